@@ -1,24 +1,36 @@
-"""Error of estimates on grades, in sags and over crests: a drive through ``graded_motorway``.
+"""Error of estimates on grades, in sags and over crests, and in bends.
 
-A frame counts to a grade if the road keeps it for the next 150 m, else to a sag or a crest. For each visibility, kind
-of road and method: frames, share of valid ones, median of the error of V_met [%] with its sign, median and 95th
+Grades are those of a drive through ``graded_motorway``: a frame counts to a grade if the road keeps it for the next
+150 m, else to a sag or a crest. Bends of 400 and 800 m to either side are drawn by a renderer that is not FogSim's
+(`tests/pictures/flat_road.py`), level and in a sag, for four cameras whose pitch is off by 0.1°. For each visibility,
+kind of road and method: frames, share of valid ones, median of the error of V_met [%] with its sign, median and 95th
 percentile of its amount, and how often the 90 % interval held the truth. ``belief`` is what the grid filter makes of
-all of them.
+all of them on the drive.
 
-    python benchmarks/grades.py [--json] [--visibility 100 --visibility 500 …] [--seed 1] [--duration 180]
+    python benchmarks/grades.py [--json] [--docs] [--visibility 100 --visibility 500 …] [--seed 1] [--duration 180]
+                                [--drawings 4]
 """
 
 import argparse
 import json
 import math
+import sys
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "pictures"))
+
+from flat_road import Road, photograph, scan
+from target_pictures import CAMERAS, PITCH_DEVIATION
+
 import fogsim
+from fogsim.estimators import make
 from fogsim.scenario import build
 from fogsim.traffic.road.network import read_net, road_network
-from fogsim.values import Step
+from fogsim.values import Observation, Step
 
 SCENARIO = "graded_motorway"
 METHODS = ("joint_road", "negru2013", "zhu2015", "huang2015")
@@ -26,6 +38,15 @@ AHEAD = 150.0
 """How far the road must keep its grade [m]."""
 CURVED = 0.002
 """Change of the grade on the way from which the road is a sag or a crest [-]."""
+
+BENDS = {
+    "bend 400 m": {"bend": 1.0 / 400.0},
+    "bend 800 m": {"bend": 1.0 / 800.0},
+    "bend 400 m, sag": {"bend": 1.0 / 400.0, "sag": 1.0 / 8800.0},
+}
+"""Drawn roads, their curvatures [1/m]; every other one bends to the right."""
+
+DOCS, MARK = Path(__file__).resolve().parents[1] / "docs" / "estimators.md", "<!-- table: grades -->"
 
 Found = tuple[float, float, float]
 """A visibility and its 90 % interval [m]."""
@@ -62,10 +83,30 @@ def drive(visibility: float, seed: int, duration: float) -> dict[tuple[str, str]
     methods = ", ".join(f"{{method: {name}}}" for name in METHODS)
     clocks = ("clocks.camera_period_s=0.5", "clocks.decision_period_s=0.5")
     settings = (f"fog.visibility_m={visibility}", f"estimators=[{methods}]", f"duration_s={duration}", *clocks)
-    profile, found = Profile(), {}
+    profile = Profile()
+    found: dict[tuple[str, str], list[Found | None]] = {}
     for step in fogsim.run(fogsim.load_scenario(SCENARIO, settings), seed):
         for name, one in found_in(step):
             found.setdefault((profile.kind(step.route_position), name), []).append(one)
+    return found
+
+
+def draw_bends(visibilities: list[float], seed: int, drawings: int) -> dict[tuple[float, str, str], list[Found | None]]:
+    """What is found in bends, by visibility, kind of road and method."""
+    found: dict[tuple[float, str, str], list[Found | None]] = {}
+    for kind, (name, course) in enumerate(BENDS.items()):
+        for number in range(drawings * len(CAMERAS)):
+            told, rng = CAMERAS[number % len(CAMERAS)], np.random.default_rng([seed, kind, number])
+            side = 1.0 if number // len(CAMERAS) % 2 else -1.0
+            true = replace(told, pitch=told.pitch + math.radians(rng.normal(0.0, PITCH_DEVIATION)))
+            road = Road(camera=true, **course).but(bend=side * course["bend"])
+            drawing = scan(road, int(rng.integers(2**31)), 3)
+            for visibility in visibilities:
+                image = photograph(road.but(visibility=visibility), drawing, int(rng.integers(2**31)))
+                for method in METHODS:
+                    one = make(method, told).update(Observation(image))
+                    told_by = (one.visibility, *one.visibility_interval) if one.valid else None
+                    found.setdefault((visibility, name, method), []).append(told_by)
     return found
 
 
@@ -88,6 +129,24 @@ def record(visibility: float, kind: str, method: str, found: Iterable[Found | No
     }
 
 
+def write_docs(records: list[dict[str, object]]) -> None:
+    """Put the table into the docs: median/p95 and share held, by road and visibility."""
+    methods, visibilities = (*METHODS, "belief"), sorted({row["V_met"] for row in records}, key=str)
+    roads = dict.fromkeys(str(row["road"]) for row in sorted(records, key=lambda row: "bend" in str(row["road"])))
+    lines = [f"| road | V_met | {' | '.join(methods)} |", f"|---|---|{'---|' * len(methods)}"]
+    for road in roads:
+        for visibility in visibilities:
+            told = {row["method"]: row for row in records if (row["road"], row["V_met"]) == (road, visibility)}
+            cells = (
+                f"{row['median']}/{row['p95']} ({row['held']})" if (row := told.get(method)) and row["held"] else ""
+                for method in methods
+            )
+            lines.append(f"| {road} | {visibility:.0f} m | {' | '.join(cells)} |")
+    before, after = DOCS.read_text(encoding="utf-8").split(MARK)
+    rest = after[after.index("\n\n## ") :] if "\n\n## " in after else ""
+    DOCS.write_text(before + MARK + "\n\n" + "\n".join(lines) + rest, encoding="utf-8")
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -95,12 +154,19 @@ def main() -> None:
     parser.add_argument("--visibility", action="append", type=float, help="V_met [m] (default 100, 200 and 500)")
     parser.add_argument("--seed", type=int, default=1, help="seed of the drive")
     parser.add_argument("--duration", type=float, default=180.0, help="longest simulated time [s]")
+    parser.add_argument("--drawings", type=int, default=4, help="drawings of each bend and camera")
+    parser.add_argument("--docs", action="store_true", help="write the table of docs/estimators.md")
     arguments = parser.parse_args()
+    visibilities = arguments.visibility or [100.0, 200.0, 300.0, 500.0]
     records = [
         record(visibility, kind, method, found)
-        for visibility in arguments.visibility or [100.0, 200.0, 500.0]
+        for visibility in visibilities
         for (kind, method), found in sorted(drive(visibility, arguments.seed, arguments.duration).items())
     ]
+    bends = draw_bends(visibilities, arguments.seed, arguments.drawings)
+    records += [record(visibility, kind, method, found) for (visibility, kind, method), found in bends.items()]
+    if arguments.docs:
+        write_docs(records)
     if arguments.json:
         print(json.dumps(records, indent=2))
         return

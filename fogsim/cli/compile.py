@@ -114,6 +114,21 @@ def _estimate_visibility() -> None:
             published = [{"as_published": True}] if "as_published" in accepted_parameters(factory) else []
             for parameters in ({}, *published):
                 _read(factory(camera=camera, **parameters), camera)
+    _follow_a_bend(camera)
+
+
+def _follow_a_bend(camera: "Camera") -> None:
+    """Lay strips along a road that bends and sags, which that of the pictures does not."""
+    import numpy as np
+
+    from fogsim.vision.lines.road_course import RoadCourse
+    from fogsim.vision.lines.road_course_kernels import PIECES
+    from fogsim.vision.strips.course_geometry import course_geometry
+    from fogsim.vision.strips.strip_geometry import strip_geometry
+
+    curved, unknown = np.full(PIECES, 1e-4), np.zeros((PIECES, PIECES))
+    course = RoadCourse(camera.principal_point[0], camera.horizon_row, curved, curved, np.eye(1 + PIECES), unknown, 2)
+    course_geometry(strip_geometry(camera, 1.0), camera, course)
 
 
 def _read(estimator: "Estimator", camera: "Camera") -> None:

@@ -75,7 +75,9 @@ class JointRoad:
     (prior: the sky), v_h (prior: the calibration) and R(d), which is a constant of each strip plus patches of its own
     plus a smooth drift that the strips share. Patches and drift correlate the rows, so the fit is generalised least
     squares by a Kalman filter along the road; how strong they are is averaged over by evidence. Rows that do not fit
-    are left out, and what lies behind an obstacle on the road with them; a tracked lead vehicle hides its lane.
+    are left out, and what lies behind an obstacle on the road with them; a tracked lead vehicle hides its lane. Where
+    lane marks show that the road bends, sags or crests, strips and distances follow it; what they leave open of that
+    widens the interval (`fogsim.vision.lines.road_course`).
 
     Own method: no paper describes it. It stands on Hautière et al. 2006 and negru2013 for the geometry of fog on a
     flat road. Daytime only; the road must be darker than the airlight.

@@ -35,8 +35,8 @@ SAG_DEVIATION, BEND_DEVIATION = 1.0 / 8000.0, 1.0 / 500.0
 crests and sags are 5000 … 13 000 m and 2600 … 8800 m on motorways, 3000 … 8000 m and 2000 … 4000 m on roads outside
 towns (RAA 2008, RAL 2012; from memory)."""
 
-CURVED_LENGTH = 150.0
-"""Length over which a road's curvature changes [m]."""
+SAG_LENGTH, BEND_LENGTH = 150.0, 400.0
+"""Lengths over which vertical and horizontal curvature change [m]."""
 
 CURVED_SHARE = 0.3
 """Share of roads' length in sags and on crests, and of that in bends, that matter [-]."""
@@ -122,7 +122,7 @@ def unseen_course(camera: Camera, horizon: Horizon) -> RoadCourse:
     """
     covariance = np.zeros((1 + PIECES, 1 + PIECES))
     covariance[0, 0] = horizon.standard_deviation**2
-    covariance[1:, 1:] = CURVED_SHARE * _curvatures(SAG_DEVIATION)
+    covariance[1:, 1:] = CURVED_SHARE * _curvatures(SAG_DEVIATION, SAG_LENGTH)
     straight = np.zeros(PIECES)
     return RoadCourse(
         camera.principal_point[0], horizon.row, straight, straight, covariance, np.zeros((PIECES, PIECES)), 0
@@ -193,10 +193,10 @@ def _middle(lines: RoadLines) -> float:
 def _course(fit: CourseFit, camera: Camera, horizon: Horizon) -> RoadCourse:
     """Weigh a curved road with a straight one."""
     unknown, covariance = fit.unknown, fit.covariance
-    bent = _share(unknown[BEND:], covariance[BEND:, BEND:], _curvatures(BEND_DEVIATION))
+    bent = _share(unknown[BEND:], covariance[BEND:, BEND:], _curvatures(BEND_DEVIATION, BEND_LENGTH))
     if bent < SHOWN:
         unknown, covariance = _without(unknown, covariance, slice(BEND, SLOPE))
-    sagging = _share(unknown[SAG:BEND], covariance[SAG:BEND, SAG:BEND], _curvatures(SAG_DEVIATION))
+    sagging = _share(unknown[SAG:BEND], covariance[SAG:BEND, SAG:BEND], _curvatures(SAG_DEVIATION, SAG_LENGTH))
     flat, flat_covariance = _without(unknown, covariance, slice(SAG, BEND))
     kept = np.array([ROW, *range(SAG, BEND)])
     apart = (unknown - flat)[kept]
@@ -259,12 +259,12 @@ def _precision(camera: Camera, row_deviation: float) -> Floats:
     """Inverse covariance of the fit's unknowns before the lines are seen; it belongs to all who ask."""
     out = np.zeros((SLOPE, SLOPE))
     out[COLUMN, COLUMN], out[ROW, ROW] = (TANGENT * camera.focal_length) ** -2, row_deviation**-2
-    out[SAG:BEND, SAG:BEND] = inverse_of(_curvatures(SAG_DEVIATION))
-    out[BEND:, BEND:] = inverse_of(_curvatures(BEND_DEVIATION))
+    out[SAG:BEND, SAG:BEND] = inverse_of(_curvatures(SAG_DEVIATION, SAG_LENGTH))
+    out[BEND:, BEND:] = inverse_of(_curvatures(BEND_DEVIATION, BEND_LENGTH))
     return out
 
 
-def _curvatures(deviation: float) -> Floats:
+def _curvatures(deviation: float, length: float) -> Floats:
     """Covariance of the pieces' curvatures on a curved road [1/m²]."""
     knots = np.array(KNOTS[:-1])
-    return np.asarray(deviation**2 * np.exp(-np.abs(knots[:, None] - knots) / CURVED_LENGTH))
+    return np.asarray(deviation**2 * np.exp(-np.abs(knots[:, None] - knots) / length))

@@ -24,7 +24,7 @@ curvature by piece [1/m], and each line's slope [-]."""
 TOP = 0.3
 """Least change of the row by the inverse distance, relative to a plane's: nearer to its top, a crest hides itself."""
 
-LIMITS = (0.05, 0.05, 0.032, 0.02, 0.013, 0.008, 0.008)
+LIMITS = (0.05, 0.05, 0.036, 0.026, 0.019, 0.014, 0.011, 0.008, 0.008)
 """Angle below the horizon down to which lines have been followed after each step [rad]."""
 
 REACH, NEAREST_REACH = 4.0, 1.0
@@ -35,6 +35,10 @@ FEW_POINTS = 4.0
 
 CROOKED = 0.04
 """By how much a line that was painted straight is none [px]."""
+
+
+BENT_WITHIN_ROW = 0.5
+"""By how much points of a line are misplaced that bends within a row's height, over its change of slope [-]."""
 
 
 class CourseFit(NamedTuple):
@@ -220,7 +224,7 @@ def fit_course(
             number = fit.number[m]
             scatter = max(fit.squares[m] / max(number, 1.0), LEAST_SCATTER**2)
             fit.weight[m] = 1.0 / (3.0 * scatter + number * CROOKED**2) if number >= FEW_POINTS else 0.0
-        reach = max(0.75 * reach, NEAREST_REACH)
+        reach = max(0.8 * reach, NEAREST_REACH)
     return _posterior(fit, inverse)
 
 
@@ -244,7 +248,7 @@ def _add_points(
     unknown, points = fit.unknown, seen.points
     fit.number[:], fit.squares[:] = 0.0, 0.0
     derivative = np.zeros(SLOPE)
-    last, plane, change, aside = math.inf, 0.0, 0.0, 0.0
+    last, plane, change, aside, tilt = math.inf, 0.0, 0.0, 0.0, 0.0
     for i in range(points.across.size - 1, -1, -1):
         below = points.below[i] - unknown[ROW]
         if below < least:
@@ -254,29 +258,35 @@ def _add_points(
             plane, change = row_on_plane(below, unknown[SAG:BEND], optics.unit, optics.height, guess)
             if plane <= 0.0:
                 break
-            last, aside = below, _row_terms(unknown, optics, plane, change, derivative)
+            aside, tilt = _row_terms(unknown, optics, plane, change, derivative)
+            last = below
         line = _nearest_line(seen, i, unknown, plane, aside, reach, first)
         if line >= 0:
             slope = unknown[SLOPE + line]
             residual = points.across[i] - unknown[COLUMN] - slope * plane - aside
             fit.number[line] += 1.0
             fit.squares[line] += residual * residual
-            _add_equation(derivative, line, slope, plane, (residual, fit.weight[line]), normal, gradient)
+            crooked = BENT_WITHIN_ROW * tilt / plane
+            weight = fit.weight[line] / (1.0 + fit.weight[line] * crooked * crooked)
+            _add_equation(derivative, line, slope + tilt, plane, (residual, weight), normal, gradient)
 
 
 @kernel
-def _row_terms(unknown: Floats, optics: _Optics, plane: float, change: float, derivative: Floats) -> float:
-    """Derivatives of the columns of a row, by row and vertical curvature for a slope of 1; returns the bend's share."""
-    aside, distance = 0.0, optics.unit / plane
+def _row_terms(
+    unknown: Floats, optics: _Optics, plane: float, change: float, derivative: Floats
+) -> tuple[float, float]:
+    """Derivatives of a row's columns, by row and sag for a slope of 1; returns the bend's column and slope."""
+    aside, tilt, distance = 0.0, 0.0, optics.unit / plane
     derivative[COLUMN], derivative[ROW] = 1.0, -change
     for piece in range(PIECES):
-        offset = turned(distance, piece)[0]
+        offset, turn = turned(distance, piece)
         shift = optics.focal * offset / distance
         aside += unknown[BEND + piece] * shift
+        tilt -= unknown[BEND + piece] * optics.focal / optics.unit * (distance * turn - offset)
         derivative[BEND + piece] = shift
         # The same row shows a point farther down the plane as the road rises.
         derivative[SAG + piece] = change * plane * offset / optics.height
-    return aside
+    return aside, tilt
 
 
 @kernel

@@ -139,7 +139,7 @@ def _read(estimator: "Estimator", camera: "Camera") -> None:
 
     for index in range(4):
         distance = 25.0 + 5.0 * index
-        image = _foggy_road(camera, distance)
+        image = _foggy_road(camera, distance, *((600.0, 60.0) if index == 1 else ()))
         frame = Frame(0.1 * index, image if index < 3 else np.ascontiguousarray(image[:, :, 0]), camera)
         estimator.update(Observation(frame, 20.0, LeadMeasurement(distance, 5.0), ()))
 
@@ -207,8 +207,11 @@ def _light_a_road() -> None:
     air.radiance(view, camera, CameraPose((0.0, 0.0, 1.4), 0.0), Lights((), LightSources.none(), beams=beams))
 
 
-def _foggy_road(camera: "Camera", lead: float, visibility: float = 120.0) -> "NDArray[np.uint8]":
-    """Picture of a straight road in fog with lane marks and a dark vehicle ahead: (rows, cols, 3) uint8."""
+def _foggy_road(camera: "Camera", lead: float, visibility: float = 120.0, bank: float = _SKY) -> "NDArray[np.uint8]":
+    """Picture of a straight road in fog with lane marks and a dark vehicle ahead: (rows, cols, 3) uint8.
+
+    From `bank` [m] on the fog is five times as dense.
+    """
     import numpy as np
 
     from fogsim.units import extinction_from_visibility
@@ -226,6 +229,7 @@ def _foggy_road(camera: "Camera", lead: float, visibility: float = 120.0) -> "ND
     foot = camera.horizon_row + camera.mount_height * size
     vehicle = (np.abs(cols - camera.principal_point[0]) < 0.9 * size) & (rows < foot) & (rows > foot - 1.4 * size)
     surface, ahead = np.where(vehicle, 20.0, surface), np.where(vehicle, lead, ahead)
-    light = 200.0 + (surface - 200.0) * np.exp(-extinction_from_visibility(visibility) * ahead)
+    path = ahead + 4.0 * np.maximum(ahead - bank, 0.0)
+    light = 200.0 + (surface - 200.0) * np.exp(-extinction_from_visibility(visibility) * path)
     grey = np.clip(light + grain, 0.0, 255.0).round().astype(np.uint8)
     return np.repeat(grey[:, :, None], 3, axis=2)

@@ -411,6 +411,11 @@ _OF_FOG = {
         _of_belief(lambda s: s.belief.visibility_quantile(0.95)),
         needs=_FRAMES,
     ),
+    "belief.denser_fog": _metres(
+        "distance from the camera to denser fog ahead that is believed; no value while there is none",
+        _of_belief(lambda s: None if s.belief.denser is None else s.belief.denser.distance),
+        needs=_FRAMES,
+    ),
     "belief.error": Signal(
         "how far the believed visibility is from the true one ahead, as a share of it, unsigned",
         _of_belief(lambda s: _relative_error(s.belief.visibility, s.truth.visibility_ahead)),

@@ -9,7 +9,7 @@ import numpy as np
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
-from fogsim.values.estimate import Estimate
+from fogsim.values.estimate import DenserFog, Estimate, OpticalDepths
 from fogsim.values.observation import LeadMeasurement, Observation
 from fogsim.vision.light.daylight import lit_by_lamps
 from fogsim.vision.light.luminance import linear_pixels
@@ -39,6 +39,7 @@ from fogsim.vision.strips.strip_curves import (
     without_rows_below,
 )
 from fogsim.vision.strips.strip_geometry import StripGeometry, strip_geometry
+from fogsim.vision.strips.uneven_fit import UnevenFit, fit_uneven
 
 MIN_COLS, MIN_ROWS = 32, 16
 """A road narrower than this, or lower below its horizon, shows no curve [px]."""
@@ -49,12 +50,21 @@ MIN_AIRLIGHT = 6.0
 MIN_USED = 0.4
 """Least share of the own lane's bins, as far as it is free, that must fit [-]."""
 
-SURE_OF_FOG = 2.0
+SURE_OF_FOG = 4.0
 """Least k in its standard deviations for an estimate of dense fog [-]."""
 
 OVERCONFIDENCE = 1.6
 """By how much the fit's deviation is too small where roads and cameras are not what its model knows: verges, tracks and
 repairs in the strips, compression, soiled windscreens; measured on pictures that FogSim did not draw [-]."""
+
+HARDLY_UNEVEN, UNEVEN_DEVIATION = 0.03, 0.04
+"""Relative deviations of the mean extinction by unevenness that the road does not show, and, where the fog is surely
+uneven, by what nodes along the way leave out [-]."""
+
+LEAST_DEPTH = 1.0
+"""Least optical depth through which road is seen, where no tracked vehicle says why not [-]: what looks like an
+obstacle across all lanes may be the edge of a shadow, and what is before it too little to tell fog from sun and
+shade."""
 
 LEAST_DEVIATION = 1e-4
 """Deviation of k that what the model leaves out makes in clear air [1/m]."""
@@ -78,6 +88,10 @@ class JointRoad:
     are left out, and what lies behind an obstacle on the road with them; a tracked lead vehicle hides its lane. Where
     lane marks show that the road bends, sags or crests, strips and distances follow it; what they leave open of that
     widens the interval (`fogsim.vision.lines.road_course`).
+
+    Fog need not be even: ln k at nodes along the way, smooth to some degree or other, is weighed against one k by
+    evidence. Then the extinction is the mean up to where 95 % of the light is lost, or to the farthest road that is
+    seen; `Estimate.optical_depths` has how it varies, `Estimate.denser` says where it becomes much denser.
 
     Own method: no paper describes it. It stands on Hautière et al. 2006 and negru2013 for the geometry of fog on a
     flat road. Daytime only; the road must be darker than the airlight.
@@ -132,7 +146,7 @@ class JointRoad:
         Estimate
             Diagnostics: ``horizon_row`` and ``told_horizon_row`` [px], ``inflection_row`` [px], ``airlight`` and
             ``road`` [linear grey levels, 0 … 255], ``misfit`` [-], ``band`` (left, right, top, bottom) of the own
-            lane's rows in use [px]; or ``reason``.
+            lane's rows in use [px], ``evenness``, how likely the fog is even [-]; or ``reason``.
 
         Raises
         ------
@@ -163,16 +177,17 @@ class JointRoad:
         fit = self._fitted(pixels, sky, prior, _free_road(observation.lead))
         if isinstance(fit, str):
             return Estimate.invalid(self.method, fit, **found)
-        unsure = course_deviation(fit, self._geometry, self._camera, course, prior, sky.noise)
+        unsure = course_deviation(fit.fit, self._geometry, self._camera, course, prior, sky.noise)
         return self._estimate(fit, found, unsure)
 
-    def _fitted(self, pixels: LinearPixels, sky: Sky, prior: JointPrior, free: float) -> JointFit | str:
+    def _fitted(self, pixels: LinearPixels, sky: Sky, prior: JointPrior, free: float) -> UnevenFit | str:
         """Fit of the road that is free up to a depth, or why there is none that is to be believed.
 
         What stands in the own lane hides, further on, the neighbours' lanes too: they are read again without it.
         """
         lowest = lowest_road_row(pixels, self._camera, sky.luminance)
         curves = self._usable(strip_curves(pixels, self._geometry, sky.noise, self._camera, free), sky, lowest)
+        whole, told = curves, free
         own = fit = fit_own(self._averaged(curves, sky), self._geometry, prior)
         for _ in range(MOST_OBSTACLES):
             if own is None or fit is None:
@@ -190,9 +205,13 @@ class JointRoad:
             if fit is own:
                 break
         self._earlier.append((curves, sky))
-        if fit is None:
+        if own is None or fit is None:
             return "too little road is seen"
-        return self._doubt(fit, sky, curves, free) or fit
+        # What even fog takes for an obstacle may be denser fog: it is not yet left out here.
+        uneven = fit_uneven(self._averaged(whole, sky), self._geometry, prior, own, fit)
+        if uneven.fit is not fit:
+            curves, free = whole, told
+        return self._doubt(uneven, sky, curves, free, told) or uneven
 
     def _usable(self, curves: StripCurves, sky: Sky, lowest: int) -> StripCurves:
         """Leave out the own bonnet, and what is clipped."""
@@ -215,8 +234,9 @@ class JointRoad:
         point = vanishing_point_of(seen, self._camera, self._horizon)
         return self._horizon if point is None else weighted_mean(self._horizon, point.horizon), course
 
-    def _doubt(self, fit: JointFit, sky: Sky, curves: StripCurves, free: float) -> str:
+    def _doubt(self, uneven: UnevenFit, sky: Sky, curves: StripCurves, free: float, told: float) -> str:
         """Say why a fit is not to be believed; empty if it is."""
+        fit = uneven.fit
         if fit.road >= (1.0 - LEAST_CONTRAST) * fit.airlight or fit.road >= 0.98 * sky.luminance:
             return "the road is nearly as bright as the airlight, or brighter"
         if fit.misfit > MAX_MISFIT:
@@ -225,17 +245,15 @@ class JointRoad:
             return "the road ahead is hidden, or is none"
         if why := no_road(fit, curves, self._geometry, self._camera):
             return why
-        deviation = _deviation(fit)
-        if fit.extinction < SURE_OF_FOG * deviation and fit.extinction + 2.0 * deviation > CLEAR:
-            return "the extinction is not observable: too little road is seen"
-        return ""
+        return _too_little_seen(uneven, told)
 
     def _is_hidden(self, fit: JointFit, curves: StripCurves, free: float) -> bool:
         """Whether too little of the own lane, as far as it is free, fits a road."""
         near = (curves.variance[0] > 0) & (self._geometry.distance < min(free, 1.5 / max(fit.extinction, 0.01)))
         return bool(near.sum() < MIN_ROWS // 2 or fit.used[0][near].mean() < MIN_USED)
 
-    def _estimate(self, fit: JointFit, found: dict[str, object], unsure: float) -> Estimate:
+    def _estimate(self, uneven: UnevenFit, found: dict[str, object], unsure: float) -> Estimate:
+        fit = uneven.fit
         horizon = self._camera.horizon_row + fit.shift
         rows = self._geometry.first[fit.used[0]]
         left, right = self._geometry.left[0][fit.used[0]], self._geometry.right[0][fit.used[0]]
@@ -244,7 +262,16 @@ class JointRoad:
         extinction = max(fit.extinction, 0.0)
         if extinction > 0:
             found["inflection_row"] = horizon + 0.5 * extinction * self._camera.row_distance
-        return Estimate(self.method, extinction, math.hypot(_deviation(fit), unsure), diagnostics=found)
+        found["evenness"] = uneven.even
+        return Estimate(
+            self.method,
+            extinction,
+            math.hypot(_deviation(fit), _unevenness(uneven) * extinction, unsure),
+            diagnostics=found,
+            reach=uneven.reach,
+            optical_depths=_optical_depths(uneven),
+            denser=None if uneven.denser is None else DenserFog(*uneven.denser),
+        )
 
 
 def _impossible(camera: Camera) -> str:
@@ -258,9 +285,33 @@ def _impossible(camera: Camera) -> str:
     return ""
 
 
+def _too_little_seen(uneven: UnevenFit, told: float) -> str:
+    """Say why too little is seen of a road that is told to be free up to a depth; empty if it is enough."""
+    fit = uneven.fit
+    if math.isinf(told) and fit.extinction > CLEAR and uneven.reach * fit.extinction < LEAST_DEPTH:
+        return "something hides all lanes, or shade lies on them"
+    deviation = math.hypot(_deviation(fit), _unevenness(uneven) * fit.extinction)
+    if fit.extinction < SURE_OF_FOG * deviation and fit.extinction + 2.0 * deviation > CLEAR:
+        return "the extinction is not observable: too little road is seen"
+    return ""
+
+
 def _deviation(fit: JointFit) -> float:
     """Standard deviation of the extinction, what the model leaves out included [1/m]."""
     return math.hypot(OVERCONFIDENCE * fit.extinction_deviation, MODEL_DEVIATION * fit.extinction, LEAST_DEVIATION)
+
+
+def _unevenness(uneven: UnevenFit) -> float:
+    """Relative deviation of a mean extinction by unevenness of the fog that the fit leaves out [-]."""
+    return math.hypot(HARDLY_UNEVEN, UNEVEN_DEVIATION * (1.0 - uneven.even))
+
+
+def _optical_depths(uneven: UnevenFit) -> OpticalDepths:
+    """How the fog varies, what the model leaves out included in its deviations."""
+    model = math.hypot(MODEL_DEVIATION, _unevenness(uneven))
+    deviation = np.hypot(OVERCONFIDENCE * uneven.deviation, model * uneven.depth)
+    deviation = np.hypot(deviation, LEAST_DEVIATION * uneven.distance)
+    return OpticalDepths(*(tuple(values.tolist()) for values in (uneven.distance, uneven.depth, deviation)))
 
 
 def _obstacle(fit: JointFit, geometry: StripGeometry) -> float:

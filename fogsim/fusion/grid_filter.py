@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
+from fogsim.fusion.announcements import Announcements
 from fogsim.linear_algebra import convolution
 from fogsim.parameters import Range, checked_parameters
-from fogsim.units import extinction_from_visibility
+from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY, extinction_from_visibility
 from fogsim.values.belief import Belief
 from fogsim.values.estimate import Estimate, ExtinctionBounds
 
@@ -38,6 +39,10 @@ class GridFilter:
     change nothing but by their bounds, beyond which k is as unlikely as bounds are wrong; time alone widens the belief.
     Before the first estimate every ln k on the grid is equally likely.
 
+    An estimate speaks of the fog up to its `reach`. Where that is nearer than the visibility that it gives, the fog
+    beyond may be another, and it counts for less the less of the way it has seen. Denser fog ahead is believed once
+    most estimates of the last `announcement_time` tell of it.
+
     Parameters
     ----------
     drift : float
@@ -52,6 +57,10 @@ class GridFilter:
         Share of estimates that say nothing, above 0 and below 1 [-].
     correlation_time : float
         Time after which the errors of an estimator are new ones [s].
+    unseen_deviation : float
+        Standard deviation of ln k over the way to the visibility of which an estimate has seen nothing [-].
+    announcement_time : float
+        Time over which estimates must tell of denser fog ahead [s].
 
     Raises
     ------
@@ -67,10 +76,13 @@ class GridFilter:
         relative_floor: Annotated[float, Range(1e-4, 100.0)] = 0.05,
         outlier_share: Annotated[float, Range(1e-12, 0.999)] = 0.07,
         correlation_time: Annotated[float, Range(1e-3, 1e6, "s")] = 0.5,
+        unseen_deviation: Annotated[float, Range(0.0, 100.0)] = 0.1,
+        announcement_time: Annotated[float, Range(0.0, 1000.0, "s")] = 1.0,
     ) -> None:
         self._drift, self._leap_rate, self._leap_scale = drift, leap_rate, leap_scale
         self._relative_floor, self._outlier_share = relative_floor, outlier_share
-        self._correlation_time = correlation_time
+        self._correlation_time, self._unseen_deviation = correlation_time, unseen_deviation
+        self._announcements = Announcements(announcement_time)
         self._log_extinction = np.linspace(LOG_LOW, LOG_HIGH, CELLS)
         self._log_extinction.flags.writeable = False
         self._extinction = np.exp(self._log_extinction)
@@ -81,6 +93,7 @@ class GridFilter:
     def reset(self) -> None:
         """Forget everything: all visibilities are equally likely again."""
         self._probability = np.full(CELLS, 1.0 / CELLS)
+        self._announcements.reset()
         self._time: float | None = None
         self._weight = 1.0
 
@@ -115,7 +128,8 @@ class GridFilter:
         # The largest exponent is zero: no product of densities can overflow, and the sum cannot vanish.
         posterior = self._probability * np.exp(log_likelihood - log_likelihood.max())
         self._probability = posterior / posterior.sum()
-        return Belief(self._log_extinction, self._probability.copy())
+        denser = self._announcements.update(estimates, time)
+        return Belief(self._log_extinction, self._probability.copy(), denser)
 
     def _advance(self, time: float) -> None:
         if not math.isfinite(time):
@@ -168,7 +182,9 @@ class GridFilter:
         measured = min(max(estimate.extinction, 0.0), float(self._extinction[-1]))
         floor = self._relative_floor * max(measured, float(self._extinction[0]))
         # A deviation far beyond the grid says as little as one a bit beyond it, and squares to no infinity.
-        deviation = math.hypot(min(max(estimate.standard_deviation, 0.0), 10.0), floor)
+        seen = estimate.reach * measured / OPTICAL_DEPTH_AT_VISIBILITY if measured > 0.0 else 1.0
+        unseen = self._unseen_deviation * max(0.0, 1.0 - seen) * measured
+        deviation = math.hypot(min(max(estimate.standard_deviation, 0.0), 10.0), floor, unseen)
         exponent = -0.5 * ((measured - self._extinction) / deviation) ** 2
         density = np.exp(exponent) / (math.sqrt(2.0 * math.pi) * deviation)
         # An outlier is any ln k on the grid: 1 / (k LOG_RANGE) in k, and no more than that at k̂ = 0.

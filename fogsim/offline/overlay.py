@@ -14,7 +14,7 @@ from fogsim.errors import InputError
 from fogsim.files.atomic import partial_path, publish, refuse_existing, refuse_missing_folder
 from fogsim.offline.estimation import FrameEstimates
 from fogsim.offline.image_files import Pixels
-from fogsim.offline.results import interval_text, metres
+from fogsim.offline.results import denser_text, interval_text, metres
 from fogsim.offline.source import Source
 from fogsim.recorders.panel.camera_picture import found_row, scale_image
 from fogsim.recorders.sign_marks import draw_signs
@@ -143,7 +143,8 @@ def _draw_estimate(draw: ImageDraw.ImageDraw, y: int, estimate: Estimate, colour
     draw.text((270, y), metres(estimate.visibility), fill=TEXT, font=font(17, bold=True), anchor="rm")
     draw.text((288, y), f"90 %: {interval_text(estimate)}", fill=MUTED, font=font(13), anchor="lm")
     category = estimate.category.value
-    draw.text((470, y), "no fog" if category == "none" else f"{category} fog", fill=TEXT, font=font(15), anchor="lm")
+    told = denser_text(estimate) or ("no fog" if category == "none" else f"{category} fog")
+    draw.text((470, y), told, fill=TEXT, font=font(15), anchor="lm")
 
 
 def _shown(image: Pixels, bits: int) -> NDArray[np.uint8]:

@@ -89,7 +89,32 @@ def _record(name: str | int, estimate: Estimate) -> dict[str, object]:
         "extinction_per_m": _number(estimate.extinction) if valid else None,
         "category": estimate.category.value if valid else None,
         "horizon_row": _number(estimate.diagnostics.get("horizon_row")) if valid else None,
+        **_along_the_road(estimate),
     }
+
+
+def _along_the_road(estimate: Estimate) -> dict[str, object]:
+    """How the fog varies ahead, of a method that tells."""
+    curve = estimate.optical_depths
+    if curve is None:
+        return {}
+    rows = zip(curve.distance, curve.depth, curve.standard_deviation, strict=True)
+    return {
+        "reach_m": _number(estimate.reach),
+        "denser_fog_m": None if estimate.denser is None else _number(estimate.denser.distance),
+        "optical_depths": [[_number(value) for value in row] for row in rows],
+    }
+
+
+def denser_text(estimate: Estimate) -> str:
+    """Say where much denser fog is ahead; empty if nowhere.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        The estimate.
+    """
+    return "" if estimate.denser is None else f"denser beyond {estimate.denser.distance:.0f} m"
 
 
 def _number(value: object) -> float | None:

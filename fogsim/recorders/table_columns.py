@@ -74,6 +74,10 @@ def _believed(share: float) -> Callable[[Step, Derived], object]:
     return lambda step, _: step.belief.visibility_quantile(share)
 
 
+def _denser_fog(step: Step, _: Derived) -> float | None:
+    return None if step.belief.denser is None else step.belief.denser.distance
+
+
 def _derived_column(name: str) -> Column[Step]:
     return Column(name, pa.float64(), DERIVED_QUANTITIES[name], lambda _, derived: derived[name])
 
@@ -197,6 +201,7 @@ _FOG_COLUMNS: tuple[Column[Step], ...] = (
     Column("believed_visibility_m", pa.float64(), "median of the belief", _believed(0.5)),
     Column("believed_visibility_low_m", pa.float64(), "5 % quantile of the belief", _believed(0.05)),
     Column("believed_visibility_high_m", pa.float64(), "95 % quantile of the belief", _believed(0.95)),
+    Column("denser_fog_m", pa.float64(), "believed distance to denser fog ahead; null for none", _denser_fog),
     Column(
         "measured_lead_distance_m",
         pa.float64(),

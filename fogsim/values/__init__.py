@@ -12,7 +12,7 @@ from fogsim.values.command import (
     Stretch,
     StretchAdvice,
 )
-from fogsim.values.estimate import Estimate, FogCategory, SignLook, fog_category
+from fogsim.values.estimate import DenserFog, Estimate, FogCategory, OpticalDepths, SignLook, fog_category
 from fogsim.values.fault import Fault, RunningFault
 from fogsim.values.fog import FogBank, FogChange, FogField, FogPatches, FogShelter
 from fogsim.values.image import Frame, View
@@ -57,6 +57,7 @@ __all__ = [
     "CameraPose",
     "Collision",
     "Command",
+    "DenserFog",
     "Display",
     "EgoControl",
     "Ending",
@@ -87,6 +88,7 @@ __all__ = [
     "Mesh",
     "NetworkSnapshot",
     "Observation",
+    "OpticalDepths",
     "PavedArea",
     "Pavement",
     "PersonState",

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fogsim.jit import kernel
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
+from fogsim.values.estimate import DenserFog
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,10 +22,13 @@ class Belief:
         Centres of the cells, ln k with k in 1/m, evenly spaced and ascending.
     probability : (n,) float64
         Probability of each cell; sums to 1.
+    denser : DenserFog or None
+        Denser fog ahead that several estimates have told of.
     """
 
     log_extinction: NDArray[np.float64]
     probability: NDArray[np.float64]
+    denser: DenserFog | None = None
 
     def visibility_quantile(self, share: float) -> float:
         """Visibility below which the truth lies with a given probability [m].

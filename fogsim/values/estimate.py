@@ -85,6 +85,62 @@ class ExtinctionBounds:
 
 
 @dataclass(frozen=True, slots=True)
+class OpticalDepths:
+    """Optical depth along the road ahead: how the fog varies with the distance.
+
+    Attributes
+    ----------
+    distance : (n,) tuple of float
+        Distances from the camera [m], ascending.
+    depth : (n,) tuple of float
+        Optical depth up to each, τ = ∫ k ds [-].
+    standard_deviation : (n,) tuple of float
+        Its standard deviation [-].
+    """
+
+    distance: tuple[float, ...]
+    depth: tuple[float, ...]
+    standard_deviation: tuple[float, ...]
+
+    def mean_extinction(self, distance: float) -> tuple[float, float]:
+        """Mean extinction from the camera to a distance, and its standard deviation [1/m].
+
+        Parameters
+        ----------
+        distance : float
+            How far [m]; beyond the last distance that of the last counts, nearer than the first that of the first.
+        """
+        at = min(max(distance, self.distance[0]), self.distance[-1])
+        after = next((i for i, place in enumerate(self.distance) if place >= at), len(self.distance) - 1)
+        before = max(after - 1, 0)
+        length = self.distance[after] - self.distance[before]
+        share = (at - self.distance[before]) / length if length > 0.0 else 0.0
+        depth, deviation = (
+            (1.0 - share) * values[before] + share * values[after] for values in (self.depth, self.standard_deviation)
+        )
+        return depth / at, deviation / at
+
+
+@dataclass(frozen=True, slots=True)
+class DenserFog:
+    """Fog ahead that is much denser than that before it, such as a bank.
+
+    Attributes
+    ----------
+    distance : float
+        From the camera to where the extinction reaches half of the densest that is seen [m].
+    standard_deviation : float
+        Of the distance [m].
+    extinction : float
+        The densest that is seen [1/m].
+    """
+
+    distance: float
+    standard_deviation: float
+    extinction: float
+
+
+@dataclass(frozen=True, slots=True)
 class Estimate:
     """An estimate of the extinction coefficient, or the statement that there is none.
 
@@ -93,7 +149,8 @@ class Estimate:
     method : str
         Name of the estimator in the registry.
     extinction : float
-        Extinction coefficient k [1/m], ≥ 0; 0 with a finite deviation means "no fog that this method could see".
+        Extinction coefficient k [1/m], ≥ 0; 0 with a finite deviation means "no fog that this method could see". Where
+        the fog is uneven, the mean from the camera to the meteorological visibility, or to `reach` if that is nearer.
     standard_deviation : float
         Standard deviation of k [1/m]; ``inf`` if not valid.
     valid : bool
@@ -102,6 +159,12 @@ class Estimate:
         What the method found on the way (rows, bands, reasons), for overlays and debugging.
     bounds : ExtinctionBounds or None
         Of an estimate that is not valid: what is known all the same ("at least 250 m").
+    reach : float
+        Distance up to which the estimate speaks of the fog [m]: what lies beyond was not seen.
+    optical_depths : OpticalDepths or None
+        How the fog varies along the road, of a method that tells.
+    denser : DenserFog or None
+        Denser fog ahead, of a method that tells.
     """
 
     method: str
@@ -110,6 +173,9 @@ class Estimate:
     valid: bool = True
     diagnostics: Mapping[str, object] = field(default_factory=dict)
     bounds: ExtinctionBounds | None = None
+    reach: float = math.inf
+    optical_depths: OpticalDepths | None = None
+    denser: DenserFog | None = None
 
     @classmethod
     def invalid(cls, method: str, reason: str, **diagnostics: object) -> "Estimate":

@@ -74,6 +74,7 @@ def test_a_step_becomes_a_row(tmp_path: Path) -> None:
         "believed_visibility_m": pytest.approx(120.0, rel=0.01),
         "believed_visibility_low_m": pytest.approx(120.0 * math.exp(-1.645 * 0.2), rel=0.02),
         "believed_visibility_high_m": pytest.approx(120.0 * math.exp(1.645 * 0.2), rel=0.02),
+        "denser_fog_m": None,
         "measured_lead_distance_m": 20.5,
         "measured_lead_relative_speed_mps": -5.1,
         "collisions": 1,

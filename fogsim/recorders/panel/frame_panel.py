@@ -130,6 +130,8 @@ class FramePanel:
             own = step.traffic.ids[step.ego] in {hit.collider, hit.victim}
             text = f"COLLISION   {hit.collider} → {hit.victim}   {_kmh(hit.impact_speed):.0f} km/h"
             _draw_banner(draw, 0, text, ALARM if own else AMBER)
+        elif step.belief.denser is not None:
+            _draw_banner(draw, 0, f"denser fog ahead: {step.belief.denser.distance:.0f} m", AMBER)
         if step.ending is not None:
             _draw_banner(draw, FRAME_HEIGHT - 34, f"end of the run: {step.ending.value}", WELL)
 

@@ -1,10 +1,12 @@
 """Compiled Kalman filter along strips of road whose albedo wanders: correlated residuals become independent ones.
 
 The albedo of a strip is R (1 + c + p(d) + b(d)): a constant, patches (an Ornstein–Uhlenbeck process along the road, for
-each strip its own) and a slow drift that all strips share. Seen through fog they leave residuals that are correlated
-from row to row. A Kalman filter from the nearest row outward turns those into independent ones ("innovations") in time
-linear in the rows, for the residual and for its derivatives alike, and so gives the exact Gauss–Newton step and the
-exact likelihood of that model.
+each strip its own) and a slow drift that all strips share. To its light comes a part s A g(γ) of the sky's, its sheen:
+asphalt reflects the more, the more grazing the angle γ at which it is looked at. Before it lies the airlight, A (1 +
+c(γ)), which clouds may make uneven (an Ornstein–Uhlenbeck process over the angle). Seen through fog they leave
+residuals that are correlated from row to row. A Kalman filter from the nearest row outward turns those into independent
+ones ("innovations") in time linear in the rows, for the residual and for its derivatives alike, and so gives the exact
+Gauss–Newton step and the exact likelihood of that model.
 """
 
 import math
@@ -25,6 +27,9 @@ LEFT_OUT_COST, HIDDEN_COST = 9.0, 3.5
 """What a bin adds to minus twice the log likelihood that is an outlier, of which any luminance up to the airlight's is
 equally likely and few are expected, or that is behind an obstacle, compared to one in use [-]."""
 
+FIRST = 4
+"""State of the first strip's constant: before it come drift, its slope, sheen and airlight."""
+
 USED, HIDDEN = 1, 2
 """What `used` says of bins in use, and of those behind an obstacle; 0 of outliers and where there is no datum."""
 
@@ -32,8 +37,16 @@ OUTLIERS_OF_OBSTACLE = 3
 """Fewest outliers that make an obstacle."""
 
 
+GRAZING = 0.05
+"""Angle at which a road's sheen is half of that at the horizon [rad]: some 7°, as a rough surface's reflection of a sky
+of even luminance has it (Fresnel's formula over facets that are tilted by some 10°)."""
+
+CLOUD_ANGLE = 0.03
+"""Angle over which uneven airlight forgets itself [rad]."""
+
+
 class Albedo(NamedTuple):
-    """How the albedo of a road wanders, relative to it.
+    """How the albedo of a road wanders, relative to it, and the airlight before it.
 
     Attributes
     ----------
@@ -41,12 +54,18 @@ class Albedo(NamedTuple):
         Standard deviation [-] and correlation length [m] of patches.
     drift_deviation, drift_length : float
         The same of the drift.
+    sheen_deviation : float
+        Standard deviation of the part of the sky's light that the road reflects at grazing angles [-].
+    cloud_deviation : float
+        Standard deviation of the airlight over the image, relative to it [-].
     """
 
     patch_deviation: float
     patch_length: float
     drift_deviation: float
     drift_length: float
+    sheen_deviation: float = 0.0
+    cloud_deviation: float = 0.0
 
 
 class Residuals(NamedTuple):
@@ -58,12 +77,15 @@ class Residuals(NamedTuple):
         Residuals in column 0, and derivatives.
     scale : (strips, n) float64
         R t: what a relative change of albedo changes.
+    veil : (strips, n) float64
+        A (1 − t): what a relative change of airlight changes.
     noise : (strips, n) float64
         Variance of each bin apart from the albedo's; 0 marks a bin without data.
     """
 
     columns: NDArray[np.float64]
     scale: NDArray[np.float64]
+    veil: NDArray[np.float64]
     noise: NDArray[np.float64]
 
 
@@ -93,7 +115,7 @@ def _averaged(ratio: float) -> float:
 
 @kernel
 def albedo_transitions(
-    distance: NDArray[np.float64], extent: NDArray[np.float64], albedo: Albedo
+    distance: NDArray[np.float64], extent: NDArray[np.float64], grazing: NDArray[np.float64], albedo: Albedo
 ) -> NDArray[np.float64]:
     """How the albedo's states change from bin to bin, and what a bin shows of them.
 
@@ -103,16 +125,19 @@ def albedo_transitions(
     ----------
     distance, extent : (n,) float64
         Distance of each bin and how much road it covers [m].
+    grazing : (n,) float64
+        Angle between the line of sight and the road [rad].
     albedo : Albedo
         How it wanders.
 
     Returns
     -------
-    (n, 7) float64
+    (n, 9) float64
         The four factors by which drift and its slope pass into themselves and each other, that by which patches keep,
-        and the shares of drift and of patches that a bin's mean shows.
+        the shares of drift and of patches that a bin's mean shows, the factor by which uneven airlight keeps, and the
+        sheen relative to that at the horizon.
     """
-    out = np.zeros((distance.size, 7))
+    out = np.zeros((distance.size, 9))
     rate = math.sqrt(3.0) / albedo.drift_length
     for i in range(distance.size):
         step = abs(distance[i] - distance[i - 1]) if i else 0.0
@@ -122,6 +147,8 @@ def albedo_transitions(
         out[i, 4] = math.exp(-step / albedo.patch_length)
         out[i, 5] = _averaged(extent[i] / albedo.drift_length)
         out[i, 6] = _averaged(extent[i] / albedo.patch_length)
+        out[i, 7] = math.exp(-abs(grazing[i] - grazing[i - 1]) / CLOUD_ANGLE) if i else 0.0
+        out[i, 8] = 1.0 / (1.0 + grazing[i] / GRAZING)
     return out
 
 
@@ -129,24 +156,26 @@ def albedo_transitions(
 def _predict(
     covariance: NDArray[np.float64], state: NDArray[np.float64], change: NDArray[np.float64], albedo: Albedo
 ) -> None:
-    """Predict drift (states 0 and 1, value and slope) and patches (states 3, 5, …) a step farther along the road."""
+    """Predict drift (states 0, 1: value, slope), uneven airlight (3) and patches (5, 7, …) a step farther."""
     size, width = state.shape
-    f00, f01, f10, f11, keep = change[0], change[1], change[2], change[3], change[4]
+    f00, f01, f10, f11, keep, cloud = change[0], change[1], change[2], change[3], change[4], change[7]
     for j in range(width):
         first, second = state[0, j], state[1, j]
         state[0, j], state[1, j] = f00 * first + f01 * second, f10 * first + f11 * second
     for j in range(size):
         first, second = covariance[0, j], covariance[1, j]
         covariance[0, j], covariance[1, j] = f00 * first + f01 * second, f10 * first + f11 * second
-    for a in range(3, size, 2):
+    for a in range(FIRST - 1, size, 2):
+        kept = keep if a >= FIRST else cloud
         for j in range(width):
-            state[a, j] *= keep
+            state[a, j] *= kept
         for j in range(size):
-            covariance[a, j] *= keep
+            covariance[a, j] *= kept
     for j in range(size):
         first, second = covariance[j, 0], covariance[j, 1]
         covariance[j, 0], covariance[j, 1] = f00 * first + f01 * second, f10 * first + f11 * second
-        for a in range(3, size, 2):
+        covariance[j, FIRST - 1] *= cloud
+        for a in range(FIRST + 1, size, 2):
             covariance[j, a] *= keep
     value = albedo.drift_deviation**2
     slope = (math.sqrt(3.0) / albedo.drift_length * albedo.drift_deviation) ** 2
@@ -155,47 +184,57 @@ def _predict(
     cross = f00 * f10 * value + f01 * f11 * slope
     covariance[0, 1] -= cross
     covariance[1, 0] -= cross
-    for a in range(3, size, 2):
+    covariance[FIRST - 1, FIRST - 1] += (1.0 - cloud * cloud) * albedo.cloud_deviation**2
+    for a in range(FIRST + 1, size, 2):
         covariance[a, a] += (1.0 - keep * keep) * albedo.patch_deviation**2
 
 
 @kernel
 def _initial_covariance(strips: int, albedo: Albedo) -> NDArray[np.float64]:
-    """Covariance of drift, its slope, and each strip's constant and patches before anything is seen."""
-    covariance = np.zeros((2 + 2 * strips, 2 + 2 * strips))
+    """Covariance of drift, its slope, sheen, airlight, and each strip's constant and patches before all is seen."""
+    covariance = np.zeros((FIRST + 2 * strips, FIRST + 2 * strips))
     covariance[0, 0] = albedo.drift_deviation**2
     covariance[1, 1] = 3.0 * (albedo.drift_deviation / albedo.drift_length) ** 2
+    covariance[2, 2] = albedo.sheen_deviation**2
+    covariance[FIRST - 1, FIRST - 1] = albedo.cloud_deviation**2
     for strip in range(strips):
-        covariance[2 + 2 * strip, 2 + 2 * strip] = CONSTANT_DEVIATION**2
-        covariance[3 + 2 * strip, 3 + 2 * strip] = albedo.patch_deviation**2
+        first = FIRST + 2 * strip
+        covariance[first, first] = CONSTANT_DEVIATION**2
+        covariance[first + 1, first + 1] = albedo.patch_deviation**2
     return covariance
+
+
+class Shares(NamedTuple):
+    """What a bin shows of drift, sheen and uneven airlight, and of its strip's constant and patches."""
+
+    drift: float
+    sheen: float
+    cloud: float
+    constant: float
+    patches: float
+
+
+@kernel
+def _shares(scale: float, veil: float, airlight: float, change: NDArray[np.float64]) -> Shares:
+    return Shares(scale * change[5], (airlight - veil) * change[8], veil, scale, scale * change[6])
 
 
 @kernel
 def _covariance_with_bin(
-    covariance: NDArray[np.float64], h0: float, h1: float, h2: float, strip: int, out: NDArray[np.float64]
-) -> None:
-    """Covariance of all states with what a bin shows of the drift, and of its strip's constant and patches."""
+    covariance: NDArray[np.float64], shares: Shares, strip: int, out: NDArray[np.float64]
+) -> float:
+    """Covariance of all states with what a bin shows of them; returns that of the bin itself."""
     for a in range(covariance.shape[0]):
-        out[a] = covariance[0, a] * h0 + covariance[strip, a] * h1 + covariance[strip + 1, a] * h2
+        total = covariance[0, a] * shares.drift + covariance[2, a] * shares.sheen + covariance[3, a] * shares.cloud
+        out[a] = total + covariance[strip, a] * shares.constant + covariance[strip + 1, a] * shares.patches
+    return _shown(out, shares, strip)
 
 
 @kernel
-def _is_road(
-    seen: tuple[float, float],
-    h0: float,
-    h1: float,
-    h2: float,
-    strip: int,
-    p: NDArray[np.float64],
-    state: NDArray[np.float64],
-) -> bool:
-    """Whether a bin, of which a residual and its variance are seen, is no outlier; see `_covariance_with_bin`."""
-    c, d = strip, strip + 1
-    total = h0 * h0 * p[0, 0] + h1 * h1 * p[c, c] + h2 * h2 * p[d, d]
-    total += 2.0 * (h0 * h1 * p[0, c] + h0 * h2 * p[0, d] + h1 * h2 * p[c, d])
-    innovation = seen[0] - h0 * state[0, 0] - h1 * state[c, 0] - h2 * state[d, 0]
-    return bool(innovation * innovation <= OUTLIER**2 * (total + seen[1]))
+def _shown(states: NDArray[np.float64], shares: Shares, strip: int) -> float:
+    """What a bin shows of states."""
+    total = states[0] * shares.drift + states[2] * shares.sheen + states[3] * shares.cloud
+    return float(total + states[strip] * shares.constant + states[strip + 1] * shares.patches)
 
 
 @kernel
@@ -229,16 +268,22 @@ def _mark_outliers(
     residuals: Residuals,
     i: int,
     change: NDArray[np.float64],
+    airlight: float,
     covariance: NDArray[np.float64],
     state: NDArray[np.float64],
+    room: NDArray[np.float64],
     used: NDArray[np.uint8],
 ) -> None:
     """Note which strips show road on one bin: all by what lies nearer, so that none comes before another."""
     for strip in range(used.shape[0]):
-        h1 = residuals.scale[strip, i]
-        h0, h2 = h1 * change[5], h1 * change[6]
-        seen = (residuals.columns[strip, i, 0], residuals.noise[strip, i])
-        used[strip, i] = USED if _is_road(seen, h0, h1, h2, 2 + 2 * strip, covariance, state) else 0
+        shares, first = (
+            _shares(residuals.scale[strip, i], residuals.veil[strip, i], airlight, change),
+            FIRST + 2 * strip,
+        )
+        total = _covariance_with_bin(covariance, shares, first, room)
+        innovation = residuals.columns[strip, i, 0] - _shown(state[:, 0], shares, first)
+        is_road = innovation * innovation <= OUTLIER**2 * (total + residuals.noise[strip, i])
+        used[strip, i] = USED if is_road else 0
 
 
 @kernel
@@ -251,7 +296,7 @@ def whiten(
     ----------
     residuals : Residuals
         Residuals and derivatives.
-    changes : (n, 7) float64
+    changes : (n, 9) float64
         See `albedo_transitions`.
     albedo : Albedo
         How the albedo wanders.
@@ -262,7 +307,13 @@ def whiten(
     out : Whitened
         The innovations; is written.
     """
-    columns, scale, noise, used = residuals.columns, residuals.scale, residuals.noise, out.used
+    columns, scale, veil, noise, used = (
+        residuals.columns,
+        residuals.scale,
+        residuals.veil,
+        residuals.noise,
+        out.used,
+    )
     strips, count, width = columns.shape
     covariance = _initial_covariance(strips, albedo)
     size = covariance.shape[0]
@@ -272,18 +323,16 @@ def whiten(
         if i:
             _predict(covariance, state, changes[i], albedo)
         if reject:
-            _mark_outliers(residuals, i, changes[i], covariance, state, used)
+            _mark_outliers(residuals, i, changes[i], airlight, covariance, state, gain, used)
         for strip in range(strips):
             out.innovations[strip, i, :] = 0.0
             if noise[strip, i] <= 0.0:
                 used[strip, i] = 0
                 continue
-            c, h1 = 2 + 2 * strip, scale[strip, i]
-            h0, h2 = h1 * changes[i, 5], h1 * changes[i, 6]
-            _covariance_with_bin(covariance, h0, h1, h2, c, gain)
-            total = h0 * gain[0] + h1 * gain[c] + h2 * gain[c + 1] + noise[strip, i]
+            first, shares = FIRST + 2 * strip, _shares(scale[strip, i], veil[strip, i], airlight, changes[i])
+            total = _covariance_with_bin(covariance, shares, first, gain) + noise[strip, i]
             for j in range(width):
-                innovation[j] = columns[strip, i, j] - h0 * state[0, j] - h1 * state[c, j] - h2 * state[c + 1, j]
+                innovation[j] = columns[strip, i, j] - _shown(state[:, j], shares, first)
             if used[strip, i] != USED:
                 log_determinant += _cost_without(used[strip, i], noise[strip, i], airlight)
                 continue
@@ -295,7 +344,7 @@ def whiten(
             weight = 1.0 / math.sqrt(total)
             for j in range(width):
                 out.innovations[strip, i, j] = innovation[j] * weight
-    out.constants[:] = state[2::2]
+    out.constants[:] = state[FIRST::2]
     return log_determinant + math.log(product)
 
 

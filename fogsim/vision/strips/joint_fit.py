@@ -20,13 +20,22 @@ Floats = NDArray[np.float64]
 PATCH_LENGTH, DRIFT_LENGTH = 3.0, 30.0
 """Lengths over which the albedo of a strip forgets itself: repaired patches, and slow change along the road [m]."""
 
-ALBEDOS = ((0.015, 0.005), (0.015, 0.04), (0.015, 0.12), (0.04, 0.05), (0.08, 0.1))
-"""Deviations of patches and of drift that are tried, relative to the road's luminance [-]."""
+ALBEDOS = (
+    (0.015, 0.005, 0.0),
+    (0.015, 0.04, 0.0),
+    (0.015, 0.12, 0.0),
+    (0.015, 0.02, 0.1),
+    (0.04, 0.05, 0.1),
+    (0.08, 0.1, 0.1),
+    (0.2, 0.3, 0.1),
+)
+"""Deviations of patches and of drift that are tried, relative to the road's luminance, and of the part of the sky's
+light that the road reflects at grazing angles [-]."""
 
-ALBEDO_CHANCES = (0.4, 0.2, 0.2, 0.15, 0.05)
+ALBEDO_CHANCES = (0.25, 0.1, 0.1, 0.25, 0.2, 0.08, 0.02)
 """How likely each of those is before the image is seen [-]."""
 
-SMOOTH, EXPLAINED = 3, 1.0
+SMOOTH, EXPLAINED = 4, 1.0
 """How many of those have patches as faint as the first, and misfit of the first up to which stronger ones are not tried
 [-]: they explain nothing then."""
 
@@ -126,14 +135,24 @@ def fit_jointly(
     """
     if int((curves.variance[0] > 0).sum()) < LEAST_BINS:
         return None
-    bins = _bins(curves, geometry, prior.vignetting)
+    bins = strip_bins(curves, geometry, prior.vignetting)
     best = _from_search(bins, prior) if near is None else _from_near(bins, near, prior)
     tried = ALBEDOS if best.misfit > EXPLAINED else ALBEDOS[:SMOOTH]
     return _average([best] + [_refined(bins, albedo, prior, best.theta, MORE_STEPS) for albedo in tried[1:]])
 
 
-def _bins(curves: StripCurves, geometry: StripGeometry, vignetting: float) -> Bins:
-    """Strips as the kernels take them, the lens's vignetting undone."""
+def strip_bins(curves: StripCurves, geometry: StripGeometry, vignetting: float) -> Bins:
+    """Strips as the kernels take them, the lens's vignetting undone.
+
+    Parameters
+    ----------
+    curves : StripCurves
+        Luminance by bin.
+    geometry : StripGeometry
+        Where the bins are.
+    vignetting : float
+        How much of what a simple lens takes from pixels off its axis this one takes [-].
+    """
     luminance, variance = curves.luminance, curves.variance
     if vignetting != 0.0:
         gain = 1.0 / (1.0 - np.minimum(vignetting * geometry.off_axis, MOST_VIGNETTING))
@@ -147,6 +166,7 @@ def _bins(curves: StripCurves, geometry: StripGeometry, vignetting: float) -> Bi
         half=geometry.half,
         distance=geometry.distance,
         extent=geometry.extent,
+        grazing=geometry.grazing,
     )
 
 
@@ -174,7 +194,7 @@ def _from_search(bins: Bins, prior: JointPrior) -> Solution:
         airlights.append(float(np.median(bins.luminance[0][bins.noise[0] > 0][-FAR_BINS:])))
     grid = _grid(bins, EXTINCTIONS)
     for airlight in airlights:
-        cost = joint_kernels.extinction_costs(bins, _albedo(ALBEDOS[1]), grid, airlight, prior.shift)
+        cost = joint_kernels.extinction_costs(bins, albedo_of(ALBEDOS[1]), grid, airlight, prior.shift)
         best = int(np.argmin(cost))
         new = all(abs(math.log(grid[best] / k)) > ALIKE for k, _ in starts)
         if math.isfinite(cost[best]) and new:
@@ -202,12 +222,19 @@ def _refined_from(bins: Bins, prior: JointPrior, start: tuple[float, float], shi
     return _refined(bins, ALBEDOS[0], prior, np.array([*start, shift, 0.0]), STEPS)
 
 
-def _refined(bins: Bins, albedo: tuple[float, float], prior: JointPrior, start: Floats, steps: int) -> Solution:
-    return joint_kernels.gauss_newton(bins, _albedo(albedo), prior, start, steps)
+def _refined(bins: Bins, albedo: tuple[float, float, float], prior: JointPrior, start: Floats, steps: int) -> Solution:
+    return joint_kernels.gauss_newton(bins, albedo_of(albedo), prior, start, steps)
 
 
-def _albedo(deviations: tuple[float, float]) -> Albedo:
-    return Albedo(deviations[0], PATCH_LENGTH, deviations[1], DRIFT_LENGTH)
+def albedo_of(deviations: tuple[float, float, float]) -> Albedo:
+    """Albedo that wanders as told, over the lengths of this module.
+
+    Parameters
+    ----------
+    deviations : (3,) tuple of float
+        One of `ALBEDOS`.
+    """
+    return Albedo(deviations[0], PATCH_LENGTH, deviations[1], DRIFT_LENGTH, deviations[2])
 
 
 def _is_clear(bins: Bins, found: Solution) -> bool:
@@ -328,6 +355,4 @@ def _alike(first: JointFit, second: JointFit) -> bool:
 def _fitted(
     curves: StripCurves, geometry: StripGeometry, prior: JointPrior, strips: list[int], near: JointFit | None = None
 ) -> JointFit | None:
-    lanes = geometry.only(strips)
-    read = StripCurves(curves.luminance[strips], curves.variance[strips], curves.scatter[strips])
-    return fit_jointly(read, lanes, prior, near)
+    return fit_jointly(curves.only(strips), geometry.only(strips), prior, near)

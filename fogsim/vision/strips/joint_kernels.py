@@ -47,7 +47,7 @@ class Bins(NamedTuple):
         Luminance and its variance apart from the albedo's; see `fogsim.vision.strips.strip_curves.StripCurves`.
     path, off_axis : (strips, n) float64
         See `fogsim.vision.strips.strip_geometry.StripGeometry`.
-    below, half, distance, extent : (n,) float64
+    below, half, distance, extent, grazing : (n,) float64
         See there.
     """
 
@@ -59,6 +59,7 @@ class Bins(NamedTuple):
     half: NDArray[np.float64]
     distance: NDArray[np.float64]
     extent: NDArray[np.float64]
+    grazing: NDArray[np.float64]
 
 
 class JointPrior(NamedTuple):
@@ -151,7 +152,7 @@ def mean_transmittance(below: float, half: float, path: float, k: float) -> tupl
 
 
 @kernel
-def _near_road(bins: Bins, strip: int, k: float, airlight: float, shift: float) -> float:
+def near_road(bins: Bins, strip: int, k: float, airlight: float, shift: float) -> float:
     """Luminance of a strip without fog: median of what its nearest bins say, given the fog."""
     found = np.empty(NEAR_BINS)
     count = 0
@@ -167,7 +168,7 @@ def _near_road(bins: Bins, strip: int, k: float, airlight: float, shift: float) 
 def _linearise(bins: Bins, strip: int, theta: NDArray[np.float64], road: float, out: Residuals) -> None:
     """Residual and derivatives by the parameters of one strip, and the scale of its albedo."""
     drop = road - theta[1]
-    columns, scale = out.columns[strip], out.scale[strip]
+    columns, scale, veil = out.columns[strip], out.scale[strip], out.veil[strip]
     for i in range(bins.below.size):
         value, by_k, by_shift = mean_transmittance(
             bins.below[i] - theta[2], bins.half[i], bins.path[strip, i], theta[0]
@@ -179,14 +180,14 @@ def _linearise(bins: Bins, strip: int, theta: NDArray[np.float64], road: float, 
         columns[i, 2] = (1.0 - value) * open_part
         columns[i, 3] = drop * by_shift * open_part
         columns[i, 4] = -bright * off_axis
-        scale[i] = road * value
+        scale[i], veil[i] = road * value, theta[1] * (1.0 - value)
 
 
 @kernel
-def _add_bins(whitened: Whitened, normal: NDArray[np.float64], gradient: NDArray[np.float64]) -> tuple[float, int]:
+def add_bins(whitened: Whitened, normal: NDArray[np.float64], gradient: NDArray[np.float64]) -> tuple[float, int]:
     """Add what the bins in use say to the normal equations; returns their squares and their number."""
     out, used = whitened.innovations, whitened.used
-    squares, number = 0.0, 0
+    squares, number, size = 0.0, 0, gradient.size
     for strip in range(used.shape[0]):
         for i in range(used.shape[1]):
             if used[strip, i] != USED:
@@ -194,12 +195,12 @@ def _add_bins(whitened: Whitened, normal: NDArray[np.float64], gradient: NDArray
             number += 1
             rest = out[strip, i, 0]
             squares += rest * rest
-            for a in range(PARAMETERS):
+            for a in range(size):
                 first = out[strip, i, a + 1]
                 gradient[a] += first * rest
                 for b in range(a + 1):
                     normal[a, b] += first * out[strip, i, b + 1]
-    for a in range(PARAMETERS):
+    for a in range(size):
         for b in range(a):
             normal[b, a] = normal[a, b]
     return squares, number
@@ -225,7 +226,7 @@ def _add_prior(
 
 
 @kernel
-def _invert(matrix: NDArray[np.float64], inverse: NDArray[np.float64]) -> float:
+def invert(matrix: NDArray[np.float64], inverse: NDArray[np.float64]) -> float:
     """Invert a positive definite matrix by Cholesky's factors; returns the logarithm of its determinant."""
     size = matrix.shape[0]
     factor, logarithm = np.zeros((size, size)), 0.0
@@ -274,15 +275,15 @@ def _move(
 
 
 @kernel
-def _allocated(strips: int, count: int, width: int, noise: NDArray[np.float64]) -> tuple[Residuals, Whitened]:
+def allocated(strips: int, count: int, width: int, noise: NDArray[np.float64]) -> tuple[Residuals, Whitened]:
     """Room for residuals and innovations."""
-    columns, scale = np.empty((strips, count, width)), np.empty((strips, count))
+    columns, scale, veil = np.empty((strips, count, width)), np.empty((strips, count)), np.empty((strips, count))
     out, constants, used = (
         np.empty((strips, count, width)),
         np.empty((strips, width)),
         np.zeros((strips, count), np.uint8),
     )
-    return Residuals(columns, scale, noise), Whitened(out, constants, used)
+    return Residuals(columns, scale, veil, noise), Whitened(out, constants, used)
 
 
 @kernel
@@ -307,10 +308,10 @@ def gauss_newton(
     strips, count = bins.luminance.shape
     theta, road = start.copy(), np.empty(strips)
     for s in range(strips):
-        guess = _near_road(bins, s, theta[0], theta[1], theta[2])
+        guess = near_road(bins, s, theta[0], theta[1], theta[2])
         road[s] = min(max(guess, 0.01 * theta[1]), theta[1])
-    residuals, whitened = _allocated(strips, count, PARAMETERS + 1, bins.noise)
-    changes, unit = albedo_transitions(bins.distance, bins.extent, albedo), 1.0 / bins.path[0, 0]
+    residuals, whitened = allocated(strips, count, PARAMETERS + 1, bins.noise)
+    changes, unit = albedo_transitions(bins.distance, bins.extent, bins.grazing, albedo), 1.0 / bins.path[0, 0]
     covariance: NDArray[np.float64] = np.eye(PARAMETERS)
     cost, squares, number = 0.0, 0.0, 0
     for iteration in range(iterations + 1):
@@ -323,9 +324,9 @@ def gauss_newton(
             # Else what was seen of the bins that are now hidden would still count through the others.
             cost = whiten(residuals, changes, albedo, prior.airlight, False, whitened)
         normal, gradient = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
-        squares, number = _add_bins(whitened, normal, gradient)
+        squares, number = add_bins(whitened, normal, gradient)
         cost += squares + _add_prior(theta, prior, normal, gradient)
-        cost += _invert(normal, covariance)
+        cost += invert(normal, covariance)
         if iteration >= iterations:
             break
         step = times(covariance, gradient)
@@ -355,18 +356,18 @@ def extinction_costs(
         Rows by which the horizon is lower [px].
     """
     strips, count = bins.luminance.shape
-    cost, changes = np.empty(extinctions.size), albedo_transitions(bins.distance, bins.extent, albedo)
-    residuals, whitened = _allocated(strips, count, 1, bins.noise)
+    cost, changes = np.empty(extinctions.size), albedo_transitions(bins.distance, bins.extent, bins.grazing, albedo)
+    residuals, whitened = allocated(strips, count, 1, bins.noise)
     for j in range(extinctions.size):
         k, possible = extinctions[j], True
         for strip in range(strips):
-            road = _near_road(bins, strip, k, airlight, shift)
+            road = near_road(bins, strip, k, airlight, shift)
             possible = possible and 0.0 < road < 1.5 * airlight
             for i in range(count):
                 value, _, _ = mean_transmittance(bins.below[i] - shift, bins.half[i], bins.path[strip, i], k)
                 rest = bins.luminance[strip, i] - airlight - (road - airlight) * value
                 residuals.columns[strip, i, 0] = rest
-                residuals.scale[strip, i] = road * value
+                residuals.scale[strip, i], residuals.veil[strip, i] = road * value, airlight * (1.0 - value)
         cost[j] = np.inf
         if possible:
             cost[j] = whiten(residuals, changes, albedo, airlight, True, whitened)

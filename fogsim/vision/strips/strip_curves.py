@@ -41,6 +41,16 @@ class StripCurves:
     variance: Floats
     scatter: Floats
 
+    def only(self, strips: list[int]) -> "StripCurves":
+        """Some of the strips.
+
+        Parameters
+        ----------
+        strips : list of int
+            Which.
+        """
+        return StripCurves(self.luminance[strips], self.variance[strips], self.scatter[strips])
+
 
 def strip_curves(
     image: LinearPixels,

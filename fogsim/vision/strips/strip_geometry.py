@@ -33,6 +33,8 @@ class StripGeometry:
         Middle of each bin below the assumed horizon, and half its height [px].
     distance, extent : (n,) float64
         Depth of each bin along the road, and how much road it covers [m].
+    grazing : (n,) float64
+        Angle between the line of sight and the road [rad].
     left, right : (strips, n) float64
         Columns between which each strip lies.
     path : (strips, n) float64
@@ -47,6 +49,7 @@ class StripGeometry:
     half: Floats
     distance: Floats
     extent: Floats
+    grazing: Floats
     left: Floats
     right: Floats
     path: Floats
@@ -142,6 +145,7 @@ def _laid(
         half=half,
         distance=camera.row_distance / below,
         extent=camera.row_distance * 2.0 * half / np.maximum(below**2 - half**2, 1e-9),
+        grazing=np.arctan2(camera.mount_height * below, camera.row_distance),
         left=left,
         right=right,
         path=camera.row_distance * _across(np.sqrt(1.0 + square)),

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from fogsim.vision.strips.albedo_filter import (
+    CLOUD_ANGLE,
     CONSTANT_DEVIATION,
+    GRAZING,
     HIDDEN,
     HIDDEN_COST,
     LEFT_OUT_COST,
@@ -17,10 +19,11 @@ from fogsim.vision.strips.albedo_filter import (
     whiten,
 )
 
-ALBEDO = Albedo(0.04, 3.0, 0.1, 30.0)
+ALBEDO = Albedo(0.04, 3.0, 0.1, 30.0, 0.15, 0.03)
 AIRLIGHT = 200.0
 DISTANCE = np.geomspace(5.0, 120.0, 24)
 EXTENT = 0.1 * DISTANCE
+GRAZING_ANGLE = np.arctan2(1.3, DISTANCE)
 STRIPS = 2
 
 
@@ -29,7 +32,8 @@ def drawn(columns=3, seed=0):
     rng = np.random.default_rng(seed)
     scale = 60.0 * np.exp(-0.02 * DISTANCE) * np.array([[1.0], [0.8]])
     noise = rng.uniform(0.5, 2.0, scale.shape)
-    return Residuals(rng.normal(0.0, 1.0, (*scale.shape, columns)), scale, noise)
+    veil = AIRLIGHT * (1.0 - np.exp(-0.02 * DISTANCE)) * np.ones((STRIPS, 1))
+    return Residuals(rng.normal(0.0, 1.0, (*scale.shape, columns)), scale, veil, noise)
 
 
 def room(residuals):
@@ -57,7 +61,11 @@ def dense_covariance(residuals, kept):
             drift = ALBEDO.drift_deviation**2 * (1.0 + x) * np.exp(-x) * drift_share[i] * drift_share[j]
             patch = ALBEDO.patch_deviation**2 * np.exp(-apart / ALBEDO.patch_length) * patch_share[i] * patch_share[j]
             own = CONSTANT_DEVIATION**2 + patch if s == t else 0.0
+            sheen = ALBEDO.sheen_deviation**2 / (1 + GRAZING_ANGLE[i] / GRAZING) / (1 + GRAZING_ANGLE[j] / GRAZING)
+            cloud = np.exp(-abs(GRAZING_ANGLE[i] - GRAZING_ANGLE[j]) / CLOUD_ANGLE) * ALBEDO.cloud_deviation**2
             matrix[a, b] = residuals.scale[s, i] * residuals.scale[t, j] * (drift + own)
+            matrix[a, b] += residuals.veil[s, i] * residuals.veil[t, j] * cloud
+            matrix[a, b] += (AIRLIGHT - residuals.veil[s, i]) * (AIRLIGHT - residuals.veil[t, j]) * sheen
         matrix[a, a] += residuals.noise[s, i]
     return matrix, index
 
@@ -67,7 +75,7 @@ def test_innovations_and_determinant_are_those_of_the_dense_cholesky_factor(miss
     residuals = drawn()
     residuals.noise[1, list(missing)] = 0.0
     out = room(residuals)
-    changes = albedo_transitions(DISTANCE, EXTENT, ALBEDO)
+    changes = albedo_transitions(DISTANCE, EXTENT, GRAZING_ANGLE, ALBEDO)
     logarithm = whiten(residuals, changes, ALBEDO, AIRLIGHT, False, out)
     covariance, index = dense_covariance(residuals, residuals.noise > 0)
     factor = np.linalg.cholesky(covariance)
@@ -84,7 +92,7 @@ def test_innovations_and_determinant_are_those_of_the_dense_cholesky_factor(miss
 def test_constants_are_the_posterior_mean_of_the_strips_albedo():
     residuals = drawn(columns=1)
     out = room(residuals)
-    whiten(residuals, albedo_transitions(DISTANCE, EXTENT, ALBEDO), ALBEDO, AIRLIGHT, False, out)
+    whiten(residuals, albedo_transitions(DISTANCE, EXTENT, GRAZING_ANGLE, ALBEDO), ALBEDO, AIRLIGHT, False, out)
     covariance, index = dense_covariance(residuals, residuals.noise > 0)
     values = np.array([residuals.columns[s, i, 0] for i, s in index])
     for strip in range(STRIPS):
@@ -94,9 +102,11 @@ def test_constants_are_the_posterior_mean_of_the_strips_albedo():
 
 def test_without_scale_the_residuals_are_divided_by_their_noise():
     residuals = drawn()
-    residuals.scale[:] = 0.0
+    residuals.scale[:], residuals.veil[:] = 0.0, 0.0
     out = room(residuals)
-    logarithm = whiten(residuals, albedo_transitions(DISTANCE, EXTENT, ALBEDO), ALBEDO, AIRLIGHT, False, out)
+    matt = ALBEDO._replace(sheen_deviation=0.0)
+    changes = albedo_transitions(DISTANCE, EXTENT, GRAZING_ANGLE, matt)
+    logarithm = whiten(residuals, changes, matt, AIRLIGHT, False, out)
     assert out.innovations == pytest.approx(residuals.columns / np.sqrt(residuals.noise)[:, :, None])
     assert logarithm == pytest.approx(np.log(residuals.noise).sum())
 
@@ -104,7 +114,7 @@ def test_without_scale_the_residuals_are_divided_by_their_noise():
 def test_of_an_outlier_nothing_is_learnt_and_it_costs_what_is_said():
     residuals = drawn()
     residuals.columns[0, 10, 0] = 80.0
-    changes = albedo_transitions(DISTANCE, EXTENT, ALBEDO)
+    changes = albedo_transitions(DISTANCE, EXTENT, GRAZING_ANGLE, ALBEDO)
     out, absent = room(residuals), room(residuals)
     logarithm = whiten(residuals, changes, ALBEDO, AIRLIGHT, True, out)
     assert [tuple(place) for place in np.argwhere(out.used != USED)] == [(0, 10)]
@@ -119,14 +129,15 @@ def test_of_an_outlier_nothing_is_learnt_and_it_costs_what_is_said():
 
 
 def test_transitions_are_those_of_the_processes():
-    same = albedo_transitions(np.array([10.0, 10.0]), np.array([1e-6, 1e-6]), ALBEDO)
-    assert same[1] == pytest.approx([1.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0])
-    far = albedo_transitions(np.array([10.0, 1e4]), np.array([1e4, 1e4]), ALBEDO)[1]
+    same = albedo_transitions(np.array([10.0, 10.0]), np.array([1e-6, 1e-6]), np.zeros(2), ALBEDO)
+    assert same[1] == pytest.approx([1.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+    far = albedo_transitions(np.array([10.0, 1e4]), np.array([1e4, 1e4]), np.zeros(2), ALBEDO)[1]
     assert far[:5] == pytest.approx(np.zeros(5), abs=1e-9)
     # Of a mean over an extent of many lengths the variance is twice the length over the extent.
     assert far[6] ** 2 == pytest.approx(2.0 * ALBEDO.patch_length / 1e4, rel=1e-3)
     # Two steps of the drift and its slope are one of twice the length.
-    one, two = (albedo_transitions(np.array([0.0, d]), np.ones(2), ALBEDO)[1, :4].reshape(2, 2) for d in (7.0, 14.0))
+    steps = (albedo_transitions(np.array([0.0, d]), np.ones(2), np.zeros(2), ALBEDO)[1] for d in (7.0, 14.0))
+    one, two = (step[:4].reshape(2, 2) for step in steps)
     assert one @ one == pytest.approx(two)
 
 

@@ -13,7 +13,9 @@ from tests.vision.strips.koschmieder_strips import AIRLIGHT, GEOMETRY, PRIOR, cu
 
 def bins(seen):
     g = GEOMETRY
-    return Bins(seen.luminance.copy(), seen.variance, g.path, g.off_axis, g.below, g.half, g.distance, g.extent)
+    return Bins(
+        seen.luminance.copy(), seen.variance, g.path, g.off_axis, g.below, g.half, g.distance, g.extent, g.grazing
+    )
 
 
 @pytest.mark.parametrize("visibility", [20.0, 60.0, 200.0, 600.0])
@@ -21,8 +23,9 @@ def test_extinction_and_airlight_come_back_within_the_stated_deviation(visibilit
     k = 3.0 / visibility
     fits = [fit_jointly(curves(k, seed), GEOMETRY, PRIOR) for seed in range(24)]
     off = np.array([(fit.extinction - k) / fit.extinction_deviation for fit in fits])
-    # An honest deviation: standardised errors are of deviation 1, none far out.
-    assert 0.4 < np.sqrt((off**2).mean()) < 1.5
+    # An honest deviation: standardised errors are of deviation 1, none far out; less on these roads, which have no
+    # sheen at grazing angles while the fit allows for it.
+    assert 0.3 < np.sqrt((off**2).mean()) < 1.5
     assert np.abs(off).max() < 4.0
     assert max(fit.extinction_deviation for fit in fits) < 0.06 * k + 2e-4
     assert np.mean([fit.airlight for fit in fits]) == pytest.approx(AIRLIGHT, abs=1.5)
@@ -45,11 +48,13 @@ def test_clear_air_has_no_extinction():
 
 
 def test_less_noise_and_more_strips_are_surer():
-    seen = curves(0.03, 5)
-    own, all_strips = fit_own(seen, GEOMETRY, PRIOR), fit_jointly(seen, GEOMETRY, PRIOR)
-    assert all_strips.extinction_deviation < own.extinction_deviation
-    louder = replace(seen, variance=25.0 * seen.variance)
-    assert fit_jointly(louder, GEOMETRY, PRIOR).extinction_deviation > all_strips.extinction_deviation
+    drawn = [curves(0.03, seed) for seed in range(8)]
+    own = [fit_own(seen, GEOMETRY, PRIOR).extinction_deviation for seen in drawn]
+    all_strips = [fit_jointly(seen, GEOMETRY, PRIOR).extinction_deviation for seen in drawn]
+    louder = [replace(seen, variance=25.0 * seen.variance) for seen in drawn]
+    loud = [fit_jointly(seen, GEOMETRY, PRIOR).extinction_deviation for seen in louder]
+    assert np.mean(all_strips) < np.mean(own)
+    assert np.mean(loud) > np.mean(all_strips)
 
 
 def test_too_few_bins_give_no_answer():

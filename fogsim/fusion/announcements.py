@@ -1,0 +1,79 @@
+"""Denser fog ahead: told by one picture, believed after several."""
+
+from collections import deque
+from collections.abc import Sequence
+
+from fogsim.values.estimate import DenserFog, Estimate
+
+FEWEST = 2
+"""Fewest pictures that must tell of denser fog."""
+
+MOST, LEAST = 0.6, 0.3
+"""Shares of the last pictures that must tell of denser fog for it to be announced, and to stay so [-]."""
+
+FASTEST = 70.0
+"""Speed beyond which nothing ahead comes nearer [m/s]."""
+
+APART = 0.35
+"""Relative difference of two pictures' distances of the same fog [-]."""
+
+
+class Announcements:
+    """Follows what estimates say of denser fog ahead.
+
+    A bank stands, or comes nearer as one drives; what one picture takes for fog and the next does not, or elsewhere, is
+    none: a vehicle, a crest, the shade of a wood.
+
+    Parameters
+    ----------
+    time : float
+        Over which estimates must tell of it [s].
+    """
+
+    def __init__(self, time: float) -> None:
+        self._window = time
+        self._told: deque[tuple[float, DenserFog | None]] = deque()
+        self._announced = False
+
+    def reset(self) -> None:
+        """Forget what was told."""
+        self._told.clear()
+        self._announced = False
+
+    def update(self, estimates: Sequence[Estimate], time: float) -> DenserFog | None:
+        """Take in the estimates of one instant.
+
+        Parameters
+        ----------
+        estimates : sequence of Estimate
+            From any estimators; those that know nothing of distances do not count.
+        time : float
+            The instant [s].
+
+        Returns
+        -------
+        DenserFog or None
+            What was told last, if it is to be announced.
+        """
+        telling = [one for one in estimates if one.valid and one.optical_depths is not None]
+        if telling:
+            self._told.append((time, next((one.denser for one in telling if one.denser is not None), None)))
+        while self._told and self._told[0][0] < time - self._window - 1e-9:
+            self._told.popleft()
+        told = [(when, denser) for when, denser in self._told if denser is not None]
+        if not told:
+            self._announced = False
+            return None
+        last = told[-1]
+        agreeing = sum(_is_same(one, last) for one in told)
+        share = agreeing / len(self._told)
+        enough = agreeing >= FEWEST and share >= (LEAST if self._announced else MOST)
+        spans = self._announced or time - told[0][0] >= 0.5 * self._window
+        self._announced = enough and spans
+        return last[1] if self._announced else None
+
+
+def _is_same(earlier: tuple[float, DenserFog], later: tuple[float, DenserFog]) -> bool:
+    """Whether two tell of the same fog, which one may have come nearer to meanwhile."""
+    nearest = earlier[1].distance - FASTEST * (later[0] - earlier[0])
+    return (1.0 - APART) * nearest <= later[1].distance <= (1.0 + APART) * earlier[1].distance

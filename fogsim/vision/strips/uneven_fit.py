@@ -1,0 +1,453 @@
+"""Fog that is denser in places: optical depth over the path ahead, weighed against even fog by evidence."""
+
+import functools
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.linear_algebra import inverse_of
+from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
+from fogsim.vision.strips import joint_fit, joint_kernels, uneven_kernels
+from fogsim.vision.strips.albedo_filter import HIDDEN, HIDDEN_COST, LEFT_OUT_COST, USED
+from fogsim.vision.strips.joint_fit import ALBEDO_CHANCES, ALBEDOS, DISAGREEMENT, JointFit
+from fogsim.vision.strips.joint_kernels import Bins, JointPrior, Solution
+from fogsim.vision.strips.strip_curves import StripCurves
+from fogsim.vision.strips.strip_geometry import StripGeometry
+from fogsim.vision.strips.uneven_kernels import FogNodes
+
+Floats = NDArray[np.float64]
+
+NODES = (0.0, *(12.0 * 1.4**i for i in range(5)), *(60.0 * 1.2**i for i in range(14)))
+"""Nodes of the path [m]: nearly two rows apart, in a camera of 800 px·m, where the road is far."""
+
+MEAN, BROAD = math.log(0.01), 1.6
+"""Mean and standard deviation of ln k of fog before anything is seen [ln 1/m]."""
+
+BANK, BANK_CHANCE = 2.0, 0.01
+"""Standard deviation of the rise of ln k into a bank that begins at a node [-], and how likely such a bank is."""
+
+ROUGHNESS = 0.03
+"""Standard deviation of ln k from node to node beside that [-]."""
+
+UNEVENNESS = ((0.4, 300.0), (0.25, 100.0), (0.7, 30.0), (0.7, 100.0), (2.0, 80.0))
+"""Standard deviations of ln k along the way [-], and their correlation lengths [m]: nearly even, patches, banks."""
+
+UNEVEN_CHANCES = (0.1, 0.05, 0.05, 0.05, 0.05)
+"""How likely each is beforehand; even fog is the rest [-]."""
+
+FIRST_BANK, LEAST_RISE = 5, 0.3
+"""Node from which on a bank may begin, and least rise of ln k in a first fit for one to be tried [-]."""
+
+GENTLE, FIRST_UNEVEN = 0, 4
+"""Which unevenness is tried first, and which then to see whether any other is to be."""
+
+SURELY_EVEN = 0.0
+"""By how much the cost of the first uneven fits must lie above that of the even one for no other to be tried [-]."""
+
+SAME_DEPTH, TOLD = 0.05, 2.0
+"""Relative difference of optical depths up to which strips tell of the same fog, and depth up to which they tell [-].
+"""
+
+UNLIKELY = 30.0
+"""By how much the cost of even fog over an albedo must lie above the best for that albedo to be left out [-]."""
+
+NEAREST = 12.0
+"""Least reach of a curve of optical depths [m]."""
+
+NEAR, TOGETHER = 30.0, 3
+"""Distance up to which bins are taken together [m], and how many."""
+
+FREE = 0.9
+"""Share of bins in use from which on even fog needs no obstacles [-]."""
+
+SURELY_EVEN_SHARE = 0.99
+"""Chance of even fog beyond which only that counts [-]."""
+
+STEPS, MORE_STEPS = 12, 8
+"""Most Gauss–Newton steps of a first fit, and from one answer to the next."""
+
+OBSTACLE_CHANCE = 0.01
+"""How likely it is that an obstacle that no sensor tells begins in a lane at one of its rows [-]."""
+
+SWALLOWED = 1.0
+"""Least optical depth of what is seen for fog ahead to be called denser [-]: it swallows most of the road there. Over
+crests and in sags road seems to fade a little."""
+
+STRANGE = 2.0
+"""What an outlier adds to a cost beside its luminance's chance, where even fog is weighed against uneven [-]."""
+
+DENSER, SURELY_DENSER = math.log(2.5), 2.5
+"""Rise of ln k from the near road on, beyond which fog ahead is denser, and its least in standard deviations [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class UnevenFit:
+    """What road and sky say of the fog along the way.
+
+    Attributes
+    ----------
+    fit : JointFit
+        The fit; its extinction is the mean up to the meteorological visibility, or to `reach` if that is nearer.
+    reach : float
+        Path up to which the road was seen [m].
+    distance, depth, deviation : (n,) float64
+        Path [m], optical depth up to there [-] and its standard deviation [-].
+    even : float
+        How likely it is that the fog is even [-].
+    denser : tuple of float or None
+        Where much denser fog begins [m], the standard deviation of that [m], and its extinction [1/m].
+    """
+
+    fit: JointFit
+    reach: float
+    distance: Floats
+    depth: Floats
+    deviation: Floats
+    even: float = 1.0
+    denser: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Candidate:
+    """One fit with its cost, the fog that it is of, and how likely that is beforehand."""
+
+    cost: float
+    solution: Solution
+    fog: FogNodes
+    chance: float
+
+
+@functools.cache
+def fog_nodes(deviation: float, length: float, count: int) -> FogNodes:
+    """Nodes of fog of some unevenness.
+
+    Parameters
+    ----------
+    deviation : float
+        Standard deviation of ln k along the way [-].
+    length : float
+        Correlation length [m].
+    count : int
+        How many nodes.
+    """
+    nodes = np.array(NODES[:count])
+    # Where nodes are farther apart than patches are long, a node stands for their mean.
+    size = np.maximum(np.diff(nodes, prepend=-NODES[1]) / length, 1e-3)
+    share = np.sqrt(2.0 * (size - 1.0 + np.exp(-size))) / size
+    apart = math.sqrt(3.0) / length * np.abs(nodes[:, None] - nodes)
+    covariance = deviation**2 * (1.0 + apart) * np.exp(-apart) * share[:, None] * share + BROAD**2
+    covariance += ROUGHNESS**2 * np.eye(count)
+    logarithm = joint_kernels.invert(covariance, np.empty_like(covariance))
+    return FogNodes(nodes, MEAN, inverse_of(covariance), logarithm)
+
+
+@functools.cache
+def bank_nodes(first: int, count: int) -> FogNodes:
+    """Nodes of fog that is even up to a bank, and even in it.
+
+    Parameters
+    ----------
+    first : int
+        First node in the bank.
+    count : int
+        How many nodes.
+    """
+    nodes = fog_nodes(*UNEVENNESS[0], count).nodes
+    inside = (np.arange(count) >= first).astype(np.float64)
+    covariance = BROAD**2 + BANK**2 * inside[:, None] * inside + ROUGHNESS**2 * np.eye(count)
+    logarithm = joint_kernels.invert(covariance, np.empty_like(covariance))
+    return FogNodes(nodes, MEAN, inverse_of(covariance), logarithm)
+
+
+def fit_uneven(
+    curves: StripCurves, geometry: StripGeometry, prior: JointPrior, own: JointFit, even: JointFit
+) -> UnevenFit:
+    """Fit strips with fog that may be uneven, weighed against even fog.
+
+    All strips count, unless even fog has left out much of them and the own lane tells of another fog than all together.
+
+    Parameters
+    ----------
+    curves : StripCurves
+        Luminance by bin.
+    geometry : StripGeometry
+        Where the bins are.
+    prior : JointPrior
+        Sky and horizon.
+    own, even : JointFit
+        Fits of even fog to the own lane, and to all lanes that agree with it.
+    """
+    found = _fitted(curves, geometry, prior, even)
+    if found is not None and not _fits_all(even, curves):
+        lane = _fitted(curves.only([0]), geometry.only([0]), prior, own)
+        if not _agree(even_fog(own, geometry) if lane is None else lane, found):
+            found = lane
+    return even_fog(even, geometry) if found is None else found
+
+
+def _fits_all(even: JointFit, curves: StripCurves) -> bool:
+    """Whether even fog has left out no strip, and not much of any."""
+    if len(even.used) < len(curves.variance):
+        return False
+    seen = curves.variance > 0
+    return bool((even.used.sum(axis=1) >= FREE * seen.sum(axis=1)).all())
+
+
+def _agree(own: UnevenFit, more: UnevenFit) -> bool:
+    """Whether more strips tell of the same optical depth as far as the own lane does."""
+    last = max(int((own.depth < TOLD).sum()) - 1, 0)
+    depth, deviation = float(own.depth[last]), float(own.deviation[last])
+    apart = abs(depth - float(np.interp(own.distance[last], more.distance, more.depth)))
+    return apart <= DISAGREEMENT * math.hypot(deviation, SAME_DEPTH * depth)
+
+
+def _fitted(curves: StripCurves, geometry: StripGeometry, prior: JointPrior, even: JointFit) -> UnevenFit | None:
+    """Fit of uneven fog, or None if even fog suffices."""
+    bins = _thinned(joint_fit.strip_bins(curves, geometry, prior.vignetting))
+    farthest = float((bins.path / bins.below)[bins.noise > 0].max())
+    count = min(sum(node < farthest for node in NODES) + 1, len(NODES))
+    start = np.array([max(even.extinction, 1e-5), even.airlight, even.shift, 0.0])
+    evens = [_even(bins, albedo, prior, start) for albedo in range(len(ALBEDOS))]
+    likely = int(np.argmin(evens))
+    first = uneven_kernels.first_profile(bins, fog_nodes(*UNEVENNESS[0], count).nodes, prior)
+    begin = np.concatenate([first, [prior.airlight, prior.shift, 0.0]])
+    tried = [_uneven(bins, likely, prior, GENTLE, begin, STEPS)]
+    tried.append(_uneven(bins, likely, prior, FIRST_UNEVEN, begin, STEPS))
+    tried += _banks(bins, likely, prior, begin)
+    if min(t.cost for t in tried) > min(evens) + SURELY_EVEN and _is_free(even, curves):
+        return None
+    begin = tried[1].solution.theta
+    for unevenness in range(len(UNEVENNESS)):
+        if unevenness not in (GENTLE, FIRST_UNEVEN):
+            tried.append(_uneven(bins, likely, prior, unevenness, begin, MORE_STEPS))
+    best = min(tried, key=lambda t: t.cost)
+    for albedo, cost in enumerate(evens):
+        if albedo != likely and cost < evens[likely] + UNLIKELY:
+            tried.append(_candidate(bins, albedo, prior, best.fog, best.chance, best.solution.theta, MORE_STEPS))
+    return _weighed(even, evens, tried, bins, geometry)
+
+
+def _taken_together(distance: Floats) -> int:
+    """How many of the nearest bins are taken together."""
+    return int((distance < NEAR).sum()) // TOGETHER * TOGETHER
+
+
+def _of_each(used: NDArray[np.bool_], distance: Floats) -> NDArray[np.bool_]:
+    """(strips, n) bool of the thinned bins, for each of all bins."""
+    near = _taken_together(distance)
+    groups = near // TOGETHER
+    return np.concatenate([np.repeat(used[:, :groups], TOGETHER, axis=1), used[:, groups:]], axis=1)
+
+
+def _thinned(bins: Bins) -> Bins:
+    """Bins of the near road taken together by threes: there fog varies little from bin to bin."""
+    near = _taken_together(bins.distance)
+    if near == 0:
+        return bins
+
+    def mean(values: Floats) -> Floats:
+        grouped = values[..., :near].reshape(*values.shape[:-1], -1, TOGETHER).mean(axis=-1)
+        return np.ascontiguousarray(np.concatenate([grouped, values[..., near:]], axis=-1))
+
+    seen = (bins.noise > 0).astype(np.float64)
+    share = mean(seen)
+    of_seen = np.maximum(share, 1e-9)
+    sizes = np.where(np.arange(bins.below.size) < near, TOGETHER, 1).astype(np.float64)
+    sizes = mean(sizes)
+    return Bins(
+        luminance=mean(bins.luminance * seen) / of_seen,
+        noise=np.where(share > 0.5, mean(bins.noise) / of_seen**2 / sizes, 0.0),
+        path=mean(bins.path),
+        off_axis=mean(bins.off_axis),
+        below=mean(bins.below),
+        half=mean(bins.half) * sizes,
+        distance=mean(bins.distance),
+        extent=mean(bins.extent) * sizes,
+        grazing=mean(bins.grazing),
+    )
+
+
+def _is_free(even: JointFit, curves: StripCurves) -> bool:
+    """Whether even fog explains nearly all bins of its strips, rather than taking them for obstacles."""
+    strips = min(len(even.used), len(curves.variance))
+    return bool(even.used[:strips][curves.variance[:strips] > 0].mean() > FREE)
+
+
+def even_fog(even: JointFit, geometry: StripGeometry) -> UnevenFit:
+    """Fog that is the same all along the way.
+
+    Parameters
+    ----------
+    even : JointFit
+        Its fit.
+    geometry : StripGeometry
+        Where its bins are.
+    """
+    reach = _reach(even.used, geometry.path / geometry.below)
+    k = max(even.extinction, 0.0)
+    distance = _distances(reach)
+    return UnevenFit(even, reach, distance, k * distance, even.extinction_deviation * distance)
+
+
+def _distances(reach: float) -> Floats:
+    """Distances of a curve up to a reach [m]."""
+    count = max(math.ceil(math.log(max(reach, NEAREST) / 10.0) / math.log(1.15)), 1)
+    return np.geomspace(10.0, max(reach, NEAREST), count + 1)
+
+
+def _reach(used: NDArray[np.bool_], paths: Floats) -> float:
+    """Path to the farthest bin in use [m]."""
+    seen = paths[: len(used)][used]
+    return float(seen.max()) if seen.size else 0.0
+
+
+def _even(bins: Bins, albedo: int, prior: JointPrior, start: Floats) -> float:
+    """Cost of even fog, as it would be with ln k as its parameter and with what is known of that."""
+    albedos = joint_fit.albedo_of(ALBEDOS[albedo])
+    found = joint_kernels.gauss_newton(bins, albedos, prior, start, joint_fit.MORE_STEPS)
+    k, variance = max(float(found.theta[0]), 1e-5), float(found.covariance[0, 0])
+    apart = (math.log(k) - MEAN) / BROAD
+    cost = found.cost + math.log(variance) + math.log(k * k / variance + BROAD**-2) + math.log(BROAD**2) + apart**2
+    chance = ALBEDO_CHANCES[albedo] * (1.0 - sum(UNEVEN_CHANCES))
+    return cost + _hidden_cost(found, bins) - 2.0 * math.log(chance)
+
+
+def _uneven(bins: Bins, albedo: int, prior: JointPrior, unevenness: int, start: Floats, steps: int) -> _Candidate:
+    """Fit of fog of some unevenness."""
+    fog = fog_nodes(*UNEVENNESS[unevenness], start.size - uneven_kernels.OTHERS)
+    return _candidate(bins, albedo, prior, fog, UNEVEN_CHANCES[unevenness], start, steps)
+
+
+def _banks(bins: Bins, albedo: int, prior: JointPrior, start: Floats) -> list[_Candidate]:
+    """Fits of banks that begin where a first fit has the fog become denser, or one node on."""
+    count = start.size - uneven_kernels.OTHERS
+    if count <= FIRST_BANK + 1:
+        return []
+    rises = np.diff(start[:count])
+    first = int(np.argmax(rises[FIRST_BANK:])) + FIRST_BANK + 1
+    if rises[first - 1] < LEAST_RISE:
+        return []
+    nodes = range(first, min(first + 2, count))
+    return [_candidate(bins, albedo, prior, bank_nodes(node, count), BANK_CHANCE, start, MORE_STEPS) for node in nodes]
+
+
+def _candidate(
+    bins: Bins, albedo: int, prior: JointPrior, fog: FogNodes, chance: float, start: Floats, steps: int
+) -> _Candidate:
+    found = uneven_kernels.fit_uneven(bins, joint_fit.albedo_of(ALBEDOS[albedo]), prior, fog, start, steps)
+    if int((found.used[0] == USED).sum()) < joint_fit.LEAST_BINS:
+        return _Candidate(math.inf, found, fog, chance)
+    likelihood = found.cost + _hidden_cost(found, bins)
+    return _Candidate(likelihood - 2.0 * math.log(ALBEDO_CHANCES[albedo] * chance), found, fog, chance)
+
+
+def _hidden_cost(found: Solution, bins: Bins) -> float:
+    """What is to be added to a cost for bins behind obstacles and for outliers.
+
+    In the fit of one fog they are cheap and dear, so that what is behind an obstacle is left out whole. Beside an
+    obstacle, denser fog is another explanation, and the two are weighed fairly: either's luminance may be any.
+    """
+    hidden = (found.used == HIDDEN) & (bins.noise > 0)
+    outliers = int(((found.used == 0) & (bins.noise > 0)).sum())
+    any_luminance = math.log(float(found.theta[-3]) ** 2 / (2.0 * math.pi))
+    cost = float((any_luminance - HIDDEN_COST - np.log(bins.noise[hidden])).sum())
+    obstacles = int(hidden.any(axis=1).sum())
+    return cost - (LEFT_OUT_COST - STRANGE) * outliers - 2.0 * math.log(OBSTACLE_CHANCE) * obstacles
+
+
+def _weighed(
+    even: JointFit, evens: list[float], tried: list[_Candidate], bins: Bins, geometry: StripGeometry
+) -> UnevenFit | None:
+    """Average over even fog and uneven fits by their evidence."""
+    costs = np.array([*evens, *(t.cost for t in tried)])
+    weights = np.exp(-0.5 * (costs - costs.min()))
+    weights /= weights.sum()
+    share, weights = float(weights[: len(evens)].sum()), weights[len(evens) :]
+    if share > SURELY_EVEN_SHARE:
+        return None
+    best = tried[int(np.argmax(weights))]
+    reach = _reach(best.solution.used == USED, bins.path / bins.below)
+    distance = _distances(reach)
+    k, k2 = share * max(even.extinction, 0.0), share * (even.extinction**2 + even.extinction_deviation**2)
+    depth = share * max(even.extinction, 0.0) * distance
+    depth2 = share * (even.extinction**2 + even.extinction_deviation**2) * distance**2
+    for weight, candidate in zip(weights, tried, strict=True):
+        if weight < 1e-3:
+            continue
+        mean, variance = _mean_extinction(candidate, reach)
+        k, k2 = k + weight * mean, k2 + weight * (mean**2 + variance)
+        for i, place in enumerate(distance):
+            value, spread = _depth(candidate, float(place))
+            depth[i] += weight * value
+            depth2[i] += weight * (value**2 + spread)
+    sd = math.sqrt(max(k2 - k * k, 0.0))
+    deviation = np.sqrt(np.maximum(depth2 - depth**2, 0.0))
+    if share > 0.5:
+        return UnevenFit(replace(even, extinction=k, extinction_deviation=sd), reach, distance, depth, deviation, share)
+    fit = JointFit(
+        extinction=k,
+        extinction_deviation=sd,
+        airlight=float(best.solution.theta[-3]),
+        shift=float(best.solution.theta[-2]),
+        road=best.solution.road,
+        misfit=best.solution.misfit,
+        used=_of_each(best.solution.used == USED, geometry.distance),
+        hidden=_of_each(best.solution.used == HIDDEN, geometry.distance)[0],
+    )
+    return UnevenFit(fit, reach, distance, depth, deviation, share, _denser(best, reach))
+
+
+def _mean_extinction(candidate: _Candidate, reach: float) -> tuple[float, float]:
+    """Mean extinction up to the meteorological visibility, or to a reach that is nearer [1/m], and its variance."""
+    nodes, solution = candidate.fog.nodes, candidate.solution
+    logs = solution.theta[: nodes.size]
+    distance = uneven_kernels.distance_at_depth(nodes, logs, OPTICAL_DEPTH_AT_VISIBILITY)
+    if distance > reach:
+        depth, variance = _depth(candidate, reach)
+        return depth / reach, variance / reach**2
+    # A depth that is greater by dτ is reached dτ / k sooner.
+    depth, variance = _depth(candidate, distance)
+    slope = depth / distance**2 / uneven_kernels.extinction_at(nodes, logs, distance)
+    return depth / distance, slope**2 * variance
+
+
+def _depth(candidate: _Candidate, distance: float) -> tuple[float, float]:
+    """Optical depth up to a distance, and its variance [-]."""
+    nodes = candidate.fog.nodes
+    depth, gradient = uneven_kernels.depth_at(nodes, candidate.solution.theta[: nodes.size], distance)
+    return depth, _variance(gradient, candidate.solution.covariance)
+
+
+def _variance(gradient: Floats, covariance: Floats) -> float:
+    size = gradient.size
+    return float((gradient[:, None] * covariance[:size, :size] * gradient).sum())
+
+
+def _denser(candidate: _Candidate, reach: float) -> tuple[float, float, float] | None:
+    """Where fog is surely much denser than near the camera, if anywhere."""
+    nodes, solution = candidate.fog.nodes, candidate.solution
+    seen = int((nodes <= reach).sum())
+    if _depth(candidate, reach)[0] < SWALLOWED:
+        return None
+    logs, covariance = solution.theta[:seen], solution.covariance[:seen, :seen]
+    for node in range(2, seen):
+        # The near road is all before the node, each stretch weighed by its length.
+        lengths = np.diff(nodes[: node + 1])
+        weight = np.zeros(seen)
+        weight[:node], weight[node] = -lengths / lengths.sum(), 1.0
+        rise = float((weight * logs).sum())
+        if rise > DENSER and rise > SURELY_DENSER * math.sqrt(_variance(weight, covariance)):
+            return _half_density(nodes, logs, node, node + int(np.argmax(logs[node:])))
+    return None
+
+
+def _half_density(nodes: Floats, logs: Floats, node: int, densest: int) -> tuple[float, float, float]:
+    """Where extinction reaches half of that of the densest node, how surely [m], and that extinction [1/m]."""
+    half = logs[densest] - math.log(2.0)
+    while logs[node] < half:
+        node += 1
+    before, after = float(nodes[node - 1]), float(nodes[node])
+    share = (half - logs[node - 1]) / max(logs[node] - logs[node - 1], 1e-9)
+    return before + min(max(share, 0.0), 1.0) * (after - before), 0.5 * (after - before), math.exp(logs[densest])

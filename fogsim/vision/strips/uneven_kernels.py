@@ -1,0 +1,425 @@
+"""Compiled fit of fog whose extinction varies along the road: ln k at nodes of the path, with a prior covariance.
+
+Where `joint_kernels` has e^(−k d), here is e^(−τ(d)), τ = ∫ k, with k straight between the nodes.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+from fogsim.linear_algebra import times
+from fogsim.vision.strips.albedo_filter import (
+    Albedo,
+    Residuals,
+    albedo_transitions,
+    hide_behind_obstacles,
+    whiten,
+)
+from fogsim.vision.strips.joint_kernels import (
+    Bins,
+    JointPrior,
+    Solution,
+    add_bins,
+    allocated,
+    invert,
+    near_road,
+)
+
+OTHERS = 3
+"""Parameters beside the cells: airlight, rows by which the horizon is lower, vignetting that is left."""
+
+LONGEST_STEP = 1.2
+"""Longest step of ln k of a cell [-]."""
+
+THINNEST, DENSEST = math.log(1e-5), math.log(0.5)
+"""Least and greatest ln k of a cell [ln 1/m]."""
+
+CONVERGED = 0.03
+"""Longest step of ln k below which only one more is made [-]."""
+
+HALVINGS = 4
+"""How often a step that leads uphill is halved."""
+
+DEEPEST = 3.5
+"""Optical depth beyond which a bin's luminance tells nothing of it in the first guess [-]."""
+
+TOLERANCE, TOLERANT = 0.06, 4
+"""Deviation of the first guess's luminance, relative to the airlight [-], and steps over which it is halved each time
+before bins count as sharp as they are: else a guess that is a little off would take far fog for an obstacle."""
+
+NEAR = 30.0
+"""Path over which the first guess takes the fog for even [m]."""
+
+
+class FogNodes(NamedTuple):
+    """Nodes of the path ahead, and what is known of their ln k beforehand.
+
+    Attributes
+    ----------
+    nodes : (m,) float64
+        Where they are along the path [m], the first at 0; beyond the last k is as there.
+    mean : float
+        Mean of ln k [ln 1/m].
+    precision : (m, m) float64
+        Inverse of its covariance.
+    log_determinant : float
+        Logarithm of the determinant of its covariance.
+    """
+
+    nodes: NDArray[np.float64]
+    mean: float
+    precision: NDArray[np.float64]
+    log_determinant: float
+
+
+@kernel
+def depths_at_nodes(nodes: NDArray[np.float64], extinctions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Optical depth up to each node [-].
+
+    Parameters
+    ----------
+    nodes : (m,) float64
+        Where they are along the path [m].
+    extinctions : (m,) float64
+        k there [1/m].
+    """
+    depths = np.zeros(nodes.size)
+    for j in range(1, nodes.size):
+        depths[j] = depths[j - 1] + 0.5 * (extinctions[j - 1] + extinctions[j]) * (nodes[j] - nodes[j - 1])
+    return depths
+
+
+@kernel
+def _before(nodes: NDArray[np.float64], distance: float) -> int:
+    """Last node before a distance."""
+    node = nodes.size - 1
+    while node > 0 and nodes[node] > distance:
+        node -= 1
+    return node
+
+
+@kernel
+def _beyond(nodes: NDArray[np.float64], node: int, distance: float) -> tuple[float, float]:
+    """Weights of a node's extinction, and of the next one's, in the optical depth from the one to a distance [m]."""
+    rest = distance - nodes[node]
+    if node + 1 == nodes.size:
+        return rest, 0.0
+    second = 0.5 * rest * rest / (nodes[node + 1] - nodes[node])
+    return rest - second, second
+
+
+@kernel
+def _extinction_at(nodes: NDArray[np.float64], extinctions: NDArray[np.float64], node: int, distance: float) -> float:
+    """Extinction at a distance beyond a node [1/m]."""
+    if node + 1 == nodes.size:
+        return float(extinctions[node])
+    share = (distance - nodes[node]) / (nodes[node + 1] - nodes[node])
+    return float(extinctions[node] + share * (extinctions[node + 1] - extinctions[node]))
+
+
+@kernel
+def _node_weights(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m, m): weight of each node's extinction (column) in the optical depth up to each node (row) [m]."""
+    weights = np.zeros((nodes.size, nodes.size))
+    for j in range(1, nodes.size):
+        half = 0.5 * (nodes[j] - nodes[j - 1])
+        weights[j] = weights[j - 1]
+        weights[j, j - 1] += half
+        weights[j, j] += half
+    return weights
+
+
+@kernel
+def _linearise(
+    bins: Bins, strip: int, theta: NDArray[np.float64], road: float, nodes: NDArray[np.float64], out: Residuals
+) -> None:
+    """Residual and derivatives by cells, airlight, horizon and vignetting of one strip."""
+    cells = nodes.size
+    extinctions, weights = np.exp(theta[:cells]), _node_weights(nodes)
+    depths = depths_at_nodes(nodes, extinctions)
+    airlight, shift, vignetting = theta[cells], theta[cells + 1], theta[cells + 2]
+    drop = road - airlight
+    columns, scale, veil = out.columns[strip], out.scale[strip], out.veil[strip]
+    by_node = np.empty(cells)
+    for i in range(bins.below.size):
+        value, by_shift = 0.0, 0.0
+        by_node[:] = 0.0
+        for j in range(3):
+            rows = bins.below[i] - shift + (j - 1) * bins.half[i]
+            if rows <= 0.0:
+                continue
+            distance = bins.path[strip, i] / rows
+            node = _before(nodes, distance)
+            first, second = _beyond(nodes, node, distance)
+            depth = depths[node] + first * extinctions[node]
+            if second > 0.0:
+                depth += second * extinctions[node + 1]
+            part = (4.0 if j == 1 else 1.0) / 6.0 * math.exp(-depth)
+            value += part
+            by_shift -= _extinction_at(nodes, extinctions, node, distance) * distance / rows * part
+            for c in range(node + 1):
+                by_node[c] -= part * extinctions[c] * weights[node, c]
+            by_node[node] -= part * extinctions[node] * first
+            if second > 0.0:
+                by_node[node + 1] -= part * extinctions[node + 1] * second
+        off_axis = bins.off_axis[strip, i]
+        bright, open_part = airlight + drop * value, 1.0 - vignetting * off_axis
+        columns[i, 0] = bins.luminance[strip, i] - bright * open_part
+        for c in range(cells):
+            columns[i, 1 + c] = drop * by_node[c] * open_part
+        columns[i, cells + 1] = (1.0 - value) * open_part
+        columns[i, cells + 2] = drop * by_shift * open_part
+        columns[i, cells + 3] = -bright * off_axis
+        scale[i], veil[i] = road * value, airlight * (1.0 - value)
+
+
+@kernel
+def _add_prior(
+    theta: NDArray[np.float64],
+    prior: JointPrior,
+    fog: FogNodes,
+    normal: NDArray[np.float64],
+    gradient: NDArray[np.float64],
+) -> float:
+    """Add what is known beforehand to the normal equations; returns what it adds to the cost."""
+    cells, cost = fog.nodes.size, fog.log_determinant
+    for a in range(cells):
+        pull = 0.0
+        for b in range(cells):
+            normal[a, b] += fog.precision[a, b]
+            pull += fog.precision[a, b] * (theta[b] - fog.mean)
+        gradient[a] -= pull
+        cost += pull * (theta[a] - fog.mean)
+    off, lower, left = theta[cells] - prior.airlight, theta[cells + 1] - prior.shift, theta[cells + 2]
+    weights = (
+        1.0 / (prior.below if off < 0.0 else prior.above) ** 2,
+        1.0 / prior.shift_deviation**2,
+        1.0 / prior.vignetting_deviation**2,
+    )
+    for j, apart in enumerate((off, lower, left)):
+        normal[cells + j, cells + j] += weights[j]
+        gradient[cells + j] -= weights[j] * apart
+        cost += weights[j] * apart * apart
+    return cost
+
+
+@kernel
+def _blur(noise: NDArray[np.float64], airlight: float, iteration: int, out: NDArray[np.float64]) -> None:
+    """Variances of the bins, in the first steps with what a first guess may be off."""
+    tolerance = (TOLERANCE * 0.4**iteration * airlight) ** 2 if iteration < TOLERANT else 0.0
+    for s in range(noise.shape[0]):
+        for i in range(noise.shape[1]):
+            out[s, i] = noise[s, i] + tolerance if noise[s, i] > 0.0 else 0.0
+
+
+@kernel
+def _move(
+    theta: NDArray[np.float64],
+    step: NDArray[np.float64],
+    road: NDArray[np.float64],
+    constants: NDArray[np.float64],
+    shift_deviation: float,
+) -> float:
+    """Take a step, damped where it is long, and let each strip's luminance follow; returns the longest of ln k."""
+    nodes, longest = theta.size - OTHERS, 0.0
+    for c in range(nodes):
+        longest = max(longest, abs(step[c]))
+    damped = min(1.0, LONGEST_STEP / max(longest, 1e-9))
+    step *= min(damped, 1.5 * shift_deviation / max(abs(step[nodes + 1]), 1e-12))
+    for strip in range(road.size):
+        change = constants[strip, 0]
+        for a in range(theta.size):
+            change -= step[a] * constants[strip, a + 1]
+        road[strip] *= min(max(1.0 + change, 0.5), 1.5)
+    for c in range(nodes):
+        step[c] = min(max(theta[c] + step[c], THINNEST), DENSEST) - theta[c]
+    theta += step
+    return longest
+
+
+@kernel
+def fit_uneven(
+    bins: Bins, albedo: Albedo, prior: JointPrior, fog: FogNodes, start: NDArray[np.float64], iterations: int
+) -> Solution:
+    """Gauss–Newton from a start, a step that leads uphill halved.
+
+    Parameters
+    ----------
+    bins : Bins
+        What is seen where.
+    albedo : Albedo
+        How the albedo wanders.
+    prior : JointPrior
+        Sky, horizon and lens.
+    fog : FogNodes
+        Cells of the path.
+    start : (m + 3,) float64
+        ln k of each cell, airlight, shift, vignetting that is left.
+    iterations : int
+        Most steps.
+
+    Returns
+    -------
+    Solution
+        Its ``theta`` as the start.
+    """
+    strips, count = bins.luminance.shape
+    cells = fog.nodes.size
+    size = cells + OTHERS
+    theta, road = start.copy(), np.empty(strips)
+    for s in range(strips):
+        guess = near_road(bins, s, math.exp(theta[0]), theta[cells], theta[cells + 1])
+        road[s] = min(max(guess, 0.01 * theta[cells]), theta[cells])
+    residuals, whitened = allocated(strips, count, size + 1, bins.noise.copy())
+    changes = albedo_transitions(bins.distance, bins.extent, bins.grazing, albedo)
+    covariance: NDArray[np.float64] = np.eye(size)
+    step, last, least, halvings = np.zeros(size), theta.copy(), np.inf, 0
+    cost, squares, number = 0.0, 0.0, 0
+    for iteration in range(iterations + 1):
+        _blur(bins.noise, prior.airlight, iteration, residuals.noise)
+        for s in range(strips):
+            _linearise(bins, s, theta, road[s], fog.nodes, residuals)
+        # What is an outlier is settled before the last steps, so that they converge.
+        reject = iteration < max(iterations - 3, 1)
+        cost = whiten(residuals, changes, albedo, prior.airlight, reject, whitened)
+        if reject and iteration >= TOLERANT and hide_behind_obstacles(bins.noise, whitened.used):
+            cost = whiten(residuals, changes, albedo, prior.airlight, False, whitened)
+        normal, gradient = np.zeros((size, size)), np.zeros(size)
+        squares, number = add_bins(whitened, normal, gradient)
+        cost += squares + _add_prior(theta, prior, fog, normal, gradient)
+        cost += invert(normal, covariance)
+        if iteration >= iterations:
+            break
+        if iteration > TOLERANT and cost > least + 1.0 and halvings < HALVINGS:
+            halvings += 1
+            step *= 0.5
+            theta[:] = last + step
+            continue
+        least, halvings = cost, 0
+        last[:] = theta
+        step = times(covariance, gradient)
+        longest = _move(theta, step, road, whitened.constants, prior.shift_deviation)
+        if iteration > TOLERANT and longest < CONVERGED:
+            iterations = min(iterations, iteration + 1)
+    return Solution(theta, covariance, cost, squares / max(number, 1), road[0], whitened.used)
+
+
+@kernel
+def first_profile(bins: Bins, nodes: NDArray[np.float64], prior: JointPrior) -> NDArray[np.float64]:
+    """First guess of ln k of each cell, from the contrast that each bin has left.
+
+    Parameters
+    ----------
+    bins : Bins
+        What is seen where.
+    nodes : (m,) float64
+        Where nodes are along the path [m].
+    prior : JointPrior
+        Sky and horizon.
+    """
+    strips, count = bins.luminance.shape
+    sums, counts = np.zeros((nodes.size, 2)), np.zeros(nodes.size)
+    depth, near = np.empty(strips), 0.0
+    top = 0.0
+    for _ in range(2):
+        road = np.empty(strips)
+        for s in range(strips):
+            road[s] = min(near_road(bins, s, near, prior.airlight, prior.shift), 0.98 * prior.airlight)
+        sums[:], counts[:], top = 0.0, 0.0, 0.0
+        for i in range(count):
+            seen = 0
+            for s in range(strips):
+                if bins.noise[s, i] > 0.0:
+                    left = (prior.airlight - bins.luminance[s, i]) / (prior.airlight - road[s])
+                    depth[seen] = -math.log(min(max(left, math.exp(-DEEPEST)), 2.0))
+                    seen += 1
+            rows = bins.below[i] - prior.shift
+            if seen == 0 or rows <= 0.5:
+                continue
+            # Optical depth never falls with distance.
+            top = max(top, min(float(np.median(depth[:seen])), DEEPEST))
+            distance = bins.path[0, i] / rows
+            cell = _before(nodes, distance)
+            sums[cell, 0] += distance
+            sums[cell, 1] += top
+            counts[cell] += 1.0
+        distance, before, known = 0.0, 0.0, False
+        logs = np.full(nodes.size, THINNEST)
+        for c in range(nodes.size):
+            if counts[c] > 0.0:
+                middle, reached = sums[c, 0] / counts[c], sums[c, 1] / counts[c]
+                if middle > distance + 1.0:
+                    logs[c] = math.log(max((reached - before) / (middle - distance), 3e-4))
+                    distance, before, known = middle, reached, True
+                    continue
+            logs[c] = logs[c - 1] if c > 0 and known else math.log(3e-3)
+        near = math.exp(logs[_before(nodes, NEAR)])
+    return logs
+
+
+@kernel
+def distance_at_depth(nodes: NDArray[np.float64], logs: NDArray[np.float64], depth: float) -> float:
+    """Distance at which an optical depth is reached [m].
+
+    Parameters
+    ----------
+    nodes : (m,) float64
+        Where nodes are along the path [m].
+    logs : (m,) float64
+        ln k there.
+    depth : float
+        The optical depth [-].
+    """
+    extinctions = np.exp(logs)
+    depths, node = depths_at_nodes(nodes, extinctions), nodes.size - 1
+    while node > 0 and depths[node] > depth:
+        node -= 1
+    here, rest = extinctions[node], depth - depths[node]
+    if node + 1 == nodes.size:
+        return float(nodes[node] + rest / here)
+    slope = (extinctions[node + 1] - here) / (nodes[node + 1] - nodes[node])
+    # Root of slope x² / 2 + here x = rest, in the form that does not cancel.
+    return float(nodes[node] + 2.0 * rest / (here + math.sqrt(max(here * here + 2.0 * slope * rest, 0.0))))
+
+
+@kernel
+def depth_at(
+    nodes: NDArray[np.float64], logs: NDArray[np.float64], distance: float
+) -> tuple[float, NDArray[np.float64]]:
+    """Optical depth up to a distance [-], and its derivatives by ln k of each node.
+
+    Parameters
+    ----------
+    nodes : (m,) float64
+        Where nodes are along the path [m].
+    logs : (m,) float64
+        ln k there.
+    distance : float
+        The distance [m].
+    """
+    extinctions, node = np.exp(logs), _before(nodes, distance)
+    gradient: NDArray[np.float64] = _node_weights(nodes)[node] * extinctions
+    first, second = _beyond(nodes, node, distance)
+    gradient[node] += first * extinctions[node]
+    if second > 0.0:
+        gradient[node + 1] += second * extinctions[node + 1]
+    return float(gradient.sum()), gradient
+
+
+@kernel
+def extinction_at(nodes: NDArray[np.float64], logs: NDArray[np.float64], distance: float) -> float:
+    """Extinction at a distance [1/m].
+
+    Parameters
+    ----------
+    nodes : (m,) float64
+        Where nodes are along the path [m].
+    logs : (m,) float64
+        ln k there.
+    distance : float
+        The distance [m].
+    """
+    return _extinction_at(nodes, np.exp(logs), _before(nodes, distance), distance)

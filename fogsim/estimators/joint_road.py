@@ -207,10 +207,9 @@ class JointRoad:
         self._earlier.append((curves, sky))
         if own is None or fit is None:
             return "too little road is seen"
-        # What even fog takes for an obstacle may be denser fog: it is not yet left out here.
-        uneven = fit_uneven(self._averaged(whole, sky), self._geometry, prior, own, fit)
-        if uneven.fit is not fit:
-            curves, free = whole, told
+        # What even fog takes for an obstacle behind a tracked vehicle may be denser fog: it is not left out here.
+        curves = whole if math.isfinite(told) else curves
+        uneven = fit_uneven(self._averaged(curves, sky), self._geometry, prior, own, fit)
         return self._doubt(uneven, sky, curves, free, told) or uneven
 
     def _usable(self, curves: StripCurves, sky: Sky, lowest: int) -> StripCurves:

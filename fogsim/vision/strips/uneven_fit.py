@@ -11,7 +11,7 @@ from fogsim.linear_algebra import inverse_of
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.vision.strips import joint_fit, joint_kernels, uneven_kernels
 from fogsim.vision.strips.albedo_filter import HIDDEN, HIDDEN_COST, LEFT_OUT_COST, USED
-from fogsim.vision.strips.joint_fit import ALBEDO_CHANCES, ALBEDOS, DISAGREEMENT, JointFit
+from fogsim.vision.strips.joint_fit import ALBEDO_CHANCES, ALBEDOS, JointFit
 from fogsim.vision.strips.joint_kernels import Bins, JointPrior, Solution
 from fogsim.vision.strips.strip_curves import StripCurves
 from fogsim.vision.strips.strip_geometry import StripGeometry
@@ -46,7 +46,7 @@ GENTLE, FIRST_UNEVEN = 0, 4
 SURELY_EVEN = 0.0
 """By how much the cost of the first uneven fits must lie above that of the even one for no other to be tried [-]."""
 
-SAME_DEPTH, TOLD = 0.05, 2.0
+SAME_DEPTH, TOLD = 0.04, 2.0
 """Relative difference of optical depths up to which strips tell of the same fog, and depth up to which they tell [-].
 """
 
@@ -74,6 +74,13 @@ OBSTACLE_CHANCE = 0.01
 SWALLOWED = 1.0
 """Least optical depth of what is seen for fog ahead to be called denser [-]: it swallows most of the road there. Over
 crests and in sags road seems to fade a little."""
+
+LEAST_ROAD = 0.3
+"""Share of bins that even fog must explain for there to be a road that other fog may lie on [-]."""
+
+EXPLAINS, FEW = 0.5, 3
+"""Share of the bins that even fog leaves out, and number of them, that uneven fog may leave out and be believed: else
+what is there is an obstacle to both [-]."""
 
 STRANGE = 2.0
 """What an outlier adds to a cost beside its luminance's chance, where even fog is weighed against uneven [-]."""
@@ -179,6 +186,8 @@ def fit_uneven(
     own, even : JointFit
         Fits of even fog to the own lane, and to all lanes that agree with it.
     """
+    if even.used.mean() < LEAST_ROAD:
+        return even_fog(even, geometry)
     found = _fitted(curves, geometry, prior, even)
     if found is not None and not _fits_all(even, curves):
         lane = _fitted(curves.only([0]), geometry.only([0]), prior, own)
@@ -200,7 +209,7 @@ def _agree(own: UnevenFit, more: UnevenFit) -> bool:
     last = max(int((own.depth < TOLD).sum()) - 1, 0)
     depth, deviation = float(own.depth[last]), float(own.deviation[last])
     apart = abs(depth - float(np.interp(own.distance[last], more.distance, more.depth)))
-    return apart <= DISAGREEMENT * math.hypot(deviation, SAME_DEPTH * depth)
+    return apart <= math.hypot(deviation, SAME_DEPTH * depth)
 
 
 def _fitted(curves: StripCurves, geometry: StripGeometry, prior: JointPrior, even: JointFit) -> UnevenFit | None:
@@ -209,7 +218,8 @@ def _fitted(curves: StripCurves, geometry: StripGeometry, prior: JointPrior, eve
     farthest = float((bins.path / bins.below)[bins.noise > 0].max())
     count = min(sum(node < farthest for node in NODES) + 1, len(NODES))
     start = np.array([max(even.extinction, 1e-5), even.airlight, even.shift, 0.0])
-    evens = [_even(bins, albedo, prior, start) for albedo in range(len(ALBEDOS))]
+    costs, left_out = zip(*(_even(bins, albedo, prior, start) for albedo in range(len(ALBEDOS))), strict=True)
+    evens = list(costs)
     likely = int(np.argmin(evens))
     first = uneven_kernels.first_profile(bins, fog_nodes(*UNEVENNESS[0], count).nodes, prior)
     begin = np.concatenate([first, [prior.airlight, prior.shift, 0.0]])
@@ -223,6 +233,8 @@ def _fitted(curves: StripCurves, geometry: StripGeometry, prior: JointPrior, eve
         if unevenness not in (GENTLE, FIRST_UNEVEN):
             tried.append(_uneven(bins, likely, prior, unevenness, begin, MORE_STEPS))
     best = min(tried, key=lambda t: t.cost)
+    if _left_out(best.solution, bins) > max(EXPLAINS * left_out[likely], FEW):
+        return None
     for albedo, cost in enumerate(evens):
         if albedo != likely and cost < evens[likely] + UNLIKELY:
             tried.append(_candidate(bins, albedo, prior, best.fog, best.chance, best.solution.theta, MORE_STEPS))
@@ -303,15 +315,20 @@ def _reach(used: NDArray[np.bool_], paths: Floats) -> float:
     return float(seen.max()) if seen.size else 0.0
 
 
-def _even(bins: Bins, albedo: int, prior: JointPrior, start: Floats) -> float:
-    """Cost of even fog, as it would be with ln k as its parameter and with what is known of that."""
+def _left_out(found: Solution, bins: Bins) -> int:
+    """How many bins a fit leaves unexplained."""
+    return int(((found.used != USED) & (bins.noise > 0)).sum())
+
+
+def _even(bins: Bins, albedo: int, prior: JointPrior, start: Floats) -> tuple[float, int]:
+    """Cost of even fog, with ln k as its parameter and what is known of that; and how many bins it leaves out."""
     albedos = joint_fit.albedo_of(ALBEDOS[albedo])
     found = joint_kernels.gauss_newton(bins, albedos, prior, start, joint_fit.MORE_STEPS)
     k, variance = max(float(found.theta[0]), 1e-5), float(found.covariance[0, 0])
     apart = (math.log(k) - MEAN) / BROAD
     cost = found.cost + math.log(variance) + math.log(k * k / variance + BROAD**-2) + math.log(BROAD**2) + apart**2
     chance = ALBEDO_CHANCES[albedo] * (1.0 - sum(UNEVEN_CHANCES))
-    return cost + _hidden_cost(found, bins) - 2.0 * math.log(chance)
+    return cost + _hidden_cost(found, bins) - 2.0 * math.log(chance), _left_out(found, bins)
 
 
 def _uneven(bins: Bins, albedo: int, prior: JointPrior, unevenness: int, start: Floats, steps: int) -> _Candidate:

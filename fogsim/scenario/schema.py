@@ -149,7 +149,7 @@ class Scenario(Section):
     """The other sensors, and the faults of all."""
 
     estimators: tuple[Annotated[Method, method_of(ESTIMATORS)], ...] = Field(
-        default=(Method(method="negru2013"),), validate_default=True
+        default=(Method(method="joint_road"), Method(method="lead_contrast")), validate_default=True
     )
     """Estimators that read every frame; the agent sees the first one's estimate. None, `[]`, with `renderer: none`."""
 

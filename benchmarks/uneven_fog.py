@@ -93,7 +93,7 @@ def drives(pool: int) -> Iterator[Drive]:
     changes = "changes: [{at_s: 0, density: 0.4}, {at_s: 30, density: 2}]"
     yield Drive("thickening", (*common, "duration_s=40", f"fog={{visibility_m: {sight}, {changes}}}"), seed)
     patches = f"{{correlation_length_m: 80, strength: 0.6, seed: {seed}}}"
-    wind = f"fog={{visibility_m: {sight}, patches: {patches}, wind: {{speed_mps: 8, from_deg: 300}}}}"
+    wind = f"fog={{visibility_m: {sight}, patches: {patches}, wind: {{speed_kmh: 30, from_deg: 300}}}}"
     yield Drive("wind", (*common, "duration_s=40", wind), seed)
     shaded = f"fog={{visibility_m: {sight}, patches: {patches}, airlight_shading: 0.1}}"
     yield Drive("dimmed airlight", (*common, "duration_s=40", shaded), seed)

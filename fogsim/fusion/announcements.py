@@ -28,17 +28,22 @@ class Announcements:
     ----------
     time : float
         Over which estimates must tell of it [s].
+
+    Attributes
+    ----------
+    announced : bool
+        Whether denser fog is announced.
     """
 
     def __init__(self, time: float) -> None:
         self._window = time
         self._told: deque[tuple[float, DenserFog | None]] = deque()
-        self._announced = False
+        self.announced = False
 
     def reset(self) -> None:
         """Forget what was told."""
         self._told.clear()
-        self._announced = False
+        self.announced = False
 
     def update(self, estimates: Sequence[Estimate], time: float) -> DenserFog | None:
         """Take in the estimates of one instant.
@@ -62,15 +67,15 @@ class Announcements:
             self._told.popleft()
         told = [(when, denser) for when, denser in self._told if denser is not None]
         if not told:
-            self._announced = False
+            self.announced = False
             return None
         last = told[-1]
         agreeing = sum(_is_same(one, last) for one in told)
         share = agreeing / len(self._told)
-        enough = agreeing >= FEWEST and share >= (LEAST if self._announced else MOST)
-        spans = self._announced or time - told[0][0] >= 0.5 * self._window
-        self._announced = enough and spans
-        return last[1] if self._announced else None
+        enough = agreeing >= FEWEST and share >= (LEAST if self.announced else MOST)
+        spans = self.announced or time - told[0][0] >= 0.5 * self._window
+        self.announced = enough and spans
+        return last[1] if self.announced else None
 
 
 def _is_same(earlier: tuple[float, DenserFog], later: tuple[float, DenserFog]) -> bool:

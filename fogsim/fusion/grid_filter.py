@@ -61,6 +61,8 @@ class GridFilter:
         Standard deviation of ln k over the way to the visibility of which an estimate has seen nothing [-].
     announcement_time : float
         Time over which estimates must tell of denser fog ahead [s].
+    announced_leap_rate : float
+        Expected leaps a second while denser fog is announced, in place of `leap_rate` where that is less [1/s].
 
     Raises
     ------
@@ -78,16 +80,18 @@ class GridFilter:
         correlation_time: Annotated[float, Range(1e-3, 1e6, "s")] = 0.5,
         unseen_deviation: Annotated[float, Range(0.0, 100.0)] = 0.1,
         announcement_time: Annotated[float, Range(0.0, 1000.0, "s")] = 1.0,
+        announced_leap_rate: Annotated[float, Range(0.0, 1000.0, "1/s")] = 2.0,
     ) -> None:
-        self._drift, self._leap_rate, self._leap_scale = drift, leap_rate, leap_scale
+        self._drift, self._leap_scale = drift, leap_scale
         self._relative_floor, self._outlier_share = relative_floor, outlier_share
         self._correlation_time, self._unseen_deviation = correlation_time, unseen_deviation
         self._announcements = Announcements(announcement_time)
+        self._leap_rates = leap_rate, max(leap_rate, announced_leap_rate)
         self._log_extinction = np.linspace(LOG_LOW, LOG_HIGH, CELLS)
         self._log_extinction.flags.writeable = False
         self._extinction = np.exp(self._log_extinction)
         self._offset = (self._log_extinction[1] - self._log_extinction[0]) * np.arange(-(CELLS - 1), CELLS)
-        self._steps: dict[float, Floats] = {}
+        self._steps: dict[tuple[float, bool], Floats] = {}
         self.reset()
 
     def reset(self) -> None:
@@ -153,16 +157,17 @@ class GridFilter:
 
     def _step(self, elapsed: float) -> Floats:
         """Distribution over offsets in cells after some time; clocks round it to one of few numbers."""
-        known = self._steps.get(elapsed)
+        announced = self._announcements.announced
+        known = self._steps.get((elapsed, announced))
         if known is not None:
             return known
         walk = self._walk(self._drift * math.sqrt(elapsed))
         leap = np.exp(-np.abs(self._offset) / self._leap_scale)
-        leaps = -math.expm1(-self._leap_rate * elapsed)
+        leaps = -math.expm1(-self._leap_rates[announced] * elapsed)
         step = np.asarray((1.0 - leaps) * walk + leaps * leap / leap.sum())
         if len(self._steps) == _MOST_STEPS:
             self._steps.clear()
-        self._steps[elapsed] = step
+        self._steps[elapsed, announced] = step
         return step
 
     def _walk(self, deviation: float) -> Floats:

@@ -85,7 +85,7 @@ def test_a_resolved_scenario_is_read_as_what_it_was(tmp_path: Path) -> None:
         ("a: {never: slow.speed > 3 kg}", "the unit 'kg' does not fit"),
         ("a: {never: gap(ego, slwo) < 3 m}", "there is no vehicle 'slwo' in"),
         ("a: {never: signal(C).state == red}", "the net has no traffic lights 'C'; it has none"),
-        ("a: {never: estimate(joint_road).valid}", "unknown estimator 'joint_road'; known: negru2013"),
+        ("a: {never: estimate(negru2013).valid}", "unknown estimator 'negru2013'; known: joint_road, lead_contrast"),
         ("a: {never: fog.bank(0)}", "there is no fog.banks.0; the fog has no banks"),
         ("a: {happened: timeline.0}", "unknown event 'timeline.0'"),
         ("a: {never: happened(cut_in)}", "unknown event 'cut_in'"),
@@ -119,7 +119,7 @@ def test_without_frames_and_ego_less_can_be_told(tmp_path: Path) -> None:
         ("mean_speed_mps > 72 km/h", 20.0),
         ("belief_median_error_percent < 20 %", 20.0),
         ("belief_median_error_percent < 20", 20.0),
-        ("estimators.negru2013.valid_share >= 0.5", 0.5),
+        ("estimators.joint_road.valid_share >= 0.5", 0.5),
         ("ending == arrived", "arrived"),
     ],
 )

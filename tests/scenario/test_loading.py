@@ -115,7 +115,7 @@ def test_an_unknown_key_inside_a_list(folder: Path) -> None:
         ("edge_m: 300", "edge_m: 3000", r"fog\.banks\.0: edge_m must not be longer than the bank"),
         ("visibility_m: 60", "visibility_m: 0", r"fog\.banks\.0\.visibility_m: .* greater than or equal to 1; got 0"),
         ("outside_visibility_m: 2000", "visibility_m: 2000", r"fog: give either visibility_m .* not both"),
-        ("[negru2013]", "[negru2014]", r"estimators\.0: unknown estimator 'negru2014'; did you mean 'negru2013'\?"),
+        ("[joint_road,", "[joint_rode,", r"estimators\.0: unknown estimator 'joint_rode'; did you mean 'joint_road'\?"),
         ("fusion: grid_filter", "fusion: kalman", r"fusion: unknown fusion 'kalman'; known: grid_filter"),
         (
             "reaction_time: 2.0",
@@ -170,7 +170,7 @@ def test_every_missing_file_is_told(folder: Path) -> None:
 
 def test_no_second_message_follows_a_mistake(folder: Path) -> None:
     with pytest.raises(InputError) as error:
-        load_scenario(spoil(folder, "[negru2013]", "[negru2014]"))
+        load_scenario(spoil(folder, "[joint_road,", "[joint_rode,"))
     assert len(str(error.value).splitlines()) == 1
 
 

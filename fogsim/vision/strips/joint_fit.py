@@ -24,10 +24,10 @@ ALBEDOS = (
     (0.015, 0.005, 0.0),
     (0.015, 0.04, 0.0),
     (0.015, 0.12, 0.0),
-    (0.015, 0.02, 0.1),
-    (0.04, 0.05, 0.1),
-    (0.08, 0.1, 0.1),
-    (0.2, 0.3, 0.1),
+    (0.015, 0.02, 0.07),
+    (0.04, 0.05, 0.07),
+    (0.08, 0.1, 0.07),
+    (0.2, 0.3, 0.07),
 )
 """Deviations of patches and of drift that are tried, relative to the road's luminance, and of the part of the sky's
 light that the road reflects at grazing angles [-]."""

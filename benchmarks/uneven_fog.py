@@ -137,6 +137,8 @@ def judge(step: Step, estimate: Estimate, found: Found) -> None:
     if not estimate.valid:
         return
     truth = true_extinction(step, estimate)
+    if truth <= 0.0:
+        return  # clear air has no relative error
     found.off.append(math.log(max(estimate.extinction, 1e-6) / truth))
     found.held.append(abs(estimate.extinction - truth) <= NORMAL_90_PERCENT * estimate.standard_deviation)
     curve = estimate.optical_depths

@@ -196,7 +196,8 @@ class LeadContrast:
         reason = _doubt(fit, road)
         if reason:
             return Estimate.invalid(self.method, reason, **found)
-        return Estimate(self.method, max(fit.extinction, 0.0), fit.deviation, diagnostics=found)
+        reach = float(self._track.likely_distances().max()) + self._setback
+        return Estimate(self.method, max(fit.extinction, 0.0), fit.deviation, diagnostics=found, reach=reach)
 
     def _fit(self) -> DecayFit | None:
         if len(self._track.detections) < MIN_SAMPLES or sum(one.alike for one in self._track.detections) < MIN_ALIKE:

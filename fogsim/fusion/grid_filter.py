@@ -41,7 +41,7 @@ class GridFilter:
 
     An estimate speaks of the fog up to its `reach`. Where that is nearer than the visibility that it gives, the fog
     beyond may be another, and it counts for less the less of the way it has seen. Denser fog ahead is believed once
-    most estimates of the last `announcement_time` tell of it.
+    most estimates of the last `announcement_time` tell of it; estimates that do not reach as far then say nothing.
 
     Parameters
     ----------
@@ -123,8 +123,12 @@ class GridFilter:
             If the time is not finite or goes backward.
         """
         self._advance(time)
+        denser = self._announcements.update(estimates, time)
+        farthest = 0.0 if denser is None else denser.distance
         log_likelihood = np.zeros(CELLS)
         for estimate in estimates:
+            if estimate.reach < farthest:
+                continue
             if estimate.valid and math.isfinite(estimate.extinction) and math.isfinite(estimate.standard_deviation):
                 log_likelihood += self._weight * self._log_likelihood(estimate)
             elif estimate.bounds is not None:
@@ -132,7 +136,6 @@ class GridFilter:
         # The largest exponent is zero: no product of densities can overflow, and the sum cannot vanish.
         posterior = self._probability * np.exp(log_likelihood - log_likelihood.max())
         self._probability = posterior / posterior.sum()
-        denser = self._announcements.update(estimates, time)
         return Belief(self._log_extinction, self._probability.copy(), denser)
 
     def _advance(self, time: float) -> None:

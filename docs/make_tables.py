@@ -5,6 +5,7 @@ import re
 import sys
 from collections.abc import Sequence
 from dataclasses import astuple, fields
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
@@ -15,6 +16,10 @@ from pydantic_core import PydanticUndefined
 from fogsim.advice import ADVISERS
 from fogsim.conditions import SIGNALS
 from fogsim.estimators import ESTIMATORS
+from fogsim.estimators.huang2015_medians import Huang2015Repair
+from fogsim.estimators.negru2013 import Negru2013Repair
+from fogsim.estimators.repairs import Repair
+from fogsim.estimators.zhu2015_road import Zhu2015Repair
 from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.lighting.legal import LAWS
@@ -166,6 +171,11 @@ def methods() -> list[tuple[str, ...]]:
     return [(f"`{name}`", (inspect.getdoc(method) or "").partition("\n")[0]) for name, method in ESTIMATORS.items()]
 
 
+def repairs(kind: type[Repair]) -> list[tuple[str, ...]]:
+    """Repairs of a paper's method: name, what the paper has, and what is done instead."""
+    return [(f"`{one.value}`", one.paper, one.corrected) for one in kind]
+
+
 def parameters() -> list[tuple[str, ...]]:
     """Parameters of every method that a scenario can name, with what they may be."""
     rows = []
@@ -268,6 +278,14 @@ TABLES = {
             ("`like`", "`reached_share`", "`rate`", "`strength`", "`delay_s`", "`trust`", "`foreseen`"),
             compliances,
         ),
+    },
+    "estimators.md": {
+        f"repairs-{name}": (("repair", "the paper", "corrected (the default)"), partial(repairs, kind))
+        for name, kind in (
+            ("negru2013", Negru2013Repair),
+            ("zhu2015", Zhu2015Repair),
+            ("huang2015_rough", Huang2015Repair),
+        )
     },
     "estimate.md": {"methods": (("method", "what it reads"), methods)},
     "scenarios.md": {

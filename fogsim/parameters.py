@@ -5,11 +5,12 @@ import inspect
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from numbers import Integral, Real
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
-from fogsim.errors import InputError, shown, suggest
+from fogsim.errors import InputError, nearest, shown, suggest
 
 T = TypeVar("T")
 
@@ -43,9 +44,9 @@ FINITE = Range()
 def checked_parameters(cls: type[T]) -> type[T]:
     """Class decorator: the constructor refuses arguments that its annotations do not allow.
 
-    Checked are ``float`` (finite, of any type of real number), ``int``, ``bool``, ``str`` and ``Literal``, with a
-    `Range` in ``Annotated``, unions and sequences of them; arguments of other types are left to the class. The
-    constructor then raises InputError.
+    Checked are ``float`` (finite, of any type of real number), ``int``, ``bool``, ``str``, ``Literal`` and the names of
+    a ``StrEnum``, with a `Range` in ``Annotated``, unions and sequences of them; arguments of other types are left to
+    the class. The constructor then raises InputError.
     """
     construct = cls.__init__
     signature = inspect.signature(construct, eval_str=True)
@@ -110,7 +111,7 @@ def mismatch(annotation: object, value: object) -> str | None:
     Parameters
     ----------
     annotation : object
-        Of a parameter: a type, a union, a Literal, a Sequence of one of them, or Annotated with a `Range`.
+        Of a parameter: a type, a StrEnum, a union, a Literal, a Sequence of one of them, or Annotated with a `Range`.
     value : object
         What was given.
 
@@ -122,17 +123,27 @@ def mismatch(annotation: object, value: object) -> str | None:
     origin, parts = get_origin(annotation), get_args(annotation)
     if origin in (Union, UnionType):
         expected = [mismatch(part, value) for part in parts]
-        told = [one for one in expected if one is not None]
-        return None if len(told) < len(expected) else " or ".join(told)
+        wrong = [one for one in expected if one is not None]
+        return None if len(wrong) < len(expected) else " or ".join(wrong)
     if origin is Literal:
         fits = any(type(value) is type(part) and value == part for part in parts)
         return None if fits else " or ".join(map(repr, parts))
     if origin is Sequence:
         entries = value if isinstance(value, list | tuple) else ()
-        fitting = len(entries) > 0 and all(mismatch(parts[0], one) is None for one in entries)
-        return None if fitting else f"a list, each {mismatch(parts[0], object())}"
+        wrong = [one for one in (mismatch(parts[0], entry) for entry in entries or [object()]) if one is not None]
+        return f"a list, each {wrong[0]}" if wrong else None
+    if isinstance(annotation, type) and issubclass(annotation, StrEnum):
+        return _unknown_name(annotation, value)
     interval = next((part for part in parts if isinstance(part, Range)), FINITE)
     return _plain_mismatch(parts[0] if origin is Annotated else annotation, interval, value)
+
+
+def _unknown_name(names: type[StrEnum], value: object) -> str | None:
+    known = [one.value for one in names]
+    if isinstance(value, str) and value in known:
+        return None
+    near = nearest(value, known) if isinstance(value, str) else None
+    return f"one of {', '.join(known)}" + (f" (did you mean {near!r}?)" if near else "")
 
 
 def _plain_mismatch(kind: object, interval: Range, value: Any) -> str | None:

@@ -68,7 +68,7 @@ def _evaluated(name: str, evaluation: "Evaluation") -> "Reproduction":
 
 def _show(done: "Reproduction", *, as_json: bool) -> None:
     if as_json:
-        for record in done.records:
+        for record in (*done.records, *done.sweeps):
             typer.echo(json.dumps(record, allow_nan=False))
         return
     # Files and pipes have no width that rows must be broken for.

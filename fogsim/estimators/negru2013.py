@@ -2,14 +2,16 @@
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.estimators.image_check import ObservationCheck
-from fogsim.estimators.negru2013_band import SeenBand, fog_slope, road_band, road_curve
+from fogsim.estimators.negru2013_band import SeenBand, fog_slope, narrowed_curve, road_band, road_curve
+from fogsim.estimators.repairs import Repair, chosen
 from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
@@ -23,15 +25,20 @@ from fogsim.vision.lines.gradient_lines import consensus_vanishing_point
 from fogsim.vision.lines.horizon import PITCH_DEVIATION, Horizon, PitchDeviation, calibrated_horizon, weighted_mean
 from fogsim.vision.lines.road_lines import road_vanishing_point
 from fogsim.vision.lines.vanishing_point import VanishingPoint
-from fogsim.vision.region.inflection import FogModel, best_inflection, printed_inflection
+from fogsim.vision.region.curve_checks import SURE_OF_FOG, check_law, seen_up_to, told
+from fogsim.vision.region.inflection import (
+    FogModel,
+    Parameters,
+    best_inflection,
+    inflection_parameters,
+    printed_inflection,
+    printed_parameters,
+)
+from fogsim.vision.region.law import extinction_deviation
 from fogsim.vision.region.profile import RoadCurve, band_profile
 from fogsim.vision.region.road_image import MIN_CONTRAST, MIN_ROWS, SATURATED, CannotTellError, RoadImage, road_image
-from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, no_road
-from fogsim.vision.strips.joint_fit import JointFit, fit_jointly
-from fogsim.vision.strips.joint_prior import joint_prior
-from fogsim.vision.strips.sky import sky_above
-from fogsim.vision.strips.strip_curves import lowest_road_row, strip_curves, without_clipped
-from fogsim.vision.strips.strip_geometry import band_geometry
+from fogsim.vision.region.subpixel_inflection import subpixel_inflections
+from fogsim.vision.strips.strip_curves import lowest_road_row
 
 MAX_ASIDE = 0.1
 """Share of the image's width by which a clear road may lie beside the vanishing column [-]."""
@@ -46,10 +53,56 @@ NEAR_HORIZON = 4.0  # [px] a region that ends this close below the horizon has s
 REACH = math.radians(4.0)  # [rad] about the assumed vanishing point, within which lines of the road may pass
 ALBEDO_DEVIATION = 0.015  # [-] of k by slow changes of the road's reflectance, which one row's inflection does not show
 MAX_RESIDUAL = 0.12  # [-] of the fitted contrast: more is no curve of Koschmieder's
-MIN_USED = 0.6  # [-] least share of the band's rows that must fit
-SURE_OF_FOG = 4.5  # [-] least k in its standard deviations
-USUAL_HEIGHT = 1.3  # [m] of a camera, for which the lengths of the fit are meant
-MODEL_DEVIATION = 0.02  # [-] of k by what the model leaves out: dark corners, marks, a road that is not quite flat
+HALF_PAVED, OTHER_GROUND = 4.0, 0.2
+"""How far to either side the ground is as the road is [m], and relative deviation of k where the band leaves it at
+twice the inflection's height below the horizon or lower: another albedo begins there [-]."""
+
+BETWEEN = 1.0
+"""Rows about the horizon that are neither road nor sky [px]."""
+
+
+class Negru2013Repair(Repair):
+    """What the corrected negru2013 does otherwise than the paper."""
+
+    SIGNS = (
+        "signs",
+        "eqs. 17 and 18 have the wrong sign of dI/dv for rows that count downward (A∞ = 162 where the truth is 200), so"
+        " most choose a row that is no inflection, or none",
+        "the signs that follow from eq. 15",
+    )
+    LINEAR_LUMINANCE = (
+        "linear_luminance",
+        "pixel values stand for luminance",
+        "the camera's response is undone, for Koschmieder's law is of light",
+    )
+    FOG_DRAWS_NO_EDGES = (
+        "fog_draws_no_edges",
+        "edges include the fog's own gradient, which stops the region where it is steepest or where road meets sky",
+        "each row's gradient is taken away as far as fog can make it",
+    )
+    BAND_AHEAD = (
+        "band_ahead",
+        "the widest vertical band, wherever it lies, which may be verge, and far away is wider than the road",
+        "a band of limited width nearest to the vanishing point, which narrows with the road (± 2.5 m), above the own"
+        " bonnet",
+    )
+    SUBPIXEL_HORIZON = (
+        "subpixel_horizon",
+        "the vanishing point is the centre of mass of intersections of Hough's whole-pixel lines, and far off",
+        "lines within the pixel, weighed against the calibration",
+    )
+    SUBPIXEL_INFLECTION = (
+        "subpixel_inflection",
+        "the inflection is one of the rows, and 1 px is 20 % of V_met at 300 m (λ = 1000 px·m); its level and slope are"
+        " those of that row alone",
+        "candidates lie between rows as well, each one's level and slope are those of eqs. 15 to 18 over the rows about"
+        " it, and the one whose model leaves least of the curve counts, as published",
+    )
+    SINGLE_FRAMES = (
+        "single_frames",
+        "of the last N frames the best counts, which holds on to old fog (hundreds of frames for the horizon)",
+        "each frame stands alone with its deviation; averaging is the fusion's",
+    )
 
 
 @checked_parameters
@@ -63,13 +116,8 @@ class Negru2013:
     last `horizon_frames` frames that with the highest score (that of the calibration until there is one), k is read
     off the inflection's row, and of the last `inflection_frames` frames the one whose curve fits best counts.
     `printed_signs` also takes eqs. 17 and 18 as they are printed, whose signs are wrong for rows that count downward
-    (they give A = 162 where the truth is 200, and mostly choose a wrong row).
-
-    Corrected (the default), lines are fitted within the pixel and the frame's own vanishing point is weighed against
-    the calibration; luminance is linear, because Koschmieder's law is; the fog's own gradient draws no edges; the band
-    is of limited width and near the vanishing point, where the road is; and k, R and A are those of least squares over
-    the whole curve, instead of those that one row gives. Frames stand alone: averaging is the fusion's job, with the
-    uncertainties.
+    (they give A = 162 where the truth is 200, and mostly choose a wrong row). What the corrected form (the default)
+    does otherwise is listed in `Negru2013Repair`, and can be switched one by one.
 
     A region that reaches the horizon without an inflection gives k = 0 with the detection limit as its deviation;
     whatever else stands in the way gives an invalid estimate with the reason in its diagnostics. Daytime only, flat
@@ -80,13 +128,15 @@ class Negru2013:
     camera : Camera
         The assumed calibration.
     as_published : bool
-        Follow the paper where it is less accurate than what is known today.
+        Make no repairs but that of the signs, without which it finds nothing.
+    repairs : {'all', 'none'} or list of str
+        Which of the repairs are made.
     printed_signs : bool
-        With `as_published`: take its eqs. 17 and 18 with their wrong signs.
+        Take eqs. 17 and 18 with their wrong signs, whatever else is repaired.
     vanishing_point : bool
         Look for the vanishing point of the road's lines; else the calibration alone gives the horizon.
     horizon_frames, inflection_frames : int
-        With `as_published`: frames of the temporal schemes.
+        Frames of the temporal schemes, where frames do not stand alone.
     pitch_deviation : float
         Standard deviation of the true pitch about the assumed one [rad].
 
@@ -103,6 +153,7 @@ class Negru2013:
         camera: Camera,
         *,
         as_published: bool = False,
+        repairs: Literal["all", "none"] | Sequence[Negru2013Repair] = "all",
         printed_signs: bool = False,
         vanishing_point: bool = True,
         horizon_frames: Annotated[int, Range(1, 100_000)] = 500,
@@ -110,14 +161,14 @@ class Negru2013:
         pitch_deviation: PitchDeviation = PITCH_DEVIATION,
     ) -> None:
         self._check = ObservationCheck(camera)
-        # The fit takes the distances of a camera of the usual height: flat roads scale with it.
-        self._camera, self._usual = camera, replace(camera, mount_height=USUAL_HEIGHT)
-        self._assumed = calibrated_horizon(camera, pitch_deviation)
-        self._as_published, self._looks_for_lines = as_published, vanishing_point
-        self._model = printed_inflection if printed_signs else best_inflection
+        self._camera, self._assumed = camera, calibrated_horizon(camera, pitch_deviation)
+        made = chosen(Negru2013Repair, repairs, as_published=as_published, published=(Negru2013Repair.SIGNS,))
+        self._repairs = made - {Negru2013Repair.SIGNS} if printed_signs else made
+        self._looks_for_lines = vanishing_point
+        alone = Negru2013Repair.SINGLE_FRAMES in self._repairs
         self._detector = CannyDeriche()
-        self._points: deque[VanishingPoint] = deque(maxlen=int(horizon_frames))
-        self._models: deque[FogModel] = deque(maxlen=int(inflection_frames))
+        self._points: deque[VanishingPoint] = deque(maxlen=1 if alone else int(horizon_frames))
+        self._models: deque[FogModel] = deque(maxlen=1 if alone else int(inflection_frames))
 
     def reset(self) -> None:
         """Forget the vanishing points and inflections of earlier frames."""
@@ -147,38 +198,29 @@ class Negru2013:
         image = self._check.image_of(observation)
         diagnostics: dict[str, object] = {"horizon_row": self._camera.horizon_row}
         try:
-            road, pixels = self._road(image)
-            slope = fog_slope(road, self._assumed)
-            edges = self._edges(road, slope)
-            horizon = self._horizon(edges, road, pixels)
-            diagnostics["horizon_row"] = horizon.row
-            band = road_band(road, edges, slope, self._camera)
-            diagnostics["band"] = (band.left, band.right, band.top + road.first_row, band.bottom + road.first_row)
-            here = replace(band, left=band.left - road.first_column, right=band.right - road.first_column)
-            seen = SeenBand(road, pixels, horizon, band, band_profile(road.luminance, here))
-            diagnostics["profile"] = seen.profile
-            return self._published(seen, diagnostics) if self._as_published else self._corrected(seen, diagnostics)
+            return self._read(image, diagnostics)
         except CannotTellError as reason:
             return Estimate.invalid(self.method, str(reason), **diagnostics)
 
-    def _road(self, image: NDArray[np.uint8] | NDArray[np.uint16]) -> tuple[RoadImage, LinearPixels]:
-        """Road from a little above the horizon down to the image's bottom or (corrected) the own bonnet."""
-        if self._as_published:
-            road = road_image(image, self._camera, self._assumed)
-            return road, linear_pixels(road.level, self._camera)
-        # A band may lie in the middle only: the verges would but cost time.
-        centre, reach = self._camera.principal_point[0], max(MIDDLE * self._camera.width, LEAST_MIDDLE)
-        columns = max(math.ceil(centre - reach), 0), min(math.floor(centre + reach) + 1, self._camera.width)
-        road = road_image(image, self._camera, self._assumed, columns)
-        pixels = linear_pixels(road.level, self._camera)
-        lowest = lowest_road_row(pixels, self._camera, road.airlight)
-        luminance = road.luminance[: lowest + 1 - road.first_row]
-        return replace(road, luminance=luminance, road=median(luminance[-1])), pixels
-
-    def _published(self, seen: SeenBand, diagnostics: dict[str, object]) -> Estimate:
-        """Fog from the row of the inflection, of the last frames the one whose curve fits best."""
-        horizon, curve = seen.horizon, road_curve(seen, self._camera)
-        model = _credible(self._inflection(curve), curve, seen.road)
+    def _read(self, image: NDArray[np.uint8] | NDArray[np.uint16], diagnostics: dict[str, object]) -> Estimate:
+        road, pixels = self._road(image)
+        slope = fog_slope(road, self._assumed)
+        edges = self._edges(road, slope)
+        horizon, axis = self._horizon(edges, road, pixels)
+        diagnostics["horizon_row"] = horizon.row
+        ahead = Negru2013Repair.BAND_AHEAD in self._repairs
+        band = road_band(road, edges, slope, self._camera, widest=not ahead)
+        diagnostics["band"] = (band.left, band.right, band.top + road.first_row, band.bottom + road.first_row)
+        here = replace(band, left=band.left - road.first_column, right=band.right - road.first_column)
+        seen = SeenBand(road, horizon, band, band_profile(road.luminance, here))
+        diagnostics["profile"] = seen.profile
+        curve = narrowed_curve(seen, axis, self._camera) if ahead else road_curve(seen, self._camera)
+        paved = abs(0.5 * (band.left + band.right) - axis) * self._camera.row_distance
+        paved /= HALF_PAVED * self._camera.focal_length
+        if curve.weight.sum() < MIN_ROWS // 2:
+            raise CannotTellError("too little road is seen")
+        whole = Negru2013Repair.SUBPIXEL_INFLECTION not in self._repairs
+        model = self._whole_row(curve, seen) if whole else self._between_rows(curve, seen, paved)
         if model is None:
             self._check_clear_view(seen)
             # An inflection needs a row on either side: the topmost that could have been seen is the second.
@@ -187,72 +229,97 @@ class Negru2013:
             return Estimate(self.method, 0.0, limit, diagnostics=diagnostics)
         self._models.append(model)
         model = min(self._models, key=lambda m: m.residual / max(m.airlight - m.road, 1e-9))
-        by_horizon = model.horizon_sensitivity * horizon.standard_deviation
-        deviation = math.hypot(model.standard_deviation, by_horizon, ALBEDO_DEVIATION * model.extinction)
         inflection = horizon.row + 0.5 * model.extinction * self._camera.row_distance
         found = {"inflection_row": inflection, "airlight": model.airlight, "road": model.road}
-        return Estimate(self.method, model.extinction, deviation, diagnostics={**diagnostics, **found})
+        return Estimate(self.method, model.extinction, model.standard_deviation, diagnostics=diagnostics | found)
 
-    def _corrected(self, seen: SeenBand, diagnostics: dict[str, object]) -> Estimate:
-        """Fog from all rows of the band, whose albedo may wander, and the sky."""
-        fit = self._fit(seen)
-        scale = USUAL_HEIGHT / self._camera.mount_height
-        k = scale * fit.extinction
-        deviation = math.hypot(scale * fit.extinction_deviation, MODEL_DEVIATION * k)
-        found = {"airlight": fit.airlight, "road": fit.road, "horizon_row": self._camera.horizon_row + fit.shift}
-        if k < SURE_OF_FOG * deviation:
-            self._check_clear_view(seen)
-            if k + SURE_OF_FOG * deviation > CLEAR:
-                raise CannotTellError("the extinction is not observable: too little road is seen")
-            return Estimate(self.method, 0.0, math.hypot(max(k, 0.0), deviation), diagnostics={**diagnostics, **found})
-        found["inflection_row"] = found["horizon_row"] + 0.5 * k * self._camera.row_distance
-        return Estimate(self.method, k, deviation, diagnostics={**diagnostics, **found})
+    def _road(self, image: NDArray[np.uint8] | NDArray[np.uint16]) -> tuple[RoadImage, LinearPixels]:
+        """Road from a little above the horizon down to the image's bottom or (repaired) the own bonnet."""
+        linear = Negru2013Repair.LINEAR_LUMINANCE in self._repairs
+        if Negru2013Repair.BAND_AHEAD not in self._repairs:
+            road = road_image(image, self._camera, self._assumed, linear=linear)
+            return road, linear_pixels(road.level, self._camera)
+        # A band may lie in the middle only: the verges would but cost time.
+        centre, reach = self._camera.principal_point[0], max(MIDDLE * self._camera.width, LEAST_MIDDLE)
+        columns = max(math.ceil(centre - reach), 0), min(math.floor(centre + reach) + 1, self._camera.width)
+        road = road_image(image, self._camera, self._assumed, columns, linear=linear)
+        pixels = linear_pixels(road.level, self._camera)
+        lowest = lowest_road_row(pixels, self._camera, road.airlight)
+        luminance = road.luminance[: lowest + 1 - road.first_row]
+        return replace(road, luminance=luminance, road=median(luminance[-1])), pixels
 
-    def _fit(self, seen: SeenBand) -> JointFit:
-        """Fit of the band, in distances of a camera of the usual height."""
-        camera, pixels, band, horizon = self._usual, seen.pixels, seen.band, seen.horizon
-        sky = sky_above(pixels, camera, 3.0 * self._assumed.standard_deviation + 2.0)
-        if sky is None:
-            raise CannotTellError("no sky is seen above the horizon")
-        rows = (band.top + seen.road.first_row, band.bottom + seen.road.first_row)
-        nearest = max(1.0, horizon.standard_deviation) + max(horizon.row - camera.horizon_row, 0.0)
-        geometry = band_geometry(camera, nearest, (band.left, band.right), rows)
-        curves = strip_curves(pixels, geometry, sky.noise, camera)
-        curves = without_clipped(curves) if sky.is_clipped else curves
-        fit = fit_jointly(curves, geometry, joint_prior(sky, camera, horizon))
-        if fit is None:
-            raise CannotTellError("too little road is seen")
-        if fit.road >= (1.0 - LEAST_CONTRAST) * fit.airlight:
-            raise CannotTellError("the road is nearly as bright as the airlight, or brighter")
-        if fit.used[0].sum() < MIN_USED * (curves.variance[0] > 0).sum():
-            raise CannotTellError("the road ahead is hidden, or is none")
-        if fit.misfit > MAX_MISFIT:
-            raise CannotTellError("the road fades into the airlight, but not as Koschmieder's law has it")
-        if why := no_road(fit, curves, geometry, camera):
-            raise CannotTellError(why)
-        return fit
+    def _whole_row(self, curve: RoadCurve, seen: SeenBand) -> FogModel | None:
+        """Fog from the row of the inflection; None where there is no credible one."""
+        inflection = best_inflection if Negru2013Repair.SIGNS in self._repairs else printed_inflection
+        model = _credible(inflection(curve), curve, seen.road)
+        if model is None:
+            return None
+        by_horizon = model.horizon_sensitivity * seen.horizon.standard_deviation
+        deviation = math.hypot(model.standard_deviation, by_horizon, ALBEDO_DEVIATION * model.extinction)
+        return replace(model, standard_deviation=deviation)
+
+    def _between_rows(self, curve: RoadCurve, seen: SeenBand, paved: float) -> FogModel | None:
+        """Fog from the inflection between rows; None where what there is may as well be none.
+
+        The band is on the road from `paved` rows below the horizon downward.
+        """
+        apart = np.abs(curve.below_horizon) > BETWEEN
+        curve = replace(curve, weight=curve.weight * apart)
+        extinction = float(self._extinctions(curve, curve.luminance[:, None])[0])
+        if not extinction > 0.0:
+            return None
+        deviation = extinction_deviation(curve, extinction, self._extinctions, seen.horizon.standard_deviation)
+        beside = min(max(2.0 * paved / (extinction * curve.row_distance) - 1.0, 0.0), 1.0)
+        deviation = math.hypot(deviation, OTHER_GROUND * beside * extinction)
+        if extinction < SURE_OF_FOG * deviation:
+            told(extinction, deviation)
+            return None
+        try:
+            airlight, dark = check_law(curve, extinction, seen.road)
+        except CannotTellError:
+            # What hides the road is the better reason.
+            seen_up_to(curve)
+            raise
+        _, square = subpixel_inflections(curve, curve.luminance[:, None], self._parameters)
+        per_row = -2.0 / curve.row_distance
+        return FogModel(extinction, dark, airlight, deviation, per_row, math.sqrt(float(square[0])))
+
+    @property
+    def _parameters(self) -> Parameters:
+        return inflection_parameters if Negru2013Repair.SIGNS in self._repairs else printed_parameters
+
+    def _extinctions(self, curve: RoadCurve, luminance: NDArray[np.float64]) -> NDArray[np.float64]:
+        rows, _ = subpixel_inflections(curve, luminance, self._parameters)
+        return np.asarray(2.0 / curve.row_distance * rows)
 
     def _edges(self, road: RoadImage, slope: NDArray[np.float32]) -> Edges:
-        edges = self._detector(road.luminance, slope)
+        edges = self._detector(road.luminance, slope if Negru2013Repair.FOG_DRAWS_NO_EDGES in self._repairs else None)
         if edges.threshold > road.contrast:
             raise CannotTellError("noise or texture drowns the contrast of road and airlight")
         return edges
 
-    def _horizon(self, edges: Edges, road: RoadImage, pixels: LinearPixels) -> Horizon:
-        """Assumed horizon and vanishing point, weighed (corrected), or the best vanishing point of late (published)."""
+    def _horizon(self, edges: Edges, road: RoadImage, pixels: LinearPixels) -> tuple[Horizon, float]:
+        """Horizon and vanishing column: assumed and seen ones, weighed (repaired), or the best of late (published)."""
+        straight_ahead = self._camera.principal_point[0]
         if not self._looks_for_lines:
-            return self._assumed
-        if not self._as_published:
+            return self._assumed, straight_ahead
+        if Negru2013Repair.SUBPIXEL_HORIZON in self._repairs:
             seen = road_vanishing_point(pixels, self._camera, self._assumed)
-            return self._assumed if seen is None else weighted_mean(self._assumed, seen.horizon)
-        guess = (self._camera.principal_point[0], self._assumed.row - road.first_row)
+            return (
+                (self._assumed, straight_ahead)
+                if seen is None
+                else (weighted_mean(self._assumed, seen.horizon), seen.column)
+            )
+        guess = (straight_ahead - road.first_column, self._assumed.row - road.first_row)
         reach = max(REACH * self._camera.focal_length, 8.0)
         point = consensus_vanishing_point(edges.gradient, edges.pixels, guess, reach)
         if point is not None:
-            self._points.append(replace(point, row=point.row + road.first_row))
+            row, column = point.row + road.first_row, point.column + road.first_column
+            self._points.append(replace(point, row=row, column=column))
         best = max(self._points, key=lambda p: p.support, default=None)
-        found = self._assumed if best is None else best.horizon
-        return found if 1.0 <= found.row <= self._camera.height - 1 - MIN_ROWS else self._assumed
+        if best is None or not 1.0 <= best.row <= self._camera.height - 1 - MIN_ROWS:
+            return self._assumed, straight_ahead
+        return best.horizon, best.column
 
     def _check_clear_view(self, seen: SeenBand) -> None:
         """Refuse to say "no fog" of anything but the road itself, seen up to the horizon where it vanishes.
@@ -269,11 +336,6 @@ class Negru2013:
             raise CannotTellError("the road ahead is hidden: a dark surface is seen only beside it")
         if -top > MAX_ABOVE * self._camera.height:
             raise CannotTellError("what is seen of the road goes on above the horizon: it is no road")
-
-    def _inflection(self, curve: RoadCurve) -> FogModel | None:
-        if curve.weight.sum() < MIN_ROWS // 2:
-            return None
-        return self._model(curve)
 
 
 def _credible(model: FogModel | None, curve: RoadCurve, road: RoadImage) -> FogModel | None:

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
-from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.lines.edges import Edges, smoothed
 from fogsim.vision.lines.horizon import Horizon
+from fogsim.vision.region.corridor import corridor_curve
 from fogsim.vision.region.inflection import steepest_slope
 from fogsim.vision.region.profile import RoadCurve, path_lengths
 from fogsim.vision.region.road_image import MIN_ROWS, SATURATED, CannotTellError, RoadImage
@@ -25,8 +25,6 @@ class SeenBand:
     ----------
     road : RoadImage
         The picture, cut out and linear.
-    pixels : LinearPixels
-        The whole picture without roll.
     horizon : Horizon
         The horizon above it.
     band : Band
@@ -36,7 +34,6 @@ class SeenBand:
     """
 
     road: RoadImage
-    pixels: LinearPixels
     horizon: Horizon
     band: Band
     profile: NDArray[np.float64]
@@ -62,7 +59,9 @@ def fog_slope(road: RoadImage, horizon: Horizon) -> NDArray[np.float32]:
     return np.minimum(steepest_slope(below_horizon, road.airlight), SIMILARITY * road.contrast).astype(np.float32)
 
 
-def road_band(road: RoadImage, edges: Edges, slope: NDArray[np.float32], camera: Camera) -> Band:
+def road_band(
+    road: RoadImage, edges: Edges, slope: NDArray[np.float32], camera: Camera, *, widest: bool = False
+) -> Band:
     """Find the band of road: columns are counted in the whole picture, rows in that of the road.
 
     Parameters
@@ -75,6 +74,9 @@ def road_band(road: RoadImage, edges: Edges, slope: NDArray[np.float32], camera:
         What fog can change from row to row, see `fog_slope`.
     camera : Camera
         The assumed calibration.
+    widest : bool
+        Take the widest band wherever it is, as published; else of those of a limited width that nearest to the
+        vanishing point.
 
     Raises
     ------
@@ -85,12 +87,38 @@ def road_band(road: RoadImage, edges: Edges, slope: NDArray[np.float32], camera:
     limits = cumulative_limits(steps, SIMILARITY * road.contrast + edges.threshold)
     region = grow_region(blurred, edges.pixels, limits)
     cols, centre = camera.width, camera.principal_point[0] - road.first_column
+    most = cols if widest else max(5, cols // 24)
     band = crossing_band(
-        region, blurred, centre, min_width=max(3, cols // 80), max_width=max(5, cols // 24), hole=max(2, cols // 128)
+        region, blurred, centre, min_width=max(3, cols // 80), max_width=most, hole=max(2, cols // 128)
     )
     if band is None or band.bottom - band.top < MIN_ROWS // 2:
         raise CannotTellError("no vertical band crosses the road's region")
     return replace(band, left=band.left + road.first_column, right=band.right + road.first_column)
+
+
+def narrowed_curve(seen: SeenBand, axis: float, camera: Camera) -> RoadCurve:
+    """Luminance of a band of road by row, as far as it is road: a band before the vehicle narrows upward with it.
+
+    Parameters
+    ----------
+    seen : SeenBand
+        The band.
+    axis : float
+        Column of the vanishing point [px].
+    camera : Camera
+        The assumed calibration.
+    """
+    road, band = seen.road, seen.band
+    if not band.left <= axis <= band.right:
+        # What is seen beside a vehicle ahead is all there is.
+        return road_curve(seen, camera)
+    inside = np.zeros(road.luminance.shape, np.uint8)
+    inside[band.top : band.bottom + 1, band.left - road.first_column : band.right + 1 - road.first_column] = 1
+    curve = corridor_curve(road, inside, seen.horizon.row, axis, camera)
+    rows = slice(band.top, band.bottom + 1)
+    return RoadCurve(
+        curve.below_horizon[rows], curve.luminance[rows], curve.distance[rows], curve.weight[rows], curve.row_distance
+    )
 
 
 def road_curve(seen: SeenBand, camera: Camera) -> RoadCurve:

@@ -2,14 +2,16 @@
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.estimators.image_check import ObservationCheck
-from fogsim.estimators.zhu2015_road import SeenRoad, fitted_fog, inflection_rows, seen_road
+from fogsim.estimators.repairs import chosen
+from fogsim.estimators.zhu2015_road import SeenRoad, Zhu2015Repair, inflection_rows, seen_road, steepest_fog
 from fogsim.linear_algebra import matrix_product
 from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
@@ -54,10 +56,9 @@ def weighted_row(rows: NDArray[np.float64]) -> float:
 
 @dataclass(frozen=True, slots=True)
 class _Reading:
-    """What one frame adds: rows relative to its horizon (as published), or an extinction (corrected)."""
+    """What one frame adds: rows of inflections below its horizon [px], and the deviation of k by them [1/m]."""
 
     rows: NDArray[np.float64]
-    extinction: float
     deviation: float
 
 
@@ -66,37 +67,41 @@ class Zhu2015:
     """Classes of fog from three frames (Zhu & Song 2015).
 
     Canny's edges, the longest lane lines left and right by a Hough transform of limited angle, the horizon at their
-    intersection, a region grown from the road's bottom row, the inflection averaged over three frames,
-    V = 3 λ / (2 (v_i − v_h)), four classes, and a state that changes after three equal ones.
+    intersection, a region grown from the road's bottom row, the inflection of its luminance averaged over three frames
+    (weights by frequency, the extremes dropped), V = 3 λ / (2 (v_i − v_h)), four classes, and a state that changes
+    after three equal ones.
 
     As published the inflection is where the region ends, which cannot work: in dense fog the road fades into the sky
     without an edge and the region grows beyond the horizon ("no fog"), and in thin fog, which is steeper from row to
-    row, it stops far below the inflection; a smaller G_max makes all fog dense (`fogsim reproduce zhu2015`).
-    Corrected, the lane lines are fitted to a fraction of a pixel and weighed against the calibration, the fog's own
-    gradient draws no edges and stops no growth, and k, A and the horizon are fitted jointly to the rows of the region
-    within the own lane and those neighbours that agree with it, with an albedo that may wander and the sky's
-    brightness as the prior of A; frames are averaged by their variances. Further errors of the paper: eq. 4 lacks the
-    squares in its Gaussian, eqs. 13 and 14 contradict each other (13's sign of θ holds for a camera that looks up),
-    eqs. 18 to 20 have v₀ for v_h and e^(−k·−kλ/…) for e^(−kλ/(v − v_h)), and the bound on ρ in section 3.2 is the
-    whole diagonal of what is looked at, which limits nothing. The angle that is limited to 10° … 170° is here that of
-    the line to the rows, as the paper words it; its eq. 7 has the normal's, by which upright lines would go and the
-    horizon stay.
+    row, it stops far below the inflection; a smaller G_max makes all fog dense (`fogsim reproduce zhu2015`). What the
+    corrected form (the default) does instead is listed in `Zhu2015Repair`, and can be switched one by one. Further
+    errors of the paper: eq. 4 lacks the squares in its Gaussian, eqs. 13 and 14 contradict each other (13's sign of θ
+    holds for a camera that looks up), eqs. 18 to 20 have v₀ for v_h and e^(−k·−kλ/…) for e^(−kλ/(v − v_h)), and the
+    bound on ρ in section 3.2 is the whole diagonal of what is looked at, which limits nothing. The angle that is
+    limited to 10° … 170° is here that of the line to the rows, as the paper words it; its eq. 7 has the normal's, by
+    which upright lines would go and the horizon stay.
 
-    Luminance is linear in both forms, because Koschmieder's law is. Daytime, flat and straight road, road darker than
-    the airlight. With a tracked lead vehicle its part of the road is left out.
+    Daytime, flat and straight road, road darker than the airlight.
 
     Parameters
     ----------
     camera : Camera
         The assumed calibration.
     as_published : bool
-        Take the row where the grown region ends for the inflection, and whole Hough cells for lines.
+        Make no repairs: the region's end is the inflection, whole Hough cells are lines.
+    repairs : {'all', 'none'} or list of str
+        Which of the repairs are made.
     growth : float
         G_max, the largest step of luminance between rows, as published [linear grey levels]; the paper names none.
     growth_share : float
         ρ < 1 of eq. 10, as published [-].
     pitch_deviation : float
         Standard deviation of the true pitch about the assumed one [rad].
+
+    Raises
+    ------
+    InputError
+        If a parameter is out of range.
     """
 
     method = "zhu2015"
@@ -106,12 +111,13 @@ class Zhu2015:
         camera: Camera,
         *,
         as_published: bool = False,
+        repairs: Literal["all", "none"] | Sequence[Zhu2015Repair] = "all",
         growth: Annotated[float, Range(0.0, 255.0)] = 6.0,
         growth_share: Annotated[float, Range(0.0, 1.0)] = 0.8,
         pitch_deviation: PitchDeviation = PITCH_DEVIATION,
     ) -> None:
         self._camera, self._check = camera, ObservationCheck(camera)
-        self._as_published = as_published
+        self._repairs = chosen(Zhu2015Repair, repairs, as_published=as_published)
         self._growth = (growth, growth_share)
         self._pitch_deviation = pitch_deviation
         self._readings: deque[_Reading] = deque(maxlen=FRAMES)
@@ -148,8 +154,7 @@ class Zhu2015:
         image = self._check.image_of(observation)
         diagnostics: dict[str, object] = {"state": self._state, "horizon_row": self._camera.horizon_row}
         try:
-            growth = self._growth if self._as_published else None
-            road = seen_road(image, self._camera, self._pitch_deviation, growth, observation.lead)
+            road = seen_road(image, self._camera, self._pitch_deviation, self._growth, self._repairs, observation.lead)
             diagnostics |= {"horizon_row": road.horizon.row, "vanishing_point": road.vanishing_point}
             self._readings.append(self._reading(road))
         except CannotTellError as reason:
@@ -162,23 +167,20 @@ class Zhu2015:
         return self._classified(Estimate(self.method, extinction, deviation), diagnostics)
 
     def _reading(self, road: SeenRoad) -> _Reading:
-        if self._as_published:
-            return _Reading(inflection_rows(road), 0.0, 0.0)
-        extinction, deviation = fitted_fog(road, self._camera)
-        return _Reading(np.zeros(0), extinction, deviation)
+        per_row = 2.0 / self._camera.row_distance
+        if Zhu2015Repair.STEEPEST_ROW in self._repairs:
+            found = steepest_fog(road, self._camera, self._repairs)
+            return _Reading(np.array([found.extinction / per_row]), found.deviation)
+        rows = inflection_rows(road)
+        # A region's end is known to a row at best.
+        return _Reading(rows, per_row * math.hypot(1.0, float(rows.std())))
 
     def _averaged(self) -> tuple[float, float]:
         """Extinction of the last frames and its standard deviation [1/m]."""
-        if self._as_published:
-            rows = np.concatenate([reading.rows for reading in self._readings])
-            per_row = 2.0 / self._camera.row_distance
-            # A region's end is known to a row at best.
-            return per_row * max(weighted_row(rows), 0.0), per_row * math.hypot(1.0, float(rows.std()))
-        weight = np.array([reading.deviation**-2 for reading in self._readings])
-        extinctions = np.array([reading.extinction for reading in self._readings])
-        mean = float(matrix_product(weight, extinctions)) / float(weight.sum())
+        rows = np.concatenate([reading.rows for reading in self._readings])
+        extinction = 2.0 / self._camera.row_distance * max(weighted_row(rows), 0.0)
         # The same camera over the same road: what errs does so alike in all frames.
-        return mean, min(reading.deviation for reading in self._readings)
+        return extinction, float(np.median([reading.deviation for reading in self._readings]))
 
     def _classified(self, estimate: Estimate, diagnostics: dict[str, object]) -> Estimate:
         found = zhu_category(estimate.visibility)

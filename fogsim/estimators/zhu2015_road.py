@@ -1,17 +1,17 @@
-"""What zhu2015 sees of the road in one frame: lane lines, horizon, region, and the fog in its rows."""
+"""What zhu2015 sees of the road in one frame: lane lines, horizon, region, and the inflection of its rows."""
 
 import math
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.estimators.repairs import Repair
 from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
-from fogsim.vision.light.luminance import linear_pixels
-from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.lines.edges import Edges, edge_map, smoothed
-from fogsim.vision.lines.horizon import Horizon, calibrated_horizon, levelled
+from fogsim.vision.lines.horizon import Horizon, calibrated_horizon, weighted_mean
 from fogsim.vision.lines.lane_lines import (
     CLEAR_OF_VANISHING_POINT,
     LaneLine,
@@ -20,18 +20,15 @@ from fogsim.vision.lines.lane_lines import (
     published_vanishing_point,
     refined_lines,
 )
-from fogsim.vision.lines.vanishing_point import VanishingPoint
+from fogsim.vision.region.corridor import corridor_curve, hide_vehicle
+from fogsim.vision.region.curve_checks import check_law, detection_limit, is_clear, seen_up_to, told
 from fogsim.vision.region.inflection import steepest_slope
-from fogsim.vision.region.region_kernels import region_tops
-from fogsim.vision.region.road_image import CannotTellError, RoadImage, road_image
+from fogsim.vision.region.law import extinction_deviation
+from fogsim.vision.region.profile import RoadCurve
+from fogsim.vision.region.region_kernels import GrowthLimits, region_tops
+from fogsim.vision.region.road_image import MIN_ROWS, SATURATED, CannotTellError, RoadImage, road_image
 from fogsim.vision.region.road_region import constant_limits, cumulative_limits, grow_region
-from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, no_road
-from fogsim.vision.strips.joint_fit import MODEL_DEVIATION, JointFit, fit_agreeing
-from fogsim.vision.strips.joint_kernels import JointPrior
-from fogsim.vision.strips.joint_prior import SKY_DEVIATION
-from fogsim.vision.strips.sky import UNKNOWN_VIGNETTING, Sky, sky_above
-from fogsim.vision.strips.strip_curves import StripCurves, strip_curves, without_clipped
-from fogsim.vision.strips.strip_geometry import StripGeometry, strip_geometry
+from fogsim.vision.region.steepest import fog_of_steepest_rows, highest_place, steepest_rows
 
 LOWEST_ANGLE = math.radians(10.0)
 """Angle to the rows below which a line is no lane line (zhu2015 section 3.2) [rad]."""
@@ -49,18 +46,62 @@ SIMILARITY = 0.25
 BENT_ROAD = 0.2
 """Deviation of the row where lane lines meet from the horizon, for roads bend and undulate [px]."""
 
-HALF_VEHICLE, VEHICLE_MARGIN = 1.5, 2.0
-"""What a tracked vehicle hides either side of the axis, and how much nearer than measured its foot may be [m]."""
+REACH = 0.7
+"""Rows to either side over which the steepest slope is taken, over those below the horizon [-]."""
 
-COVERED = 0.6
-"""Share of a bin that the region must hold for it to be road [-]."""
+RESOLVED = 1.1
+"""The steepest row over the topmost at which a slope is seen, from which on it is no end of what is seen [-]."""
 
-FIRST_BINS, FIRST_COVERED = 12, 0.5
-"""Nearest bins of a strip, and the share of them that must be road: a region that gets beside the road farther away,
-where the fog hides its edge, has found the verge [-]."""
+FARTHEST_NEAR, LEAST_LEFT, ALBEDO = 30.0, 0.05, 0.04
+"""Distance that the last row must have at least [m], least share of its contrast that must be left, and deviation of
+two places of a road from one another [-]."""
 
-CLIPPED_LEVEL, CLIPPED_DEVIATION = 1.03, 0.1
-"""How much brighter than it looks a clipped sky is taken to be, and its deviation upward, relative to it [-]."""
+
+class Zhu2015Repair(Repair):
+    """What the corrected zhu2015 does otherwise than the paper."""
+
+    LINEAR_LUMINANCE = (
+        "linear_luminance",
+        "pixel values stand for luminance",
+        "the camera's response is undone, for Koschmieder's law is of light",
+    )
+    FOG_DRAWS_NO_EDGES = (
+        "fog_draws_no_edges",
+        "Canny's edges include the fog's own gradient, and stop the region at its steepest",
+        "each row's gradient is taken away as far as fog can make it",
+    )
+    GROWTH_BY_FOG = (
+        "growth_by_fog",
+        "one G_max for all rows, and no value for it or ρ: no value suits both dense and thin fog",
+        "G_max of a row is the steepest that fog can be there, airlight / (e (v − v_h)); a silhouette's step is more",
+    )
+    STEEPEST_ROW = (
+        "steepest_row",
+        "the row where the region ends is taken for the inflection",
+        "the steepest row of the region's medians, to a fraction of a row, its slopes taken over rows in proportion to"
+        " their height below the horizon; the law itself tells by how much such a window shifts the steepest row",
+    )
+    LAST_ROW = (
+        "last_row",
+        "a road that is hidden before its inflection (by a vehicle, or by what stands along the horizon) has none, and"
+        " its end is taken for it",
+        "how far the last row that is seen has brightened towards the sky, since the bottom of the picture, tells k",
+    )
+    SUBPIXEL_HORIZON = (
+        "subpixel_horizon",
+        "the intersection of whole Hough cells (1 px, 1°) is the horizon",
+        "lines are fitted to a fraction of a pixel, and their intersection weighed against the calibration",
+    )
+    OWN_LANE = (
+        "own_lane",
+        "the whole region counts, which in fog spreads over the verge",
+        "what of it lies within 2.5 m of the lane lines' vanishing column, as the lane narrows",
+    )
+    LEAD_LEFT_OUT = (
+        "lead_left_out",
+        "a vehicle ahead joins the region or ends it",
+        "what the tracked vehicle hides is left out, and the road beside it looked at",
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,10 +120,8 @@ class SeenRoad:
         Column and row [px].
     lines : tuple of LaneLine
         The lane lines that were looked at, in rows of `image`.
-    pixels : LinearPixels
-        The whole image, level.
-    free : float
-        Depth up to which the own lane is free of a tracked vehicle [m].
+    hidden : float
+        Half of what a tracked vehicle hides of the width of the image [px]; 0 without one.
     """
 
     image: RoadImage
@@ -90,15 +129,15 @@ class SeenRoad:
     region: NDArray[np.uint8]
     vanishing_point: tuple[float, float] | None
     lines: tuple[LaneLine, ...]
-    pixels: LinearPixels
-    free: float
+    hidden: float = 0.0
 
 
 def seen_road(
     image: NDArray[np.uint8] | NDArray[np.uint16],
     camera: Camera,
     pitch_deviation: float,
-    growth: tuple[float, float] | None,
+    growth: tuple[float, float],
+    repairs: AbstractSet[Zhu2015Repair],
     lead: LeadMeasurement | None,
 ) -> SeenRoad:
     """Find lines, horizon and road in an image.
@@ -111,8 +150,10 @@ def seen_road(
         The assumed calibration.
     pitch_deviation : float
         Standard deviation of the pitch [rad].
-    growth : tuple of float or None
-        G_max and ρ as published, or None for the corrected growth.
+    growth : tuple of float
+        G_max and ρ as published.
+    repairs : set of Zhu2015Repair
+        What is done otherwise than published.
     lead : LeadMeasurement or None
         A tracked vehicle that hides part of the road.
 
@@ -121,32 +162,45 @@ def seen_road(
     CannotTellError
         If the image shows no road by day.
     """
-    assumed, free = calibrated_horizon(camera, pitch_deviation), _free(lead)
-    road = road_image(image, camera, assumed)
+    assumed = calibrated_horizon(camera, pitch_deviation)
+    road = road_image(image, camera, assumed, linear=Zhu2015Repair.LINEAR_LUMINANCE in repairs)
     blurred = smoothed(road.luminance)
     below = np.arange(blurred.shape[0], dtype=np.float64) + (road.first_row - assumed.row)
     slope = np.minimum(steepest_slope(below, road.airlight), SIMILARITY * road.contrast).astype(np.float32)
-    edges = edge_map(blurred, slope if growth is None else np.zeros_like(slope))
+    edges = edge_map(blurred, slope if Zhu2015Repair.FOG_DRAWS_NO_EDGES in repairs else np.zeros_like(slope))
     if edges.threshold > road.contrast:
         raise CannotTellError("noise or texture drowns the contrast of road and airlight")
-    first = math.ceil(assumed.row - road.first_row) + 1
-    if growth is not None:
-        lines = hough_lines(edges.pixels, first, LOWEST_ANGLE)
-        point = published_vanishing_point(lines)
-        limits = constant_limits(blurred.shape[0], growth[0], growth[0] * growth[1], growth[0])
-        region = grow_region(blurred, edges.pixels, limits)
-    else:
+    if Zhu2015Repair.SUBPIXEL_HORIZON in repairs:
         lines = _sure_lines(edges, blurred, road, camera, assumed)
         expected = (camera.principal_point[0], assumed.row - road.first_row)
         point = lane_vanishing_point(lines, expected, max(5.0 * assumed.standard_deviation, 2.0))
-        steps = (slope + edges.threshold).astype(np.float32)
-        limits = cumulative_limits(steps, SIMILARITY * road.contrast + edges.threshold)
-        region = grow_region(blurred, edges.pixels, limits)
-        _hide(region, road, camera, free)
-    horizon = assumed if point is None else _combined(assumed, point, road.first_row, plain=growth is not None)
+    else:
+        lines = hough_lines(edges.pixels, math.ceil(assumed.row - road.first_row) + 1, LOWEST_ANGLE)
+        point = published_vanishing_point(lines)
+    region = grow_region(blurred, edges.pixels, _limits(slope, road, edges, growth, repairs))
+    hidden = hide_vehicle(region, road, camera, lead) if Zhu2015Repair.LEAD_LEFT_OUT in repairs else 0.0
+    horizon = assumed
+    if point is not None:
+        horizon = Horizon(point.row + road.first_row, point.row_deviation)
+        if Zhu2015Repair.SUBPIXEL_HORIZON in repairs:
+            bent = Horizon(horizon.row, math.hypot(point.row_deviation, BENT_ROAD))
+            horizon = weighted_mean(assumed, bent)
     where = None if point is None else (point.column, point.row + road.first_row)
-    pixels = linear_pixels(levelled(image, camera), camera)
-    return SeenRoad(road, horizon, region, where, tuple(lines), pixels, free)
+    return SeenRoad(road, horizon, region, where, tuple(lines), hidden)
+
+
+def _limits(
+    slope: NDArray[np.float32],
+    road: RoadImage,
+    edges: Edges,
+    growth: tuple[float, float],
+    repairs: AbstractSet[Zhu2015Repair],
+) -> GrowthLimits:
+    if Zhu2015Repair.GROWTH_BY_FOG not in repairs:
+        step, share = growth
+        return constant_limits(slope.size, step, step * share, step)
+    steps = (slope + edges.threshold).astype(np.float32)
+    return cumulative_limits(steps, SIMILARITY * road.contrast + edges.threshold)
 
 
 def _sure_lines(
@@ -156,33 +210,6 @@ def _sure_lines(
     first = math.ceil(assumed.row - road.first_row + clear)
     lines = hough_lines(edges.pixels, first, SURE_LOWEST, LINES, SURE_STEEPEST)
     return refined_lines(lines, edges.pixels, blurred, first)
-
-
-def _combined(assumed: Horizon, point: VanishingPoint, first_row: int, *, plain: bool) -> Horizon:
-    if plain:
-        return Horizon(point.row + first_row, point.row_deviation)
-    near = math.hypot(point.row_deviation, BENT_ROAD)
-    share = assumed.standard_deviation**2 / (assumed.standard_deviation**2 + near**2)
-    row = assumed.row + share * (point.row + first_row - assumed.row)
-    return Horizon(row, math.sqrt(share) * near)
-
-
-def _free(lead: LeadMeasurement | None) -> float:
-    """Depth up to which the own lane is free of a tracked vehicle [m]."""
-    if lead is None or not lead.distance > VEHICLE_MARGIN:
-        return math.inf
-    return max(lead.distance - VEHICLE_MARGIN, 1.0)
-
-
-def _hide(region: NDArray[np.uint8], road: RoadImage, camera: Camera, free: float) -> None:
-    """Take what a tracked vehicle may cover out of a region."""
-    if math.isinf(free):
-        return
-    foot = math.ceil(camera.horizon_row + camera.row_distance / free) - road.first_row
-    half = HALF_VEHICLE * camera.focal_length / free
-    middle = camera.principal_point[0]
-    left, right = max(math.ceil(middle - half), 0), max(math.floor(middle + half) + 1, 0)
-    region[: max(foot, 0), left:right] = 0
 
 
 def inflection_rows(road: SeenRoad) -> NDArray[np.float64]:
@@ -204,8 +231,26 @@ def inflection_rows(road: SeenRoad) -> NDArray[np.float64]:
     return np.asarray(tops + (road.image.first_row - road.horizon.row), np.float64)
 
 
-def fitted_fog(road: SeenRoad, camera: Camera) -> tuple[float, float]:
-    """Extinction and its standard deviation by a fit over the region's strips and the sky [1/m].
+@dataclass(frozen=True, slots=True)
+class Inflection:
+    """The fog of one frame.
+
+    Attributes
+    ----------
+    extinction, deviation : float
+        k and its standard deviation [1/m]; k is 0 where no fog shows.
+    airlight, road : float or None
+        A and R that go with it [linear grey levels].
+    """
+
+    extinction: float
+    deviation: float
+    airlight: float | None = None
+    road: float | None = None
+
+
+def steepest_fog(road: SeenRoad, camera: Camera, repairs: AbstractSet[Zhu2015Repair]) -> Inflection:
+    """Fog of the steepest row of the region's medians.
 
     Parameters
     ----------
@@ -213,62 +258,61 @@ def fitted_fog(road: SeenRoad, camera: Camera) -> tuple[float, float]:
         The road.
     camera : Camera
         The assumed calibration.
+    repairs : set of Zhu2015Repair
+        Whether the region counts as far as it is the own lane.
 
     Raises
     ------
     CannotTellError
         If the road is hidden, too bright, or follows no Koschmieder's law, or the fog does not show.
     """
-    horizon = road.horizon
-    tilt = math.atan((camera.principal_point[1] - horizon.row) / camera.focal_length)
-    level = replace(camera, pitch=tilt, roll=0.0)
-    sky = sky_above(road.pixels, level, 3.0 * horizon.standard_deviation + 2.0)
-    if sky is None:
-        raise CannotTellError("no sky is seen above the horizon")
-    geometry = strip_geometry(level, max(1.0, horizon.standard_deviation))
-    curves = strip_curves(road.pixels, geometry, sky.noise, level, road.free)
-    curves = without_clipped(curves) if sky.is_clipped else curves
-    curves = _on_road(curves, geometry, road.region, road.image.first_row)
-    fit = fit_agreeing(curves, geometry, _prior(sky, horizon))
-    if fit is None:
+    curve = _curve(road, camera, own_lane=Zhu2015Repair.OWN_LANE in repairs)
+    apart = road.horizon.standard_deviation
+    if is_clear(curve, road.image):
+        if Zhu2015Repair.LAST_ROW in repairs:
+            return _of_last_row(curve, road)
+        return Inflection(0.0, detection_limit(seen_up_to(curve), apart, camera.row_distance))
+    extinction = float(_read(curve, curve.luminance[:, None])[0])
+    # What is saturated is seen, too.
+    seen = replace(curve, weight=np.maximum(curve.weight, curve.luminance >= SATURATED))
+    resolved = RESOLVED * highest_place(seen, REACH)
+    if extinction > 0.0 and steepest_rows(curve, curve.luminance[:, None], REACH)[0] >= resolved:
+        airlight, dark = check_law(curve, extinction, road.image)
+        deviation = extinction_deviation(curve, extinction, _read, apart)
+        return Inflection(*told(extinction, deviation), airlight, dark)
+    if Zhu2015Repair.LAST_ROW not in repairs:
+        seen_up_to(curve)
+        raise CannotTellError("the inflection lies above the last row of the road that is seen")
+    return _of_last_row(curve, road)
+
+
+def _of_last_row(curve: RoadCurve, road: SeenRoad) -> Inflection:
+    """Fog of how far the last row that is seen has brightened."""
+    rows = np.flatnonzero((curve.weight > 0.0) & (curve.below_horizon >= 1.0))
+    if rows.size < MIN_ROWS // 2 or curve.below_horizon[rows[0]] * FARTHEST_NEAR > curve.row_distance:
+        raise CannotTellError("the road's region ends below the horizon, and no inflection lies in it")
+    near = rows[curve.below_horizon[rows] >= 0.5 * curve.below_horizon[-1]]
+    if near.size == 0:
         raise CannotTellError("no road is seen")
-    _check(fit, sky)
-    if why := no_road(fit, curves, geometry, level):
-        raise CannotTellError(why)
-    return max(fit.extinction, 0.0), math.hypot(fit.extinction_deviation, MODEL_DEVIATION * fit.extinction)
+    below, apart = float(curve.below_horizon[rows[0]]), road.horizon.standard_deviation
+    dark = road.image.airlight - float(curve.luminance[rows[0]])
+    bottom = road.image.airlight - float(np.median(curve.luminance[near]))
+    if dark <= LEAST_LEFT * bottom:
+        raise CannotTellError("the road has faded into the airlight where it is last seen")
+    # (A − I) e^(kλ/(v − v_h)) is the same of both rows, and the nearer one's fog is thin.
+    span = 1.0 / below - float(np.mean(1.0 / curve.below_horizon[near]))
+    optical = max(math.log(bottom / dark), 0.0) / span
+    noise = road.image.contrast * ALBEDO / dark
+    deviation = math.hypot(math.hypot(ALBEDO, noise) / span, optical * apart / below)
+    return Inflection(*told(optical / curve.row_distance, deviation / curve.row_distance))
 
 
-def _on_road(curves: StripCurves, geometry: StripGeometry, region: NDArray[np.uint8], first_row: int) -> StripCurves:
-    """Leave out bins that are not on the region, and strips that begin beside it."""
-    rows = (geometry.first + geometry.last) // 2 - first_row
-    inside = np.cumsum(np.pad(region[rows] != 0, ((0, 0), (1, 0))), axis=1, dtype=np.int32)
-    cols = region.shape[1]
-    left = np.clip(np.ceil(geometry.left).astype(np.int64), 0, cols)
-    right = np.clip(np.floor(geometry.right).astype(np.int64) + 1, left, cols)
-    at = np.arange(rows.size)
-    share = (inside[at, right] - inside[at, left]) / np.maximum(right - left, 1)
-    road = (share >= COVERED) & (curves.variance > 0)
-    for strip in range(1, len(road)):
-        nearest = np.flatnonzero(curves.variance[strip] > 0)[:FIRST_BINS]
-        if nearest.size == 0 or road[strip, nearest].mean() < FIRST_COVERED:
-            road[strip] = False
-    return replace(curves, variance=np.where(road, curves.variance, 0.0))
+def _read(curve: RoadCurve, luminance: NDArray[np.float64]) -> NDArray[np.float64]:
+    return fog_of_steepest_rows(curve, luminance, REACH)
 
 
-def _prior(sky: Sky, horizon: Horizon) -> JointPrior:
-    airlight = sky.luminance
-    below, above = (math.hypot(SKY_DEVIATION * airlight, apart) for apart in (sky.deviation, sky.upward))
-    if sky.is_clipped:
-        airlight *= CLIPPED_LEVEL
-        below, above = below + airlight - sky.luminance, CLIPPED_DEVIATION * airlight
-    return JointPrior(airlight, below, above, 0.0, horizon.standard_deviation, 0.0, UNKNOWN_VIGNETTING)
-
-
-def _check(fit: JointFit, sky: Sky) -> None:
-    if fit.road >= (1.0 - LEAST_CONTRAST) * fit.airlight or fit.road >= 0.98 * sky.luminance:
-        raise CannotTellError("the road is nearly as bright as the airlight, or brighter")
-    if fit.misfit > MAX_MISFIT:
-        raise CannotTellError("the road fades into the airlight, but not as Koschmieder's law has it")
-    deviation = fit.extinction_deviation
-    if fit.extinction < 2.0 * deviation and fit.extinction + 2.0 * deviation > CLEAR:
-        raise CannotTellError("the extinction is not observable: too little road is seen")
+def _curve(road: SeenRoad, camera: Camera, *, own_lane: bool) -> RoadCurve:
+    axis = camera.principal_point[0] if road.vanishing_point is None else road.vanishing_point[0]
+    return corridor_curve(
+        road.image, road.region, road.horizon.row, axis, camera, own_lane=own_lane, hidden=road.hidden
+    )

@@ -5,12 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from fogsim.estimators import make
+from fogsim.estimators.huang2015_medians import Huang2015Repair
 from fogsim.render import Renderer
 from fogsim.reproduce.huang2015_chase import Chase, Scene, drawn, fogged
 from fogsim.reproduce.huang2015_picture import Tracked, picture
 from fogsim.reproduce.huang2015_plan import CAMERA, LAST, VARIANTS, VEHICLE, Case, Plan
 from fogsim.reproduce.huang2015_tables import NOTES, records, tables, verdicts
 from fogsim.reproduce.result import Reproduction, Steps, Watch, unwatched
+from fogsim.reproduce.road_sweeps import steps_of, swept
 from fogsim.reproduce.scenes import road_renderer
 from fogsim.values import Estimate, Observation
 
@@ -34,7 +36,8 @@ def reproduce(plan: Plan | None = None, *, watch: Watch = unwatched) -> Reproduc
     rng = np.random.default_rng(2015)
     cases = _cases(plan)
     # Each of the rough method's images is a step, and so is the picture.
-    steps = Steps(sum(len(case.frames) for case in cases) + len(plan.methods) + 1, watch)
+    frames = sum(len(case.frames) for case in cases)
+    steps = Steps(frames + len(plan.methods) + 1 + steps_of(plan.drives), watch)
     with road_renderer() as renderer:
         results: dict[Case, dict[float, Estimate]] = {}
         for way in ((False, False), (True, False), (False, True)):
@@ -43,8 +46,10 @@ def reproduce(plan: Plan | None = None, *, watch: Watch = unwatched) -> Reproduc
         shown = [Tracked(v, {name: results[Case(v, name)][LAST] for name in VARIANTS}) for v in plan.ratios]
         drawing = picture(renderer, Chase(CAMERA, VEHICLE), shown)
         steps.advance()
+        sweeps, swept_tables = swept("huang2015_rough", Huang2015Repair, renderer, steps, plan.drives)
     found, told = records(results, rough, plan), tables(results, rough, plan)
-    return Reproduction("huang2015", tuple(found), told[0].rows, (*NOTES, *verdicts(found)), drawing, told)
+    notes, all_tables = (*NOTES, *verdicts(found)), (*told, *swept_tables)
+    return Reproduction("huang2015", tuple(found), told[0].rows, notes, drawing, all_tables, tuple(sweeps))
 
 
 def _cases(plan: Plan) -> list[Case]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fogsim.reproduce.huang2015_published import TABLE_4_3, TABLE_5_2, TABLE_5_3
+from fogsim.reproduce.road_sweeps import DRIVES
 from fogsim.reproduce.scenes import StagedVehicle
 from fogsim.values import Camera, Estimate
 
@@ -41,6 +42,8 @@ class Plan:
         Table 5.2: visibilities by interval [m].
     starts : tuple of float
         Positions of the reference in table 5.3 [m].
+    drives : int
+        Drives of each setting of the rough method's sweeps.
     """
 
     methods: tuple[float, ...] = tuple(TABLE_4_3)
@@ -51,6 +54,7 @@ class Plan:
         default_factory=lambda: {interval: tuple(row) for interval, row in TABLE_5_2.items()}
     )
     starts: tuple[float, ...] = tuple(TABLE_5_3)
+    drives: int = DRIVES
 
 
 @dataclass(frozen=True, slots=True)

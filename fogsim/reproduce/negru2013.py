@@ -8,9 +8,11 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from fogsim.estimators import make
+from fogsim.estimators.negru2013 import Negru2013Repair
 from fogsim.recorders.style import font
-from fogsim.reproduce.result import Cell, Reproduction, Steps, Watch, found_visibility, unwatched
-from fogsim.reproduce.scenes import foggy_image, views
+from fogsim.reproduce.result import Cell, Reproduction, Steps, TitledTable, Watch, found_visibility, unwatched
+from fogsim.reproduce.road_sweeps import DRIVES, steps_of, swept
+from fogsim.reproduce.scenes import foggy_image, road_renderer, views
 from fogsim.units import visibility_from_extinction
 from fogsim.values import Camera, Estimate, Observation, fog_category
 
@@ -50,11 +52,13 @@ NOTES = (
 )
 
 
-def reproduce(watch: Watch = unwatched) -> Reproduction:
-    """Run the evaluation again.
+def reproduce(drives: int = DRIVES, *, watch: Watch = unwatched) -> Reproduction:
+    """Run the evaluation again, and sweep what the paper leaves open.
 
     Parameters
     ----------
+    drives : int
+        Drives of each setting of the sweeps.
     watch : Watch
         Told of every image that is done.
 
@@ -65,7 +69,7 @@ def reproduce(watch: Watch = unwatched) -> Reproduction:
     """
     records: list[Mapping[str, Cell]] = []
     pictures = []
-    steps = Steps(len(SCENES) * len(EXTINCTIONS), watch)
+    steps = Steps(len(SCENES) * len(EXTINCTIONS) + steps_of(drives), watch)
     milliseconds = float("inf")
     for scene, (trees, cars) in SCENES.items():
         with views(CAMERA, cars, trees=trees) as (view, pose):
@@ -78,7 +82,12 @@ def reproduce(watch: Watch = unwatched) -> Reproduction:
                     milliseconds = min(milliseconds, _milliseconds(image))
                 steps.advance()
     speed = f"One frame takes {milliseconds:.1f} ms here, {PAPER_MS:.0f} ms in the paper (2013, an i7)."
-    return Reproduction("negru2013", tuple(records), _table(records), (*NOTES, speed), np.hstack(pictures))
+    with road_renderer() as renderer:
+        sweeps, tables = swept("negru2013", Negru2013Repair, renderer, steps, drives)
+    table = _table(records)
+    shown = (TitledTable("V_met by scene and k: true, and as found (error)", table), *tables)
+    notes = (*NOTES, speed)
+    return Reproduction("negru2013", tuple(records), table, notes, np.hstack(pictures), shown, tuple(sweeps))
 
 
 def _estimate(image: NDArray[np.uint8], options: Mapping[str, bool]) -> Estimate:

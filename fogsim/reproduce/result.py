@@ -97,6 +97,8 @@ class Reproduction:
         A picture like the paper's.
     tables : tuple of TitledTable
         All tables, of a paper that has several.
+    sweeps : tuple of mappings
+        Further records: what becomes of the method where the paper leaves something open, or a repair is left out.
     """
 
     paper: str
@@ -105,6 +107,7 @@ class Reproduction:
     notes: tuple[str, ...]
     picture: NDArray[np.uint8]
     tables: tuple[TitledTable, ...] = ()
+    sweeps: tuple[Mapping[str, Cell], ...] = ()
 
     @property
     def all_tables(self) -> tuple[TitledTable, ...]:

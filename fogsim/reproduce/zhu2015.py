@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 from fogsim.errors import InputError
 from fogsim.estimators import make
 from fogsim.estimators.zhu2015 import FRAMES
-from fogsim.reproduce.result import Cell, Reproduction, Steps, Watch, found_visibility, unwatched
+from fogsim.estimators.zhu2015_road import Zhu2015Repair
+from fogsim.reproduce.result import Cell, Reproduction, Steps, TitledTable, Watch, found_visibility, unwatched
+from fogsim.reproduce.road_sweeps import CAMERA, DRIVES, steps_of, swept
 from fogsim.reproduce.scenes import road_renderer
 from fogsim.reproduce.zhu2015_drive import Moment, drive, observed
+from fogsim.reproduce.zhu2015_growth import swept_growth
 from fogsim.reproduce.zhu2015_picture import picture
-from fogsim.values import Camera, Estimate, FogCategory, Observation, Response
-
-CAMERA = Camera(640, 480, 577.0, (319.5, 239.5), mount_height=1.38, pitch=0.035, response=Response.SRGB)
-"""The paper says nothing of its camera: 58° wide, as cameras behind windscreens are."""
+from fogsim.values import Estimate, FogCategory, Observation
 
 EDGE = 0.05
 """How far visibilities keep from the edges of their class, relative to them [-]."""
@@ -91,7 +91,9 @@ NOTES = (
 )
 
 
-def reproduce(drives: int = 10, visibilities: int = 4, frames: int = 6, *, watch: Watch = unwatched) -> Reproduction:
+def reproduce(
+    drives: int = 10, visibilities: int = 4, frames: int = 6, sweeps: int = DRIVES, *, watch: Watch = unwatched
+) -> Reproduction:
     """Run the evaluation again.
 
     Parameters
@@ -102,6 +104,8 @@ def reproduce(drives: int = 10, visibilities: int = 4, frames: int = 6, *, watch
         Visibilities of each class in a drive.
     frames : int
         Frames of a drive, at least three.
+    sweeps : int
+        Drives of each setting of the sweeps of what the paper leaves open.
     watch : Watch
         Told of every fog of every drive that is done.
 
@@ -116,15 +120,15 @@ def reproduce(drives: int = 10, visibilities: int = 4, frames: int = 6, *, watch
     InputError
         If there are too few of anything.
     """
-    if drives < 1 or visibilities < 1 or frames < FRAMES:
+    if min(drives, visibilities, sweeps) < 1 or frames < FRAMES:
         raise InputError(
-            f"drives and visibilities must be at least 1 and frames at least {FRAMES}, got {drives}, {visibilities}"
-            f" and {frames}"
+            f"drives, visibilities and sweeps must be at least 1 and frames at least {FRAMES}, got {drives},"
+            f" {visibilities}, {sweeps} and {frames}"
         )
     records: list[Mapping[str, Cell]] = []
     pictured: list[Moment] = []
     # Of "sunny" there is one more, and the picture is a step too.
-    steps = Steps(drives * (len(WEATHERS) * visibilities + 1) + 1, watch)
+    steps = Steps(drives * (len(WEATHERS) * visibilities + 1) + 1 + steps_of(sweeps) + sweeps, watch)
     with road_renderer() as renderer:
         for number in range(drives):
             rng = np.random.default_rng([2015, number])
@@ -135,9 +139,13 @@ def reproduce(drives: int = 10, visibilities: int = 4, frames: int = 6, *, watch
                 observations = [observed(moment, CAMERA, visibility, rng) for moment in moments]
                 records += _records(weather, visibility, lead=lead, drive=number, observations=observations)
                 steps.advance()
+        swept_records, tables = swept("zhu2015", Zhu2015Repair, renderer, steps, sweeps)
+        growth_records, growth = swept_growth(renderer, steps, sweeps)
     drawing = picture(pictured[-1], CAMERA)
     steps.advance()
-    return Reproduction("zhu2015", tuple(records), _table(records), NOTES, drawing)
+    table = _table(records)
+    shown = (TitledTable("Table 2 and figure 7", table), *tables, growth)
+    return Reproduction("zhu2015", tuple(records), table, NOTES, drawing, shown, (*swept_records, *growth_records))
 
 
 def _drawn(count: int, rng: np.random.Generator) -> Iterator[tuple[Weather, float]]:

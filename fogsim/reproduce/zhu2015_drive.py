@@ -146,7 +146,9 @@ def _wear_integral(places: Floats, knots: Floats) -> Floats:
     return np.asarray(pieces[index] + along * (ends[index] + 0.5 * slope * along), np.float64)
 
 
-def observed(moment: Moment, camera: Camera, visibility: float, rng: np.random.Generator) -> Observation:
+def observed(
+    moment: Moment, camera: Camera, visibility: float, rng: np.random.Generator, sensor: Sensor = SENSOR
+) -> Observation:
     """What the vehicle has at an instant in homogeneous fog.
 
     Parameters
@@ -159,7 +161,9 @@ def observed(moment: Moment, camera: Camera, visibility: float, rng: np.random.G
         Meteorological visibility [m]; ``inf`` for clear air.
     rng : numpy Generator
         The sensor's noise.
+    sensor : Sensor
+        The sensor.
     """
     radiance = foggy_radiance(moment.view, moment.pose, camera, extinction_from_visibility(visibility))
-    image = expose(radiance, SENSOR, camera.response, rng)
+    image = expose(radiance, sensor, camera.response, rng)
     return Observation(image, speed=SPEED, lead=moment.lead)

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from fogsim.estimators import make
-from fogsim.estimators.zhu2015_road import SeenRoad, seen_road
+from fogsim.estimators.zhu2015_road import SeenRoad, Zhu2015Repair, seen_road
 from fogsim.recorders.style import font
 from fogsim.reproduce.zhu2015_drive import Moment, observed
 from fogsim.values import Camera, Observation
@@ -53,9 +53,9 @@ def picture(moment: Moment, camera: Camera) -> NDArray[np.uint8]:
 
 def _panel(seen: Observation, camera: Camera, visibility: float, *, as_published: bool) -> NDArray[np.uint8]:
     estimate = make("zhu2015", camera, as_published=as_published).update(seen)
-    growth = (GROWTH, GROWTH_SHARE) if as_published else None
     image = np.array(seen.image, np.uint8)
-    road = seen_road(image, camera, PITCH_DEVIATION, growth, seen.lead)
+    repairs: frozenset[Zhu2015Repair] = frozenset(() if as_published else Zhu2015Repair)
+    road = seen_road(image, camera, PITCH_DEVIATION, (GROWTH, GROWTH_SHARE), repairs, seen.lead)
     drawing = Image.fromarray(_with_region(image, road))
     draw = ImageDraw.Draw(drawing)
     _draw_lines_and_curve(draw, road, camera.height - 1)

@@ -11,15 +11,17 @@ from PIL import Image
 
 from fogsim.cli import app
 from fogsim.reproduce import REPRODUCTIONS, Reproduction
-from fogsim.reproduce.negru2013 import CAMERA, EXTINCTIONS, SCENES
+from fogsim.reproduce.negru2013 import CAMERA, EXTINCTIONS, SCENES, reproduce
+from fogsim.reproduce.road_sweeps import SETTINGS
 from fogsim.reproduce.scenes import foggy_image, views
 
 
 @pytest.fixture(scope="module")
 def done() -> Reproduction:
     told = []
-    done = REPRODUCTIONS["negru2013"](watch=lambda step, total: told.append((step, total)))
-    assert told == [(step, len(SCENES) * len(EXTINCTIONS)) for step in range(len(SCENES) * len(EXTINCTIONS) + 1)]
+    done = reproduce(1, watch=lambda step, total: told.append((step, total)))
+    steps = len(SCENES) * len(EXTINCTIONS) + len(SETTINGS)
+    assert told == [(step, steps) for step in range(steps + 1)]
     return done
 
 
@@ -42,7 +44,7 @@ def test_the_corrected_method_is_near_the_truth_wherever_it_tells(done) -> None:
     assert len(told) >= 0.9 * len(done.records)
     errors = np.abs([record["corrected_visibility_m"] / record["visibility_m"] - 1.0 for record in told])
     assert np.median(errors) < 0.025
-    assert np.max(errors) < 0.08
+    assert np.max(errors) < 0.1
 
 
 def test_the_published_method_is_worse_but_no_nonsense(done) -> None:
@@ -93,7 +95,7 @@ def test_the_command_prints_a_table_and_writes_a_picture(command, tmp_path: Path
 def test_the_command_prints_records(command, done) -> None:
     code, out, _ = command("negru2013", "--json")
     assert code == 0
-    assert [json.loads(line) for line in out.splitlines()] == [dict(record) for record in done.records]
+    assert [json.loads(line) for line in out.splitlines()] == [dict(record) for record in (*done.records, *done.sweeps)]
 
 
 def test_unknown_papers_answer_with_the_nearest(command) -> None:

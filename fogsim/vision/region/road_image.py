@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.values.camera import Camera
+from fogsim.values.camera import Camera, Response
 from fogsim.vision.light.daylight import lit_by_lamps
 from fogsim.vision.light.luminance import linear_luminance
 from fogsim.vision.light.medians import columns_apart, median, quantile
@@ -74,6 +74,8 @@ def road_image(
     camera: Camera,
     horizon: Horizon,
     columns: tuple[int, int] | None = None,
+    *,
+    linear: bool = True,
 ) -> RoadImage:
     """Cut, level and linearise an image.
 
@@ -87,6 +89,8 @@ def road_image(
         Where the calibration has the horizon.
     columns : (int, int) or None
         First column and that after the last to be cut out; None for all.
+    linear : bool
+        Whether to undo the camera's response; else pixel values are taken for luminance, as papers do.
 
     Raises
     ------
@@ -103,9 +107,10 @@ def road_image(
     first = max(0, sky_end - 4 - round(SKY_SHARE * rows))
     level = levelled(image, camera)
     left, right = columns or (0, cols)
-    luminance = linear_luminance(level[first:, left:right], camera.response, camera.bits, camera.black_level)
+    response = (camera.response, camera.bits, camera.black_level) if linear else (Response.LINEAR, camera.bits)
+    luminance = linear_luminance(level[first:, left:right], *response)
     top = min(first, max(0, sky_end - round(SKY_HEIGHT * camera.focal_length)))
-    above = linear_luminance(columns_apart(level[top:sky_end:2], 4), camera.response, camera.bits, camera.black_level)
+    above = linear_luminance(columns_apart(level[top:sky_end:2], 4), *response)
     airlight = quantile(above, 0.9)
     seed = median(luminance[-1])
     road = _checked(RoadImage(luminance, first, sky_end - first, airlight, seed, level, left))

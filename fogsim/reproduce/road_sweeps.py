@@ -1,0 +1,220 @@
+"""What a method of the road makes of what its paper leaves open, camera, wear and noise, and of its own repairs."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fogsim.camera import Sensor
+from fogsim.estimators import make
+from fogsim.estimators.repairs import Repair
+from fogsim.render import Renderer
+from fogsim.reproduce.result import Cell, Rows, Steps, TitledTable
+from fogsim.reproduce.zhu2015_drive import SENSOR, drive, observed
+from fogsim.units import extinction_from_visibility
+from fogsim.values import Camera, Estimate, Observation, Response
+
+CAMERA = Camera(640, 480, 577.0, (319.5, 239.5), mount_height=1.38, pitch=0.035, response=Response.SRGB)
+"""That of `zhu2015`'s evaluation, 58° wide: λ = 797 px·m."""
+
+VISIBILITIES = (50.0, 100.0, 200.0, 400.0)
+"""Of every drive [m]."""
+
+DRIVES, FRAMES = 6, 3
+"""Drives of each setting, and their frames, of which the last one's estimate counts."""
+
+Form = Mapping[str, object]
+"""Options of an estimator."""
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What is other than in the first of the sweeps.
+
+    Attributes
+    ----------
+    name : str
+        In words.
+    camera : Camera
+        The assumed calibration; the pitch is off by 0.1° and sways by 0.05°.
+    wear : float
+        Change of the road's albedo along the way [-].
+    sensor : Sensor
+        Noise and exposure.
+    """
+
+    name: str
+    camera: Camera = CAMERA
+    wear: float = 0.03
+    sensor: Sensor = SENSOR
+
+
+NOISY = replace(SENSOR, full_well=SENSOR.full_well / 16.0, read_noise=4.0 * SENSOR.read_noise)
+"""Four times the noise."""
+
+SETTINGS = (
+    Setting("58°, 1.38 m, wear 3 %"),
+    Setting("f = 288 px (96°)", replace(CAMERA, focal_length=288.0)),
+    Setting("f = 1154 px (31°)", replace(CAMERA, focal_length=1154.0, pitch=0.02)),
+    Setting("mounted 2.5 m high", replace(CAMERA, mount_height=2.5)),
+    Setting("linear response", replace(CAMERA, response=Response.LINEAR)),
+    Setting("no wear", wear=0.0),
+    Setting("wear 10 %", wear=0.1),
+    Setting("noise × 4", sensor=NOISY),
+)
+"""What is varied, one thing at a time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Driven:
+    """Observations of one drive in one fog."""
+
+    visibility: float
+    observations: tuple[Observation, ...]
+
+
+def driven(
+    renderer: Renderer, setting: Setting, visibilities: Sequence[float], drives: int, steps: Steps
+) -> list[Driven]:
+    """Drive along the road alone, in every fog.
+
+    Parameters
+    ----------
+    renderer : Renderer
+        Of the road.
+    setting : Setting
+        Camera, road and sensor.
+    visibilities : sequence of float
+        V_met [m].
+    drives : int
+        How many.
+    steps : Steps
+        Told of every drive.
+    """
+    found = []
+    for number in range(drives):
+        rng = np.random.default_rng([2013, number])
+        moments = list(drive(renderer, setting.camera, FRAMES, lead=False, rng=rng, wear=setting.wear))
+        for visibility in visibilities:
+            seen = tuple(observed(moment, setting.camera, visibility, rng, setting.sensor) for moment in moments)
+            found.append(Driven(visibility, seen))
+        steps.advance()
+    return found
+
+
+def last_estimate(method: str, camera: Camera, form: Form, one: Driven) -> Estimate:
+    """What a form of a method says after the last frame of a drive.
+
+    Parameters
+    ----------
+    method : str
+        Its name.
+    camera : Camera
+        The assumed calibration.
+    form : mapping
+        Its options.
+    one : Driven
+        The drive.
+    """
+    estimator = make(method, camera, **form)
+    found = [estimator.update(observation) for observation in one.observations]
+    return found[-1]
+
+
+def without_each(kind: type[Repair]) -> dict[str, Form]:
+    """Forms of a method: all repairs, and all but each.
+
+    Parameters
+    ----------
+    kind : type
+        The repairs that there are.
+    """
+    forms: dict[str, Form] = {"all repairs": {}}
+    for left_out in kind:
+        forms[f"without {left_out.value}"] = {"repairs": [one.value for one in kind if one is not left_out]}
+    return forms
+
+
+def steps_of(drives: int = DRIVES) -> int:
+    """Steps that `swept` takes.
+
+    Parameters
+    ----------
+    drives : int
+        Drives of each setting.
+    """
+    return len(SETTINGS) * drives
+
+
+def swept(
+    method: str, kind: type[Repair], renderer: Renderer, steps: Steps, drives: int = DRIVES
+) -> tuple[list[dict[str, Cell]], tuple[TitledTable, TitledTable]]:
+    """Errors of a method, as published and corrected, over settings, and with each repair switched off.
+
+    Parameters
+    ----------
+    method : str
+        Its name.
+    kind : type
+        Its repairs.
+    renderer : Renderer
+        Of the road.
+    steps : Steps
+        Told of every drive.
+    drives : int
+        Drives of each setting.
+
+    Returns
+    -------
+    (list of records, (TitledTable, TitledTable))
+        A record for each setting, form and visibility: share of drives with an estimate of fog, median error and bias.
+    """
+    both: dict[str, Form] = {"published": {"as_published": True}, "corrected": {}}
+    records: list[dict[str, Cell]] = []
+    for setting in SETTINGS:
+        seen = driven(renderer, setting, VISIBILITIES, drives, steps)
+        forms = both | (without_each(kind) if setting is SETTINGS[0] else {})
+        for name, form in forms.items():
+            for visibility in VISIBILITIES:
+                here = [one for one in seen if one.visibility == visibility]
+                estimates = [last_estimate(method, setting.camera, form, one) for one in here]
+                records.append(_record(method, setting, name, visibility, estimates))
+    titles = (
+        f"Sweeps of {method}: |error| of V_met, median [%], and share of drives that tell, by V_met",
+        f"Repairs of {method}, each switched off: |error| of V_met, median [%], and share of drives that tell",
+    )
+    rows = (
+        _rows(records, [(setting.name, name) for setting in SETTINGS for name in both]),
+        _rows(records, [(SETTINGS[0].name, name) for name in ("published", *without_each(kind))]),
+    )
+    return records, (TitledTable(titles[0], rows[0]), TitledTable(titles[1], rows[1]))
+
+
+def _record(
+    method: str, setting: Setting, form: str, visibility: float, estimates: Sequence[Estimate]
+) -> dict[str, Cell]:
+    told = [one.extinction for one in estimates if one.valid and one.extinction > 0.0]
+    apart = extinction_from_visibility(visibility) / np.array(told) - 1.0
+    return {
+        "paper": method,
+        "table": "sweep",
+        "setting": setting.name,
+        "form": form,
+        "visibility_m": visibility,
+        "told_share": len(told) / len(estimates),
+        "median_error_pct": 100.0 * float(np.median(np.abs(apart))) if told else None,
+        "bias_pct": 100.0 * float(np.median(apart)) if told else None,
+    }
+
+
+def _rows(records: Sequence[Mapping[str, Cell]], wanted: Sequence[tuple[str, str]]) -> Rows:
+    rows = [("setting", "form", *(f"{visibility:.0f} m" for visibility in VISIBILITIES))]
+    for setting, form in wanted:
+        here = [one for one in records if (one["setting"], one["form"]) == (setting, form)]
+        rows.append((setting, form, *(_cell(one) for one in here)))
+    return tuple(rows)
+
+
+def _cell(record: Mapping[str, Cell]) -> str:
+    error, share = record["median_error_pct"], record["told_share"]
+    return "—" if error is None else f"{error:.1f} ({100.0 * float(share or 0.0):.0f} %)"

@@ -57,7 +57,7 @@ OVERCONFIDENCE = 1.6
 """By how much the fit's deviation is too small where roads and cameras are not what its model knows: verges, tracks and
 repairs in the strips, compression, soiled windscreens; measured on pictures that FogSim did not draw [-]."""
 
-HARDLY_UNEVEN, UNEVEN_DEVIATION = 0.03, 0.04
+HARDLY_UNEVEN, UNEVEN_DEVIATION = 0.05, 0.07
 """Relative deviations of the mean extinction by unevenness that the road does not show, and, where the fog is surely
 uneven, by what nodes along the way leave out [-]."""
 

@@ -168,7 +168,9 @@ def seen_road(
     below = np.arange(blurred.shape[0], dtype=np.float64) + (road.first_row - assumed.row)
     slope = np.minimum(steepest_slope(below, road.airlight), SIMILARITY * road.contrast).astype(np.float32)
     edges = edge_map(blurred, slope if Zhu2015Repair.FOG_DRAWS_NO_EDGES in repairs else np.zeros_like(slope))
-    if edges.threshold > road.contrast:
+    # What smoothing takes away leaves no edges either: a pattern as fine as the pixels.
+    grain = float(np.median(np.abs(road.luminance - blurred))) if repairs else 0.0
+    if max(edges.threshold, 2.0 * grain) > road.contrast:
         raise CannotTellError("noise or texture drowns the contrast of road and airlight")
     if Zhu2015Repair.SUBPIXEL_HORIZON in repairs:
         lines = _sure_lines(edges, blurred, road, camera, assumed)

@@ -35,7 +35,7 @@ def test_the_estimate_follows_the_sight_into_the_bank(drive):
         if estimate.valid and 1300.0 - step.route_position < 90.0:
             off.append(math.log(estimate.extinction / step.truth.extinction_ahead))
     assert len(off) >= 4
-    assert np.median(np.abs(off)) < 0.1
+    assert np.median(np.abs(off)) < 0.15
 
 
 def test_a_curve_of_optical_depths_is_read_between_its_places():

@@ -1,16 +1,15 @@
 """Fog that is denser in places: optical depth over the path ahead, weighed against even fog by evidence."""
 
-import functools
 import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.linear_algebra import inverse_of
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.vision.strips import joint_fit, joint_kernels, uneven_kernels
 from fogsim.vision.strips.albedo_filter import HIDDEN, HIDDEN_COST, LEFT_OUT_COST, USED
+from fogsim.vision.strips.fog_nodes import BROAD, MEAN, NODES, UNEVENNESS, bank_nodes, fog_nodes
 from fogsim.vision.strips.joint_fit import ALBEDO_CHANCES, ALBEDOS, JointFit
 from fogsim.vision.strips.joint_kernels import Bins, JointPrior, Solution
 from fogsim.vision.strips.strip_curves import StripCurves
@@ -19,20 +18,8 @@ from fogsim.vision.strips.uneven_kernels import FogNodes
 
 Floats = NDArray[np.float64]
 
-NODES = (0.0, *(12.0 * 1.4**i for i in range(5)), *(60.0 * 1.2**i for i in range(14)))
-"""Nodes of the path [m]: nearly two rows apart, in a camera of 800 px·m, where the road is far."""
-
-MEAN, BROAD = math.log(0.01), 1.6
-"""Mean and standard deviation of ln k of fog before anything is seen [ln 1/m]."""
-
-BANK, BANK_CHANCE = 2.0, 0.01
-"""Standard deviation of the rise of ln k into a bank that begins at a node [-], and how likely such a bank is."""
-
-ROUGHNESS = 0.03
-"""Standard deviation of ln k from node to node beside that [-]."""
-
-UNEVENNESS = ((0.4, 300.0), (0.25, 100.0), (0.7, 30.0), (0.7, 100.0), (2.0, 80.0))
-"""Standard deviations of ln k along the way [-], and their correlation lengths [m]: nearly even, patches, banks."""
+BANK_CHANCE = 0.01
+"""How likely it is that a bank begins at a node [-]."""
 
 UNEVEN_CHANCES = (0.1, 0.05, 0.05, 0.05, 0.05)
 """How likely each is beforehand; even fog is the rest [-]."""
@@ -124,48 +111,6 @@ class _Candidate:
     solution: Solution
     fog: FogNodes
     chance: float
-
-
-@functools.cache
-def fog_nodes(deviation: float, length: float, count: int) -> FogNodes:
-    """Nodes of fog of some unevenness.
-
-    Parameters
-    ----------
-    deviation : float
-        Standard deviation of ln k along the way [-].
-    length : float
-        Correlation length [m].
-    count : int
-        How many nodes.
-    """
-    nodes = np.array(NODES[:count])
-    # Where nodes are farther apart than patches are long, a node stands for their mean.
-    size = np.maximum(np.diff(nodes, prepend=-NODES[1]) / length, 1e-3)
-    share = np.sqrt(2.0 * (size - 1.0 + np.exp(-size))) / size
-    apart = math.sqrt(3.0) / length * np.abs(nodes[:, None] - nodes)
-    covariance = deviation**2 * (1.0 + apart) * np.exp(-apart) * share[:, None] * share + BROAD**2
-    covariance += ROUGHNESS**2 * np.eye(count)
-    logarithm = joint_kernels.invert(covariance, np.empty_like(covariance))
-    return FogNodes(nodes, MEAN, inverse_of(covariance), logarithm)
-
-
-@functools.cache
-def bank_nodes(first: int, count: int) -> FogNodes:
-    """Nodes of fog that is even up to a bank, and even in it.
-
-    Parameters
-    ----------
-    first : int
-        First node in the bank.
-    count : int
-        How many nodes.
-    """
-    nodes = fog_nodes(*UNEVENNESS[0], count).nodes
-    inside = (np.arange(count) >= first).astype(np.float64)
-    covariance = BROAD**2 + BANK**2 * inside[:, None] * inside + ROUGHNESS**2 * np.eye(count)
-    logarithm = joint_kernels.invert(covariance, np.empty_like(covariance))
-    return FogNodes(nodes, MEAN, inverse_of(covariance), logarithm)
 
 
 def fit_uneven(

@@ -5,9 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from fogsim.vision.strips.fog_nodes import NODES, UNEVENNESS, fog_nodes
 from fogsim.vision.strips.joint_fit import fit_agreeing, fit_own
 from fogsim.vision.strips.strip_curves import StripCurves
-from fogsim.vision.strips.uneven_fit import NODES, UNEVENNESS, fit_uneven, fog_nodes
+from fogsim.vision.strips.uneven_fit import fit_uneven
 from fogsim.vision.strips.uneven_kernels import depth_at, distance_at_depth, extinction_at
 from tests.vision.strips import koschmieder_strips
 from tests.vision.strips.koschmieder_strips import AIRLIGHT, GEOMETRY, NOISE, curves

@@ -15,7 +15,7 @@ from fogsim.estimators.repairs import Repair, chosen
 from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
-from fogsim.values.observation import Observation
+from fogsim.values.observation import LeadMeasurement, Observation
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.medians import median
 from fogsim.vision.light.pixel_kernels import LinearPixels
@@ -97,6 +97,11 @@ class Negru2013Repair(Repair):
         " those of that row alone",
         "candidates lie between rows as well, each one's level and slope are those of eqs. 15 to 18 over the rows about"
         " it, and the one whose model leaves least of the curve counts, as published",
+    )
+    LEAD_LEFT_OUT = (
+        "lead_left_out",
+        "a vehicle ahead joins the region or ends it",
+        "the band lies beside the tracked vehicle",
     )
     SINGLE_FRAMES = (
         "single_frames",
@@ -182,7 +187,7 @@ class Negru2013:
         Parameters
         ----------
         observation : Observation
-            Its image is all that is used.
+            Its image is used, and (repaired) the range of its lead vehicle to look beside it.
 
         Returns
         -------
@@ -198,18 +203,24 @@ class Negru2013:
         image = self._check.image_of(observation)
         diagnostics: dict[str, object] = {"horizon_row": self._camera.horizon_row}
         try:
-            return self._read(image, diagnostics)
+            return self._read(image, observation.lead, diagnostics)
         except CannotTellError as reason:
             return Estimate.invalid(self.method, str(reason), **diagnostics)
 
-    def _read(self, image: NDArray[np.uint8] | NDArray[np.uint16], diagnostics: dict[str, object]) -> Estimate:
+    def _read(
+        self,
+        image: NDArray[np.uint8] | NDArray[np.uint16],
+        lead: LeadMeasurement | None,
+        diagnostics: dict[str, object],
+    ) -> Estimate:
         road, pixels = self._road(image)
         slope = fog_slope(road, self._assumed)
         edges = self._edges(road, slope)
         horizon, axis = self._horizon(edges, road, pixels)
         diagnostics["horizon_row"] = horizon.row
         ahead = Negru2013Repair.BAND_AHEAD in self._repairs
-        band = road_band(road, edges, slope, self._camera, widest=not ahead)
+        hiding = lead if Negru2013Repair.LEAD_LEFT_OUT in self._repairs else None
+        band = road_band(road, edges, slope, self._camera, widest=not ahead, lead=hiding)
         diagnostics["band"] = (band.left, band.right, band.top + road.first_row, band.bottom + road.first_row)
         here = replace(band, left=band.left - road.first_column, right=band.right - road.first_column)
         seen = SeenBand(road, horizon, band, band_profile(road.luminance, here))

@@ -6,15 +6,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
+from fogsim.values.observation import LeadMeasurement
 from fogsim.vision.lines.edges import Edges, smoothed
 from fogsim.vision.lines.horizon import Horizon
-from fogsim.vision.region.corridor import corridor_curve
+from fogsim.vision.region.corridor import corridor_curve, hide_vehicle
 from fogsim.vision.region.inflection import steepest_slope
 from fogsim.vision.region.profile import RoadCurve, path_lengths
 from fogsim.vision.region.road_image import MIN_ROWS, SATURATED, CannotTellError, RoadImage
 from fogsim.vision.region.road_region import Band, crossing_band, cumulative_limits, grow_region
 
 SIMILARITY = 0.25  # [-] steepest fog, in contrasts of road to airlight a row; a silhouette takes at least 0.34
+
+HALF_BODY = 1.1
+"""Half the width of a vehicle ahead, beside which a band may lie at once [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +64,13 @@ def fog_slope(road: RoadImage, horizon: Horizon) -> NDArray[np.float32]:
 
 
 def road_band(
-    road: RoadImage, edges: Edges, slope: NDArray[np.float32], camera: Camera, *, widest: bool = False
+    road: RoadImage,
+    edges: Edges,
+    slope: NDArray[np.float32],
+    camera: Camera,
+    *,
+    widest: bool = False,
+    lead: LeadMeasurement | None = None,
 ) -> Band:
     """Find the band of road: columns are counted in the whole picture, rows in that of the road.
 
@@ -77,6 +87,8 @@ def road_band(
     widest : bool
         Take the widest band wherever it is, as published; else of those of a limited width that nearest to the
         vanishing point.
+    lead : LeadMeasurement or None
+        A tracked vehicle, which no band crosses.
 
     Raises
     ------
@@ -86,6 +98,7 @@ def road_band(
     blurred, steps = smoothed(road.luminance), slope + np.float32(edges.threshold)
     limits = cumulative_limits(steps, SIMILARITY * road.contrast + edges.threshold)
     region = grow_region(blurred, edges.pixels, limits)
+    hide_vehicle(region, road, camera, lead, HALF_BODY)
     cols, centre = camera.width, camera.principal_point[0] - road.first_column
     most = cols if widest else max(5, cols // 24)
     band = crossing_band(

@@ -49,8 +49,14 @@ BENT_ROAD = 0.2
 REACH = 0.7
 """Rows to either side over which the steepest slope is taken, over those below the horizon [-]."""
 
-RESOLVED = 1.1
+RESOLVED = 1.3
 """The steepest row over the topmost at which a slope is seen, from which on it is no end of what is seen [-]."""
+
+MOST_SCATTER = 0.2
+"""Median deviation of the nearest row's pixels from their median, over the contrast, beyond which it is no road [-]."""
+
+TOGETHER = 3
+"""Neighbouring rows that make the last that is seen."""
 
 FARTHEST_NEAR, LEAST_LEFT, ALBEDO = 30.0, 0.05, 0.04
 """Distance that the last row must have at least [m], least share of its contrast that must be left, and deviation of
@@ -168,9 +174,7 @@ def seen_road(
     below = np.arange(blurred.shape[0], dtype=np.float64) + (road.first_row - assumed.row)
     slope = np.minimum(steepest_slope(below, road.airlight), SIMILARITY * road.contrast).astype(np.float32)
     edges = edge_map(blurred, slope if Zhu2015Repair.FOG_DRAWS_NO_EDGES in repairs else np.zeros_like(slope))
-    # What smoothing takes away leaves no edges either: a pattern as fine as the pixels.
-    grain = float(np.median(np.abs(road.luminance - blurred))) if repairs else 0.0
-    if max(edges.threshold, 2.0 * grain) > road.contrast:
+    if edges.threshold > road.contrast:
         raise CannotTellError("noise or texture drowns the contrast of road and airlight")
     if Zhu2015Repair.SUBPIXEL_HORIZON in repairs:
         lines = _sure_lines(edges, blurred, road, camera, assumed)
@@ -275,9 +279,7 @@ def steepest_fog(road: SeenRoad, camera: Camera, repairs: AbstractSet[Zhu2015Rep
             return _of_last_row(curve, road)
         return Inflection(0.0, detection_limit(seen_up_to(curve), apart, camera.row_distance))
     extinction = float(_read(curve, curve.luminance[:, None])[0])
-    # What is saturated is seen, too.
-    seen = replace(curve, weight=np.maximum(curve.weight, curve.luminance >= SATURATED))
-    resolved = RESOLVED * highest_place(seen, REACH)
+    resolved = RESOLVED * highest_place(curve, REACH)
     if extinction > 0.0 and steepest_rows(curve, curve.luminance[:, None], REACH)[0] >= resolved:
         airlight, dark = check_law(curve, extinction, road.image)
         deviation = extinction_deviation(curve, extinction, _read, apart)
@@ -291,13 +293,21 @@ def steepest_fog(road: SeenRoad, camera: Camera, repairs: AbstractSet[Zhu2015Rep
 def _of_last_row(curve: RoadCurve, road: SeenRoad) -> Inflection:
     """Fog of how far the last row that is seen has brightened."""
     rows = np.flatnonzero((curve.weight > 0.0) & (curve.below_horizon >= 1.0))
+    # A row of a few pixels between edges may be anything: the last counts that has others below it.
+    together = np.flatnonzero(rows[TOGETHER - 1 :] - rows[: 1 - TOGETHER] == TOGETHER - 1)
+    rows = rows[int(together[0]) :] if together.size else rows[:0]
     if rows.size < MIN_ROWS // 2 or curve.below_horizon[rows[0]] * FARTHEST_NEAR > curve.row_distance:
         raise CannotTellError("the road's region ends below the horizon, and no inflection lies in it")
     near = rows[curve.below_horizon[rows] >= 0.5 * curve.below_horizon[-1]]
     if near.size == 0:
         raise CannotTellError("no road is seen")
-    below, apart = float(curve.below_horizon[rows[0]]), road.horizon.standard_deviation
-    dark = road.image.airlight - float(curve.luminance[rows[0]])
+    bottom_row = int(near[-1])
+    pixels = road.image.luminance[bottom_row][road.region[bottom_row] != 0]
+    if pixels.size and np.median(np.abs(pixels - np.median(pixels))) > MOST_SCATTER * road.image.contrast:
+        raise CannotTellError("what is ahead is too patchy for a road")
+    last = rows[:TOGETHER]
+    below, apart = float(curve.below_horizon[last[TOGETHER // 2]]), road.horizon.standard_deviation
+    dark = road.image.airlight - float(np.median(curve.luminance[last]))
     bottom = road.image.airlight - float(np.median(curve.luminance[near]))
     if dark <= LEAST_LEFT * bottom:
         raise CannotTellError("the road has faded into the airlight where it is last seen")
@@ -315,6 +325,8 @@ def _read(curve: RoadCurve, luminance: NDArray[np.float64]) -> NDArray[np.float6
 
 def _curve(road: SeenRoad, camera: Camera, *, own_lane: bool) -> RoadCurve:
     axis = camera.principal_point[0] if road.vanishing_point is None else road.vanishing_point[0]
-    return corridor_curve(
+    curve = corridor_curve(
         road.image, road.region, road.horizon.row, axis, camera, own_lane=own_lane, hidden=road.hidden
     )
+    # A sky that is clipped does not brighten: rows of it tell where the slope ends.
+    return replace(curve, weight=np.maximum(curve.weight, curve.luminance >= SATURATED))

@@ -47,6 +47,11 @@ def scenes(render, road):
         "own_lane": ([render(verge)], road.camera, None),
         "band_ahead": ([render(verge)], road.camera, None),
         "lead_left_out": ([render(road.but(visibility=200.0, lead_distance=25.0))], road.camera, ahead),
+        "negru2013.lead_left_out": (
+            [render(road.but(visibility=200.0, lead_distance=40.0))],
+            road.camera,
+            LeadMeasurement(40.0, 0.0),
+        ),
         "own_luminance": ([render(road.but(visibility=50.0))], road.camera, None),
         "relative_search": ([render(road.but(visibility=30.0, drift=0.15), 3)], road.camera, None),
         "single_frames": ([*plain, render(road.but(visibility=60.0, patch_contrast=0.08), 1)], road.camera, None),
@@ -65,7 +70,7 @@ def pictures(render, road):
     ("method", "repair"), [(method, one) for method, kind in REPAIRS.items() for one in kind], ids=str
 )
 def test_each_repair_can_be_switched_off_and_matters(pictures, method, repair):
-    frames, camera, lead = pictures[repair]
+    frames, camera, lead = pictures.get(f"{method}.{repair}", pictures[repair])
     others = [one.value for one in REPAIRS[method] if one is not repair]
     whole = read(method, frames, camera, lead)
     without = read(method, frames, camera, lead, repairs=others)

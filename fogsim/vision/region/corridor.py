@@ -28,7 +28,13 @@ FEWEST = 3
 """Fewest pixels that make a row's median."""
 
 
-def hide_vehicle(region: NDArray[np.uint8], road: RoadImage, camera: Camera, lead: LeadMeasurement | None) -> float:
+def hide_vehicle(
+    region: NDArray[np.uint8],
+    road: RoadImage,
+    camera: Camera,
+    lead: LeadMeasurement | None,
+    half_width: float = HALF_VEHICLE,
+) -> float:
     """Take what a tracked vehicle may cover out of a region.
 
     Parameters
@@ -41,6 +47,8 @@ def hide_vehicle(region: NDArray[np.uint8], road: RoadImage, camera: Camera, lea
         The assumed calibration.
     lead : LeadMeasurement or None
         The vehicle.
+    half_width : float
+        What it hides to either side of the axis [m].
 
     Returns
     -------
@@ -51,8 +59,8 @@ def hide_vehicle(region: NDArray[np.uint8], road: RoadImage, camera: Camera, lea
         return 0.0
     free = max(lead.distance - VEHICLE_MARGIN, 1.0)
     foot = math.ceil(camera.horizon_row + camera.row_distance / free) - road.first_row
-    half = HALF_VEHICLE * camera.focal_length / free
-    middle = camera.principal_point[0]
+    half = half_width * camera.focal_length / free
+    middle = camera.principal_point[0] - road.first_column
     left, right = max(math.ceil(middle - half), 0), max(math.floor(middle + half) + 1, 0)
     region[: max(foot, 0), left:right] = 0
     return half

@@ -74,7 +74,7 @@ class Announcements:
         share = agreeing / len(self._told)
         enough = agreeing >= FEWEST and share >= (LEAST if self.announced else MOST)
         spans = self.announced or time - told[0][0] >= 0.5 * self._window
-        self.announced = enough and spans
+        self.announced = bool(enough and spans)
         return last[1] if self.announced else None
 
 

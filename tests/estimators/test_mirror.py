@@ -55,11 +55,8 @@ def mirrored(camera: Camera) -> Camera:
 
 
 def same(found: Estimate, other: Estimate) -> bool:
-    # Where several fogs are averaged by their evidence, the rounding of sums of pixels is told in their shares.
-    uneven = found.diagnostics.get("evenness", 1.0) < 1.0
-    tolerance = {"rel": 1e-6, "abs": 0.1 * found.standard_deviation if uneven else 0.0}
-    alike = found.extinction == pytest.approx(other.extinction, **tolerance)
-    sure = found.standard_deviation == pytest.approx(other.standard_deviation, **tolerance)
+    alike = found.extinction == pytest.approx(other.extinction, rel=1e-6)
+    sure = found.standard_deviation == pytest.approx(other.standard_deviation, rel=1e-6)
     return found.valid == other.valid and alike and sure
 
 

@@ -37,9 +37,9 @@ OUTLIERS_OF_OBSTACLE = 3
 """Fewest outliers that make an obstacle."""
 
 
-GRAZING = 0.05
-"""Angle at which a road's sheen is half of that at the horizon [rad]: some 7°, as a rough surface's reflection of a sky
-of even luminance has it (Fresnel's formula over facets that are tilted by some 10°)."""
+GRAZING = 0.1
+"""Angle at which a road's sheen is half of that at the horizon [rad]: 6°, between what CIE's table of dry asphalt (R2)
+has under a sky of even luminance, 11°, and Fresnel's formula over facets that are tilted by some 10°, 3°."""
 
 CLOUD_ANGLE = 0.03
 """Angle over which uneven airlight forgets itself [rad]."""
@@ -54,8 +54,8 @@ class Albedo(NamedTuple):
         Standard deviation [-] and correlation length [m] of patches.
     drift_deviation, drift_length : float
         The same of the drift.
-    sheen_deviation : float
-        Standard deviation of the part of the sky's light that the road reflects at grazing angles [-].
+    sheen, sheen_deviation : float
+        Part of the sky's light that the road reflects at grazing angles, and its standard deviation [-].
     cloud_deviation : float
         Standard deviation of the airlight over the image, relative to it [-].
     """
@@ -64,6 +64,7 @@ class Albedo(NamedTuple):
     patch_length: float
     drift_deviation: float
     drift_length: float
+    sheen: float = 0.0
     sheen_deviation: float = 0.0
     cloud_deviation: float = 0.0
 
@@ -318,6 +319,7 @@ def whiten(
     covariance = _initial_covariance(strips, albedo)
     size = covariance.shape[0]
     state, gain, innovation = np.zeros((size, width)), np.empty(size), np.empty(width)
+    state[2, 0] = albedo.sheen
     log_determinant, product = 0.0, 1.0
     for i in range(count):
         if i:

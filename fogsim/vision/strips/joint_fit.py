@@ -20,19 +20,21 @@ Floats = NDArray[np.float64]
 PATCH_LENGTH, DRIFT_LENGTH = 3.0, 30.0
 """Lengths over which the albedo of a strip forgets itself: repaired patches, and slow change along the road [m]."""
 
-ALBEDOS = (
-    (0.015, 0.005, 0.0),
-    (0.015, 0.04, 0.0),
-    (0.015, 0.12, 0.0),
-    (0.015, 0.02, 0.07),
-    (0.04, 0.05, 0.07),
-    (0.08, 0.1, 0.07),
-    (0.2, 0.3, 0.07),
-)
-"""Deviations of patches and of drift that are tried, relative to the road's luminance, and of the part of the sky's
-light that the road reflects at grazing angles [-]."""
+SHEEN = (0.04, 0.04)
+"""Part of the sky's light that asphalt reflects at grazing angles, and its standard deviation [-]."""
 
-ALBEDO_CHANCES = (0.25, 0.1, 0.1, 0.25, 0.2, 0.08, 0.02)
+ALBEDOS = (
+    Albedo(0.015, PATCH_LENGTH, 0.005, DRIFT_LENGTH),
+    Albedo(0.015, PATCH_LENGTH, 0.04, DRIFT_LENGTH),
+    Albedo(0.015, PATCH_LENGTH, 0.02, DRIFT_LENGTH, *SHEEN),
+    Albedo(0.015, PATCH_LENGTH, 0.12, DRIFT_LENGTH, *SHEEN),
+    Albedo(0.04, PATCH_LENGTH, 0.05, DRIFT_LENGTH, *SHEEN),
+    Albedo(0.08, PATCH_LENGTH, 0.1, DRIFT_LENGTH, *SHEEN),
+    Albedo(0.2, PATCH_LENGTH, 0.3, DRIFT_LENGTH, *SHEEN),
+)
+"""How the albedo may wander: what is tried, before airlight that is as uneven as the sky."""
+
+ALBEDO_CHANCES = (0.3, 0.1, 0.25, 0.1, 0.15, 0.07, 0.03)
 """How likely each of those is before the image is seen [-]."""
 
 SMOOTH, EXPLAINED = 4, 1.0
@@ -194,7 +196,7 @@ def _from_search(bins: Bins, prior: JointPrior) -> Solution:
         airlights.append(float(np.median(bins.luminance[0][bins.noise[0] > 0][-FAR_BINS:])))
     grid = _grid(bins, EXTINCTIONS)
     for airlight in airlights:
-        cost = joint_kernels.extinction_costs(bins, albedo_of(ALBEDOS[1]), grid, airlight, prior.shift)
+        cost = joint_kernels.extinction_costs(bins, under_sky(ALBEDOS[1], prior), grid, airlight, prior.shift)
         best = int(np.argmin(cost))
         new = all(abs(math.log(grid[best] / k)) > ALIKE for k, _ in starts)
         if math.isfinite(cost[best]) and new:
@@ -222,19 +224,21 @@ def _refined_from(bins: Bins, prior: JointPrior, start: tuple[float, float], shi
     return _refined(bins, ALBEDOS[0], prior, np.array([*start, shift, 0.0]), STEPS)
 
 
-def _refined(bins: Bins, albedo: tuple[float, float, float], prior: JointPrior, start: Floats, steps: int) -> Solution:
-    return joint_kernels.gauss_newton(bins, albedo_of(albedo), prior, start, steps)
+def _refined(bins: Bins, albedo: Albedo, prior: JointPrior, start: Floats, steps: int) -> Solution:
+    return joint_kernels.gauss_newton(bins, under_sky(albedo, prior), prior, start, steps)
 
 
-def albedo_of(deviations: tuple[float, float, float]) -> Albedo:
-    """Albedo that wanders as told, over the lengths of this module.
+def under_sky(albedo: Albedo, prior: JointPrior) -> Albedo:
+    """Albedo seen through an airlight that is as uneven as is known beforehand.
 
     Parameters
     ----------
-    deviations : (3,) tuple of float
-        One of `ALBEDOS`.
+    albedo : Albedo
+        How it wanders.
+    prior : JointPrior
+        Sky and horizon.
     """
-    return Albedo(deviations[0], PATCH_LENGTH, deviations[1], DRIFT_LENGTH, deviations[2])
+    return albedo._replace(cloud_deviation=prior.cloud)
 
 
 def _is_clear(bins: Bins, found: Solution) -> bool:
@@ -317,17 +321,22 @@ def with_neighbours(own: JointFit, curves: StripCurves, geometry: StripGeometry,
     best = _fitted(curves, geometry, prior, [0, *seen], own) if seen else None
     if best is None:
         return own
-    if agree(own, best):
+    agreed = agree(own, best)
+    if agreed and best.misfit < CLEAR_MISFIT:
         return best
     if len(seen) == 1:
-        return own
+        return best if agreed else own
     found = [_fitted(curves, geometry, prior, [0, strip], own) for strip in seen]
     pairs = [pair for pair in found if pair is not None]
     # With an obstacle where there is none, or without the one that there is, a lane alone fits well and is far off.
     if own.hidden.any() and len(pairs) == len(seen) and all(_alike(pair, best) for pair in pairs):
-        return best
+        return min((best, *pairs), key=_deviation)
     kept = [pair for pair in pairs if agree(own, pair)]
-    return kept[0] if len(kept) == 1 else own
+    return min(kept, key=_deviation) if kept else own
+
+
+def _deviation(fit: JointFit) -> float:
+    return fit.extinction_deviation
 
 
 def agree(own: JointFit, more: JointFit) -> bool:

@@ -76,6 +76,8 @@ class JointPrior(NamedTuple):
     vignetting, vignetting_deviation : float
         How much of what a simple lens takes from pixels off its axis (1 − cos⁴) this one takes, and the standard
         deviation of that [-].
+    cloud : float
+        Deviation of the airlight over the image, relative to it [-].
     """
 
     airlight: float
@@ -85,6 +87,7 @@ class JointPrior(NamedTuple):
     shift_deviation: float
     vignetting: float
     vignetting_deviation: float
+    cloud: float = 0.0
 
 
 class Solution(NamedTuple):

@@ -18,6 +18,10 @@ OVEREXPOSURE = 0.15
 HALF, MOSTLY = 0.5, 0.98
 """Shares of saturated pixels beyond which a sky may be brighter, and beyond which it tells no more than that [-]."""
 
+EVEN_SKY, CLOUD, MOST_CLOUD = 0.02, 1.5, 0.015
+"""Unevenness of a sky that trees before it and rounding make, how much of more of it the airlight before the road has,
+and the most of that [-]: clouds and dirt on the glass go on below the horizon."""
+
 
 def joint_prior(sky: Sky, camera: Camera, horizon: Horizon) -> JointPrior:
     """Prior of airlight, horizon and lens for `fogsim.vision.strips.joint_fit.fit_jointly`.
@@ -40,6 +44,7 @@ def joint_prior(sky: Sky, camera: Camera, horizon: Horizon) -> JointPrior:
         shift_deviation=horizon.standard_deviation,
         vignetting=sky.vignetting,
         vignetting_deviation=sky.vignetting_deviation,
+        cloud=min(CLOUD * max(sky.unevenness - EVEN_SKY, 0.0), MOST_CLOUD),
     )
 
 

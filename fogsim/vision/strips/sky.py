@@ -2,7 +2,7 @@
 
 import functools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,8 @@ class Sky:
     vignetting, vignetting_deviation : float
         How much of what a simple lens takes from pixels off its axis (1 − cos⁴) this one takes, and the standard
         deviation of that [-].
+    unevenness : float
+        Deviation of its luminance from place to place, relative to it [-]: by clouds, by dirt on the glass, by trees.
     """
 
     luminance: float
@@ -53,6 +55,7 @@ class Sky:
     clipped: float
     vignetting: float = 0.0
     vignetting_deviation: float = UNKNOWN_VIGNETTING
+    unevenness: float = 0.0
 
     @property
     def is_clipped(self) -> bool:
@@ -114,42 +117,43 @@ def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
     saturated, clipped = sky_kernels.saturation(image, rows, side)
     # Where the sky is clipped it looks the same though a lens darkens it.
     free = np.flatnonzero(height >= lowest)[::-2] if clipped <= SATURATED_SHARE else np.zeros(0, np.int64)
-    shading = _shading(image, camera, rows[free], bright[free], noise)
-    if shading is None:
-        shading = _Shading(level, scatter, 0.0, UNKNOWN_VIGNETTING)
+    shading = _shading(image, camera, rows[free], bright[free], noise, _Shading(level, scatter))
     level, scatter = shading.level, shading.deviation
     unseen = UNSEEN * max(float(lowest) - margin / camera.focal_length - CLOSE, 0.0) * level
     deviation = math.hypot(scatter, unseen)
     # What looks everywhere different is a wood rather than a sky, which is no darker than that.
     covered = median(share) < PATCHY and scatter > SCATTERED * level
     upward = BRIGHTER * level if covered else deviation
-    return Sky(level, deviation, upward, noise, saturated, clipped, shading.vignetting, shading.vignetting_deviation)
+    lens = (shading.vignetting, shading.vignetting_deviation)
+    return Sky(level, deviation, upward, noise, saturated, clipped, *lens, shading.unevenness)
 
 
 @dataclass(frozen=True, slots=True)
 class _Shading:
-    """Brightness at the horizon straight ahead and vignetting of the lens, with their standard deviations."""
+    """A sky's brightness at the horizon straight ahead, vignetting, their standard deviations, and unevenness."""
 
     level: float
     deviation: float
-    vignetting: float
-    vignetting_deviation: float
+    vignetting: float = 0.0
+    vignetting_deviation: float = UNKNOWN_VIGNETTING
+    unevenness: float = 0.0
 
 
 def _shading(
-    image: LinearPixels, camera: Camera, rows: NDArray[np.int64], bright: Floats, noise: float
-) -> _Shading | None:
-    """Sky of even slopes behind a lens; None where it does not fill most of its rows, or is black."""
+    image: LinearPixels, camera: Camera, rows: NDArray[np.int64], bright: Floats, noise: float, unseen: _Shading
+) -> _Shading:
+    """Sky of even slopes behind a lens, or what is known without them where it does not fill most of its rows."""
     if rows.size < 2 or median(bright) <= 0.0:
-        return None
+        return unseen
     axis = np.array([*camera.principal_point, camera.horizon_row, camera.focal_length])
-    found, covariance, seen = sky_kernels.sky_shading(image, rows, axis, bright, noise)
+    found, covariance, seen, scatter = sky_kernels.sky_shading(image, rows, axis, bright, noise)
     level = float(found[0])
+    unevenness = scatter / level if level > 0.0 else 0.0
     if seen < LEAST_SEEN or level <= 0.0:
-        return None
+        return replace(unseen, unevenness=unevenness)
     vignetting = min(max(float(found[3]) / level, 0.0), MOST_VIGNETTING)
     deviation = min(math.hypot(UNEVEN, math.sqrt(covariance[3, 3]) / level), UNKNOWN_VIGNETTING)
-    return _Shading(level, math.sqrt(covariance[0, 0]), vignetting, deviation)
+    return _Shading(level, math.sqrt(covariance[0, 0]), vignetting, deviation, unevenness)
 
 
 @functools.lru_cache(maxsize=64)

@@ -191,7 +191,7 @@ ALIKE = 4.0
 @kernel
 def sky_shading(
     image: LinearPixels, rows: NDArray[np.int64], axis: NDArray[np.float64], bright: NDArray[np.float64], noise: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float, float]:
     """Sky as L = a + b x + c y − d (1 − cos⁴ of the angle to the camera's axis), by least squares in Cauchy's norm.
 
     Parameters
@@ -209,8 +209,9 @@ def sky_shading(
 
     Returns
     -------
-    tuple of (4,) and (4, 4) float64 and float
-        a, b, c, d, their covariance, and the share of pixels that lie near.
+    tuple of (4,) and (4, 4) float64 and two floats
+        a, b, c, d, their covariance, the share of pixels that lie near, and the robust deviation of all of them beside
+        their noise [linear grey levels].
     """
     cols, count = image.pixels.shape[1], SHADING_COLS
     level = float(np.median(bright))
@@ -234,7 +235,31 @@ def sky_shading(
         inverse = inverse_of(normal)
         found = times(inverse, right)
         covariance = inverse * (ALIKE * max(squares / max(number, 1), noise * noise))
-    return found, covariance, number / seen.size
+    return found, covariance, number / seen.size, _scatter(seen, aside, height, above_axis, found, noise)
+
+
+@kernel
+def _scatter(
+    seen: NDArray[np.float64],
+    aside: NDArray[np.float64],
+    height: NDArray[np.float64],
+    above_axis: NDArray[np.float64],
+    found: NDArray[np.float64],
+    noise: float,
+) -> float:
+    """Robust deviation of pixels from a sky's shading, beside that of their noise."""
+    apart = np.empty(seen.size)
+    for i in range(height.size):
+        for j in range(aside.size):
+            apart[i * aside.size + j] = abs(seen[i, j] - _shaded(aside[j], height[i], above_axis[i], found))
+    return math.sqrt(max((1.4826 * float(np.median(apart))) ** 2 - noise * noise, 0.0))
+
+
+@kernel
+def _shaded(x: float, height: float, y: float, found: NDArray[np.float64]) -> float:
+    """Luminance of a sky of some shading at a place."""
+    off = 1.0 - 1.0 / (1.0 + x * x + y * y) ** 2
+    return float(found[0] + found[1] * x + found[2] * height - found[3] * off)
 
 
 @kernel
@@ -254,7 +279,7 @@ def _add_sky(
         y = above_axis[i]
         for j in range(aside.size):
             off = 1.0 - 1.0 / (1.0 + aside[j] * aside[j] + y * y) ** 2
-            rest = seen[i, j] - found[0] - found[1] * aside[j] - found[2] * height[i] + found[3] * off
+            rest = seen[i, j] - _shaded(aside[j], height[i], y, found)
             if rest * rest < 4.0 * spread:
                 number += 1
                 squares += rest * rest

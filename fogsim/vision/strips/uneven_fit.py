@@ -267,7 +267,7 @@ def _left_out(found: Solution, bins: Bins) -> int:
 
 def _even(bins: Bins, albedo: int, prior: JointPrior, start: Floats) -> tuple[float, int]:
     """Cost of even fog, with ln k as its parameter and what is known of that; and how many bins it leaves out."""
-    albedos = joint_fit.albedo_of(ALBEDOS[albedo])
+    albedos = joint_fit.under_sky(ALBEDOS[albedo], prior)
     found = joint_kernels.gauss_newton(bins, albedos, prior, start, joint_fit.MORE_STEPS)
     k, variance = max(float(found.theta[0]), 1e-5), float(found.covariance[0, 0])
     apart = (math.log(k) - MEAN) / BROAD
@@ -298,7 +298,8 @@ def _banks(bins: Bins, albedo: int, prior: JointPrior, start: Floats) -> list[_C
 def _candidate(
     bins: Bins, albedo: int, prior: JointPrior, fog: FogNodes, chance: float, start: Floats, steps: int
 ) -> _Candidate:
-    found = uneven_kernels.fit_uneven(bins, joint_fit.albedo_of(ALBEDOS[albedo]), prior, fog, start, steps)
+    albedos = joint_fit.under_sky(ALBEDOS[albedo], prior)
+    found = uneven_kernels.fit_uneven(bins, albedos, prior, fog, start, steps)
     if int((found.used[0] == USED).sum()) < joint_fit.LEAST_BINS:
         return _Candidate(math.inf, found, fog, chance)
     likelihood = found.cost + _hidden_cost(found, bins)

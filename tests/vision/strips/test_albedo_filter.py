@@ -19,7 +19,7 @@ from fogsim.vision.strips.albedo_filter import (
     whiten,
 )
 
-ALBEDO = Albedo(0.04, 3.0, 0.1, 30.0, 0.15, 0.03)
+ALBEDO = Albedo(0.04, 3.0, 0.1, 30.0, sheen=0.05, sheen_deviation=0.15, cloud_deviation=0.03)
 AIRLIGHT = 200.0
 DISTANCE = np.geomspace(5.0, 120.0, 24)
 EXTENT = 0.1 * DISTANCE
@@ -47,6 +47,11 @@ def share(length):
     middle = (np.arange(400) + 0.5) / 400
     apart = np.abs(middle[:, None] - middle)
     return np.array([np.sqrt(np.exp(-extent / length * apart).mean()) for extent in EXTENT])
+
+
+def mean_sheen(residuals):
+    """Light of the mean sheen, by strip and bin."""
+    return ALBEDO.sheen * (AIRLIGHT - residuals.veil) / (1.0 + GRAZING_ANGLE / GRAZING)
 
 
 def dense_covariance(residuals, kept):
@@ -80,6 +85,7 @@ def test_innovations_and_determinant_are_those_of_the_dense_cholesky_factor(miss
     covariance, index = dense_covariance(residuals, residuals.noise > 0)
     factor = np.linalg.cholesky(covariance)
     columns = np.array([residuals.columns[s, i] for i, s in index])
+    columns[:, 0] -= [mean_sheen(residuals)[s, i] for i, s in index]
     expected = np.linalg.solve(factor, columns)
     found = np.array([out.innovations[s, i] for i, s in index])
     # The shares of means over bins are integrated in steps here.
@@ -94,7 +100,7 @@ def test_constants_are_the_posterior_mean_of_the_strips_albedo():
     out = room(residuals)
     whiten(residuals, albedo_transitions(DISTANCE, EXTENT, GRAZING_ANGLE, ALBEDO), ALBEDO, AIRLIGHT, False, out)
     covariance, index = dense_covariance(residuals, residuals.noise > 0)
-    values = np.array([residuals.columns[s, i, 0] for i, s in index])
+    values = np.array([residuals.columns[s, i, 0] - mean_sheen(residuals)[s, i] for i, s in index])
     for strip in range(STRIPS):
         cross = np.array([CONSTANT_DEVIATION**2 * residuals.scale[s, i] * (s == strip) for i, s in index])
         assert out.constants[strip, 0] == pytest.approx(cross @ np.linalg.solve(covariance, values), abs=1e-4)
@@ -104,7 +110,7 @@ def test_without_scale_the_residuals_are_divided_by_their_noise():
     residuals = drawn()
     residuals.scale[:], residuals.veil[:] = 0.0, 0.0
     out = room(residuals)
-    matt = ALBEDO._replace(sheen_deviation=0.0)
+    matt = ALBEDO._replace(sheen=0.0, sheen_deviation=0.0)
     changes = albedo_transitions(DISTANCE, EXTENT, GRAZING_ANGLE, matt)
     logarithm = whiten(residuals, changes, matt, AIRLIGHT, False, out)
     assert out.innovations == pytest.approx(residuals.columns / np.sqrt(residuals.noise)[:, :, None])

@@ -5,7 +5,7 @@ import pytest
 
 from fogsim.values import Camera
 from fogsim.vision.lines.horizon import calibrated_horizon
-from fogsim.vision.strips.joint_prior import OVEREXPOSURE, SKY_DEVIATION, joint_prior
+from fogsim.vision.strips.joint_prior import MOST_CLOUD, OVEREXPOSURE, SKY_DEVIATION, joint_prior
 from fogsim.vision.strips.sky import Sky
 
 CAMERA = Camera(640, 480, 577.0, (319.5, 239.5), 1.38, np.radians(2.0))
@@ -24,6 +24,12 @@ def test_an_open_sky_is_the_airlight_within_its_deviation():
     assert prior.above == pytest.approx(np.hypot(SKY_DEVIATION * 200.0, 3.0))
     assert (prior.shift, prior.shift_deviation) == (0.0, HORIZON.standard_deviation)
     assert (prior.vignetting, prior.vignetting_deviation) == (0.4, 0.05)
+
+
+def test_airlight_is_as_uneven_as_a_sky_that_trees_and_rounding_do_not_explain():
+    cloud = [joint_prior(replace(SKY, unevenness=uneven), CAMERA, HORIZON).cloud for uneven in (0.0, 0.015, 0.025, 0.5)]
+    assert cloud[:2] == [0.0, 0.0]
+    assert 0.0 < cloud[2] < cloud[3] == MOST_CLOUD
 
 
 def test_a_horizon_that_was_seen_lower_is_a_shift():

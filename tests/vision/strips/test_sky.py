@@ -75,7 +75,7 @@ def test_a_sky_of_even_slopes_behind_a_lens_is_found_with_its_covariance():
     sky = truth[0] + truth[1] * across + truth[2] * height - truth[3] * AWAY
     for seed in range(20):
         image = photographed(sky, noise=1.5, seed=seed)
-        fit, covariance, seen = sky_shading(image, rows, axis, sky[rows].mean(axis=1), 1.5)
+        fit, covariance, seen, _ = sky_shading(image, rows, axis, sky[rows].mean(axis=1), 1.5)
         assert seen > 0.95
         found.append(fit)
     spread = np.sqrt(np.diag(covariance))
@@ -83,6 +83,13 @@ def test_a_sky_of_even_slopes_behind_a_lens_is_found_with_its_covariance():
     # Neighbouring pixels of a true sky err together, here they do not: twice as sure.
     assert (np.std(found, axis=0) < spread).all()
     assert (np.std(found, axis=0) > 0.2 * spread).all()
+
+
+def test_how_uneven_a_sky_is_beside_its_noise_is_told():
+    assert sky_above(photographed(np.full(ROWS.shape, 180.0), noise=2.0), CAMERA, 3.0).unevenness < 0.004
+    clouds = 180.0 * (1.0 + 0.04 * np.sign(np.sin(COLS / 9.0) * np.sin(ROWS / 7.0)))
+    seen = sky_above(photographed(clouds, noise=2.0), CAMERA, 3.0)
+    assert seen.unevenness == pytest.approx(1.4826 * 0.04, rel=0.15)
 
 
 def test_the_level_at_the_horizon_is_that_of_a_straight_line_above_what_stands_there():

@@ -1,5 +1,6 @@
-"""Photons in fog: veils of head lamps and halos of lamps, to which the models of `fogsim.atmosphere` are compared.
+"""Photons in fog: veils, halos of lamps, airlight by day, to which the models of `fogsim.atmosphere` are compared.
 
+    python benchmarks/monte_carlo.py airlight tests/data/monte_carlo_airlight.csv --photons 400000
     python benchmarks/monte_carlo.py halo tests/data/monte_carlo_halo.csv --photons 1000000
     python benchmarks/monte_carlo.py lobes tests/data/monte_carlo_lobes.csv --photons 4000000
     python benchmarks/monte_carlo.py origins fogsim/atmosphere/data/light_origins.csv --photons 6000000
@@ -18,6 +19,7 @@ import numpy as np
 from photon_paths import (
     LAMP_SIZES,
     STEP,
+    from_layer,
     halo,
     likely_cosines,
     lobe_halo,
@@ -27,6 +29,7 @@ from photon_paths import (
     without_peak,
 )
 
+from fogsim.atmosphere.lamps.phase_function import henyey_greenstein
 from fogsim.lighting.beams import high_beam, low_beam
 from fogsim.scene.lamps import STREET_ANGLES, STREET_INTENSITIES
 from fogsim.units import extinction_from_visibility
@@ -55,6 +58,18 @@ VISIBILITIES = (30.0, 50.0, 80.0, 100.0, 150.0, 200.0, 300.0, 500.0)
 DIRECTIONS = ((0.0, -2.02), (0.0, 2.0), (0.0, 8.0), (0.0, -8.0), (10.0, 0.0), (-15.0, -4.0))
 LAMPS = np.array([[1.8, 0.6, -0.85], [1.8, -0.6, -0.85]])
 EYE_HEIGHT = 1.5
+LAYERS = (
+    (30, 250, 1.3),
+    (50, 250, 1.3),
+    (100, 250, 1.3),
+    (100, 250, 2.5),
+    (100, 20, 1.3),
+    (400, 250, 1.3),
+    (2000, 250, 1.3),
+)
+"""V_met, height of the layer and of the eye [m]."""
+
+LOOKS = (-30.0, -10.0, -5.0, -2.0, -0.5, 0.0, 0.5, 2.0, 5.0, 10.0, 30.0, 90.0)
 
 
 def phase_table(fog):
@@ -81,6 +96,29 @@ def write_road(out, paths):
             fixed = (phases, likely_cosines(phase), STEP, table, LAMPS, -EYE_HEIGHT, 0.1)
             result = road_light(paths, np.random.default_rng(1), k, towards, 400.0, *fixed)
             file.write(f"{fog},{visibility},{up}," + ",".join(f"{n:.4g}" for n in result) + "\n")
+
+
+def write_airlight(out, photons):
+    """Table of the light that arrives at an eye in a plane layer of fog."""
+    angle = np.arange(0.0, math.pi + STEP, STEP)
+    phases = {fog: phase_table(fog) for fog in ("moderate_radiation", "heavy_advection")}
+    phases["henyey_greenstein"] = henyey_greenstein(angle, 0.85)
+    with out.open("w", encoding="utf-8") as file:
+        file.write("# Radiance at an eye in a layer of fog that absorbs nothing, by elevation [degrees], as parts:\n")
+        file.write("# `ground` by a black sky and a ground of luminance 1, `sky` over black ground by a CIE overcast\n")
+        file.write("# sky that alone gives a white horizontal surface luminance 1; standard errors. Lengths [m].\n")
+        file.write(
+            "# `reflectance` of the layer from below, `transmittance` for that sky (g of Henyey-Greenstein: 0.85).\n"
+        )
+        file.write(f"# Command: python benchmarks/monte_carlo.py airlight {out} --photons {photons}\n")
+        file.write("fog,visibility,top,eye,elevation,ground,sky,ground_error,sky_error,reflectance,transmittance\n")
+        for (fog, phase), (visibility, top, eye) in itertools.product(phases.items(), LAYERS):
+            rng, cosines, k = np.random.default_rng(1), likely_cosines(phase), extinction_from_visibility(visibility)
+            flux = from_layer(photons, rng, cosines, k * top, 0.0, 2.0)[:2]
+            for look in LOOKS:
+                found = from_layer(photons, rng, cosines, k * top, k * eye, math.sin(math.radians(look)))
+                numbers = (visibility, top, eye, look, *found, *flux)
+                file.write(f"{fog}," + ",".join(f"{n:.5g}" for n in numbers) + "\n")
 
 
 def write_halo(out, photons):
@@ -210,12 +248,12 @@ def write_veil(out, paths):
 def main():
     """Write a table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=("halo", "lobes", "origins", "road", "veil"))
+    parser.add_argument("what", choices=("airlight", "halo", "lobes", "origins", "road", "veil"))
     parser.add_argument("out", type=Path)
     parser.add_argument("--photons", type=int, default=400_000)
     arguments = parser.parse_args()
     writers = {"halo": write_halo, "lobes": write_lobes, "origins": write_origins}
-    writers |= {"road": write_road, "veil": write_veil}
+    writers |= {"airlight": write_airlight, "road": write_road, "veil": write_veil}
     writers[arguments.what](arguments.out, arguments.photons)
 
 

@@ -37,7 +37,7 @@ def turned(x, y, z, cosine, azimuth):
     a, b = sine * math.cos(azimuth), sine * math.sin(azimuth)
     flat = math.hypot(x, y)
     if flat < 1e-9:
-        return a, b, math.copysign(cosine, z)
+        return a, b, math.copysign(1.0, z) * cosine
     return cosine * x + (a * x * z - b * y) / flat, cosine * y + (a * y * z + b * x) / flat, cosine * z - a * flat
 
 
@@ -303,3 +303,33 @@ def road_light(paths, rng, k, towards, reach, phases, cosines, step, beam, lamps
         sums += np.array([weight * light, (weight * light) ** 2])
     mean = sums[0] / paths
     return mean, math.sqrt(max(sums[1] / paths - mean * mean, 0.0) / paths)
+
+
+@njit(cache=False)
+def from_layer(paths, rng, cosines, thickness, height, sine):
+    """Where the light comes from that arrives at a place in a plane layer of fog, traced backward from there.
+
+    Lengths are optical depths, heights those above the ground; `sine` is that of the elevation of the line of sight,
+    above 1 for the light that falls on a horizontal surface, facing upward. Returns the share of the ground's light and
+    of that of an overcast sky whose luminance goes as (1 + 2 sin) / 3 [both relative to a luminance of 1: the ground's,
+    and that of a white horizontal surface under that sky], and the standard errors of both.
+    """
+    ground = sky = squares = 0.0
+    for _ in range(paths):
+        up = math.sqrt(rng.random()) if sine > 1.0 else sine
+        x, y, z = math.sqrt(max(0.0, 1.0 - up * up)), 0.0, up
+        place = height
+        while True:
+            place -= math.log(1.0 - rng.random()) * z
+            if place <= 0.0:
+                ground += 1.0
+                break
+            if place >= thickness:
+                light = 3.0 / 7.0 * (1.0 + 2.0 * z)
+                sky += light
+                squares += light * light
+                break
+            cosine = cosines[int(rng.random() * len(cosines))]
+            x, y, z = turned(x, y, z, cosine, 2.0 * math.pi * rng.random())
+    ground, sky, squares = ground / paths, sky / paths, squares / paths
+    return ground, sky, math.sqrt(ground * (1.0 - ground) / paths), math.sqrt(max(squares - sky * sky, 0.0) / paths)

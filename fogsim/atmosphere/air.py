@@ -33,8 +33,7 @@ class Air:
     field : FogField
         The fog.
     droplets : Droplets
-        Sizes of its droplets, which set how lamplight is scattered.
-
+        Sizes of its droplets, which set how light is scattered.
 
     Attributes
     ----------
@@ -43,7 +42,7 @@ class Air:
     """
 
     def __init__(self, field: FogField, droplets: Droplets = Droplets.MODERATE_RADIATION) -> None:
-        self.field = field
+        self.field, self._droplets = field, droplets
         self._own, self._halos, self._streets = OwnLamplight(droplets), Halos(droplets), StreetLight()
         self._traffic = TrafficLight()
         self._road = RoadGlow()
@@ -101,7 +100,7 @@ class Air:
             by_beams = self._traffic.on(view, camera, pose, field, lights.beams)
             # Each adds to the sky's light alone.
             lit = by_beams if lit is view else replace(lit, radiance=lit.radiance + (by_beams.radiance - view.radiance))
-        radiance = daytime_luminance(lit, field, camera, pose)
+        radiance = daytime_luminance(lit, field, camera, pose, self._droplets)
         if lights.own:
             self._own.add(radiance, view, camera, pose, field, lights.own)
         sources = lights.others

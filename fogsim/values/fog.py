@@ -171,6 +171,9 @@ class FogField:
     airlight_shading : float
         How much the airlight dims with each unit of optical depth overhead [-]; 0 for airlight that is the same
         everywhere. Two-stream theory of a conservative layer gives ¾ (1 − g), about 0.1 in fog.
+    ground_albedo : float or None
+        Albedo of the land [-], 0 … 1, for an airlight by elevation and path as radiative transfer in a plane layer of
+        even fog has it (`airlight` is its level then); None for Koschmieder's, the same everywhere.
     forward_scatter : float
         Share of what the fog takes from the transmitted light that arrives blurred by day [-], 0 … 0.3.
     forward_scatter_width : float
@@ -190,6 +193,7 @@ class FogField:
     wind: tuple[float, float] = (0.0, 0.0)
     changes: tuple[FogChange, ...] = ()
     airlight_shading: float = 0.0
+    ground_albedo: float | None = None
     forward_scatter: float = 0.0
     forward_scatter_width: float = math.radians(1.0)
     shelters: tuple[FogShelter, ...] = ()
@@ -215,3 +219,26 @@ class FogField:
         for one, other in itertools.pairwise(self.changes):
             if not one.time < other.time:
                 raise InputError(f"times of changing fog must increase, got {one.time!r} and then {other.time!r} s")
+        if self.ground_albedo is not None:
+            self._refuse_no_layer(self.ground_albedo)
+
+    def _refuse_no_layer(self, albedo: float) -> None:
+        """Refuse an airlight by elevation and path where there is no plane layer of even fog."""
+        if not 0 <= albedo <= 1:
+            raise InputError(f"the albedo of the ground must lie within 0 … 1, got {albedo!r}")
+        uneven = {
+            "banks": bool(self.banks),
+            "patches": self.patches is not None,
+            "a soft top": self.top_edge > 0,
+            "no top": math.isinf(self.top),
+            "a base": self.base > -math.inf,
+            "a scale height": math.isfinite(self.scale_height),
+            "tunnels": bool(self.shelters),
+            "shaded airlight": self.airlight_shading > 0,
+            "forward scattering": self.forward_scatter > 0,
+        }
+        found = [name for name, is_so in uneven.items() if is_so]
+        if found:
+            raise InputError(
+                f"airlight by elevation is known of an even layer of fog on flat land, not with {', '.join(found)}"
+            )

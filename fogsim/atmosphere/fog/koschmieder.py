@@ -9,14 +9,21 @@ from fogsim.atmosphere.fog.airlight import airlight_source
 from fogsim.atmosphere.fog.forward_scatter import add_forward_scatter, pixel_width
 from fogsim.atmosphere.fog.frustum import frustum_grid, radiance_through_grid
 from fogsim.atmosphere.fog.koschmieder_kernels import BankedFog, fog_rows
+from fogsim.atmosphere.fog.layer_airlight import slant_airlight
+from fogsim.atmosphere.fog.layer_airlight_kernels import LayeredFog, layered_fog_rows
 from fogsim.atmosphere.fog.medium import has_closed_form
 from fogsim.atmosphere.fog.shelters import is_sheltered, sheltered_pixels
 from fogsim.jit import Bands
 from fogsim.values import Camera, CameraPose, FogBank, FogField, View
 from fogsim.values.pinhole import ray_from_pixel
 
+USUAL_DROPLETS = "moderate_radiation"
+"""Small droplets, as `Droplets` calls them."""
 
-def daytime_luminance(view: View, field: FogField, camera: Camera, pose: CameraPose) -> NDArray[np.float32]:
+
+def daytime_luminance(
+    view: View, field: FogField, camera: Camera, pose: CameraPose, droplets: str = USUAL_DROPLETS
+) -> NDArray[np.float32]:
     """Luminance at a camera, L = L0 T + L∞ (1 − T), with the field's forward scattering.
 
     Parameters
@@ -27,12 +34,16 @@ def daytime_luminance(view: View, field: FogField, camera: Camera, pose: CameraP
         The fog, at one time (see `field_at`).
     camera, pose
         The camera.
+    droplets : str
+        A member of `Droplets`; the airlight goes by it where the field has an albedo of the ground.
 
     Returns
     -------
     (rows, cols, 3) float32
         Linear luminance per channel [cd/m²].
     """
+    if field.ground_albedo is not None:
+        return fogged_radiance(view, field, pose.position, ray_from_pixel(camera, pose), droplets)
     radiance = _through_fog(view, field, camera, pose)
     if field.forward_scatter > 0:
         width = pixel_width(field.forward_scatter_width, camera.focal_length)
@@ -60,7 +71,7 @@ def transmittance(view: View, field: FogField, camera: Camera, pose: CameraPose)
     """
     # A white scene in fog that adds no light of its own is seen as its transmittance.
     white = dataclasses.replace(view, radiance=np.ones_like(view.radiance), lamp_response=None)
-    dark = dataclasses.replace(field, airlight=(0.0, 0.0, 0.0))
+    dark = dataclasses.replace(field, airlight=(0.0, 0.0, 0.0), ground_albedo=None)
     return np.ascontiguousarray(_through_fog(white, dark, camera, pose)[..., 0])
 
 
@@ -88,9 +99,15 @@ def _through_field(view: View, field: FogField, camera: Camera, pose: CameraPose
 
 
 def fogged_radiance(
-    view: View, field: FogField, eye: tuple[float, float, float], ray_map: NDArray[np.float64]
+    view: View,
+    field: FogField,
+    eye: tuple[float, float, float],
+    ray_map: NDArray[np.float64],
+    droplets: str = USUAL_DROPLETS,
 ) -> NDArray[np.float32]:
     """Luminance that reaches the camera through daytime fog: L = L0 e^(−τ) + L∞ (1 − e^(−τ)) (Koschmieder 1924).
+
+    L∞ goes by elevation and path where the field has an albedo of the ground (see `layer_airlight`).
 
     Parameters
     ----------
@@ -102,6 +119,8 @@ def fogged_radiance(
         Optical centre (x, y, z) [m].
     ray_map : (3, 3) float64
         Takes a pixel (u, v, 1) to its viewing ray in the world, of any length.
+    droplets : str
+        See `daytime_luminance`.
 
     Returns
     -------
@@ -115,18 +134,36 @@ def fogged_radiance(
     rows, columns = view.distance.shape
     lines, fogged = radiance.reshape(rows, 3 * columns), out.reshape(rows, 3 * columns)
     distance, rays = np.ascontiguousarray(view.distance, dtype=np.float32), np.ascontiguousarray(ray_map, np.float32)
-    fog = BankedFog(
+    fog, layer = _banked_fog(field, eye), None if field.ground_albedo is None else _layered_fog(field, eye, droplets)
+
+    def add_fog(_: int, top: int, bottom: int) -> None:
+        if layer is None:
+            fog_rows(lines, distance, rays, fog, top, bottom, fogged)
+        else:
+            layered_fog_rows(lines, distance, rays, layer, top, bottom, fogged)
+
+    Bands().work(add_fog, rows, columns)
+    return out
+
+
+def _banked_fog(field: FogField, eye: tuple[float, float, float]) -> BankedFog:
+    return BankedFog(
         headroom=np.float32(field.top - eye[2]),
         extinction=np.float32(field.extinction),
         banks=_bank_rows(field.banks, eye),
         airlight=np.array(field.airlight, dtype=np.float32),
     )
 
-    def add_fog(_: int, top: int, bottom: int) -> None:
-        fog_rows(lines, distance, rays, fog, top, bottom, fogged)
 
-    Bands().work(add_fog, rows, columns)
-    return out
+def _layered_fog(field: FogField, eye: tuple[float, float, float], droplets: str) -> LayeredFog:
+    around = slant_airlight(field, eye[2], droplets)
+    return LayeredFog(
+        headroom=np.float32(field.top - eye[2]),
+        extinction=np.float32(field.extinction),
+        airlight=np.array(field.airlight, dtype=np.float32),
+        share=around.share,
+        sky=np.float32(around.sky),
+    )
 
 
 def _bank_rows(banks: tuple[FogBank, ...], eye: tuple[float, float, float]) -> NDArray[np.float32]:

@@ -1,0 +1,211 @@
+"""Airlight by elevation and path in a plane layer of even fog, as radiative transfer has it.
+
+Fog that absorbs nothing, between a Lambertian ground and a CIE overcast sky. What is scattered toward the eye at a
+place, over E / π (E is the illuminance of the ground), goes by the optical thickness of the layer, the place's share
+of it, the elevation of the line of sight and, linearly, by the albedo of the ground; `tools/make_airlight_table.py`
+made the table of it.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from importlib.resources import files
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.atmosphere.fog.layer_airlight_kernels import BEND, ELEVATIONS, PATHS
+from fogsim.errors import InputError
+from fogsim.values import FogField
+
+_PIECES = 4
+"""Places on a line of sight between two paths of the table."""
+
+
+@dataclass(frozen=True, slots=True)
+class LayerTable:
+    """Source functions in layers, over E / π.
+
+    Attributes
+    ----------
+    thickness : (n,) float64
+        Optical thickness of the layer, ascending [-].
+    place : (m,) float64
+        Optical height above the ground over the thickness, from 0 to 1 [-].
+    elevation : (k,) float64
+        Of the line of sight, from −π/2 to π/2 [rad].
+    black, per_albedo : (n, m, k) float64
+        Over black ground, and what an albedo of 1 adds [-].
+    reflectance, transmittance : (n,) float64
+        Of the layer, for the light of the ground and for that of an overcast sky [-].
+    """
+
+    thickness: NDArray[np.float64]
+    place: NDArray[np.float64]
+    elevation: NDArray[np.float64]
+    black: NDArray[np.float64]
+    per_albedo: NDArray[np.float64]
+    reflectance: NDArray[np.float64]
+    transmittance: NDArray[np.float64]
+
+
+@cache
+def layer_table(droplets: str) -> LayerTable:
+    """The table that FogSim carries.
+
+    Parameters
+    ----------
+    droplets : str
+        A member of `Droplets`.
+    """
+    with (files("fogsim.atmosphere") / "data" / "airlight.npz").open("rb") as file, np.load(file) as found:
+        return LayerTable(
+            thickness=found["thickness"],
+            place=found["place"],
+            elevation=np.radians(found["elevation"]),
+            black=found[f"{droplets}_black"].astype(np.float64),
+            per_albedo=found[f"{droplets}_per_albedo"].astype(np.float64),
+            reflectance=found[f"{droplets}_reflectance"],
+            transmittance=found[f"{droplets}_transmittance"],
+        )
+
+
+def horizontal_share(albedo: float) -> float:
+    """Airlight seen level near the ground over that of a white horizontal diffuser, E / π: 0.34 + 0.66 ρ.
+
+    Parameters
+    ----------
+    albedo : float
+        Albedo ρ of the land around [-], 0 … 1.
+    """
+    return 0.34 + 0.66 * albedo
+
+
+@dataclass(frozen=True, slots=True)
+class SlantAirlight:
+    """What the fog adds between an eye and places around it.
+
+    Attributes
+    ----------
+    share : (`ELEVATIONS`, `PATHS`) float32
+        Airlight over the field's: mean source function on a path, by the bent sine of its elevation and by what it
+        takes from the light, 1 − T (see `layer_airlight_kernels`).
+    sky : float
+        Luminance of the sky above the fog over that of a sky which gives the ground the same illuminance without fog.
+    """
+
+    share: NDArray[np.float32]
+    sky: float
+
+
+def sines() -> NDArray[np.float64]:
+    """Sines of the elevations of `SlantAirlight.share`: dense at the horizon."""
+    bent = np.linspace(-1.0, 1.0, ELEVATIONS) / (1.0 + BEND)
+    return np.clip(BEND * bent / (1.0 - np.abs(bent)), -1.0, 1.0)
+
+
+def slant_airlight(field: FogField, eye_height: float, droplets: str) -> SlantAirlight:
+    """Airlight around an eye in a layer.
+
+    Parameters
+    ----------
+    field : FogField
+        The fog at one time, with an albedo of the ground.
+    eye_height : float
+        z of the eye [m].
+    droplets : str
+        A member of `Droplets`.
+
+    Raises
+    ------
+    InputError
+        If the eye is above the layer, or the table does not have so thin or thick a layer.
+    """
+    if eye_height > field.top:
+        raise InputError(
+            f"the eye, {eye_height - field.ground:.4g} m above the lowest road, is above the fog, whose top is "
+            f"{field.top - field.ground:.4g} m high; airlight by elevation is known within the layer"
+        )
+    thickness = layer_thickness(field.extinction, field.top - field.ground)
+    depth = max(eye_height - field.ground, 1e-3) * field.extinction
+    return _slant_airlight(_stepped(thickness), _stepped(depth), field.ground_albedo or 0.0, droplets)
+
+
+def _stepped(depth: float) -> float:
+    """The next of depths 1 % apart, which changes no light by more than a thousandth.
+
+    Roads that climb and fog that thickens take most of their frames' tables from memory so.
+    """
+    return math.exp(0.01 * round(100.0 * math.log(depth)))
+
+
+def layer_thickness(extinction: float, height: float) -> float:
+    """Optical thickness of a layer.
+
+    Parameters
+    ----------
+    extinction : float
+        Extinction coefficient [1/m].
+    height : float
+        Height of the top above the ground [m].
+
+    Raises
+    ------
+    InputError
+        If the table does not have it.
+    """
+    thickness, known = extinction * height, layer_table("moderate_radiation").thickness
+    if not known[0] <= thickness <= known[-1]:
+        raise InputError(
+            f"airlight by elevation is known for layers of optical thickness {known[0]:g} … {known[-1]:g}, got "
+            f"{thickness:.3g} (extinction {extinction:.3g} 1/m over {height:.4g} m)"
+        )
+    return thickness
+
+
+@lru_cache(maxsize=128)
+def _slant_airlight(thickness: float, depth: float, albedo: float, droplets: str) -> SlantAirlight:
+    table = layer_table(droplets)
+    log = np.log(table.thickness)
+    low = min(int(np.searchsorted(log, math.log(thickness), side="right")) - 1, len(log) - 2)
+    on = (math.log(thickness) - log[low]) / (log[low + 1] - log[low])
+
+    def between(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(values[low] + (values[low + 1] - values[low]) * on)
+
+    source = between(table.black) + albedo * between(table.per_albedo)
+    share = path_means(table, source, thickness, depth) / horizontal_share(albedo)
+    brighter = (1.0 - albedo * between(table.reflectance)) / between(table.transmittance)
+    return SlantAirlight(share.astype(np.float32), float(brighter))
+
+
+def path_means(table: LayerTable, source: NDArray[np.float64], thickness: float, depth: float) -> NDArray[np.float64]:
+    """What paths from an eye scatter in, over what they take from the light.
+
+    Parameters
+    ----------
+    table : LayerTable
+        Whose places and elevations count.
+    source : (m, k) float64
+        Source function at the table's places and elevations [-].
+    thickness : float
+        Optical thickness of the layer [-].
+    depth : float
+        Optical height of the eye above the ground [-].
+
+    Returns
+    -------
+    (`ELEVATIONS`, `PATHS`) float64
+        By the elevations of `sines` and by 1 − T, of paths that go on beyond ground and top as if in what is there [-].
+    """
+    slopes = sines()
+    looks = np.arcsin(slopes)
+    by_look = np.array([np.interp(looks, table.elevation, row) for row in source]).T
+    pieces = (PATHS - 1) * _PIECES
+    # dT = −T dτ: what a path scatters in is the source function's mean over the transmittance.
+    path = -np.log1p(-(np.arange(pieces) + 0.5) / pieces)
+    places = np.clip((depth + slopes[:, None] * path) / thickness, 0.0, 1.0)
+    scattered = np.array([np.interp(at, table.place, row) for at, row in zip(places, by_look, strict=True)])
+    sums = np.cumsum(scattered, axis=1)[:, _PIECES - 1 :: _PIECES] / _PIECES
+    at_eye = [np.interp(depth / thickness, table.place, row) for row in by_look]
+    return np.column_stack((at_eye, sums / np.arange(1, PATHS)))

@@ -23,7 +23,7 @@ LOOKS = np.array((*_NEAR_HORIZON, *range(30, 91, 5)), dtype=float)
 KEPT = (0, 2, 3, 5, 7, 8, 9, 10, 12, 13, 15, 17, 19, 22, 25, 28, 31)
 """Those of them that the table keeps, above and below."""
 
-THICKNESSES = np.geomspace(0.03, 100.0, 25)
+THICKNESSES = np.geomspace(0.002, 100.0, 32)
 """Optical thicknesses of the layer [-]."""
 
 PLACES = np.concatenate(([0.0], np.geomspace(0.001, 0.3, 14), np.linspace(0.4, 0.8, 5), [0.86, 0.91, 0.95, 0.98, 1.0]))

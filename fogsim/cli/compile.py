@@ -21,7 +21,10 @@ _SIZES = ((160, 120), (640, 480))
 """Pictures that are estimated: methods choose what they do by size [px]."""
 
 _DRIVES: dict[str, tuple[str, tuple[tuple[str, ...], ...]]] = {
-    "drives by day": ("motorway_fog_bank", (("end_when=lead.position > 100 km",),)),
+    "drives by day": (
+        "motorway_fog_bank",
+        (("end_when=lead.position > 100 km",), ("fog={visibility_m: 100, airlight: photons}",)),
+    ),
     "drives by night": (
         "night_motorway_fog",
         ((), ("street_lamps=true", "fog.patches={correlation_length_m: 20}", "camera.lens_glare=0.05")),

@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Sequence
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,9 @@ from fogsim.scenario.section import (
 )
 from fogsim.units import KMH_PER_MPS, extinction_from_visibility
 from fogsim.values import FogBank, FogChange, FogField, FogPatches, FogShelter
+
+_ALBEDO = 0.1
+"""Of land between asphalt and grass, which FogSim draws."""
 
 
 class Bank(Section):
@@ -135,6 +138,14 @@ class Fog(Section):
     droplets: Droplets = Droplets.MODERATE_RADIATION
     """Sizes of the droplets, which set how fog scatters lamplight: large in advection fog, small in radiation fog."""
 
+    airlight: Literal["koschmieder", "photons"] = "koschmieder"
+    """Light that the fog adds by day: the same everywhere, or by elevation and path as photons have it, which are
+    scattered many times between sky and ground: for even fog in a layer, on flat land without tunnels."""
+
+    ground_albedo: Annotated[Number, Field(ge=0, le=1)] | None = None
+    """Albedo of the land around, for `airlight: photons`: 0.05 dark asphalt or woods, 0.2 grass, 0.8 snow; 0.1 if not
+    given."""
+
     airlight_shading: Annotated[Number, Field(ge=0, le=1)] = 0.0
     """Dimming of the airlight for each unit of optical depth overhead; 0.1 in real fog, 0 for an even airlight."""
 
@@ -160,6 +171,26 @@ class Fog(Section):
             if one.end_m + 0.5 * one.edge_m > other.start_m - 0.5 * other.edge_m:
                 raise ValueError(f"banks overlap: one ends at {one.end_m:g} m, another starts at {other.start_m:g} m")
         return self
+
+    @model_validator(mode="after")
+    def _even_for_photons(self) -> Self:
+        if self.airlight != "photons":
+            if self.ground_albedo is not None:
+                raise ValueError("ground_albedo goes with airlight: photons")
+            return self
+        uneven = ("outside_visibility_m", "patches", "top_edge_m", "base_m", "scale_height_m", "airlight_shading")
+        given = [key for key in (*uneven, "forward_scatter") if getattr(self, key)]
+        if given or any(change.base_m is not None for change in self.changes):
+            raise ValueError(
+                "airlight: photons is known of even fog in a layer on the ground (visibility_m, top_m), not with "
+                + (", ".join(given) or "base_m in changes")
+            )
+        return self
+
+    @property
+    def albedo_of_photons(self) -> float | None:
+        """Albedo of the land around for `airlight: photons`, else None."""
+        return None if self.airlight == "koschmieder" else _ALBEDO if self.ground_albedo is None else self.ground_albedo
 
     @model_validator(mode="after")
     def _times_increase(self) -> Self:
@@ -227,6 +258,7 @@ def fog_along(
         wind=(0.0, 0.0) if fog.wind is None else _velocity(fog.wind),
         changes=_changes(fog, ground),
         airlight_shading=fog.airlight_shading,
+        ground_albedo=fog.albedo_of_photons,
         forward_scatter=fog.forward_scatter,
         forward_scatter_width=math.radians(fog.forward_scatter_deg),
         shelters=tuple(_shelter(tunnel, fog.in_tunnels_m) for tunnel in tunnels if math.isfinite(fog.in_tunnels_m)),

@@ -25,8 +25,10 @@ from fogsim.scenario.roads.schema import Actors, DemandSection, Road, check_road
 from fogsim.scenario.section import Flag, Method, Number, Period, Section, Seed, Text, method_of
 from fogsim.scenario.sensor_schema import Sensors
 from fogsim.scenario.timeline import Timeline, check_timeline
+from fogsim.scenario.timeline.checks import PHOTONS_BY_DAY
 from fogsim.scenario.traffic_alone import without_ego
 from fogsim.scenario.traffic_schema import DriversSection, Traffic
+from fogsim.units import DAY_ILLUMINANCE
 from fogsim.values.scene import USUAL_PAVEMENT, RoadSurface
 
 NO_RENDERER = "none"
@@ -181,6 +183,12 @@ class Scenario(Section):
     @model_validator(mode="after")
     def _road_or_network(self) -> Self:
         check_roads(self)
+        return self
+
+    @model_validator(mode="after")
+    def _photons_by_day(self) -> Self:
+        if self.fog.airlight == "photons" and self.light.illuminance_lx < DAY_ILLUMINANCE:
+            raise ValueError(f"light.illuminance_lx is {self.light.illuminance_lx:g}, and {PHOTONS_BY_DAY}")
         return self
 
     @model_validator(mode="after")

@@ -82,6 +82,9 @@ def test_the_resolved_scenario_says_it_all_again() -> None:
         ("scale_height_m=0", "fog.scale_height_m: input should be greater than or equal to 0.1"),
         ("wind={speed_kmh: 5}", "fog.wind.from_deg: this key is missing"),
         ("banks=[{start_m: 500, end_m: 300, visibility_m: 40}]", "start_m must be less than end_m, got 500 and 300"),
+        ("airlight=photon", "fog.airlight: input should be 'koschmieder' or 'photons'"),
+        ("ground_albedo=0.2", "ground_albedo goes with airlight: photons"),
+        ("airlight=photons", "even fog in a layer on the ground (visibility_m, top_m), not with outside_visibility_m"),
         ("airlight_shading=-0.1", "fog.airlight_shading: input should be greater than or equal to 0"),
     ],
 )
@@ -89,6 +92,47 @@ def test_mistakes_are_told(setting: str, told: str) -> None:
     with pytest.raises(InputError) as error:
         fog(setting)
     assert told in str(error.value)
+
+
+def photons(*settings: str) -> FogField:
+    return fog("visibility_m=100", "airlight=photons", *settings)
+
+
+def test_airlight_of_photons() -> None:
+    assert photons().ground_albedo == 0.1
+    field = photons("ground_albedo=0.2", "changes=[{at_s: 0}, {at_s: 60, density: 2}]")
+    assert field.ground_albedo == 0.2
+    assert field.airlight[1] == pytest.approx((0.34 + 0.66 * 0.2) * 10_000.0 / math.pi)
+    assert fog("visibility_m=100").ground_albedo is None
+
+
+@pytest.mark.parametrize(
+    ("settings", "told"),
+    [
+        (("ground_albedo=1.5",), "fog.ground_albedo: input should be less than or equal to 1; got 1.5"),
+        (("top_m=17.5",), "fog.top_m must be above the highest point of the road and the camera"),
+        (("top_m=1000", "visibility_m=20"), "optical thickness up to 100, got 149.8"),
+        (("changes=[{at_s: 0}, {at_s: 60, density: 40}]",), "optical thickness up to 100, got 299.6"),
+        (("top_m=.inf",), "flat land, not with no top"),
+        (("patches={correlation_length_m: 60}",), "not with patches"),
+        (("changes=[{at_s: 0, base_m: 5, top_m: 90}]",), "not with base_m in changes"),
+    ],
+)
+def test_layers_that_photons_do_not_know_are_told(settings: tuple[str, ...], told: str) -> None:
+    with pytest.raises(InputError) as error:
+        photons(*settings)
+    assert told in str(error.value)
+
+
+def test_photons_are_of_daylight() -> None:
+    settings = ["fog={visibility_m: 100, airlight: photons}"]
+    with pytest.raises(
+        InputError, match=r"light.illuminance_lx is 50, and fog.airlight: photons is of the sky's light"
+    ):
+        load_scenario("motorway_fog_bank", [*settings, "light.illuminance_lx=50"])
+    dusk = "timeline=[{when: time >= 1 s, do: {light: {illuminance_lx: 100}}}]"
+    with pytest.raises(InputError, match=r"illuminance_lx is 100, and fog.airlight: photons is of the sky's light"):
+        load_scenario("motorway_fog_bank", [*settings, dusk])
 
 
 def test_negative_illuminance_is_told() -> None:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere.fog.frustum import FrustumGrid
+from fogsim.atmosphere.fog.layer_airlight import horizontal_share
 from fogsim.atmosphere.fog.medium import medium_of
 from fogsim.atmosphere.fog.optical_depth_kernels import extinctions_on_ray
 from fogsim.values import FogField
@@ -17,6 +18,17 @@ AIRLIGHT_TINT = (0.98, 1.0, 1.02)
 _DEEPEST = 2000.0
 """Fog without end is taken to reach this far above the eye [m]."""
 _LEVELS = 800
+
+
+def airlight_share(ground_albedo: float | None) -> float:
+    """Airlight near the ground relative to a perfectly white horizontal diffuser, E / π.
+
+    Parameters
+    ----------
+    ground_albedo : float or None
+        Albedo of the land around, whose level this then is, for an airlight by elevation; None for Koschmieder's.
+    """
+    return 0.95 if ground_albedo is None else horizontal_share(ground_albedo)
 
 
 def airlight_from_illuminance(illuminance: float, share: float = 0.95) -> tuple[float, float, float]:

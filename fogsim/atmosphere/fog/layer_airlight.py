@@ -119,7 +119,7 @@ def slant_airlight(field: FogField, eye_height: float, droplets: str) -> SlantAi
     Raises
     ------
     InputError
-        If the eye is above the layer, or the table does not have so thin or thick a layer.
+        If the eye is above the layer, or the table does not have so thick a layer.
     """
     if eye_height > field.top:
         raise InputError(
@@ -140,7 +140,7 @@ def _stepped(depth: float) -> float:
 
 
 def layer_thickness(extinction: float, height: float) -> float:
-    """Optical thickness of a layer.
+    """Optical thickness of a layer; of one too thin to be seen, that of the thinnest that is known.
 
     Parameters
     ----------
@@ -152,15 +152,15 @@ def layer_thickness(extinction: float, height: float) -> float:
     Raises
     ------
     InputError
-        If the table does not have it.
+        If it is thicker than the table knows.
     """
     thickness, known = extinction * height, layer_table("moderate_radiation").thickness
-    if not known[0] <= thickness <= known[-1]:
+    if thickness > known[-1]:
         raise InputError(
-            f"airlight by elevation is known for layers of optical thickness {known[0]:g} … {known[-1]:g}, got "
-            f"{thickness:.3g} (extinction {extinction:.3g} 1/m over {height:.4g} m)"
+            f"airlight by elevation is known for layers of optical thickness up to {known[-1]:g}, got {thickness:.4g} "
+            f"(extinction {extinction:.3g} 1/m over {height:.4g} m)"
         )
-    return thickness
+    return max(thickness, float(known[0]))
 
 
 @lru_cache(maxsize=128)

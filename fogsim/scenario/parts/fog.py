@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere import airlight_from_illuminance
+from fogsim.atmosphere import airlight_from_illuminance, airlight_share, layer_thickness
+from fogsim.errors import InputError
 from fogsim.obstruction import tunnels_of
 from fogsim.scenario.fog import fog_along
 from fogsim.scenario.schema import Scenario
@@ -24,7 +25,28 @@ def fog_field(scenario: Scenario, route: NDArray[np.float64], structures: Sequen
         Polyline along the route [m].
     structures : sequence of Structure
         What stands beside the roads and over them; tunnels keep fog out.
+
+    Raises
+    ------
+    InputError
+        If the airlight is to be that of photons, and there is no such layer, it is denser than is known, or the road
+        leads out of it.
     """
-    airlight = airlight_from_illuminance(scenario.light.illuminance_lx)
-    fog = fog_along(scenario.fog, airlight, route, tunnels_of(structures))
-    return scripted_fog(scenario.timeline, fog)
+    share = airlight_share(scenario.fog.albedo_of_photons)
+    airlight = airlight_from_illuminance(scenario.light.illuminance_lx, share)
+    fog = scripted_fog(scenario.timeline, fog_along(scenario.fog, airlight, route, tunnels_of(structures)))
+    if fog.ground_albedo is not None:
+        _check_layer(fog, float(route[:, 2].max()) + (scenario.camera.mount_height_m or 0.0))
+    return fog
+
+
+def _check_layer(fog: FogField, eye: float) -> None:
+    """Refuse a layer that may become denser than is known, or lower than an eye."""
+    tops = [fog.top, *(change.top for change in fog.changes)]
+    density = max([1.0, *fog.reachable_densities, *(change.density for change in fog.changes)])
+    layer_thickness(fog.extinction * density, max(tops) - fog.ground)
+    if eye > min(tops):
+        raise InputError(
+            "fog.airlight: photons is known for eyes within the layer: fog.top_m must be above the highest point of "
+            f"the road and the camera, {eye - fog.ground:.4g} m, got {min(tops) - fog.ground:.4g} m"
+        )

@@ -25,6 +25,9 @@ from fogsim.units import DAY_ILLUMINANCE
 if TYPE_CHECKING:
     from fogsim.scenario.schema import Scenario
 
+PHOTONS_BY_DAY = f"fog.airlight: photons is of the sky's light by day, from {DAY_ILLUMINANCE:g} lx on"
+"""Why there is none by lamplight."""
+
 DAYLIGHT_RENDERER = "reference"
 """Name of the renderer that draws by daylight only."""
 
@@ -117,6 +120,8 @@ def _light_mistake(doing: LightActions, scenario: "Scenario") -> str | None:
             f"illuminance_lx is {doing.illuminance_lx:g}, and the renderer {DAYLIGHT_RENDERER} knows no lamplight, "
             f"which there is below {DAY_ILLUMINANCE:g}; take opengl or cpu"
         )
+    if scenario.fog.airlight == "photons" and doing.illuminance_lx < DAY_ILLUMINANCE:
+        return f"illuminance_lx is {doing.illuminance_lx:g}, and {PHOTONS_BY_DAY}"
     if doing.course == "factors" and scenario.light.illuminance_lx == 0.0:
         return "course: factors goes on from the light that there is, and light.illuminance_lx is 0"
     return None

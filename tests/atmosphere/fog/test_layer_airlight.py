@@ -103,7 +103,7 @@ def disort(thickness: float, eye: float, albedo: float, slopes: NDArray[np.float
 
 
 @pytest.mark.parametrize("albedo", [0.0, 0.1, 0.5, 1.0])
-@pytest.mark.parametrize("layer", [8, 12, 15, 17, 20])
+@pytest.mark.parametrize("layer", [3, 10, 16, 19, 22, 24, 27])
 def test_the_table_agrees_with_disort(layer: int, albedo: float) -> None:
     thickness = float(layer_table("moderate_radiation").thickness[layer])
     slopes = sines()
@@ -111,7 +111,7 @@ def test_the_table_agrees_with_disort(layer: int, albedo: float) -> None:
     for eye in (0.003 * thickness, 0.02 * thickness):
         ours = even_sky(thickness, eye, albedo, "moderate_radiation")[here]
         theirs = disort(thickness, eye, albedo, slopes[here])
-        assert np.max(np.abs(ours / theirs - 1.0)[slopes[here] > -0.05]) < 0.02
+        assert np.max(np.abs(ours / theirs - 1.0)[slopes[here] > -0.05]) < (0.02 if thickness > 0.4 else 0.03)
         assert np.max(np.abs(ours - theirs)) < 0.006
 
 
@@ -173,5 +173,5 @@ def test_what_is_no_layer_is_refused(wrong: dict[str, Any], told: str) -> None:
 def test_an_eye_above_the_layer_and_unknown_layers_are_refused() -> None:
     with pytest.raises(InputError, match=r"the eye, 1.3 m above the lowest road, is above the fog, whose top is 1 m"):
         slant_airlight(field_of(100.0, 1.0, RHO), 1.3, "moderate_radiation")
-    with pytest.raises(InputError, match=r"optical thickness 0.03 … 100, got 150"):
+    with pytest.raises(InputError, match=r"optical thickness up to 100, got 149.8"):
         slant_airlight(field_of(5.0, 250.0, RHO), 1.3, "moderate_radiation")

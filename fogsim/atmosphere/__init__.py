@@ -4,7 +4,7 @@ from fogsim.atmosphere.air import Air
 from fogsim.atmosphere.fog.airlight import airlight_from_illuminance, airlight_share
 from fogsim.atmosphere.fog.frustum import FrustumGrid, frustum_grid, radiance_through_grid
 from fogsim.atmosphere.fog.koschmieder import fogged_radiance
-from fogsim.atmosphere.fog.layer_airlight import layer_thickness
+from fogsim.atmosphere.fog.layer_airlight import horizontal_share, layer_thickness
 from fogsim.atmosphere.fog.medium import field_at, with_change
 from fogsim.atmosphere.fog.optical_depth import (
     FieldAccess,
@@ -37,6 +37,7 @@ __all__ = [
     "field_at",
     "fogged_radiance",
     "frustum_grid",
+    "horizontal_share",
     "layer_thickness",
     "optical_depth",
     "optical_depth_along",

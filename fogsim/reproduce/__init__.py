@@ -3,7 +3,7 @@
 from typing import Protocol
 
 from fogsim.registry import Registry
-from fogsim.reproduce import belaroussi2015, drivers, huang2015, negru2013, zhu2015
+from fogsim.reproduce import airlight, belaroussi2015, drivers, huang2015, negru2013, zhu2015
 from fogsim.reproduce.night import gallen2014
 from fogsim.reproduce.result import Reproduction, Watch, unwatched
 
@@ -24,8 +24,10 @@ REPRODUCTIONS: Registry[Evaluation] = Registry(
         "belaroussi2015": belaroussi2015.reproduce,
         "gallen2014": gallen2014.reproduce,
         "drivers": drivers.reproduce,
+        "airlight": airlight.reproduce,
     },
 )
-"""Every paper by name, and ``drivers`` for the field studies of traffic: called, it reruns the evaluation."""
+"""Every paper by name, ``drivers`` for the field studies of traffic, ``airlight`` for methods in two fogs: called, it
+reruns the evaluation."""
 
 __all__ = ["REPRODUCTIONS", "Evaluation", "Reproduction", "Watch"]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere import fogged_radiance
+from fogsim.atmosphere import airlight_from_illuminance, airlight_share, fogged_radiance
 from fogsim.camera import Sensor, expose
 from fogsim.render import Renderer, make_renderer
 from fogsim.scene import build_scene, vehicle_batches
@@ -27,6 +27,9 @@ from fogsim.values.pinhole import ray_from_pixel
 
 ILLUMINANCE = 10_000.0  # [lx] an overcast day
 AIRLIGHT = 3000.0  # [cd/m²] near E/π, that of a white horizontal surface under it
+LAYER = 250.0
+"""Height of a layer of fog [m]."""
+
 NOISELESS = Sensor(saturation_luminance=AIRLIGHT, full_well=1e9, read_noise=0.0)
 """A sensor that the airlight fills: pixel value 255."""
 
@@ -151,7 +154,9 @@ def staged_traffic(vehicles: Sequence[tuple[float, StagedVehicle]], speed: float
     )
 
 
-def foggy_radiance(view: View, pose: CameraPose, camera: Camera, extinction: float) -> NDArray[np.float32]:
+def foggy_radiance(
+    view: View, pose: CameraPose, camera: Camera, extinction: float, albedo: float | None = None
+) -> NDArray[np.float32]:
     """What a camera gets of a view in homogeneous fog.
 
     Parameters
@@ -164,13 +169,19 @@ def foggy_radiance(view: View, pose: CameraPose, camera: Camera, extinction: flo
         The true calibration.
     extinction : float
         Extinction coefficient k [1/m].
+    albedo : float or None
+        Albedo of the land for the airlight of photons, in a layer of `LAYER`; None for Koschmieder's.
 
     Returns
     -------
     (rows, cols, 3) float32
         Linear radiance [cd/m²].
     """
-    fog = FogField(extinction, (AIRLIGHT,) * 3)
+    if albedo is None:
+        fog = FogField(extinction, (AIRLIGHT,) * 3)
+    else:
+        fog = FogField(extinction, airlight_from_illuminance(ILLUMINANCE, airlight_share(albedo)), top=LAYER)
+        fog = replace(fog, ground_albedo=albedo)
     return fogged_radiance(view, fog, pose.position, ray_from_pixel(camera, pose))
 
 

@@ -1,0 +1,211 @@
+"""Daytime methods in Koschmieder's fog and in that of photons: what they read, by albedo, visibility and camera."""
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.camera import Sensor, expose
+from fogsim.estimators import make
+from fogsim.render import Renderer
+from fogsim.reproduce.airlight_picture import picture
+from fogsim.reproduce.huang2015_chase import drawn
+from fogsim.reproduce.result import Cell, Reproduction, Rows, Steps, TitledTable, Watch, unwatched
+from fogsim.reproduce.road_sweeps import CAMERA
+from fogsim.reproduce.scenes import StagedVehicle, foggy_radiance, road_renderer
+from fogsim.reproduce.zhu2015_drive import SPEED, drive
+from fogsim.units import LUMINANCE_WEIGHTS, extinction_from_visibility
+from fogsim.values import Camera, CameraPose, Estimate, Frame, LeadMeasurement, Observation, View
+
+ROAD_METHODS = ("negru2013", "zhu2015", "huang2015_rough", "joint_road")
+CHASE_METHODS = ("lead_contrast",)
+
+FRAMES = 3
+"""Of a drive; the last one's estimate counts."""
+
+EXPOSED, BRIGHTEST = 0.65, 95.0
+"""Share of saturation at which the camera holds a percentile of the picture's luminance, as FogSim's does."""
+
+PAINTS = (0.03, 0.6)
+"""Reflectances of vehicles that are followed [-]."""
+
+FIRST_RANGE, LAST_RANGE, RANGE_STEP = 12.0, 100.0, 1.0
+"""Ranges of the vehicle that is followed as it drives away [m]; in dense fog up to 0.9 V_met."""
+
+AWAY = 5.0
+"""By how much it is faster [m/s]."""
+
+RANGE_DEVIATION = 0.25
+"""Noise of its range [m]."""
+
+NOTES = (
+    "Fog of 250 m, CIE overcast sky, flat Lambertian land of one albedo; small droplets (moderate radiation fog). The "
+    "drawn road is the same in all: its own albedo is about 0.1.",
+    "Koschmieder: the airlight is 0.95 E/π everywhere. Photons: about (0.34 + 0.66 ρ) E/π level, brighter upward, less "
+    "toward the road (docs/airlight.md).",
+    "Transmission along every line of sight is the same in both; extinction coefficients are equal.",
+    "Exposure: 95 % of the picture's pixels below 0.65 of saturation, in both.",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One fog.
+
+    Attributes
+    ----------
+    albedo : float or None
+        Of the land; None for Koschmieder's fog.
+    visibility : float
+        V_met [m].
+    """
+
+    albedo: float | None
+    visibility: float
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What is run.
+
+    Attributes
+    ----------
+    albedos : tuple of float or None
+        Of the land around; None for Koschmieder's fog.
+    visibilities : tuple of float
+        V_met [m].
+    heights : tuple of float
+        Of the camera above the road [m]: a car's and a lorry's.
+    drives : int
+        Drives for each camera, without and with a vehicle ahead.
+    """
+
+    albedos: tuple[float | None, ...] = (None, 0.05, 0.1, 0.2, 0.4, 0.8)
+    visibilities: tuple[float, ...] = (50.0, 100.0, 200.0, 400.0)
+    heights: tuple[float, ...] = (1.3, 2.5)
+    drives: int = 4
+
+    @property
+    def cases(self) -> tuple[Case, ...]:
+        """Every fog."""
+        return tuple(Case(albedo, visibility) for albedo in self.albedos for visibility in self.visibilities)
+
+
+WHOLE = Plan()
+"""What the command runs."""
+
+
+def reproduce(plan: Plan = WHOLE, *, watch: Watch = unwatched) -> Reproduction:
+    """Let every daytime method read frames of both fogs.
+
+    Parameters
+    ----------
+    plan : Plan
+        What is run.
+    watch : Watch
+        Told of every drive.
+
+    Returns
+    -------
+    Reproduction
+        A record for each height, albedo, visibility and method: share of drives with an estimate of fog, the median of
+        what they read, and how often the 90 % interval holds the truth.
+    """
+    steps = Steps(len(plan.heights) * 2 * plan.drives, watch)
+    records: list[Mapping[str, Cell]] = []
+    with road_renderer() as renderer:
+        for height in plan.heights:
+            camera = replace(CAMERA, mount_height=height)
+            found: dict[tuple[Case, str], list[Estimate]] = {}
+            for followed, number in itertools.product((_road, _chase), range(plan.drives)):
+                for case, method, estimate in followed(renderer, camera, plan.cases, number):
+                    found.setdefault((case, method), []).append(estimate)
+                steps.advance()
+            records += [_record(height, case, method, told) for (case, method), told in found.items()]
+    tables = tuple(
+        TitledTable(
+            f"V_met as read [m] (share of drives that tell), camera {height:g} m high", _rows(records, plan, height)
+        )
+        for height in plan.heights
+    )
+    return Reproduction("airlight", tuple(records), tables[0].rows, NOTES, picture(records), tables)
+
+
+def _road(
+    renderer: Renderer, camera: Camera, cases: Sequence[Case], number: int
+) -> Iterator[tuple[Case, str, Estimate]]:
+    """Drive along the road alone, in every fog."""
+    rng = np.random.default_rng([21, number])
+    moments = list(drive(renderer, camera, FRAMES, lead=False, rng=rng))
+    for case in cases:
+        frames = [Observation(_image(one.view, one.pose, camera, case, rng), SPEED) for one in moments]
+        for method in ROAD_METHODS:
+            estimator = make(method, camera)
+            yield case, method, [estimator.update(frame) for frame in frames][-1]
+
+
+def _chase(
+    renderer: Renderer, camera: Camera, cases: Sequence[Case], number: int
+) -> Iterator[tuple[Case, str, Estimate]]:
+    """Follow a vehicle that drives away, in every fog."""
+    rng = np.random.default_rng([22, number])
+    estimators = {case: make(CHASE_METHODS[0], camera) for case in cases}
+    last: dict[Case, Estimate] = {}
+    vehicle = StagedVehicle(paint=(float(rng.uniform(*PAINTS)),) * 3)
+    for ahead in np.arange(FIRST_RANGE, LAST_RANGE, RANGE_STEP).tolist():
+        time = (ahead - FIRST_RANGE) / AWAY
+        scene = drawn(renderer, camera, vehicle, ahead, time * SPEED)
+        lead = LeadMeasurement(ahead + RANGE_DEVIATION * float(rng.normal()), AWAY)
+        for case, estimator in estimators.items():
+            if ahead <= 0.9 * case.visibility:
+                frame = Frame(time, _image(scene.view, scene.pose, camera, case, rng), camera)
+                last[case] = estimator.update(Observation(frame, SPEED, lead))
+    for case, estimate in last.items():
+        yield case, CHASE_METHODS[0], estimate
+
+
+def _image(view: View, pose: CameraPose, camera: Camera, case: Case, rng: np.random.Generator) -> NDArray[np.uint8]:
+    radiance = foggy_radiance(view, pose, camera, extinction_from_visibility(case.visibility), case.albedo)
+    luminance = (radiance * np.array(LUMINANCE_WEIGHTS)).sum(axis=-1)
+    sensor = Sensor(saturation_luminance=float(np.percentile(luminance, BRIGHTEST)) / EXPOSED)
+    return expose(radiance, sensor, camera.response, rng).astype(np.uint8)
+
+
+def _record(height: float, case: Case, method: str, estimates: Sequence[Estimate]) -> dict[str, Cell]:
+    told = [one for one in estimates if one.valid and one.extinction > 0.0]
+    read = float(np.median([one.visibility for one in told])) if told else None
+    held = [one.visibility_interval[0] <= case.visibility <= one.visibility_interval[1] for one in told]
+    return {
+        "paper": "airlight",
+        "fog": "koschmieder" if case.albedo is None else "photons",
+        "ground_albedo": case.albedo,
+        "mount_height_m": height,
+        "visibility_m": case.visibility,
+        "method": method,
+        "told_share": len(told) / len(estimates),
+        "read_m": read,
+        "bias_pct": None if read is None else 100.0 * (read / case.visibility - 1.0),
+        "interval_coverage": float(np.mean(held)) if held else None,
+    }
+
+
+def _rows(records: Sequence[Mapping[str, Cell]], plan: Plan, height: float) -> Rows:
+    rows = [("method", "fog", *(f"{visibility:.0f} m" for visibility in plan.visibilities))]
+    for method in (*ROAD_METHODS, *CHASE_METHODS):
+        for albedo in plan.albedos:
+            here = [
+                one
+                for one in records
+                if (one["method"], one["ground_albedo"], one["mount_height_m"]) == (method, albedo, height)
+            ]
+            fog = "Koschmieder" if albedo is None else f"photons, ρ {albedo:g}"
+            rows.append((method, fog, *(_cell(one) for one in here)))
+    return tuple(rows)
+
+
+def _cell(record: Mapping[str, Cell]) -> str:
+    read, share = record["read_m"], float(record["told_share"] or 0.0)
+    told = "" if share == 1.0 else f" ({100.0 * share:.0f} %)"
+    return "—" if read is None else f"{read:.0f}{told}"

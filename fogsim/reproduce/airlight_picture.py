@@ -1,0 +1,118 @@
+"""Airlight by elevation and path, and what methods read in it."""
+
+import math
+from collections.abc import Mapping, Sequence
+from io import BytesIO
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from PIL import Image
+
+from fogsim.atmosphere import fogged_radiance, horizontal_share
+from fogsim.reproduce.result import Cell
+from fogsim.units import extinction_from_visibility
+from fogsim.values import FogField, View
+
+Records = Sequence[Mapping[str, Cell]]
+
+_VISIBILITY, _TOP, _EYE = 100.0, 250.0, 1.3  # of the curves [m]
+_COLOURS = {0.05: "C3", 0.1: "C1", 0.2: "C2", 0.4: "C0", 0.8: "C4"}
+
+
+def picture(records: Records) -> NDArray[np.uint8]:
+    """Draw the airlight by elevation, a dark road's luminance by distance, and what methods read of a car's camera.
+
+    Parameters
+    ----------
+    records : sequence of mapping
+        Records of the reproduction.
+
+    Returns
+    -------
+    (rows, cols, 3) uint8
+    """
+    methods = list(dict.fromkeys(str(one["method"]) for one in records))
+    figure = Figure(figsize=(15.0, 8.4), dpi=90, layout="constrained")
+    axes = figure.subplots(2, math.ceil((len(methods) + 2) / 2)).ravel()
+    _draw_airlight(axes[0])
+    _draw_road(axes[1])
+    lowest = min(float(str(one["mount_height_m"])) for one in records)
+    for method, one in zip(methods, axes[2:], strict=False):
+        here = [r for r in records if r["method"] == method and r["mount_height_m"] == lowest]
+        _draw_method(one, method, here)
+    for one in axes[2 + len(methods) :]:
+        one.set_axis_off()
+    FigureCanvasAgg(figure)
+    drawn = BytesIO()
+    figure.savefig(drawn, format="png")
+    return np.asarray(Image.open(drawn).convert("RGB"))
+
+
+def _luminance(elevations: NDArray[np.float64], distance: NDArray[np.float64], albedo: float | None) -> list[float]:
+    """Of black things at distances in directions [degrees], over E / π."""
+    level = (0.95 if albedo is None else horizontal_share(albedo),) * 3
+    field = FogField(extinction_from_visibility(_VISIBILITY), level, top=_TOP, ground_albedo=albedo)
+    found = []
+    for up, far in zip(np.radians(elevations), distance, strict=True):
+        ray = np.zeros((3, 3))
+        ray[:, 2] = math.cos(up), 0.0, math.sin(up)
+        view = View(np.zeros((1, 1, 3), np.float32), np.full((1, 1), far, np.float32), np.zeros((1, 1), np.int32))
+        found.append(float(fogged_radiance(view, field, (0.0, 0.0, _EYE), ray)[0, 0, 1]))
+    return found
+
+
+def _draw_airlight(axes: Axes) -> None:
+    up = np.concatenate((-np.geomspace(15.0, 0.5, 40), [0.0], np.geomspace(0.5, 30.0, 40)))
+    far = np.where(up < 0, _EYE / np.sin(np.radians(np.maximum(-up, 1e-3))), 1e6)
+    lost = 1.0 - np.exp(-extinction_from_visibility(_VISIBILITY) * far)
+    for albedo, colour in _COLOURS.items():
+        axes.plot(up, np.array(_luminance(up, far, albedo)) / lost, colour, label=f"land of albedo {albedo:g}")
+    axes.axhline(0.95, color="0.5", ls="--", label="Koschmieder, as drawn")
+    axes.axvline(0.0, color="0.8", lw=1)
+    axes.set(xlabel="elevation [°]", ylabel="airlight / (1 − T), over E/π", title="Airlight up to road or sky")
+    axes.legend(fontsize=8)
+
+
+def _draw_road(axes: Axes) -> None:
+    far = np.geomspace(5.0, 300.0, 60)
+    up = -np.degrees(np.arcsin(_EYE / far))
+    through = np.exp(-extinction_from_visibility(_VISIBILITY) * far)
+    for albedo, colour in ((None, "0.5"), (0.1, "C1"), (0.8, "C4")):
+        horizon = _luminance(np.zeros(1), np.full(1, 1e6), albedo)[0]
+        seen = 1.0 - (np.array(_luminance(up, far, albedo)) + 0.1 * through) / horizon
+        name = "Koschmieder" if albedo is None else f"land of albedo {albedo:g}"
+        axes.semilogy(far, seen, color=colour, ls="--" if albedo is None else "-", label=name)
+    axes.axhline(0.05, color="0.8", lw=1)
+    axes.set(
+        xlabel="distance [m]",
+        ylim=(0.005, 1.0),
+        ylabel="contrast of the road to the horizon",
+        title="Road, V_met 100 m",
+    )
+    axes.legend(fontsize=8)
+
+
+def _draw_method(axes: Axes, method: str, records: Records) -> None:
+    for albedo in (None, *_COLOURS):
+        here = [one for one in records if one["ground_albedo"] == albedo and one["read_m"] is not None]
+        true = [float(str(one["visibility_m"])) for one in here]
+        ratio = [float(str(one["read_m"])) / float(str(one["visibility_m"])) for one in here]
+        name = "Koschmieder" if albedo is None else f"ρ {albedo:g}"
+        colour = "0.5" if albedo is None else _COLOURS[albedo]
+        axes.plot(true, ratio, "o--" if albedo is None else "o-", color=colour, ms=4, label=name)
+    axes.axhline(1.0, color="0.8", lw=1)
+    axes.set(
+        xscale="log",
+        yscale="log",
+        ylim=(0.5, 6.0),
+        xlabel="true V_met [m]",
+        ylabel="read over true V_met",
+        title=method,
+    )
+    axes.set_xticks([50, 100, 200, 400], ["50", "100", "200", "400"])
+    axes.set_yticks([0.5, 1, 2, 4], ["0.5", "1", "2", "4"])
+    axes.minorticks_off()
+    axes.legend(fontsize=7)

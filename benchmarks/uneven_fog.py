@@ -41,7 +41,7 @@ CAMERAS = (
     ("camera.width=640", "camera.height=480"),
     ("camera.width=800", "camera.height=600", "camera.field_of_view_deg=50", "camera.response=linear"),
 )
-CLEAR_ROADS = ("motorway_fog_bank", "graded_motorway", "a16_netherlands")
+CLEAR_ROADS = ("motorway_fog_bank", "graded_motorway", "clear_day", "ramp_merge")
 DOCS = Path(__file__).resolve().parents[1] / "docs" / "estimators.md"
 Row = dict[str, Any]
 

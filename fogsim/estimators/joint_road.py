@@ -24,6 +24,7 @@ from fogsim.vision.lines.horizon import (
 )
 from fogsim.vision.lines.road_course import RoadCourse, road_course, unseen_course
 from fogsim.vision.lines.road_lines import seen_lines, vanishing_point_of
+from fogsim.vision.strips.airlight_edge import airlight_edge
 from fogsim.vision.strips.course_geometry import course_deviation, course_geometry
 from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, no_road
 from fogsim.vision.strips.joint_fit import MODEL_DEVIATION, JointFit, fit_own, with_neighbours
@@ -57,7 +58,7 @@ OVERCONFIDENCE = 1.6
 """By how much the fit's deviation is too small where roads and cameras are not what its model knows: verges, tracks and
 repairs in the strips, compression, soiled windscreens; measured on pictures that FogSim did not draw [-]."""
 
-HARDLY_UNEVEN, UNEVEN_DEVIATION = 0.05, 0.07
+HARDLY_UNEVEN, UNEVEN_DEVIATION = 0.05, 0.13
 """Relative deviations of the mean extinction by unevenness that the road does not show, and, where the fog is surely
 uneven, by what nodes along the way leave out [-]."""
 
@@ -178,7 +179,8 @@ class JointRoad:
         if isinstance(fit, str):
             return Estimate.invalid(self.method, fit, **found)
         unsure = course_deviation(fit.fit, self._geometry, self._camera, course, prior, sky.noise)
-        return self._estimate(fit, found, unsure)
+        front = fit.denser or airlight_edge(pixels, self._geometry, self._camera, sky, fit, prior.shift_deviation)
+        return self._estimate(fit, front, found, unsure)
 
     def _fitted(self, pixels: LinearPixels, sky: Sky, prior: JointPrior, free: float) -> UnevenFit | str:
         """Fit of the road that is free up to a depth, or why there is none that is to be believed.
@@ -251,7 +253,9 @@ class JointRoad:
         near = (curves.variance[0] > 0) & (self._geometry.distance < min(free, 1.5 / max(fit.extinction, 0.01)))
         return bool(near.sum() < MIN_ROWS // 2 or fit.used[0][near].mean() < MIN_USED)
 
-    def _estimate(self, uneven: UnevenFit, found: dict[str, object], unsure: float) -> Estimate:
+    def _estimate(
+        self, uneven: UnevenFit, front: tuple[float, float, float] | None, found: dict[str, object], unsure: float
+    ) -> Estimate:
         fit = uneven.fit
         horizon = self._camera.horizon_row + fit.shift
         rows = self._geometry.first[fit.used[0]]
@@ -269,7 +273,7 @@ class JointRoad:
             diagnostics=found,
             reach=uneven.reach,
             optical_depths=_optical_depths(uneven),
-            denser=None if uneven.denser is None else DenserFog(*uneven.denser),
+            denser=None if front is None else DenserFog(*front),
         )
 
 

@@ -8,14 +8,15 @@ from fogsim.values.estimate import DenserFog, Estimate
 FEWEST = 2
 """Fewest pictures that must tell of denser fog."""
 
-MOST, LEAST = 0.6, 0.3
+MOST, LEAST = 0.7, 0.3
 """Shares of the last pictures that must tell of denser fog for it to be announced, and to stay so [-]."""
 
 FASTEST = 70.0
 """Speed beyond which nothing ahead comes nearer [m/s]."""
 
-APART = 0.35
-"""Relative difference of two pictures' distances of the same fog [-]."""
+NEARER, FARTHER = 0.35, 0.2
+"""How much nearer than it can have come, and how much farther than before, a later picture may tell the same fog, in
+shares of its distance [-]. What seems to be fog beyond a crest recedes."""
 
 
 class Announcements:
@@ -58,7 +59,7 @@ class Announcements:
         Returns
         -------
         DenserFog or None
-            What was told last, if it is to be announced.
+            What most pictures, and of those the last, tell, if it is to be announced.
         """
         telling = [one for one in estimates if one.valid and one.optical_depths is not None]
         if telling:
@@ -69,8 +70,8 @@ class Announcements:
         if not told:
             self.announced = False
             return None
-        last = told[-1]
-        agreeing = sum(_is_same(one, last) for one in told)
+        likely = [(sum(_is_same(one, other) or _is_same(other, one) for one in told), other) for other in told]
+        agreeing, last = max(likely, key=lambda pair: (pair[0], pair[1][0]))
         share = agreeing / len(self._told)
         enough = agreeing >= FEWEST and share >= (LEAST if self.announced else MOST)
         spans = self.announced or time - told[0][0] >= 0.5 * self._window
@@ -79,6 +80,7 @@ class Announcements:
 
 
 def _is_same(earlier: tuple[float, DenserFog], later: tuple[float, DenserFog]) -> bool:
-    """Whether two tell of the same fog, which one may have come nearer to meanwhile."""
-    nearest = earlier[1].distance - FASTEST * (later[0] - earlier[0])
-    return (1.0 - APART) * nearest <= later[1].distance <= (1.0 + APART) * earlier[1].distance
+    """Whether the later tells of the same fog, which one may have come nearer to meanwhile."""
+    way = later[0] - earlier[0]
+    nearest = earlier[1].distance - FASTEST * way
+    return way >= 0.0 and (1.0 - NEARER) * nearest <= later[1].distance <= (1.0 + FARTHER) * earlier[1].distance

@@ -19,6 +19,9 @@ QUIET, SMOOTHED = 0.3, 1.0
 KEPT = 2.5
 """Half-width of the core of a row, in its robust standard deviations: marks and other narrow things lie outside."""
 
+MOST_COLUMNS = 128
+"""Columns of a row that are looked at for airlight, or up to twice as many."""
+
 
 class StripBins(NamedTuple):
     """Where the bins of one strip of road are.
@@ -179,3 +182,33 @@ def middle_levels(image: LinearPixels, rows: NDArray[np.int64]) -> NDArray[np.fl
             samples[j] = pixel_luminance(image, rows[i], even_column(j, samples.size, left, right))
         out[i] = median_of_few(samples, ordered)
     return out
+
+
+@kernel
+def airlight_shares(
+    image: LinearPixels, rows: NDArray[np.int64], columns: tuple[int, int], airlight: float, alike: float
+) -> NDArray[np.float64]:
+    """Shares of rows' pixels that are as bright as the airlight [-].
+
+    Parameters
+    ----------
+    image : LinearPixels
+        The image.
+    rows : (n,) int64
+        Which rows.
+    columns : (int, int)
+        First column, and that behind the last.
+    airlight : float
+        Luminance of the sky [linear grey levels].
+    alike : float
+        Difference up to which a pixel is as bright, relative to it [-].
+    """
+    shares: NDArray[np.float64] = np.zeros(rows.size)
+    step = max((columns[1] - columns[0]) // MOST_COLUMNS, 1)
+    for i in range(rows.size):
+        count = 0
+        for column in range(columns[0], columns[1], step):
+            count += 1
+            shares[i] += abs(pixel_luminance(image, rows[i], column) - airlight) < alike * airlight
+        shares[i] /= max(count, 1)
+    return shares

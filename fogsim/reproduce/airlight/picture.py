@@ -11,14 +11,15 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
-from fogsim.atmosphere import fogged_radiance, horizontal_share
+from fogsim.reproduce.airlight.conditions import Condition, airlight
 from fogsim.reproduce.result import Cell
 from fogsim.units import extinction_from_visibility
-from fogsim.values import FogField, View
 
 Records = Sequence[Mapping[str, Cell]]
 
-_VISIBILITY, _TOP, _EYE = 100.0, 250.0, 1.3  # of the curves [m]
+_ROAD = 0.1
+"""Albedo of the road [-]."""
+
 _COLOURS = {0.05: "C3", 0.1: "C1", 0.2: "C2", 0.4: "C0", 0.8: "C4"}
 
 
@@ -51,25 +52,11 @@ def picture(records: Records) -> NDArray[np.uint8]:
     return np.asarray(Image.open(drawn).convert("RGB"))
 
 
-def _luminance(elevations: NDArray[np.float64], distance: NDArray[np.float64], albedo: float | None) -> list[float]:
-    """Of black things at distances in directions [degrees], over E / π."""
-    level = (0.95 if albedo is None else horizontal_share(albedo),) * 3
-    field = FogField(extinction_from_visibility(_VISIBILITY), level, top=_TOP, ground_albedo=albedo)
-    found = []
-    for up, far in zip(np.radians(elevations), distance, strict=True):
-        ray = np.zeros((3, 3))
-        ray[:, 2] = math.cos(up), 0.0, math.sin(up)
-        view = View(np.zeros((1, 1, 3), np.float32), np.full((1, 1), far, np.float32), np.zeros((1, 1), np.int32))
-        found.append(float(fogged_radiance(view, field, (0.0, 0.0, _EYE), ray)[0, 0, 1]))
-    return found
-
-
 def _draw_airlight(axes: Axes) -> None:
     up = np.concatenate((-np.geomspace(15.0, 0.5, 40), [0.0], np.geomspace(0.5, 30.0, 40)))
-    far = np.where(up < 0, _EYE / np.sin(np.radians(np.maximum(-up, 1e-3))), 1e6)
-    lost = 1.0 - np.exp(-extinction_from_visibility(_VISIBILITY) * far)
     for albedo, colour in _COLOURS.items():
-        axes.plot(up, np.array(_luminance(up, far, albedo)) / lost, colour, label=f"land of albedo {albedo:g}")
+        over = Condition("", albedo)
+        axes.plot(up, [airlight(over, one) for one in up.tolist()], colour, label=f"land of albedo {albedo:g}")
     axes.axhline(0.95, color="0.5", ls="--", label="Koschmieder, as drawn")
     axes.axvline(0.0, color="0.8", lw=1)
     axes.set(xlabel="elevation [°]", ylabel="airlight / (1 − T), over E/π", title="Airlight up to road or sky")
@@ -78,11 +65,12 @@ def _draw_airlight(axes: Axes) -> None:
 
 def _draw_road(axes: Axes) -> None:
     far = np.geomspace(5.0, 300.0, 60)
-    up = -np.degrees(np.arcsin(_EYE / far))
-    through = np.exp(-extinction_from_visibility(_VISIBILITY) * far)
     for albedo, colour in ((None, "0.5"), (0.1, "C1"), (0.8, "C4")):
-        horizon = _luminance(np.zeros(1), np.full(1, 1e6), albedo)[0]
-        seen = 1.0 - (np.array(_luminance(up, far, albedo)) + 0.1 * through) / horizon
+        over = Condition("", albedo)
+        through = np.exp(-extinction_from_visibility(over.visibility) * far)
+        down = -np.degrees(np.arcsin(over.eye / far))
+        light = [airlight(over, one, reach) for one, reach in zip(down.tolist(), far.tolist(), strict=True)]
+        seen = 1.0 - (np.array(light) * (1.0 - through) + _ROAD * through) / airlight(over, 0.0)
         name = "Koschmieder" if albedo is None else f"land of albedo {albedo:g}"
         axes.semilogy(far, seen, color=colour, ls="--" if albedo is None else "-", label=name)
     axes.axhline(0.05, color="0.8", lw=1)

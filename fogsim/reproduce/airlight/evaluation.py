@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from fogsim.camera import Sensor, expose
 from fogsim.estimators import make
 from fogsim.render import Renderer
-from fogsim.reproduce.airlight_picture import picture
+from fogsim.reproduce.airlight.conditions import conditions
+from fogsim.reproduce.airlight.picture import picture
 from fogsim.reproduce.huang2015_chase import drawn
 from fogsim.reproduce.result import Cell, Reproduction, Rows, Steps, TitledTable, Watch, unwatched
 from fogsim.reproduce.road_sweeps import CAMERA
@@ -130,7 +131,9 @@ def reproduce(plan: Plan = WHOLE, *, watch: Watch = unwatched) -> Reproduction:
         )
         for height in plan.heights
     )
-    return Reproduction("airlight", tuple(records), tables[0].rows, NOTES, picture(records), tables)
+    sweeps, by_elevation = conditions()
+    shown = (*by_elevation, *tables)
+    return Reproduction("airlight", tuple(records), tables[0].rows, NOTES, picture(records), shown, tuple(sweeps))
 
 
 def _road(

@@ -1,0 +1,108 @@
+"""Airlight by elevation under several conditions: when it is far from even, and when it is not."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fogsim.atmosphere import Droplets, fogged_radiance, horizontal_share
+from fogsim.reproduce.result import Cell, TitledTable
+from fogsim.units import extinction_from_visibility
+from fogsim.values import FogField, View
+
+ELEVATIONS = (-10.0, -5.0, -2.0, 0.0, 2.0, 5.0, 10.0, 30.0)
+"""Of the lines of sight [degrees]."""
+
+ALBEDOS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """Fog, land and eye.
+
+    Attributes
+    ----------
+    name : str
+        In words.
+    albedo : float or None
+        Of the land; None for Koschmieder's fog.
+    visibility, top, eye : float
+        V_met, height of the layer and of the eye [m].
+    droplets : Droplets
+        Their sizes.
+    """
+
+    name: str
+    albedo: float | None = 0.1
+    visibility: float = 100.0
+    top: float = 250.0
+    eye: float = 1.3
+    droplets: Droplets = Droplets.MODERATE_RADIATION
+
+
+_USUAL = Condition("V_met 100 m, layer 250 m, eye 1.3 m, small droplets")
+CONDITIONS = (
+    _USUAL,
+    replace(_USUAL, name="V_met 30 m", visibility=30.0),
+    replace(_USUAL, name="V_met 400 m", visibility=400.0),
+    replace(_USUAL, name="V_met 2000 m", visibility=2000.0),
+    replace(_USUAL, name="layer 20 m", top=20.0),
+    replace(_USUAL, name="layer 1000 m", top=1000.0),
+    replace(_USUAL, name="eye 2.5 m", eye=2.5),
+    replace(_USUAL, name="eye 6 m", eye=6.0),
+    replace(_USUAL, name="large droplets (heavy advection fog)", droplets=Droplets.HEAVY_ADVECTION),
+)
+"""What is varied over land of albedo 0.1, one thing at a time."""
+
+
+def airlight(condition: Condition, elevation: float, distance: float | None = None) -> float:
+    """Airlight up to the road, or to a distance, over what the path takes from the light, in E / π.
+
+    Parameters
+    ----------
+    condition : Condition
+        The condition.
+    elevation : float
+        Of the line of sight [degrees].
+    distance : float or None
+        Along the line of sight [m]; None for the road, or a black sky behind the layer.
+    """
+    slope = math.sin(math.radians(elevation))
+    if distance is None:
+        distance = condition.eye / -slope if slope < 0 else (condition.top - condition.eye) / max(slope, 1e-6)
+    level = (0.95 if condition.albedo is None else horizontal_share(condition.albedo),) * 3
+    extinction = extinction_from_visibility(condition.visibility)
+    field = FogField(extinction, level, top=condition.top, ground_albedo=condition.albedo)
+    ray = np.zeros((3, 3))
+    ray[:, 2] = math.cos(math.radians(elevation)), 0.0, slope
+    black = View(np.zeros((1, 1, 3), np.float32), np.full((1, 1), distance, np.float32), np.zeros((1, 1), np.int32))
+    seen = fogged_radiance(black, field, (0.0, 0.0, condition.eye), ray, condition.droplets)
+    return float(seen[0, 0, 1]) / -math.expm1(-extinction * distance)
+
+
+def conditions() -> tuple[list[Mapping[str, Cell]], tuple[TitledTable, TitledTable]]:
+    """Airlight by albedo, and by what else there may be.
+
+    Returns
+    -------
+    (list of records, (TitledTable, TitledTable))
+        A record for each condition and elevation.
+    """
+    lands = [replace(_USUAL, name=f"albedo {albedo:g}", albedo=albedo) for albedo in ALBEDOS]
+    records: list[Mapping[str, Cell]] = []
+    tables = []
+    for title, kinds in (
+        (f"Airlight over E/π by elevation: {_USUAL.name}", lands),
+        ("The same over land of albedo 0.1, with one thing changed", list(CONDITIONS)),
+    ):
+        rows = [("", *(f"{elevation:g}°" for elevation in ELEVATIONS))]
+        for kind in kinds:
+            found = [airlight(kind, elevation) for elevation in ELEVATIONS]
+            rows.append((kind.name, *(f"{one:.3f}" for one in found)))
+            records += [
+                {"paper": "airlight", "condition": kind.name, "elevation_deg": elevation, "airlight": one}
+                for elevation, one in zip(ELEVATIONS, found, strict=True)
+            ]
+        tables.append(TitledTable(title, tuple(rows)))
+    return records, (tables[0], tables[1])

@@ -4,7 +4,7 @@ from fogsim.atmosphere.air import Air
 from fogsim.atmosphere.fog.airlight import airlight_from_illuminance, airlight_share
 from fogsim.atmosphere.fog.frustum import FrustumGrid, frustum_grid, radiance_through_grid
 from fogsim.atmosphere.fog.koschmieder import fogged_radiance
-from fogsim.atmosphere.fog.layer_airlight import horizontal_share, layer_thickness
+from fogsim.atmosphere.fog.layer_airlight import horizontal_share, layer_thickness, slant_airlight, slant_share
 from fogsim.atmosphere.fog.medium import field_at, with_change
 from fogsim.atmosphere.fog.optical_depth import (
     FieldAccess,
@@ -42,6 +42,8 @@ __all__ = [
     "optical_depth",
     "optical_depth_along",
     "radiance_through_grid",
+    "slant_airlight",
+    "slant_share",
     "veiling_luminance",
     "visibility_distance",
     "visibility_level",

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from fogsim.offline.layered_fog import FogLayer
     from fogsim.offline.road_plane import RoadPlane
 
 
@@ -46,10 +47,16 @@ def fog_command(
     ] = None,
     focal_length: Annotated[float | None, typer.Option(help="The same: focal length in pixels.")] = None,
     mount_height: Annotated[float | None, typer.Option(help="The same: metres from the road to the lens.")] = None,
+    ground_albedo: Annotated[
+        float | None,
+        typer.Option(help="Of the land around, 0 to 1: airlight by elevation as photons have it, not an even one."),
+    ] = None,
+    layer_height: Annotated[float | None, typer.Option(help="For --ground-albedo: metres of fog; else 250.")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it is there already.")] = False,
 ) -> None:
     """Put homogeneous fog on an image or video from disk: Koschmieder's law on light and slant range."""
     light = None if airlight is None else _pixel_values(airlight)
+    layer = _layer(ground_albedo, layer_height)
     told = {"--horizon-row": horizon_row, "--focal-length": focal_length, "--mount-height": mount_height}
     if (depth is None) != road_plane:
         what = "both are given" if road_plane else "neither is given"
@@ -58,14 +65,24 @@ def fog_command(
         for option, value in (("--depth-kind", depth_kind), ("--depth-scale", depth_scale)):
             if value is not None:
                 raise InputError(f"{option} goes with --depth; --road-plane reads no depth map")
-        used = _fog_road(image, _road(image, camera, told), visibility, out, light, overwrite)
+        used = _fog_road(image, _road(image, camera, told), visibility, out, light, layer, overwrite)
     else:
         for option, value in told.items():
             if value is not None:
                 raise InputError(f"{option} goes with --road-plane; with --depth the camera file has it")
-        used = _fog_depth(image, depth, depth_kind, depth_scale, camera, visibility, out, light, overwrite)
+        used = _fog_depth(image, depth, depth_kind, depth_scale, camera, visibility, out, light, layer, overwrite)
     values = ", ".join(f"{value:.4g}" for value in used)
     stdout.print(f"{escape(out)}: visibility {visibility:g} m, airlight {values}", soft_wrap=True)
+
+
+def _layer(albedo: float | None, height: float | None) -> "FogLayer | None":
+    from fogsim.offline.layered_fog import FogLayer
+
+    if albedo is None:
+        if height is not None:
+            raise InputError("--layer-height goes with --ground-albedo")
+        return None
+    return FogLayer(albedo, 250.0 if height is None else height)
 
 
 def _fog_depth(
@@ -77,6 +94,7 @@ def _fog_depth(
     visibility: float,
     out: Path,
     light: tuple[float, ...] | None,
+    layer: "FogLayer | None",
     overwrite: bool,
 ) -> "NDArray[np.float64]":
     from fogsim.offline.camera_file import load_calibration, straight_camera
@@ -94,7 +112,9 @@ def _fog_depth(
     calibration = load_calibration(camera)
     print_remarks("assumed", calibration.remarks)
     pinhole = straight_camera(calibration, camera)
-    return fog_file(image, DepthMap(depth, kind, scale), visibility, pinhole, out, light, overwrite=overwrite)
+    return fog_file(
+        image, DepthMap(depth, kind, scale), visibility, pinhole, out, light, layer=layer, overwrite=overwrite
+    )
 
 
 def _road(image: Path, camera: Path | None, told: dict[str, float | None]) -> "RoadPlane":
@@ -118,7 +138,13 @@ def _road(image: Path, camera: Path | None, told: dict[str, float | None]) -> "R
 
 
 def _fog_road(
-    image: Path, road: "RoadPlane", visibility: float, out: Path, light: tuple[float, ...] | None, overwrite: bool
+    image: Path,
+    road: "RoadPlane",
+    visibility: float,
+    out: Path,
+    light: tuple[float, ...] | None,
+    layer: "FogLayer | None",
+    overwrite: bool,
 ) -> "NDArray[np.float64]":
     from fogsim.offline.fog_image import fog_file
     from fogsim.offline.fog_video import fog_video
@@ -126,11 +152,11 @@ def _fog_road(
     from fogsim.offline.source import VideoFile
 
     if not is_video(image):
-        return fog_file(image, road, visibility, road.calibration.camera, out, light, overwrite=overwrite)
+        return fog_file(image, road, visibility, road.calibration.camera, out, light, layer=layer, overwrite=overwrite)
     video = VideoFile.open(image)
     with (
         progress_bar(stderr) as progress,
-        contextlib.closing(fog_video(video, road, visibility, out, light, overwrite=overwrite)) as frames,
+        contextlib.closing(fog_video(video, road, visibility, out, light, layer=layer, overwrite=overwrite)) as frames,
     ):
         task = progress.add_task(video.description, total=video.count)
         airlight = next(frames)

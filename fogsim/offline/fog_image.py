@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from fogsim.errors import InputError
 from fogsim.files.atomic import refuse_existing
 from fogsim.offline.image_files import DepthMap, Pixels, read_distance, read_image, write_image
+from fogsim.offline.layered_fog import FogLayer, elevation_sines
 from fogsim.offline.road_plane import RoadPlane
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera
@@ -22,7 +23,13 @@ BRIGHTEST_ABOVE_ROAD = 0.2
 
 
 def fog_image(
-    image: Pixels, distance: NDArray[np.float64], visibility: float, camera: Camera, airlight: NDArray[np.float64]
+    image: Pixels,
+    distance: NDArray[np.float64],
+    visibility: float,
+    camera: Camera,
+    airlight: NDArray[np.float64],
+    layer: FogLayer | None = None,
+    sines: NDArray[np.float64] | None = None,
 ) -> Pixels:
     """Put homogeneous fog on an image, L = L0 e^(−k d) + L∞ (1 − e^(−k d)) with k = ln 20 / V_met (Koschmieder 1924).
 
@@ -39,7 +46,11 @@ def fog_image(
     camera : Camera
         Its response and, for images of 16 bits, its bit depth.
     airlight : (channels,) float64
-        Pixel values of the airlight.
+        Pixel values of the airlight; with a layer, of what of it is seen level.
+    layer : FogLayer or None
+        Airlight by elevation and path; None for one that is the same everywhere.
+    sines : (rows, cols) float64 or None
+        Of the elevations of the pixels' rays, for a layer; None for those of the pinhole.
 
     Returns
     -------
@@ -49,7 +60,7 @@ def fog_image(
     Raises
     ------
     InputError
-        If the visibility is not positive.
+        If the visibility is not positive, or the layer is not known.
     """
     if not visibility > 0:
         raise InputError(f"--visibility must be a positive length in metres, got {visibility!r}")
@@ -59,10 +70,15 @@ def fog_image(
     full = full_scale(image, camera)
     colours = image.reshape(*image.shape[:2], -1)
     channels = min(colours.shape[2], 3)
-    transmittance = np.exp(-extinction * distance)[..., None]
+    if layer is None:
+        kept = np.exp(-extinction * distance)
+        added = 1.0 - kept
+    else:
+        slopes = elevation_sines(camera) if sines is None else sines
+        kept, added = layer.light(distance, slopes, visibility, camera.mount_height)
     light = exposure_of(colours[..., :channels] / full, camera.response, camera.black_level)
     air = exposure_of(airlight[:channels] / full, camera.response, camera.black_level)
-    fogged = respond(light * transmittance + air * (1.0 - transmittance), camera.response, camera.black_level)
+    fogged = respond(light * kept[..., None] + air * added[..., None], camera.response, camera.black_level)
     out = colours.copy()
     out[..., :channels] = np.rint(np.clip(fogged, 0.0, 1.0) * full)
     return out.reshape(image.shape)
@@ -112,6 +128,29 @@ def airlight_of(image: Pixels, distance: NDArray[np.float64], share: float = 1.0
     return np.asarray(colours[brightest].mean(axis=0))
 
 
+def in_layer(
+    airlight: NDArray[np.float64], image: Pixels, camera: Camera, layer: FogLayer | None
+) -> NDArray[np.float64]:
+    """Pixel values of the airlight seen level in a layer, from those of an even one.
+
+    Parameters
+    ----------
+    airlight : (channels,) float64
+        Pixel values.
+    image : (rows, cols[, channels]) uint8 or uint16
+        The image.
+    camera : Camera
+        Its response.
+    layer : FogLayer or None
+        None for an even airlight, which it stays.
+    """
+    if layer is None:
+        return airlight
+    full = full_scale(image, camera)
+    light = layer.level * exposure_of(airlight / full, camera.response, camera.black_level)
+    return np.asarray(full * respond(light, camera.response, camera.black_level))
+
+
 def fog_file(
     image: Path,
     depth: DepthMap | RoadPlane,
@@ -120,6 +159,7 @@ def fog_file(
     out: Path,
     airlight: tuple[float, ...] | None = None,
     *,
+    layer: FogLayer | None = None,
     overwrite: bool = False,
 ) -> NDArray[np.float64]:
     """Put homogeneous fog on an image file.
@@ -138,6 +178,8 @@ def fog_file(
         The fogged image.
     airlight : tuple of float or None
         Pixel value of the airlight: one, or red, green and blue; None to take it from the image (`airlight_of`).
+    layer : FogLayer or None
+        Airlight by elevation and path; None for one that is the same everywhere.
     overwrite : bool
         True to replace a file that is there.
 
@@ -155,15 +197,15 @@ def fog_file(
     pixels = read_image(image)
     refuse_other_size(image, (pixels.shape[1], pixels.shape[0]), camera)
     if isinstance(depth, DepthMap):
-        distance, share = read_distance(depth, camera), 1.0
+        distance, share, sines = read_distance(depth, camera), 1.0, None
     else:
-        distance, share = depth.distance(), BRIGHTEST_ABOVE_ROAD
+        distance, share, sines = depth.distance(), BRIGHTEST_ABOVE_ROAD, depth.sines()
     colours = min(3, 1 if pixels.ndim == 2 else pixels.shape[2])
     if airlight is None:
-        air = airlight_of(pixels, distance, share)
+        air = in_layer(airlight_of(pixels, distance, share), pixels, camera, layer)
     else:
         air = given_airlight(airlight, colours, pixels, camera)
-    write_image(out, fog_image(pixels, distance, visibility, camera, air))
+    write_image(out, fog_image(pixels, distance, visibility, camera, air, layer, sines))
     return air[::-1]
 
 

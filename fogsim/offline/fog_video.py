@@ -13,9 +13,11 @@ from fogsim.offline.fog_image import (
     airlight_of,
     fog_image,
     given_airlight,
+    in_layer,
     refuse_other_size,
     refuse_out,
 )
+from fogsim.offline.layered_fog import FogLayer
 from fogsim.offline.road_plane import RoadPlane
 from fogsim.offline.source import VideoFile
 from fogsim.recorders.video import Encoder, encoder_command
@@ -31,6 +33,7 @@ def fog_video(
     out: Path,
     airlight: tuple[float, ...] | None = None,
     *,
+    layer: FogLayer | None = None,
     overwrite: bool = False,
 ) -> Generator[NDArray[np.float64]]:
     """Put homogeneous fog on a video of a flat road; under its final name only when it is whole.
@@ -48,6 +51,8 @@ def fog_video(
     airlight : tuple of float or None
         Pixel value of the airlight: one, or red, green and blue; None to take it from the first frame's sky, once for
         all frames, lest it flicker.
+    layer : FogLayer or None
+        Airlight by elevation and path; None for one that is the same everywhere.
     overwrite : bool
         True to replace a file that is there.
 
@@ -72,7 +77,7 @@ def fog_video(
             f"{video.path}: frames of {camera.width} × {camera.height} pixels cannot be written as .mp4, which wants "
             "even numbers; cut a row or column off and give the camera of what is left"
         )
-    distance = road.distance()
+    distance, sines = road.distance(), road.sines()
     air: NDArray[np.float64] | None = None
     encoder: Encoder | None = None
     try:
@@ -81,8 +86,11 @@ def fog_video(
                 raise InputError(picture.error)
             if air is None:
                 given = None if airlight is None else given_airlight(airlight, 3, picture.image, camera)[::-1]
-                air = airlight_of(picture.image, distance, BRIGHTEST_ABOVE_ROAD) if given is None else given
-            fogged = fog_image(picture.image, distance, visibility, camera, air)
+                air = given
+                if air is None:
+                    found = airlight_of(picture.image, distance, BRIGHTEST_ABOVE_ROAD)
+                    air = in_layer(found, picture.image, camera, layer)
+            fogged = fog_image(picture.image, distance, visibility, camera, air, layer, sines)
             if encoder is None:
                 encoder = Encoder(encoder_command(partial_path(out), video.period, video.size, RATE_FACTOR))
             encoder.write(fogged.tobytes())

@@ -51,19 +51,28 @@ class RoadPlane:
         InputError
             If the horizon is not within the image, or the lens shows some pixel by no ray.
         """
-        camera = self.calibration.camera
-        right, down = _unbent_rays(self.calibration)
-        across, lower, ahead = camera_axes(camera, CameraPose((0.0, 0.0, camera.mount_height), 0.0))[:, 2].tolist()
-        descent = -(across * right + lower * down + ahead)
-        road = descent > 0.0
+        camera, sine = self.calibration.camera, self.sines()
+        road = sine < 0.0
         if road.all() or not road.any():
             raise InputError(
                 f"the horizon, on row {camera.horizon_row:.1f} at the principal point, is not within the image of rows "
                 f"0 … {camera.height - 1}: --road-plane needs both road and sky; check pitch or horizon row, and focal "
                 "length"
             )
-        length = np.sqrt(1.0 + right**2 + down**2)
-        return np.where(road, camera.mount_height * length / np.where(road, descent, 1.0), math.inf)
+        return np.where(road, camera.mount_height / np.where(road, -sine, 1.0), math.inf)
+
+    def sines(self) -> Floats:
+        """Sines of the elevations of the pixels' rays, (rows, cols).
+
+        Raises
+        ------
+        InputError
+            If the lens shows some pixel by no ray.
+        """
+        camera = self.calibration.camera
+        right, down = _unbent_rays(self.calibration)
+        across, lower, ahead = camera_axes(camera, CameraPose((0.0, 0.0, camera.mount_height), 0.0))[:, 2].tolist()
+        return np.asarray((across * right + lower * down + ahead) / np.sqrt(1.0 + right**2 + down**2))
 
 
 def _unbent_rays(calibration: Calibration) -> tuple[Floats, Floats]:

@@ -70,6 +70,14 @@ def test_a_file_that_is_there_is_replaced_only_when_it_is_asked_for(folder: Path
             ("--visibility", "80", "--depth-kind", "range", "--road-plane"),
             "the flat road; both are given",
         ),
+        (
+            ("--visibility", "80", "--depth-kind", "range", "--ground-albedo", "2"),
+            "--ground-albedo must lie within 0 … 1",
+        ),
+        (
+            ("--visibility", "80", "--depth-kind", "range", "--layer-height", "9"),
+            "--layer-height goes with --ground-alb",
+        ),
         (("--visibility", "80", "--depth-kind", "range", "--horizon-row", "9"), "--horizon-row goes with --road-plane"),
     ],
 )

@@ -14,6 +14,7 @@ from fogsim.errors import InputError
 from fogsim.offline.camera_file import load_camera
 from fogsim.offline.fog_image import airlight_of, fog_file, fog_image
 from fogsim.offline.image_files import DepthMap, range_from_planar
+from fogsim.offline.layered_fog import FogLayer
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, CameraPose, FogField, Response, View
 from fogsim.values.camera_response import respond
@@ -63,6 +64,8 @@ def run(folder: Path, **changed: object) -> NDArray[np.generic]:
         "airlight": (255.0,),
     }
     options = {**given, **changed}
+    if "layer" in options:
+        options["layer"] = FogLayer(*options["layer"])  # type: ignore[misc]
     depth = DepthMap(options.pop("depth"), options.pop("kind"), options.pop("scale", None))  # type: ignore[arg-type]
     fog_file(depth=depth, **options)  # type: ignore[arg-type]  # some are wrong on purpose
     return np.asarray(cv2.imread(str(folder / "out.png"), cv2.IMREAD_UNCHANGED))
@@ -149,9 +152,28 @@ def test_a_clear_frame_fogged_afterwards_is_the_frame_that_the_loop_fogs() -> No
         assert np.abs(afterwards - in_loop).max() <= 1.0
 
 
+def test_airlight_by_elevation_is_that_of_the_loop() -> None:
+    rng = np.random.default_rng(7)
+    distance = rng.uniform(2.0, 300.0, (48, 64))
+    distance[:20] = math.inf
+    clear = rng.integers(0, 256, (48, 64, 3)).astype(np.uint8)
+    level = np.array([90.0, 100.0, 110.0])
+    for albedo in (0.0, 0.1, 0.8):
+        layer = FogLayer(albedo, 250.0)
+        afterwards = fog_image(clear, distance, 80.0, CAMERA, level, layer)
+        field = FogField(extinction_from_visibility(80.0), (90.0, 100.0, 110.0), top=250.0, ground_albedo=albedo)
+        view = View(clear.astype(np.float32), distance.astype(np.float32), np.zeros((48, 64), np.int32))
+        pose = CameraPose((0.0, 0.0, CAMERA.mount_height), 0.0)
+        in_loop = np.clip(Air(field).radiance(view, CAMERA, pose), 0.0, 255.0)
+        assert np.abs(afterwards - in_loop).max() <= 0.6
+
+
 @pytest.mark.parametrize(
     ("changed", "told"),
     [
+        ({"layer": (1.5, 250.0)}, "--ground-albedo must lie within 0 … 1, got 1.5"),
+        ({"layer": (0.1, 1.0)}, "above the fog, whose top is 1 m high"),
+        ({"layer": (0.1, math.nan)}, "--layer-height must be a positive length"),
         ({"visibility": 0.0}, "--visibility must be"),
         ({"visibility": math.nan}, "--visibility must be"),
         ({"kind": "plannar"}, "did you mean 'planar'"),

@@ -139,6 +139,27 @@ def _stepped(depth: float) -> float:
     return math.exp(0.01 * round(100.0 * math.log(depth)))
 
 
+def slant_share(around: SlantAirlight, sine: NDArray[np.float64], lost: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Airlight over its level on lines of sight, as `layered_fog_rows` has it at the pixels of a pinhole.
+
+    Parameters
+    ----------
+    around : SlantAirlight
+        Of an eye.
+    sine : (...) float64
+        Of the elevations of the lines of sight [-].
+    lost : (...) float64
+        What they take from the light, 1 − T [-].
+    """
+    look = 0.5 * (ELEVATIONS - 1) * (1.0 + (1.0 + BEND) * sine / (np.abs(sine) + BEND))
+    path = lost * (PATHS - 1)
+    a, b = np.minimum(look.astype(int), ELEVATIONS - 2), np.minimum(path.astype(int), PATHS - 2)
+    up, on = look - a, path - b
+    low = around.share[a, b] * (1.0 - on) + around.share[a, b + 1] * on
+    high = around.share[a + 1, b] * (1.0 - on) + around.share[a + 1, b + 1] * on
+    return np.asarray(low * (1.0 - up) + high * up)
+
+
 def layer_thickness(extinction: float, height: float) -> float:
     """Optical thickness of a layer; of one too thin to be seen, that of the thinnest that is known.
 

@@ -71,7 +71,9 @@ def airlight_edge(
         return None
     below = geometry.below - uneven.fit.shift
     whole = (geometry.first == geometry.last) & (below > max(LEAST_ROWS, horizon_deviation / UNSURE))
-    far = np.flatnonzero(whole & (geometry.distance > NEAREST))
+    # Behind a crest no row is farther than the one below it.
+    farther = np.diff(below, prepend=math.inf) < 0.0
+    far = np.flatnonzero(whole & farther & (geometry.distance > NEAREST))
     reach = ASIDE * camera.focal_length
     columns = (
         max(round(camera.principal_point[0] - reach), 0),

@@ -7,9 +7,10 @@ fog and lamplight, "camera" the taking, and "scene" what is left.
 
 The scene is the road of the scenario motorway_fog_bank with trees, rails and posts, 30 vehicles of every kind with lit
 lamps on its lanes 12 ... 250 m ahead and 10 signs beside it, in homogeneous fog of 100 m visibility; by night the
-camera's own low beam and everyone's lamps light it. The camera drives on by 2.5 m a frame, over 50 m and again from the
-start. Repetitions of all cases alternate, and each record has the median of the repetitions' medians, the fastest
-frame, and each stage's median; on a machine that does other work too, only the fastest says something.
+camera's own low beam and everyone's lamps light it; `photons` is the day with that airlight. The camera drives on by
+2.5 m a frame, over 50 m and again from the start. Repetitions of all cases alternate, and each record has the median of
+the repetitions' medians, the fastest frame, and each stage's median; on a machine that does other work too, only the
+fastest says something.
 
     python benchmarks/frames.py [--json] [--renderer cpu ...] [--light night ...] [--size 640x480 ...]
         [--samples 2 ...] [--frames 60] [--repeat 5]
@@ -46,7 +47,7 @@ SIZES = {  # length, width and height [m]
     "motorcycle": (2.1, 0.8, 1.5),
 }
 KINDS = ("car", "car", "truck", "car", "van", "car", "bus", "car", "car", "motorcycle")
-LIGHTS = {"day": 10_000.0, "night": 0.5}  # [lx]
+LIGHTS = {"day": 10_000.0, "night": 0.5, "photons": 10_000.0}  # [lx]; the last with the airlight of photons
 Key = tuple[str, str, str, int]
 """Renderer, light, size and samples a pixel side of a case."""
 
@@ -58,7 +59,12 @@ def scenario(renderer: str, light: str, size: str, samples: int) -> Scenario:
     """The scenario with homogeneous fog and a camera of a given size and antialiasing."""
     width, height = size.split("x")
     camera = (f"camera.width={width}", f"camera.height={height}", f"camera.samples={samples}")
-    lit = ("fog={visibility_m: 100}", f"light.illuminance_lx={LIGHTS[light]}", f"renderer={renderer}")
+    airlight = "photons" if light == "photons" else "koschmieder"
+    lit = (
+        f"fog={{visibility_m: 100, airlight: {airlight}}}",
+        f"light.illuminance_lx={LIGHTS[light]}",
+        f"renderer={renderer}",
+    )
     return fogsim.load_scenario("motorway_fog_bank", [*camera, *lit])
 
 

@@ -1,9 +1,9 @@
 """Airlight by elevation and path: against photon counts, DISORT, conservation and single scattering."""
 
 import math
+import platform
 from typing import Any
 
-import nanodisort
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -88,6 +88,8 @@ def moments(droplets: Droplets, count: int) -> NDArray[np.float64]:
 
 def disort(thickness: float, eye: float, albedo: float, slopes: NDArray[np.float64]) -> NDArray[np.float64]:
     """The same by DISORT."""
+    import nanodisort
+
     state = nanodisort.DisortState()
     state.nstr, state.nmom, state.nlyr, state.ntau, state.numu, state.nphi = 64, 64, 1, 2, len(slopes), 1
     state.allocate()
@@ -102,6 +104,7 @@ def disort(thickness: float, eye: float, albedo: float, slopes: NDArray[np.float
     return np.asarray(state.uu[::-1, 0, 0] * math.pi / state.rfldn[1])
 
 
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="nanodisort comes ready-made for x86-64 alone")
 @pytest.mark.parametrize("albedo", [0.0, 0.1, 0.5, 1.0])
 @pytest.mark.parametrize("layer", [3, 10, 16, 19, 22, 24, 27])
 def test_the_table_agrees_with_disort(layer: int, albedo: float) -> None:
@@ -136,6 +139,31 @@ def test_a_thin_layer_scatters_once() -> None:
         height = slope * np.cos(angle) + flat * np.sin(angle) * np.cos(turn)
         once = np.sum(np.where(height > 0, 3.0 / 7.0 * (1.0 + 2.0 * height), 0.0) * weight)
         assert black[len(black) // 2, len(looks) + index] == pytest.approx(once, rel=0.01)
+
+
+@pytest.mark.parametrize("layer", [4, 18, 26])
+def test_the_table_is_what_its_tool_makes(layer: int) -> None:
+    for droplets in (Droplets.HEAVY_ADVECTION, Droplets.MODERATE_RADIATION):
+        table = layer_table(droplets)
+        matrix, thickness = make_airlight_table.scattering(droplets), float(table.thickness[layer])
+        heights, reflectance, transmittance, black, _ = make_airlight_table.layer(matrix, thickness)
+        assert table.reflectance[layer] == pytest.approx(reflectance, abs=1e-4)
+        assert table.transmittance[layer] == pytest.approx(transmittance, abs=1e-4)
+        level = np.interp(thickness * table.place, heights, black[:, len(make_airlight_table.LOOKS)])
+        assert table.black[layer, :, len(table.elevation) // 2] == pytest.approx(level, rel=2e-3)
+
+
+@pytest.mark.parametrize("visibility", [30.0, 100.0, 400.0])
+def test_a_black_target_at_the_visibility_has_five_percent_of_contrast(visibility: float) -> None:
+    ray_map = np.zeros((3, 3))
+    ray_map[0, 2] = 1.0
+    for albedo in ALBEDOS:
+        field = field_of(visibility, 250.0, albedo)
+        seen_at = []
+        for distance in (visibility, 1e6):
+            view = View(np.zeros((1, 1, 3), np.float32), np.full((1, 1), distance, np.float32), np.zeros((1, 1), int))
+            seen_at.append(float(fogged_radiance(view, field, (0.0, 0.0, 1.3), ray_map)[0, 0, 1]))
+        assert 1.0 - seen_at[0] / seen_at[1] == pytest.approx(0.05, abs=1e-3)
 
 
 def test_the_level_is_that_of_a_horizontal_line_of_sight() -> None:

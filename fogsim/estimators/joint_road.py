@@ -62,6 +62,10 @@ HARDLY_UNEVEN, UNEVEN_DEVIATION = 0.05, 0.13
 """Relative deviations of the mean extinction by unevenness that the road does not show, and, where the fog is surely
 uneven, by what nodes along the way leave out [-]."""
 
+MEMORY, CHANGING, MOST_CHANGE = 5.0, 1.5, 0.15
+"""Time over which the last pictures' extinctions tell how uneven the fog is [s], how many times their relative
+deviation that of a single one is, and the most of it [-]: fog that has changed along the way goes on to."""
+
 LEAST_DEPTH = 1.0
 """Least optical depth through which road is seen, where no tracked vehicle says why not [-]: what looks like an
 obstacle across all lanes may be the edge of a shadow, and what is before it too little to tell fog from sun and
@@ -128,11 +132,13 @@ class JointRoad:
         self._straight = strip_geometry(camera, max(1.0, self._horizon.standard_deviation))
         self._geometry = self._straight
         self._earlier: deque[tuple[StripCurves, Sky]] = deque(maxlen=int(frames) - 1)
+        self._before: deque[tuple[float, float]] = deque()
 
     def reset(self) -> None:
         """Forget all earlier frames."""
         self._check.reset()
         self._earlier.clear()
+        self._before.clear()
 
     def update(self, observation: Observation) -> Estimate:
         """Estimate the fog from one image, and the range of the lead vehicle if it is tracked.
@@ -180,7 +186,8 @@ class JointRoad:
             return Estimate.invalid(self.method, fit, **found)
         unsure = course_deviation(fit.fit, self._geometry, self._camera, course, prior, sky.noise)
         front = fit.denser or airlight_edge(pixels, self._geometry, self._camera, sky, fit, prior.shift_deviation)
-        return self._estimate(fit, front, found, unsure)
+        changing = self._change(observation.time, fit.fit.extinction) * max(fit.fit.extinction, 0.0)
+        return self._estimate(fit, front, found, math.hypot(unsure, changing))
 
     def _fitted(self, pixels: LinearPixels, sky: Sky, prior: JointPrior, free: float) -> UnevenFit | str:
         """Fit of the road that is free up to a depth, or why there is none that is to be believed.
@@ -234,6 +241,13 @@ class JointRoad:
             return course.horizon, course
         point = vanishing_point_of(seen, self._camera, self._horizon)
         return self._horizon if point is None else weighted_mean(self._horizon, point.horizon), course
+
+    def _change(self, time: float, extinction: float) -> float:
+        """Relative deviation of the extinction by how it changed over the last pictures [-]; 0 without their times."""
+        while self._before and not time - MEMORY <= self._before[0][0] < time:
+            self._before.popleft()
+        self._before.append((time, math.log(max(extinction, LEAST_DEVIATION))))
+        return min(CHANGING * float(np.std([logarithm for _, logarithm in self._before])), MOST_CHANGE)
 
     def _doubt(self, uneven: UnevenFit, sky: Sky, curves: StripCurves, free: float, told: float) -> str:
         """Say why a fit is not to be believed; empty if it is."""

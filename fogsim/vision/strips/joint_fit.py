@@ -34,7 +34,7 @@ ALBEDOS = (
 )
 """How the albedo may wander: what is tried, before airlight that is as uneven as the sky."""
 
-ALBEDO_CHANCES = (0.3, 0.1, 0.25, 0.1, 0.15, 0.07, 0.03)
+ALBEDO_CHANCES = (0.5, 0.25, 0.08, 0.05, 0.07, 0.04, 0.01)
 """How likely each of those is before the image is seen [-]."""
 
 SMOOTH, EXPLAINED = 4, 1.0

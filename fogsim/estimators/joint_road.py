@@ -40,7 +40,7 @@ from fogsim.vision.strips.strip_curves import (
     without_rows_below,
 )
 from fogsim.vision.strips.strip_geometry import StripGeometry, strip_geometry
-from fogsim.vision.strips.uneven_fit import UnevenFit, fit_uneven
+from fogsim.vision.strips.uneven_fit import UnevenFit, even_fog, fit_uneven
 
 MIN_COLS, MIN_ROWS = 32, 16
 """A road narrower than this, or lower below its horizon, shows no curve [px]."""
@@ -181,7 +181,7 @@ class JointRoad:
         if not course.is_straight:
             self._geometry = course_geometry(self._straight, self._camera, course)
         prior = joint_prior(sky, self._camera, horizon)
-        fit = self._fitted(pixels, sky, prior, _free_road(observation.lead))
+        fit = self._fitted(pixels, sky, prior, _free_road(observation.lead), course)
         if isinstance(fit, str):
             return Estimate.invalid(self.method, fit, **found)
         unsure = course_deviation(fit.fit, self._geometry, self._camera, course, prior, sky.noise)
@@ -189,7 +189,9 @@ class JointRoad:
         changing = self._change(observation.time, fit.fit.extinction) * max(fit.fit.extinction, 0.0)
         return self._estimate(fit, front, found, math.hypot(unsure, changing))
 
-    def _fitted(self, pixels: LinearPixels, sky: Sky, prior: JointPrior, free: float) -> UnevenFit | str:
+    def _fitted(
+        self, pixels: LinearPixels, sky: Sky, prior: JointPrior, free: float, course: RoadCourse
+    ) -> UnevenFit | str:
         """Fit of the road that is free up to a depth, or why there is none that is to be believed.
 
         What stands in the own lane hides, further on, the neighbours' lanes too: they are read again without it.
@@ -218,7 +220,11 @@ class JointRoad:
             return "too little road is seen"
         # What even fog takes for an obstacle behind a tracked vehicle may be denser fog: it is not left out here.
         curves = whole if math.isfinite(told) else curves
-        uneven = fit_uneven(self._averaged(curves, sky), self._geometry, prior, own, fit)
+        # Where a sag or crest is not quite followed, the road fades as in fog that changes along the way.
+        uneven = even_fog(fit, self._geometry)
+        if not course.sag.any():
+            seen = self._averaged(curves, sky)
+            uneven = fit_uneven(seen, self._geometry, prior, own, fit, bool(course.bend.any()))
         return self._doubt(uneven, sky, curves, free, told) or uneven
 
     def _usable(self, curves: StripCurves, sky: Sky, lowest: int) -> StripCurves:

@@ -40,6 +40,9 @@ SAME_DEPTH, TOLD = 0.04, 2.0
 UNLIKELY = 30.0
 """By how much the cost of even fog over an albedo must lie above the best for that albedo to be left out [-]."""
 
+BENT = 30.0
+"""How much more evidence uneven fog needs on a road that bends, which strips may leave far away [-]."""
+
 NEAREST = 12.0
 """Least reach of a curve of optical depths [m]."""
 
@@ -114,7 +117,12 @@ class _Candidate:
 
 
 def fit_uneven(
-    curves: StripCurves, geometry: StripGeometry, prior: JointPrior, own: JointFit, even: JointFit
+    curves: StripCurves,
+    geometry: StripGeometry,
+    prior: JointPrior,
+    own: JointFit,
+    even: JointFit,
+    bent: bool = False,
 ) -> UnevenFit:
     """Fit strips with fog that may be uneven, weighed against even fog.
 
@@ -130,12 +138,14 @@ def fit_uneven(
         Sky and horizon.
     own, even : JointFit
         Fits of even fog to the own lane, and to all lanes that agree with it.
+    bent : bool
+        Whether the strips follow a road that bends, and may leave it far away.
     """
     if even.used.mean() < LEAST_ROAD:
         return even_fog(even, geometry)
-    found = _fitted(curves, geometry, prior, even)
+    found = _fitted(curves, geometry, prior, even, bent)
     if found is not None and not _fits_all(even, curves):
-        lane = _fitted(curves.only([0]), geometry.only([0]), prior, own)
+        lane = _fitted(curves.only([0]), geometry.only([0]), prior, own, bent)
         if not _agree(even_fog(own, geometry) if lane is None else lane, found):
             found = lane
     return even_fog(even, geometry) if found is None else found
@@ -157,14 +167,16 @@ def _agree(own: UnevenFit, more: UnevenFit) -> bool:
     return apart <= math.hypot(deviation, SAME_DEPTH * depth)
 
 
-def _fitted(curves: StripCurves, geometry: StripGeometry, prior: JointPrior, even: JointFit) -> UnevenFit | None:
+def _fitted(
+    curves: StripCurves, geometry: StripGeometry, prior: JointPrior, even: JointFit, bent: bool
+) -> UnevenFit | None:
     """Fit of uneven fog, or None if even fog suffices."""
     bins = _thinned(joint_fit.strip_bins(curves, geometry, prior.vignetting))
     farthest = float((bins.path / bins.below)[bins.noise > 0].max())
     count = min(sum(node < farthest for node in NODES) + 1, len(NODES))
     start = np.array([max(even.extinction, 1e-5), even.airlight, even.shift, 0.0])
     costs, left_out = zip(*(_even(bins, albedo, prior, start) for albedo in range(len(ALBEDOS))), strict=True)
-    evens = list(costs)
+    evens = [cost - BENT * bent for cost in costs]
     likely = int(np.argmin(evens))
     first = uneven_kernels.first_profile(bins, fog_nodes(*UNEVENNESS[0], count).nodes, prior)
     begin = np.concatenate([first, [prior.airlight, prior.shift, 0.0]])

@@ -10,7 +10,8 @@ import pytest
 
 import fogsim
 from fogsim.camera import mounted_pose
-from fogsim.ego.equipment import EgoEquipment, fog_truth
+from fogsim.ego.equipment import EgoEquipment
+from fogsim.ego.fog_truth import fog_truth
 from fogsim.ego.view_rendering import ViewRenderer
 from fogsim.randomness import spawn_streams
 from fogsim.scenario import build, catalogue

@@ -1,17 +1,15 @@
 """What rides in the ego: from a snapshot of the traffic to a finished step."""
 
-import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from types import MappingProxyType
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere import distance_at_depth, extinction, field_at, with_change
+from fogsim.atmosphere import field_at, with_change
 from fogsim.camera import Delivered, FaultyLens, FrameDelivery, knocked, mounted_pose, unexposed
 from fogsim.ego.daylight import Ramp, in_daylight
+from fogsim.ego.fog_truth import KnownWay, carriageways, fog_truth
 from fogsim.ego.frame_watch import FrameWatch, LeadHistory
 from fogsim.ego.light_sensing import LightSensing, lamp_effects
 from fogsim.ego.measurements import EgoSensors
@@ -25,7 +23,7 @@ from fogsim.scenario import Scenario, build
 from fogsim.scenario.schema import NO_RENDERER
 from fogsim.scenario.sensor_schema import fault_of
 from fogsim.sensors import check_sign_ids, faulty_signs
-from fogsim.units import DAY_ILLUMINANCE, OPTICAL_DEPTH_AT_VISIBILITY
+from fogsim.units import DAY_ILLUMINANCE
 from fogsim.values import (
     Camera,
     CameraPose,
@@ -35,28 +33,18 @@ from fogsim.values import (
     Fault,
     FogField,
     Frame,
-    Lane,
-    LaneKind,
     Observation,
     RoadNetwork,
-    RoadSection,
     RunningFault,
     SignMap,
     Step,
     TrafficSnapshot,
     TrafficState,
-    Truth,
 )
 from fogsim.values.fault import FaultKind, Where
 from fogsim.values.light import ALL_LAMPS
 from fogsim.values.result_checks import checked_belief, checked_estimate
 from fogsim.values.script import Actions
-
-_SIGHT_LINE = np.geomspace(1.0, 20_000.0, 400)
-"""Distances ahead at which the optical depth is looked up to find how far one sees [m]."""
-
-_EYES = np.array([0.0, 0.0, 1.2])
-"""Where eyes are above the road, whatever the vehicle [m]; fog over a road changes little over a truck's height."""
 
 
 class EgoEquipment:
@@ -280,11 +268,7 @@ class EgoEquipment:
             ego,
             pose,
         )
-        if radiance is None:
-            image = self._unexposed
-        else:
-            image = self._camera_sensor.take(self._glass.look_through(radiance, camera, faults), streams.camera)
-        frame = Frame(*self._delivery.deliver(Delivered(time, image), faults), self._assumed_camera)
+        frame = self._frame(radiance, camera, faults, streams, time)
         observation = Observation(
             frame=frame,
             speed=float(state.speed[ego]),
@@ -295,6 +279,7 @@ class EgoEquipment:
             light=self._light_sensing.measure(state, ego, fog, light),
         )
         estimates = self._estimate(frame, observation, time)
+        belief = checked_belief(self._scenario.fusion.method, self._fusion.update(estimates, time))
         return Step(
             index=index,
             time=time,
@@ -309,11 +294,25 @@ class EgoEquipment:
             view=view,
             observation=observation,
             estimates=estimates,
-            belief=checked_belief(self._scenario.fusion.method, self._fusion.update(estimates, time)),
+            belief=belief,
             command=command,
             ending=ending,
             reading_radius=self._scenario.traffic.reading_radius_m,
         )
+
+    def _frame(
+        self,
+        radiance: NDArray[np.float32] | None,
+        camera: Camera,
+        faults: Sequence[RunningFault],
+        streams: Streams,
+        time: float,
+    ) -> Frame:
+        """What the camera delivers of the light that falls on its glass; None where nothing is drawn."""
+        image = self._unexposed
+        if radiance is not None:
+            image = self._camera_sensor.take(self._glass.look_through(radiance, camera, faults), streams.camera)
+        return Frame(*self._delivery.deliver(Delivered(time, image), faults), self._assumed_camera)
 
     def surrounding(self, state: TrafficState, ego: int, pose: CameraPose) -> Surrounding:
         """Tell what is around the camera.
@@ -360,101 +359,3 @@ class EgoEquipment:
         if self._view_renderer is not None:
             self._view_renderer.close()
         self._view_renderer, self._streams, self._schedule = None, None, None
-
-
-class KnownWay(NamedTuple):
-    """What of the road does not change in a run.
-
-    Attributes
-    ----------
-    route : (n, 3) float64 or None
-        Polyline along the ego's route [m].
-    carriageways : mapping from str to tuple of str
-        Lanes for vehicles of each edge, from `carriageways`.
-    """
-
-    route: NDArray[np.float64] | None = None
-    carriageways: Mapping[str, tuple[str, ...]] = MappingProxyType({})
-
-
-def fog_truth(
-    fog: FogField,
-    pose: CameraPose,
-    camera: Camera,
-    signs: SignMap,
-    traffic: TrafficState | None = None,
-    sections: tuple[RoadSection, ...] = (),
-    way: KnownWay | None = None,
-    faults: tuple[Fault, ...] = (),
-) -> Truth:
-    """The fog at a camera, and as far as it sees along its heading, parallel to the road under it.
-
-    Parameters
-    ----------
-    fog : FogField
-        The fog now.
-    pose : CameraPose
-        Where the camera is.
-    camera : Camera
-        Its true calibration.
-    signs : SignMap
-        The signs that stand in the world.
-    traffic : TrafficState or None
-        Vehicles whose drivers have fog about them, too.
-    sections : tuple of RoadSection
-        What meters beside the road measure.
-    way : KnownWay or None
-        The ego's route, and the lanes.
-    faults : tuple of Fault
-        Faults of its sensors in force.
-    """
-    eye, level = np.array(pose.position), math.cos(pose.road_grade)
-    direction = np.array([math.cos(pose.heading) * level, math.sin(pose.heading) * level, math.sin(pose.road_grade)])
-    sight = distance_at_depth(fog, eye, direction, _SIGHT_LINE, OPTICAL_DEPTH_AT_VISIBILITY)
-    here, drivers = _extinctions(fog, eye, traffic)
-    return Truth(
-        extinction=here,
-        extinction_ahead=OPTICAL_DEPTH_AT_VISIBILITY / sight,
-        camera=camera,
-        pose=pose,
-        fog=fog,
-        signs=signs,
-        sections=sections,
-        route=None if way is None else way.route,
-        carriageways={} if way is None else way.carriageways,
-        faults=faults,
-        vehicle_extinctions=drivers,
-    )
-
-
-def _extinctions(
-    fog: FogField, eye: NDArray[np.float64], traffic: TrafficState | None
-) -> tuple[float, NDArray[np.float64] | None]:
-    """Extinction coefficients at a camera, and at the eyes of the drivers of some traffic, if there is any [1/m]."""
-    if traffic is None:
-        return float(extinction(fog, eye)), None
-    places = np.empty((1 + len(traffic.position), 3))
-    places[0] = eye
-    np.add(traffic.position, _EYES, out=places[1:])
-    found = extinction(fog, places)
-    return float(found[0]), found[1:]
-
-
-def carriageways(lanes: Iterable[Lane]) -> dict[str, tuple[str, ...]]:
-    """Ids of the lanes for vehicles of each edge, from the right.
-
-    Parameters
-    ----------
-    lanes : iterable of Lane
-        Every lane, named by its edge and its number from the right as SUMO does.
-    """
-    found: dict[str, list[str]] = {}
-    for lane in lanes:
-        if lane.kind is LaneKind.CARRIAGEWAY:
-            found.setdefault(lane.edge_id, []).append(lane.lane_id)
-    return {edge: tuple(sorted(ids, key=_number_from_right)) for edge, ids in found.items()}
-
-
-def _number_from_right(lane_id: str) -> int:
-    number = lane_id.rpartition("_")[2]
-    return int(number) if number.isdecimal() else 0

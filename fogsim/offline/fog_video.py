@@ -21,6 +21,7 @@ from fogsim.offline.layered_fog import FogLayer
 from fogsim.offline.road_plane import RoadPlane
 from fogsim.offline.source import VideoFile
 from fogsim.recorders.video import Encoder, encoder_command
+from fogsim.values import Camera
 
 RATE_FACTOR = 12
 """Constant rate factor of fogged videos: what is left of the road far away is a few pixel values, and is to be kept."""
@@ -67,16 +68,7 @@ def fog_video(
         If anything does not fit, the video is cut off, or there is a file `out` that must not be replaced.
     """
     camera = road.calibration.camera
-    if out.suffix.lower() != ".mp4":
-        raise InputError(f"--out {out}: a fogged video is written as .mp4, got {out.suffix or 'no ending'}")
-    refuse_missing_folder(out, "--out")
-    refuse_out(out, video.paths, overwrite)
-    refuse_other_size(video.path, video.size, camera)
-    if camera.width % 2 or camera.height % 2:
-        raise InputError(
-            f"{video.path}: frames of {camera.width} × {camera.height} pixels cannot be written as .mp4, which wants "
-            "even numbers; cut a row or column off and give the camera of what is left"
-        )
+    _refuse_unfit(video, camera, out, overwrite)
     distance, sines = road.distance(), road.sines()
     air: NDArray[np.float64] | None = None
     encoder: Encoder | None = None
@@ -85,11 +77,7 @@ def fog_video(
             if picture.image is None:
                 raise InputError(picture.error)
             if air is None:
-                given = None if airlight is None else given_airlight(airlight, 3, picture.image, camera)[::-1]
-                air = given
-                if air is None:
-                    found = airlight_of(picture.image, distance, BRIGHTEST_ABOVE_ROAD)
-                    air = in_layer(found, picture.image, camera, layer)
+                air = _airlight(picture.image, distance, camera, airlight, layer)
             fogged = fog_image(picture.image, distance, visibility, camera, air, layer, sines)
             if encoder is None:
                 encoder = Encoder(encoder_command(partial_path(out), video.period, video.size, RATE_FACTOR))
@@ -103,3 +91,29 @@ def fog_video(
         if encoder is not None:
             encoder.finish()
         partial_path(out).unlink(missing_ok=True)
+
+
+def _refuse_unfit(video: VideoFile, camera: Camera, out: Path, overwrite: bool) -> None:
+    if out.suffix.lower() != ".mp4":
+        raise InputError(f"--out {out}: a fogged video is written as .mp4, got {out.suffix or 'no ending'}")
+    refuse_missing_folder(out, "--out")
+    refuse_out(out, video.paths, overwrite)
+    refuse_other_size(video.path, video.size, camera)
+    if camera.width % 2 or camera.height % 2:
+        raise InputError(
+            f"{video.path}: frames of {camera.width} × {camera.height} pixels cannot be written as .mp4, which wants "
+            "even numbers; cut a row or column off and give the camera of what is left"
+        )
+
+
+def _airlight(
+    first: NDArray[np.uint8] | NDArray[np.uint16],
+    distance: NDArray[np.float64],
+    camera: Camera,
+    given: tuple[float, ...] | None,
+    layer: FogLayer | None,
+) -> NDArray[np.float64]:
+    """Airlight of a video, as given or from the sky of its first frame, red first."""
+    if given is not None:
+        return np.asarray(given_airlight(given, 3, first, camera)[::-1])
+    return in_layer(airlight_of(first, distance, BRIGHTEST_ABOVE_ROAD), first, camera, layer)

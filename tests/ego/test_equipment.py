@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from fogsim.ego.equipment import fog_truth
+from fogsim.ego.fog_truth import fog_truth
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, CameraPose, FogBank, FogField, SignMap
 

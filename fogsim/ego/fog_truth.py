@@ -1,0 +1,117 @@
+"""The truth about the fog around a camera, which estimators never see."""
+
+import math
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.atmosphere import distance_at_depth, extinction
+from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
+from fogsim.values import Camera, CameraPose, Fault, FogField, Lane, LaneKind, RoadSection, SignMap, TrafficState, Truth
+
+_SIGHT_LINE = np.geomspace(1.0, 20_000.0, 400)
+"""Distances ahead at which the optical depth is looked up to find how far one sees [m]."""
+
+_EYES = np.array([0.0, 0.0, 1.2])
+"""Where eyes are above the road, whatever the vehicle [m]; fog over a road changes little over a truck's height."""
+
+
+class KnownWay(NamedTuple):
+    """What of the road does not change in a run.
+
+    Attributes
+    ----------
+    route : (n, 3) float64 or None
+        Polyline along the ego's route [m].
+    carriageways : mapping from str to tuple of str
+        Lanes for vehicles of each edge, from `carriageways`.
+    """
+
+    route: NDArray[np.float64] | None = None
+    carriageways: Mapping[str, tuple[str, ...]] = MappingProxyType({})
+
+
+def fog_truth(
+    fog: FogField,
+    pose: CameraPose,
+    camera: Camera,
+    signs: SignMap,
+    traffic: TrafficState | None = None,
+    sections: tuple[RoadSection, ...] = (),
+    way: KnownWay | None = None,
+    faults: tuple[Fault, ...] = (),
+) -> Truth:
+    """The fog at a camera, and as far as it sees along its heading, parallel to the road under it.
+
+    Parameters
+    ----------
+    fog : FogField
+        The fog now.
+    pose : CameraPose
+        Where the camera is.
+    camera : Camera
+        Its true calibration.
+    signs : SignMap
+        The signs that stand in the world.
+    traffic : TrafficState or None
+        Vehicles whose drivers have fog about them, too.
+    sections : tuple of RoadSection
+        What meters beside the road measure.
+    way : KnownWay or None
+        The ego's route, and the lanes.
+    faults : tuple of Fault
+        Faults of its sensors in force.
+    """
+    eye, level = np.array(pose.position), math.cos(pose.road_grade)
+    direction = np.array([math.cos(pose.heading) * level, math.sin(pose.heading) * level, math.sin(pose.road_grade)])
+    sight = distance_at_depth(fog, eye, direction, _SIGHT_LINE, OPTICAL_DEPTH_AT_VISIBILITY)
+    here, drivers = _extinctions(fog, eye, traffic)
+    return Truth(
+        extinction=here,
+        extinction_ahead=OPTICAL_DEPTH_AT_VISIBILITY / sight,
+        camera=camera,
+        pose=pose,
+        fog=fog,
+        signs=signs,
+        sections=sections,
+        route=None if way is None else way.route,
+        carriageways={} if way is None else way.carriageways,
+        faults=faults,
+        vehicle_extinctions=drivers,
+    )
+
+
+def _extinctions(
+    fog: FogField, eye: NDArray[np.float64], traffic: TrafficState | None
+) -> tuple[float, NDArray[np.float64] | None]:
+    """Extinction coefficients at a camera, and at the eyes of the drivers of some traffic, if there is any [1/m]."""
+    if traffic is None:
+        return float(extinction(fog, eye)), None
+    places = np.empty((1 + len(traffic.position), 3))
+    places[0] = eye
+    np.add(traffic.position, _EYES, out=places[1:])
+    found = extinction(fog, places)
+    return float(found[0]), found[1:]
+
+
+def carriageways(lanes: Iterable[Lane]) -> dict[str, tuple[str, ...]]:
+    """Ids of the lanes for vehicles of each edge, from the right.
+
+    Parameters
+    ----------
+    lanes : iterable of Lane
+        Every lane, named by its edge and its number from the right as SUMO does.
+    """
+    found: dict[str, list[str]] = {}
+    for lane in lanes:
+        if lane.kind is LaneKind.CARRIAGEWAY:
+            found.setdefault(lane.edge_id, []).append(lane.lane_id)
+    return {edge: tuple(sorted(ids, key=_number_from_right)) for edge, ids in found.items()}
+
+
+def _number_from_right(lane_id: str) -> int:
+    number = lane_id.rpartition("_")[2]
+    return int(number) if number.isdecimal() else 0

@@ -28,7 +28,7 @@ BARREL = (-0.32, 0.09, 0.0011, -0.0007)
 """About what a dash camera of 60° has."""
 
 VISIBILITY = 120.0
-METHODS = ("joint_road",)
+METHODS = ("negru2013", "zhu2015", "joint_road")
 Draw = Callable[..., NDArray[np.uint8]]
 
 

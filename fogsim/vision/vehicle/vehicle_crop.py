@@ -281,6 +281,8 @@ def _daylight(pixels: LinearPixels, camera: Camera, margin: float, depth: float)
     axis = camera.principal_point[0] - camera.width // 6
     luminance = airlight_beside(light, sky.luminance, sky.noise, axis, hidden)
     clear = np.abs(light - luminance) <= 4.0 * max(sky.noise, 1.0)
+    if not clear.any():
+        raise CannotTellError("nowhere is the sky as bright as it is beside the vehicle")
     lost = clipping(pixels.pixels[rows, camera.width // 6 : camera.width - camera.width // 6][clear], camera)
     # What clipping takes from the sky, its noise shows; then it is no longer clipped.
     is_clipped = not lost.noise > 0.0 and sky.is_clipped

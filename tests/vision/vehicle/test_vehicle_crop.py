@@ -4,7 +4,7 @@ import pytest
 from fogsim.values import Camera, Response
 from fogsim.vision.light.clipped_sky import Clipping
 from fogsim.vision.region.road_image import CannotTellError
-from fogsim.vision.vehicle.vehicle_crop import SkyReading, noise_gain, vehicle_crop
+from fogsim.vision.vehicle.vehicle_crop import SkyReading, daytime_crop, noise_gain, vehicle_crop
 
 CAMERA = Camera(640, 480, 600.0, (319.5, 239.5), 1.4, np.radians(2.0), response=Response.LINEAR)
 SKY = SkyReading(200.0, 1.5, Clipping(0.0, 0.0, 0.0), is_clipped=False)
@@ -49,6 +49,16 @@ def test_what_is_too_near_or_too_far_cannot_be_looked_for(depth):
 def test_a_road_brighter_than_the_sky_is_refused():
     with pytest.raises(CannotTellError, match="brighter than the sky"):
         crop(30.0, road=230.0)
+
+
+def test_a_sky_that_is_nowhere_as_bright_as_beside_the_vehicle_is_told(monkeypatch):
+    sky = np.random.default_rng(0).normal(200.0, 1.0, (CAMERA.height, CAMERA.width))
+    sky[int(CAMERA.horizon_row) + 2 :] = 90.0
+    image = np.clip(np.rint(sky), 0, 255).astype(np.uint8)
+    assert daytime_crop(image, CAMERA, 30.0, 0.002).sky.luminance == pytest.approx(200.0, abs=1.0)
+    monkeypatch.setattr("fogsim.vision.vehicle.vehicle_crop.airlight_beside", lambda *_: 150.0)
+    with pytest.raises(CannotTellError, match="nowhere is the sky as bright"):
+        daytime_crop(image, CAMERA, 30.0, 0.002)
 
 
 def test_an_even_picture_shows_no_vehicle():

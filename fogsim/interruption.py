@@ -78,11 +78,14 @@ class ProgramSignals:
         _handle_signals(self._raise)
 
     def _note_unraisable(self, unraisable: "sys.UnraisableHookArgs") -> None:
-        """Have a signal come again at once whose exception a destructor or a library could not hand on."""
-        if self.last is None or not issubclass(unraisable.exc_type, KeyboardInterrupt):
-            sys.__unraisablehook__(unraisable)
-        else:
+        """Have a signal come again at once whose exception a destructor or a library could not hand on.
+
+        What lacks an attribute then is an object whose making the signal has cut off: that is no news.
+        """
+        if self.last is not None and issubclass(unraisable.exc_type, KeyboardInterrupt):
             signal.setitimer(signal.ITIMER_REAL, _AT_ONCE, _PATIENCE)
+        elif self.last is None or not issubclass(unraisable.exc_type, AttributeError):
+            sys.__unraisablehook__(unraisable)
 
     def _lost(self, _: int, __: FrameType | None) -> None:
         if self.last is not None:

@@ -25,10 +25,10 @@ from fogsim.vision.lines.horizon import (
 from fogsim.vision.lines.road_course import RoadCourse, road_course, unseen_course
 from fogsim.vision.lines.road_lines import seen_lines, vanishing_point_of
 from fogsim.vision.strips.airlight_edge import airlight_edge
+from fogsim.vision.strips.airlight_slopes import darkening_priors
 from fogsim.vision.strips.course_geometry import course_deviation, course_geometry
 from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, no_road
-from fogsim.vision.strips.joint_fit import MODEL_DEVIATION, JointFit, fit_own, with_neighbours
-from fogsim.vision.strips.joint_kernels import JointPrior
+from fogsim.vision.strips.joint_fit import MODEL_DEVIATION, JointFit, Priors, fit_own, with_neighbours
 from fogsim.vision.strips.joint_prior import joint_prior
 from fogsim.vision.strips.sky import Sky, sky_above
 from fogsim.vision.strips.strip_curves import (
@@ -181,7 +181,8 @@ class JointRoad:
         if not course.is_straight:
             self._geometry = course_geometry(self._straight, self._camera, course)
         prior = joint_prior(sky, self._camera, horizon)
-        fit = self._fitted(pixels, sky, prior, _free_road(observation.lead), course)
+        priors = (prior, *darkening_priors(prior, sky))
+        fit = self._fitted(pixels, sky, priors, _free_road(observation.lead), course)
         if isinstance(fit, str):
             return Estimate.invalid(self.method, fit, **found)
         unsure = course_deviation(fit.fit, self._geometry, self._camera, course, prior, sky.noise)
@@ -190,7 +191,7 @@ class JointRoad:
         return self._estimate(fit, front, found, math.hypot(unsure, changing))
 
     def _fitted(
-        self, pixels: LinearPixels, sky: Sky, prior: JointPrior, free: float, course: RoadCourse
+        self, pixels: LinearPixels, sky: Sky, priors: Priors, free: float, course: RoadCourse
     ) -> UnevenFit | str:
         """Fit of the road that is free up to a depth, or why there is none that is to be believed.
 
@@ -199,7 +200,7 @@ class JointRoad:
         lowest = lowest_road_row(pixels, self._camera, sky.luminance)
         curves = self._usable(strip_curves(pixels, self._geometry, sky.noise, self._camera, free), sky, lowest)
         whole, told = curves, free
-        own = fit = fit_own(self._averaged(curves, sky), self._geometry, prior)
+        own = fit = fit_own(self._averaged(curves, sky), self._geometry, priors)
         for _ in range(MOST_OBSTACLES):
             if own is None or fit is None:
                 break
@@ -212,7 +213,7 @@ class JointRoad:
                 curves = self._usable(curves, sky, lowest)
             elif fit is not own:
                 break
-            fit = with_neighbours(own, self._averaged(curves, sky), self._geometry, prior)
+            fit = with_neighbours(own, self._averaged(curves, sky), self._geometry, priors)
             if fit is own:
                 break
         self._earlier.append((curves, sky))
@@ -222,9 +223,9 @@ class JointRoad:
         curves = whole if math.isfinite(told) else curves
         # Where a sag or crest is not quite followed, the road fades as in fog that changes along the way.
         uneven = even_fog(fit, self._geometry)
-        if not course.sag.any():
+        if not course.sag.any() and fit.darker < 0.5:
             seen = self._averaged(curves, sky)
-            uneven = fit_uneven(seen, self._geometry, prior, own, fit, bool(course.bend.any()))
+            uneven = fit_uneven(seen, self._geometry, priors[0], own, fit, bool(course.bend.any()))
         return self._doubt(uneven, sky, curves, free, told) or uneven
 
     def _usable(self, curves: StripCurves, sky: Sky, lowest: int) -> StripCurves:
@@ -286,6 +287,7 @@ class JointRoad:
         if extinction > 0:
             found["inflection_row"] = horizon + 0.5 * extinction * self._camera.row_distance
         found["evenness"] = uneven.even
+        found["darker"] = fit.darker
         return Estimate(
             self.method,
             extinction,

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.vision.strips import albedo_filter, joint_kernels
+from fogsim.vision.strips.airlight_slopes import darkening_of_bins, slope_cost
 from fogsim.vision.strips.albedo_filter import Albedo
-from fogsim.vision.strips.joint_kernels import Bins, JointPrior, Solution
+from fogsim.vision.strips.joint_kernels import PARAMETERS, Bins, JointPrior, Solution
 from fogsim.vision.strips.strip_curves import StripCurves
 from fogsim.vision.strips.strip_geometry import StripGeometry
 
@@ -99,6 +100,8 @@ class JointFit:
         Bins that took part.
     hidden : (n,) bool
         Bins of the first strip that lie behind an obstacle which stands on it.
+    darker : float
+        How likely the airlight darkens toward the road [-].
     """
 
     extinction: float
@@ -109,10 +112,23 @@ class JointFit:
     misfit: float
     used: NDArray[np.bool_]
     hidden: NDArray[np.bool_]
+    darker: float = 0.0
+
+
+Priors = tuple[JointPrior, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Answer:
+    """A solution, its cost with what is likely beforehand, and whether its airlight is even."""
+
+    cost: float
+    solution: Solution
+    is_even: bool
 
 
 def fit_jointly(
-    curves: StripCurves, geometry: StripGeometry, prior: JointPrior, near: JointFit | None = None
+    curves: StripCurves, geometry: StripGeometry, priors: Priors, near: JointFit | None = None
 ) -> JointFit | None:
     """Fit Koschmieder's law to strips of road.
 
@@ -125,8 +141,9 @@ def fit_jointly(
         Luminance by bin.
     geometry : StripGeometry
         Where the bins are.
-    prior : JointPrior
-        Sky and horizon.
+    priors : tuple of JointPrior
+        What sky and horizon say of airlight that is even and, where it may be otherwise, of that too: answers with
+        either are averaged by their evidence.
     near : JointFit or None
         Answer for some of the strips, from which to start in place of a search.
 
@@ -137,13 +154,23 @@ def fit_jointly(
     """
     if int((curves.variance[0] > 0).sum()) < LEAST_BINS:
         return None
-    bins = strip_bins(curves, geometry, prior.vignetting)
+    return _average([answer for prior in priors for answer in _answers(curves, geometry, prior, near)])
+
+
+def _answers(curves: StripCurves, geometry: StripGeometry, prior: JointPrior, near: JointFit | None) -> list[_Answer]:
+    """Answers under one prior, each with its cost, in which how likely the albedo is beforehand is counted."""
+    bins = strip_bins(curves, geometry, prior)
     best = _from_search(bins, prior) if near is None else _from_near(bins, near, prior)
     tried = ALBEDOS if best.misfit > EXPLAINED else ALBEDOS[:SMOOTH]
-    return _average([best] + [_refined(bins, albedo, prior, best.theta, MORE_STEPS) for albedo in tried[1:]])
+    found = [best] + [_refined(bins, albedo, prior, best.theta, MORE_STEPS) for albedo in tried[1:]]
+    cost, is_even = slope_cost(prior), prior.rise.size == 0
+    chances = ALBEDO_CHANCES[: len(found)]
+    return [
+        _Answer(f.cost + cost - 2.0 * math.log(chance), f, is_even) for f, chance in zip(found, chances, strict=True)
+    ]
 
 
-def strip_bins(curves: StripCurves, geometry: StripGeometry, vignetting: float) -> Bins:
+def strip_bins(curves: StripCurves, geometry: StripGeometry, prior: JointPrior) -> Bins:
     """Strips as the kernels take them, the lens's vignetting undone.
 
     Parameters
@@ -152,13 +179,14 @@ def strip_bins(curves: StripCurves, geometry: StripGeometry, vignetting: float) 
         Luminance by bin.
     geometry : StripGeometry
         Where the bins are.
-    vignetting : float
-        How much of what a simple lens takes from pixels off its axis this one takes [-].
+    prior : JointPrior
+        How much of what a simple lens takes from pixels off its axis this one takes, and whether the airlight is even.
     """
-    luminance, variance = curves.luminance, curves.variance
+    luminance, variance, vignetting = curves.luminance, curves.variance, prior.vignetting
     if vignetting != 0.0:
         gain = 1.0 / (1.0 - np.minimum(vignetting * geometry.off_axis, MOST_VIGNETTING))
         luminance, variance = gain * luminance, gain**2 * variance
+    darker, by_row = darkening_of_bins(geometry.grazing, geometry.below, prior)
     return Bins(
         luminance=np.ascontiguousarray(luminance),
         noise=np.ascontiguousarray(variance),
@@ -169,6 +197,9 @@ def strip_bins(curves: StripCurves, geometry: StripGeometry, vignetting: float) 
         distance=geometry.distance,
         extent=geometry.extent,
         grazing=geometry.grazing,
+        darker=darker,
+        darker_by_row=by_row,
+        eye=float(geometry.distance[0] * math.tan(geometry.grazing[0])),
     )
 
 
@@ -196,7 +227,8 @@ def _from_search(bins: Bins, prior: JointPrior) -> Solution:
         airlights.append(float(np.median(bins.luminance[0][bins.noise[0] > 0][-FAR_BINS:])))
     grid = _grid(bins, EXTINCTIONS)
     for airlight in airlights:
-        cost = joint_kernels.extinction_costs(bins, under_sky(ALBEDOS[1], prior), grid, airlight, prior.shift)
+        around = prior._replace(airlight=airlight)
+        cost = joint_kernels.extinction_costs(bins, under_sky(ALBEDOS[1], prior), grid, around)
         best = int(np.argmin(cost))
         new = all(abs(math.log(grid[best] / k)) > ALIKE for k, _ in starts)
         if math.isfinite(cost[best]) and new:
@@ -221,7 +253,10 @@ def _span(bins: Bins) -> tuple[float, float]:
 
 
 def _refined_from(bins: Bins, prior: JointPrior, start: tuple[float, float], shift: float) -> Solution:
-    return _refined(bins, ALBEDOS[0], prior, np.array([*start, shift, 0.0]), STEPS)
+    theta = [*start, shift, 0.0]
+    if prior.rise.size:
+        theta.append(joint_kernels.darkness_by_sky(prior, start[0], bins.eye)[0])
+    return _refined(bins, ALBEDOS[0], prior, np.array(theta), STEPS)
 
 
 def _refined(bins: Bins, albedo: Albedo, prior: JointPrior, start: Floats, steps: int) -> Solution:
@@ -247,11 +282,12 @@ def _is_clear(bins: Bins, found: Solution) -> bool:
     return found.misfit < CLEAR_MISFIT and used >= CLEAR_USED * int((bins.noise > 0).sum())
 
 
-def _average(found: list[Solution]) -> JointFit:
-    costs = np.array([f.cost for f in found]) - 2.0 * np.log(ALBEDO_CHANCES[: len(found)])
+def _average(answers: list[_Answer]) -> JointFit:
+    costs = np.array([answer.cost for answer in answers])
     weight = np.exp(-0.5 * (costs - costs.min()))
     weight /= weight.sum()
-    thetas = np.array([f.theta for f in found])
+    found = [answer.solution for answer in answers]
+    thetas = np.array([f.theta[:PARAMETERS] for f in found])
     mean = (weight[:, None] * thetas).sum(axis=0)
     variances = np.array([f.covariance[0, 0] for f in found]) + (thetas[:, 0] - mean[0]) ** 2
     best = found[int(np.argmax(weight))]
@@ -264,10 +300,11 @@ def _average(found: list[Solution]) -> JointFit:
         misfit=best.misfit,
         used=best.used == albedo_filter.USED,
         hidden=best.used[0] == albedo_filter.HIDDEN,
+        darker=float(weight[[not answer.is_even for answer in answers]].sum()),
     )
 
 
-def fit_agreeing(curves: StripCurves, geometry: StripGeometry, prior: JointPrior) -> JointFit | None:
+def fit_agreeing(curves: StripCurves, geometry: StripGeometry, priors: Priors) -> JointFit | None:
     """Fit the own lane, which is the first strip, with the neighbours that agree with it.
 
     A strip that holds a lane at one distance and a verge at another looks like fog of another density. Where the own
@@ -279,24 +316,24 @@ def fit_agreeing(curves: StripCurves, geometry: StripGeometry, prior: JointPrior
         Luminance by bin.
     geometry : StripGeometry
         Where the bins are.
-    prior : JointPrior
-        Sky and horizon.
+    priors : tuple of JointPrior
+        See `fit_jointly`.
 
     Returns
     -------
     JointFit or None
         None if the own lane has too few bins.
     """
-    own = fit_own(curves, geometry, prior)
-    return None if own is None else with_neighbours(own, curves, geometry, prior)
+    own = fit_own(curves, geometry, priors)
+    return None if own is None else with_neighbours(own, curves, geometry, priors)
 
 
-def fit_own(curves: StripCurves, geometry: StripGeometry, prior: JointPrior) -> JointFit | None:
+def fit_own(curves: StripCurves, geometry: StripGeometry, priors: Priors) -> JointFit | None:
     """Fit the own lane alone.
 
     Parameters
     ----------
-    curves, geometry, prior
+    curves, geometry, priors
         See `fit_agreeing`.
 
     Returns
@@ -304,21 +341,21 @@ def fit_own(curves: StripCurves, geometry: StripGeometry, prior: JointPrior) -> 
     JointFit or None
         None if it has too few bins.
     """
-    return _fitted(curves, geometry, prior, [0])
+    return _fitted(curves, geometry, priors, [0])
 
 
-def with_neighbours(own: JointFit, curves: StripCurves, geometry: StripGeometry, prior: JointPrior) -> JointFit:
+def with_neighbours(own: JointFit, curves: StripCurves, geometry: StripGeometry, priors: Priors) -> JointFit:
     """Fit the own lane again, with the neighbours that agree with it.
 
     Parameters
     ----------
     own : JointFit
         Fit of the own lane alone.
-    curves, geometry, prior
+    curves, geometry, priors
         See `fit_agreeing`.
     """
     seen = [strip for strip in range(1, len(curves.variance)) if (curves.variance[strip] > 0).any()]
-    best = _fitted(curves, geometry, prior, [0, *seen], own) if seen else None
+    best = _fitted(curves, geometry, priors, [0, *seen], own) if seen else None
     if best is None:
         return own
     agreed = agree(own, best)
@@ -326,7 +363,7 @@ def with_neighbours(own: JointFit, curves: StripCurves, geometry: StripGeometry,
         return best
     if len(seen) == 1:
         return best if agreed else own
-    found = [_fitted(curves, geometry, prior, [0, strip], own) for strip in seen]
+    found = [_fitted(curves, geometry, priors, [0, strip], own) for strip in seen]
     pairs = [pair for pair in found if pair is not None]
     # With an obstacle where there is none, or without the one that there is, a lane alone fits well and is far off.
     if own.hidden.any() and len(pairs) == len(seen) and all(_alike(pair, best) for pair in pairs):
@@ -362,6 +399,6 @@ def _alike(first: JointFit, second: JointFit) -> bool:
 
 
 def _fitted(
-    curves: StripCurves, geometry: StripGeometry, prior: JointPrior, strips: list[int], near: JointFit | None = None
+    curves: StripCurves, geometry: StripGeometry, priors: Priors, strips: list[int], near: JointFit | None = None
 ) -> JointFit | None:
-    return fit_jointly(curves.only(strips), geometry.only(strips), prior, near)
+    return fit_jointly(curves.only(strips), geometry.only(strips), priors, near)

@@ -23,7 +23,16 @@ from fogsim.vision.strips.albedo_filter import (
 )
 
 PARAMETERS = 4
-"""Extinction, airlight, rows by which the horizon is lower, vignetting that is left."""
+"""Extinction, airlight, rows by which the horizon is lower, vignetting that is left; and, where the airlight is not even,
+by how much it darkens toward the road."""
+
+FIRST_DEPTH, DEPTH_STEP = 0.002, math.log(200.0) / 11.0
+"""First of the optical heights of an eye by which the airlight's darkening goes [-], and the step of their logarithm."""
+
+NO_LEVELS: NDArray[np.float64] = np.zeros(0)
+
+MOST_DARKER = 2.7
+"""Most by which the airlight darkens toward the road, over black land with the eye on the ground [-]."""
 
 SHORT = 0.15
 """Height of a bin over its rows below the horizon up to which a series takes the place of Simpson's rule [-]."""
@@ -49,6 +58,11 @@ class Bins(NamedTuple):
         See `fogsim.vision.strips.strip_geometry.StripGeometry`.
     below, half, distance, extent, grazing : (n,) float64
         See there.
+    darker, darker_by_row : (levels, n) float64
+        How the airlight darkens toward the bins, by the optical height of the eye, and its derivative by the horizon's
+        row [1/px]; see `fogsim.vision.strips.airlight_slopes`. No levels where airlight counts as even.
+    eye : float
+        Height of the eye above the road [m].
     """
 
     luminance: NDArray[np.float64]
@@ -60,6 +74,9 @@ class Bins(NamedTuple):
     distance: NDArray[np.float64]
     extent: NDArray[np.float64]
     grazing: NDArray[np.float64]
+    darker: NDArray[np.float64]
+    darker_by_row: NDArray[np.float64]
+    eye: float
 
 
 class JointPrior(NamedTuple):
@@ -78,6 +95,14 @@ class JointPrior(NamedTuple):
         deviation of that [-].
     cloud : float
         Deviation of the airlight over the image, relative to it [-].
+    slope, slope_deviation : float
+        By how much the sky brightens upward, as a straight line has it, and the standard deviation of that [linear grey
+        levels per rad].
+    rise, level : (levels,) float64
+        Slope [1/rad] of such a line over the airlight at the horizon, and by which part its level there is above that, if
+        the airlight darkens by 1 toward the road; by the optical height of the eye. None where it counts as even.
+    droplets : int
+        Which sizes of them the latter are of.
     """
 
     airlight: float
@@ -88,6 +113,11 @@ class JointPrior(NamedTuple):
     vignetting: float
     vignetting_deviation: float
     cloud: float = 0.0
+    slope: float = 0.0
+    slope_deviation: float = 1.0
+    rise: NDArray[np.float64] = NO_LEVELS
+    level: NDArray[np.float64] = NO_LEVELS
+    droplets: int = 0
 
 
 class Solution(NamedTuple):
@@ -95,9 +125,9 @@ class Solution(NamedTuple):
 
     Attributes
     ----------
-    theta : (4,) float64
-        k, airlight, shift and vignetting that is left.
-    covariance : (4, 4) float64
+    theta : (4 or 5,) float64
+        k, airlight, shift, vignetting that is left, and by how much the airlight darkens toward the road.
+    covariance : (4, 4) or (5, 5) float64
         Theirs.
     cost : float
         Minus twice the log likelihood, with the parameters' priors and integrated over them.
@@ -155,14 +185,35 @@ def mean_transmittance(below: float, half: float, path: float, k: float) -> tupl
 
 
 @kernel
-def near_road(bins: Bins, strip: int, k: float, airlight: float, shift: float) -> float:
+def eye_level(k: float, eye: float, levels: int) -> tuple[int, float]:
+    """Level of the optical heights of an eye below that of an extinction, and how far the latter is on to the next."""
+    at = math.log(max(k * eye, FIRST_DEPTH) / FIRST_DEPTH) / DEPTH_STEP
+    at = min(at, levels - 1.001)
+    return int(at), at - int(at)
+
+
+@kernel
+def darkening(bins: Bins, i: int, level: int, on: float, shift: float) -> tuple[float, float, float]:
+    """How the airlight darkens toward a bin, with its derivatives by the logarithm of k and by the horizon's row."""
+    low, high = bins.darker[level, i], bins.darker[level + 1, i]
+    by_row = bins.darker_by_row[level, i] * (1.0 - on) + bins.darker_by_row[level + 1, i] * on
+    return low + on * (high - low) + shift * by_row, (high - low) / DEPTH_STEP, by_row
+
+
+@kernel
+def near_road(bins: Bins, strip: int, k: float, airlight: float, shift: float, darker: float) -> float:
     """Luminance of a strip without fog: median of what its nearest bins say, given the fog."""
     found = np.empty(NEAR_BINS)
-    count = 0
+    count, level, on = 0, 0, 0.0
+    if darker > 0.0:
+        level, on = eye_level(k, bins.eye, bins.darker.shape[0])
     for i in range(bins.below.size):
         if bins.noise[strip, i] > 0.0 and count < NEAR_BINS:
             value, _, _ = mean_transmittance(bins.below[i] - shift, bins.half[i], bins.path[strip, i], k)
-            found[count] = airlight + (bins.luminance[strip, i] - airlight) / max(value, 1e-6)
+            before = airlight
+            if darker > 0.0:
+                before *= 1.0 - darker * darkening(bins, i, level, on, shift)[0]
+            found[count] = before + (bins.luminance[strip, i] - before) / max(value, 1e-6)
             count += 1
     return float(np.median(found[:count])) if count else 0.0
 
@@ -170,18 +221,27 @@ def near_road(bins: Bins, strip: int, k: float, airlight: float, shift: float) -
 @kernel
 def _linearise(bins: Bins, strip: int, theta: NDArray[np.float64], road: float, out: Residuals) -> None:
     """Residual and derivatives by the parameters of one strip, and the scale of its albedo."""
-    drop = road - theta[1]
+    drop, is_even = road - theta[1], theta.size == PARAMETERS
     columns, scale, veil = out.columns[strip], out.scale[strip], out.veil[strip]
+    level, on = (0, 0.0) if is_even else eye_level(theta[0], bins.eye, bins.darker.shape[0])
     for i in range(bins.below.size):
         value, by_k, by_shift = mean_transmittance(
             bins.below[i] - theta[2], bins.half[i], bins.path[strip, i], theta[0]
         )
         off_axis = bins.off_axis[strip, i]
         bright, open_part = theta[1] + drop * value, 1.0 - theta[3] * off_axis
-        columns[i, 0] = bins.luminance[strip, i] - bright * open_part
         columns[i, 1] = drop * by_k * open_part
         columns[i, 2] = (1.0 - value) * open_part
         columns[i, 3] = drop * by_shift * open_part
+        if not is_even:
+            darker, by_log, by_row = darkening(bins, i, level, on, theta[2])
+            lost, missing = 1.0 - value, theta[1] * theta[4] * open_part
+            bright -= theta[1] * theta[4] * darker * lost
+            columns[i, 1] -= missing * (by_log / max(theta[0], 1e-5) * lost - darker * by_k)
+            columns[i, 2] -= theta[4] * darker * lost * open_part
+            columns[i, 3] -= missing * (by_row * lost - darker * by_shift)
+            columns[i, 5] = -theta[1] * darker * lost * open_part
+        columns[i, 0] = bins.luminance[strip, i] - bright * open_part
         columns[i, 4] = -bright * off_axis
         scale[i], veil[i] = road * value, theta[1] * (1.0 - value)
 
@@ -210,22 +270,64 @@ def add_bins(whitened: Whitened, normal: NDArray[np.float64], gradient: NDArray[
 
 
 @kernel
+def _add_datum(
+    by: NDArray[np.float64], off: float, weight: float, normal: NDArray[np.float64], gradient: NDArray[np.float64]
+) -> float:
+    """Add a datum that is off by so much, with its derivatives, to the normal equations; returns what it adds to the cost."""
+    for a in range(by.size):
+        gradient[a] -= weight * off * by[a]
+        for b in range(by.size):
+            normal[a, b] += weight * by[a] * by[b]
+    return weight * off * off
+
+
+@kernel
 def _add_prior(
-    theta: NDArray[np.float64], prior: JointPrior, normal: NDArray[np.float64], gradient: NDArray[np.float64]
+    theta: NDArray[np.float64],
+    prior: JointPrior,
+    eye: float,
+    normal: NDArray[np.float64],
+    gradient: NDArray[np.float64],
 ) -> float:
     """Add what is known beforehand to the normal equations; returns what it adds to the cost."""
-    off, lower = theta[1] - prior.airlight, theta[2] - prior.shift
-    airlight = 1.0 / (prior.below if off < 0.0 else prior.above) ** 2
-    shift, vignetting = 1.0 / prior.shift_deviation**2, 1.0 / prior.vignetting_deviation**2
     # A weak hold on k keeps the matrix regular where there is nothing to see.
     normal[0, 0] += 1.0
-    normal[1, 1] += airlight
+    off, by, cost = theta[1] - prior.airlight, np.zeros(theta.size), 0.0
+    by[1] = 1.0
+    if theta.size > PARAMETERS:
+        level, on = eye_level(theta[0], eye, prior.rise.size)
+        per_k = 1.0 / (DEPTH_STEP * max(theta[0], 1e-5))
+        steeper, higher = prior.rise[level + 1] - prior.rise[level], prior.level[level + 1] - prior.level[level]
+        rise, above = prior.rise[level] + on * steeper, prior.level[level] + on * higher
+        by[0], by[1], by[4] = theta[1] * theta[4] * steeper * per_k, theta[4] * rise, theta[1] * rise
+        cost += _add_datum(by, theta[1] * theta[4] * rise - prior.slope, prior.slope_deviation**-2, normal, gradient)
+        off += theta[1] * theta[4] * above
+        by[0], by[1], by[4] = theta[1] * theta[4] * higher * per_k, 1.0 + theta[4] * above, theta[1] * above
+        normal[4, 4] += 1.0
+        gradient[4] -= theta[4] - 1.0
+        cost += (theta[4] - 1.0) ** 2
+    cost += _add_datum(by, off, 1.0 / (prior.below if off < 0.0 else prior.above) ** 2, normal, gradient)
+    lower, vignetting = theta[2] - prior.shift, 1.0 / prior.vignetting_deviation**2
+    shift = 1.0 / prior.shift_deviation**2
     normal[2, 2] += shift
     normal[3, 3] += vignetting
-    gradient[1] -= airlight * off
     gradient[2] -= shift * lower
     gradient[3] -= vignetting * theta[3]
-    return float(airlight * off * off + shift * lower * lower + vignetting * theta[3] * theta[3])
+    return float(cost + shift * lower * lower + vignetting * theta[3] * theta[3])
+
+
+@kernel
+def darkness_by_sky(prior: JointPrior, k: float, eye: float) -> tuple[float, float]:
+    """By how much the airlight darkens toward the road, as the sky tells it; and that airlight's level at the horizon."""
+    if prior.rise.size == 0:
+        return 0.0, prior.airlight
+    level, on = eye_level(k, eye, prior.rise.size)
+    rise = prior.rise[level] + on * (prior.rise[level + 1] - prior.rise[level])
+    above = prior.level[level] + on * (prior.level[level + 1] - prior.level[level])
+    # slope = A m rise and level = A (1 + m above).
+    share = min(max(prior.slope / prior.airlight, 0.0) / rise, 5.0)
+    darker = min(share / max(1.0 - share * above, 0.2), MOST_DARKER)
+    return darker, prior.airlight / (1.0 + darker * above)
 
 
 @kernel
@@ -270,11 +372,12 @@ def _move(
         damped = 0.5 * damped
     for strip in range(road.size):
         change = constant[strip, 0]
-        for a in range(PARAMETERS):
+        for a in range(theta.size):
             change -= damped * step[a] * constant[strip, a + 1]
         road[strip] *= min(max(1.0 + change, 0.5), 1.5)
-    for a in range(PARAMETERS):
-        theta[a] += damped * step[a]
+    theta += damped * step
+    if theta.size > PARAMETERS:
+        theta[4] = min(max(theta[4], 0.0), MOST_DARKER)
 
 
 @kernel
@@ -303,19 +406,20 @@ def gauss_newton(
         How the albedo wanders.
     prior : JointPrior
         Sky, horizon and lens.
-    start : (4,) float64
-        k, airlight, shift, vignetting that is left.
+    start : (4 or 5,) float64
+        See `Solution.theta`; five where the prior has levels.
     iterations : int
         Most steps.
     """
     strips, count = bins.luminance.shape
-    theta, road = start.copy(), np.empty(strips)
+    theta, road, size = start.copy(), np.empty(strips), start.size
+    darker = theta[4] if size > PARAMETERS else 0.0
     for s in range(strips):
-        guess = near_road(bins, s, theta[0], theta[1], theta[2])
+        guess = near_road(bins, s, theta[0], theta[1], theta[2], darker)
         road[s] = min(max(guess, 0.01 * theta[1]), theta[1])
-    residuals, whitened = allocated(strips, count, PARAMETERS + 1, bins.noise)
+    residuals, whitened = allocated(strips, count, size + 1, bins.noise)
     changes, unit = albedo_transitions(bins.distance, bins.extent, bins.grazing, albedo), 1.0 / bins.path[0, 0]
-    covariance: NDArray[np.float64] = np.eye(PARAMETERS)
+    covariance: NDArray[np.float64] = np.eye(size)
     cost, squares, number = 0.0, 0.0, 0
     for iteration in range(iterations + 1):
         for s in range(strips):
@@ -326,9 +430,9 @@ def gauss_newton(
         if reject and hide_behind_obstacles(bins.noise, whitened.used):
             # Else what was seen of the bins that are now hidden would still count through the others.
             cost = whiten(residuals, changes, albedo, prior.airlight, False, whitened)
-        normal, gradient = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
+        normal, gradient = np.zeros((size, size)), np.zeros(size)
         squares, number = add_bins(whitened, normal, gradient)
-        cost += squares + _add_prior(theta, prior, normal, gradient)
+        cost += squares + _add_prior(theta, prior, bins.eye, normal, gradient)
         cost += invert(normal, covariance)
         if iteration >= iterations:
             break
@@ -341,7 +445,7 @@ def gauss_newton(
 
 @kernel
 def extinction_costs(
-    bins: Bins, albedo: Albedo, extinctions: NDArray[np.float64], airlight: float, shift: float
+    bins: Bins, albedo: Albedo, extinctions: NDArray[np.float64], prior: JointPrior
 ) -> NDArray[np.float64]:
     """Minus twice the log likelihood of each of several extinctions, the rest at their first guesses; inf for none.
 
@@ -353,27 +457,30 @@ def extinction_costs(
         How the albedo wanders.
     extinctions : (m,) float64
         The extinctions [1/m].
-    airlight : float
-        Airlight [linear grey levels].
-    shift : float
-        Rows by which the horizon is lower [px].
+    prior : JointPrior
+        Sky and horizon.
     """
     strips, count = bins.luminance.shape
+    shift = prior.shift
     cost, changes = np.empty(extinctions.size), albedo_transitions(bins.distance, bins.extent, bins.grazing, albedo)
     residuals, whitened = allocated(strips, count, 1, bins.noise)
     for j in range(extinctions.size):
         k, possible = extinctions[j], True
+        darker, airlight = darkness_by_sky(prior, k, bins.eye)
+        level, on = eye_level(k, bins.eye, bins.darker.shape[0]) if darker > 0.0 else (0, 0.0)
         for strip in range(strips):
-            road = near_road(bins, strip, k, airlight, shift)
+            road = near_road(bins, strip, k, airlight, shift, darker)
             possible = possible and 0.0 < road < 1.5 * airlight
             for i in range(count):
                 value, _, _ = mean_transmittance(bins.below[i] - shift, bins.half[i], bins.path[strip, i], k)
                 rest = bins.luminance[strip, i] - airlight - (road - airlight) * value
+                if darker > 0.0:
+                    rest += airlight * darker * darkening(bins, i, level, on, shift)[0] * (1.0 - value)
                 residuals.columns[strip, i, 0] = rest
                 residuals.scale[strip, i], residuals.veil[strip, i] = road * value, airlight * (1.0 - value)
         cost[j] = np.inf
         if possible:
-            cost[j] = whiten(residuals, changes, albedo, airlight, True, whitened)
+            cost[j] = whiten(residuals, changes, albedo, prior.airlight, True, whitened)
             cost[j] += (whitened.innovations**2).sum()
     return cost
 
@@ -400,11 +507,16 @@ def fit_constant_albedo(bins: Bins, extinctions: NDArray[np.float64], prior: Joi
     scale = (GRAINY * prior.airlight) ** 2
     stride = max(count // 36, 1)
     value = np.empty((count + stride - 1) // stride)
+    base = np.ones(value.size)
     for k in extinctions:
+        darker, likely = darkness_by_sky(prior, k, bins.eye)
+        level, on = eye_level(k, bins.eye, bins.darker.shape[0]) if darker > 0.0 else (0, 0.0)
         for j in range(value.size):
             i = j * stride
             value[j], _, _ = mean_transmittance(bins.below[i] - prior.shift, bins.half[i], bins.path[0, i], k)
-        airlight, drop, total = prior.airlight, 0.0, 0.0
+            if darker > 0.0:
+                base[j] = 1.0 - darker * darkening(bins, i, level, on, prior.shift)[0] * (1.0 - value[j])
+        airlight, drop, total = likely, 0.0, 0.0
         for iteration in range(4):
             s0, s1, s2, r0, r1 = 0.0, 0.0, 0.0, 0.0, 0.0
             total = 0.0
@@ -414,19 +526,19 @@ def fit_constant_albedo(bins: Bins, extinctions: NDArray[np.float64], prior: Joi
                     if noise[strip, i] <= 0.0:
                         continue
                     t, spread = value[j], noise[strip, i] + scale * (value[j] ** 2 + 0.02)
-                    rest = luminance[strip, i] - airlight - drop * t
+                    rest = luminance[strip, i] - airlight * base[j] - drop * t
                     weight = 1.0 / (spread + rest * rest) if iteration else 1.0 / spread
                     if iteration == 3:
                         total += math.log1p(rest * rest / spread)
-                    y = luminance[strip, i] - prior.airlight
-                    s0, s1, s2 = s0 + weight, s1 + weight * t, s2 + weight * t * t
-                    r0, r1 = r0 + weight * y, r1 + weight * t * y
-            off = airlight - prior.airlight
+                    y, one = luminance[strip, i] - likely * base[j], base[j]
+                    s0, s1, s2 = s0 + weight * one * one, s1 + weight * one * t, s2 + weight * t * t
+                    r0, r1 = r0 + weight * one * y, r1 + weight * t * y
+            off = airlight - likely
             known = 1.0 / (prior.below if off < 0.0 else prior.above) ** 2
             total += known * off * off
             s0 += known
             determinant = max(s0 * s2 - s1 * s1, 1e-12)
-            airlight = prior.airlight + (s2 * r0 - s1 * r1) / determinant
+            airlight = likely + (s2 * r0 - s1 * r1) / determinant
             drop = min((s0 * r1 - s1 * r0) / determinant, 0.0)
             drop = max(drop, -airlight)
         if total < best:

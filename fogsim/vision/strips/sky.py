@@ -21,7 +21,7 @@ SATURATED_SHARE = 0.02
 UNKNOWN_VIGNETTING = 0.3
 """Standard deviation of a lens's vignetting where the sky does not show it [-]: most pictures are corrected."""
 
-UNEVEN, LEAST_SEEN, MOST_VIGNETTING = 0.02, 0.7, 1.5
+UNEVEN, LEAST_SEEN, MOST_VIGNETTING = 0.02, 0.6, 1.5
 """Deviation of a lens's vignetting by skies that are brighter in the middle, least share of a sky's pixels that must
 show it, and most that it can be [-]."""
 
@@ -45,6 +45,10 @@ class Sky:
         deviation of that [-].
     unevenness : float
         Deviation of its luminance from place to place, relative to it [-]: by clouds, by dirt on the glass, by trees.
+    slope, slope_deviation : float
+        How it brightens upward, as a straight line, and the standard deviation of that [linear grey levels per rad].
+    heights : (float, float)
+        Least and greatest height above the horizon at which that was seen [rad].
     """
 
     luminance: float
@@ -56,6 +60,9 @@ class Sky:
     vignetting: float = 0.0
     vignetting_deviation: float = UNKNOWN_VIGNETTING
     unevenness: float = 0.0
+    slope: float = 0.0
+    slope_deviation: float = math.inf
+    heights: tuple[float, float] = (0.0, 0.0)
 
     @property
     def is_clipped(self) -> bool:
@@ -125,18 +132,22 @@ def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
     covered = median(share) < PATCHY and scatter > SCATTERED * level
     upward = BRIGHTER * level if covered else deviation
     lens = (shading.vignetting, shading.vignetting_deviation)
-    return Sky(level, deviation, upward, noise, saturated, clipped, *lens, shading.unevenness)
+    seen = height[free] if free.size else np.zeros(1)
+    slope = (shading.slope, shading.slope_deviation, (float(seen.min()), float(seen.max())))
+    return Sky(level, deviation, upward, noise, saturated, clipped, *lens, shading.unevenness, *slope)
 
 
 @dataclass(frozen=True, slots=True)
 class _Shading:
-    """A sky's brightness at the horizon straight ahead, vignetting, their standard deviations, and unevenness."""
+    """A sky's brightness at the horizon straight ahead, vignetting, their deviations, unevenness, and its slope upward."""
 
     level: float
     deviation: float
     vignetting: float = 0.0
     vignetting_deviation: float = UNKNOWN_VIGNETTING
     unevenness: float = 0.0
+    slope: float = 0.0
+    slope_deviation: float = math.inf
 
 
 def _shading(
@@ -145,15 +156,20 @@ def _shading(
     """Sky of even slopes behind a lens, or what is known without them where it does not fill most of its rows."""
     if rows.size < 2 or median(bright) <= 0.0:
         return unseen
+    height = (camera.horizon_row - rows) / camera.focal_length
     axis = np.array([*camera.principal_point, camera.horizon_row, camera.focal_length])
     found, covariance, seen, scatter = sky_kernels.sky_shading(image, rows, axis, bright, noise)
     level = float(found[0])
     unevenness = scatter / level if level > 0.0 else 0.0
     if seen < LEAST_SEEN or level <= 0.0:
         return replace(unseen, unevenness=unevenness)
-    vignetting = min(max(float(found[3]) / level, 0.0), MOST_VIGNETTING)
-    deviation = min(math.hypot(UNEVEN, math.sqrt(covariance[3, 3]) / level), UNKNOWN_VIGNETTING)
-    return _Shading(level, math.sqrt(covariance[0, 0]), vignetting, deviation, unevenness)
+    vignetting = min(max(float(found[4]) / level, 0.0), MOST_VIGNETTING)
+    deviation = min(math.hypot(UNEVEN, math.sqrt(covariance[4, 4]) / level), UNKNOWN_VIGNETTING)
+    # Mean slope over the heights that are seen.
+    ends = float(height.min() + height.max())
+    variance = covariance[2, 2] + 2.0 * ends * covariance[2, 3] + ends**2 * covariance[3, 3]
+    slope = (float(found[2] + ends * found[3]), math.sqrt(max(variance, 0.0)))
+    return _Shading(level, math.sqrt(covariance[0, 0]), vignetting, deviation, unevenness, *slope)
 
 
 @functools.lru_cache(maxsize=64)

@@ -177,9 +177,9 @@ def saturation(image: LinearPixels, rows: NDArray[np.int64], side: int) -> tuple
 SHADING_SCALES = (0.06, 0.02, 0.006, 0.006)
 """Deviations beyond which a pixel weighs little in each iteration of the fit of a sky's shading, relative to it [-]."""
 
-TILT, BRIGHTENING, VIGNETTING = 0.3, 1.5, 0.5
-"""Standard deviations of a sky's slopes sideways and upward, and of its fall toward the corners, before it is looked
-at, relative to it [-]."""
+TILT, BRIGHTENING, BENDING, VIGNETTING = 0.3, 1.5, 4.0, 0.5
+"""Standard deviations of a sky's slopes sideways and upward [1/rad], of the bend of the latter [1/rad²], and of its fall
+toward the corners [-], before it is looked at, relative to it."""
 
 SHADING_COLS = 32
 """Pixels of each row that are looked at."""
@@ -192,7 +192,7 @@ ALIKE = 4.0
 def sky_shading(
     image: LinearPixels, rows: NDArray[np.int64], axis: NDArray[np.float64], bright: NDArray[np.float64], noise: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float, float]:
-    """Sky as L = a + b x + c y − d (1 − cos⁴ of the angle to the camera's axis), by least squares in Cauchy's norm.
+    """Sky as L = a + b x + c y + e y² − d (1 − cos⁴ of the angle to the camera's axis), by least squares in Cauchy's norm.
 
     Parameters
     ----------
@@ -209,15 +209,15 @@ def sky_shading(
 
     Returns
     -------
-    tuple of (4,) and (4, 4) float64 and two floats
-        a, b, c, d, their covariance, the share of pixels that lie near, and the robust deviation of all of them beside
+    tuple of (5,) and (5, 5) float64 and two floats
+        a, b, c, e, d, their covariance, the share of pixels that lie near, and the robust deviation of all of them beside
         their noise [linear grey levels].
     """
     cols, count = image.pixels.shape[1], SHADING_COLS
     level = float(np.median(bright))
     height, above_axis = (axis[2] - rows) / axis[3], (axis[1] - rows) / axis[3]
-    found = np.array([level, 0.0, 0.0, 0.0])
-    covariance: NDArray[np.float64] = np.eye(4)
+    found = np.array([level, 0.0, 0.0, 0.0, 0.0])
+    covariance: NDArray[np.float64] = np.eye(5)
     seen, aside = np.empty((rows.size, count)), np.empty(count)
     for j in range(count):
         col = even_column(j, count, -0.5, cols - 0.5)
@@ -227,9 +227,9 @@ def sky_shading(
     number = 0
     for relative in SHADING_SCALES:
         spread = (relative * level) ** 2 + (2.0 * noise) ** 2
-        normal, right = np.zeros((4, 4)), np.zeros(4)
+        normal, right = np.zeros((5, 5)), np.zeros(5)
         normal[0, 0] = 1e-6
-        for a, deviation in ((1, TILT), (2, BRIGHTENING), (3, VIGNETTING)):
+        for a, deviation in ((1, TILT), (2, BRIGHTENING), (3, BENDING), (4, VIGNETTING)):
             normal[a, a] = spread / (deviation * level) ** 2
         number, squares = _add_sky(seen, aside, height, above_axis, found, spread, normal, right)
         inverse = inverse_of(normal)
@@ -259,7 +259,7 @@ def _scatter(
 def _shaded(x: float, height: float, y: float, found: NDArray[np.float64]) -> float:
     """Luminance of a sky of some shading at a place."""
     off = 1.0 - 1.0 / (1.0 + x * x + y * y) ** 2
-    return float(found[0] + found[1] * x + found[2] * height - found[3] * off)
+    return float(found[0] + found[1] * x + (found[2] + found[3] * height) * height - found[4] * off)
 
 
 @kernel
@@ -274,7 +274,7 @@ def _add_sky(
     right: NDArray[np.float64],
 ) -> tuple[int, float]:
     """Add pixels to the normal equations of a sky's shading; returns how many lie near, and their squares."""
-    number, squares = 0, 0.0
+    number, squares, shapes = 0, 0.0, np.ones(5)
     for i in range(height.size):
         y = above_axis[i]
         for j in range(aside.size):
@@ -284,22 +284,12 @@ def _add_sky(
                 number += 1
                 squares += rest * rest
             weight = 1.0 / (1.0 + rest * rest / spread) ** 2
-            p1, p2, p3 = aside[j], height[i], -off
-            normal[0, 0] += weight
-            normal[0, 1] += weight * p1
-            normal[0, 2] += weight * p2
-            normal[0, 3] += weight * p3
-            normal[1, 1] += weight * p1 * p1
-            normal[1, 2] += weight * p1 * p2
-            normal[1, 3] += weight * p1 * p3
-            normal[2, 2] += weight * p2 * p2
-            normal[2, 3] += weight * p2 * p3
-            normal[3, 3] += weight * p3 * p3
-            right[0] += weight * seen[i, j]
-            right[1] += weight * seen[i, j] * p1
-            right[2] += weight * seen[i, j] * p2
-            right[3] += weight * seen[i, j] * p3
-    for a in range(4):
+            shapes[1], shapes[2], shapes[3], shapes[4] = aside[j], height[i], height[i] ** 2, -off
+            for a in range(5):
+                right[a] += weight * seen[i, j] * shapes[a]
+                for b in range(a, 5):
+                    normal[a, b] += weight * shapes[a] * shapes[b]
+    for a in range(5):
         for b in range(a):
             normal[a, b] = normal[b, a]
     return number, squares

@@ -171,7 +171,7 @@ def _fitted(
     curves: StripCurves, geometry: StripGeometry, prior: JointPrior, even: JointFit, bent: bool
 ) -> UnevenFit | None:
     """Fit of uneven fog, or None if even fog suffices."""
-    bins = _thinned(joint_fit.strip_bins(curves, geometry, prior.vignetting))
+    bins = _thinned(joint_fit.strip_bins(curves, geometry, prior))
     farthest = float((bins.path / bins.below)[bins.noise > 0].max())
     count = min(sum(node < farthest for node in NODES) + 1, len(NODES))
     start = np.array([max(even.extinction, 1e-5), even.airlight, even.shift, 0.0])
@@ -235,6 +235,9 @@ def _thinned(bins: Bins) -> Bins:
         distance=mean(bins.distance),
         extent=mean(bins.extent) * sizes,
         grazing=mean(bins.grazing),
+        darker=bins.darker,
+        darker_by_row=bins.darker_by_row,
+        eye=bins.eye,
     )
 
 

@@ -271,7 +271,7 @@ def fit_uneven(
     size = cells + OTHERS
     theta, road = start.copy(), np.empty(strips)
     for s in range(strips):
-        guess = near_road(bins, s, math.exp(theta[0]), theta[cells], theta[cells + 1])
+        guess = near_road(bins, s, math.exp(theta[0]), theta[cells], theta[cells + 1], 0.0)
         road[s] = min(max(guess, 0.01 * theta[cells]), theta[cells])
     residuals, whitened = allocated(strips, count, size + 1, bins.noise.copy())
     changes = albedo_transitions(bins.distance, bins.extent, bins.grazing, albedo)
@@ -327,7 +327,7 @@ def first_profile(bins: Bins, nodes: NDArray[np.float64], prior: JointPrior) -> 
     for _ in range(2):
         road = np.empty(strips)
         for s in range(strips):
-            road[s] = min(near_road(bins, s, near, prior.airlight, prior.shift), 0.98 * prior.airlight)
+            road[s] = min(near_road(bins, s, near, prior.airlight, prior.shift, 0.0), 0.98 * prior.airlight)
         sums[:], counts[:], top = 0.0, 0.0, 0.0
         for i in range(count):
             seen = 0

@@ -13,12 +13,12 @@ from tests.vision.strips.koschmieder_strips import CAMERA, GEOMETRY, PRIOR, curv
 @pytest.mark.parametrize("k", [0.005, 0.03, 0.2])
 def test_a_road_in_fog_is_one(k):
     seen = curves(k)
-    assert no_road(fit_own(seen, GEOMETRY, PRIOR), seen, GEOMETRY, CAMERA) == ""
+    assert no_road(fit_own(seen, GEOMETRY, (PRIOR,)), seen, GEOMETRY, CAMERA) == ""
 
 
 def test_scatter_is_measured_against_the_contrast_of_road_and_airlight():
     seen = curves(0.03)
-    fit = fit_own(seen, GEOMETRY, PRIOR)
+    fit = fit_own(seen, GEOMETRY, (PRIOR,))
     for factor, scattered in ((0.95, False), (1.05, True)):
         patchy = replace(seen, scatter=np.full_like(seen.scatter, factor * MAX_SCATTER * (fit.airlight - fit.road)))
         assert is_scattered(fit, patchy, GEOMETRY) is scattered

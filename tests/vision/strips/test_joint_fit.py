@@ -5,22 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fogsim.vision.strips.joint_fit import ALBEDOS, agree, fit_agreeing, fit_jointly, fit_own
-from fogsim.vision.strips.joint_kernels import Bins, extinction_costs, fit_constant_albedo, mean_transmittance
+from fogsim.vision.strips.joint_fit import ALBEDOS, agree, fit_agreeing, fit_jointly, fit_own, strip_bins
+from fogsim.vision.strips.joint_kernels import extinction_costs, fit_constant_albedo, mean_transmittance
 from tests.vision.strips.koschmieder_strips import AIRLIGHT, GEOMETRY, PRIOR, curves
 
 
 def bins(seen):
-    g = GEOMETRY
-    return Bins(
-        seen.luminance.copy(), seen.variance, g.path, g.off_axis, g.below, g.half, g.distance, g.extent, g.grazing
-    )
+    return strip_bins(seen, GEOMETRY, PRIOR)
 
 
 @pytest.mark.parametrize("visibility", [20.0, 60.0, 200.0, 600.0])
 def test_extinction_and_airlight_come_back_within_the_stated_deviation(visibility):
     k = 3.0 / visibility
-    fits = [fit_jointly(curves(k, seed), GEOMETRY, PRIOR) for seed in range(24)]
+    fits = [fit_jointly(curves(k, seed), GEOMETRY, (PRIOR,)) for seed in range(24)]
     off = np.array([(fit.extinction - k) / fit.extinction_deviation for fit in fits])
     # An honest deviation: standardised errors are of deviation 1, none far out.
     assert 0.4 < np.sqrt((off**2).mean()) < 1.5
@@ -34,23 +31,23 @@ def test_extinction_and_airlight_come_back_within_the_stated_deviation(visibilit
 
 @pytest.mark.parametrize("shift", [-1.5, 1.0])
 def test_a_horizon_that_is_off_is_found_in_dense_fog(shift):
-    fit = fit_jointly(curves(0.05, 3, shift=shift), GEOMETRY, PRIOR._replace(shift_deviation=2.0))
+    fit = fit_jointly(curves(0.05, 3, shift=shift), GEOMETRY, (PRIOR._replace(shift_deviation=2.0),))
     assert fit.shift == pytest.approx(shift, abs=0.5)
     assert fit.extinction == pytest.approx(0.05, rel=0.03)
 
 
 def test_clear_air_has_no_extinction():
-    fit = fit_jointly(curves(0.0, 1), GEOMETRY, PRIOR)
+    fit = fit_jointly(curves(0.0, 1), GEOMETRY, (PRIOR,))
     assert abs(fit.extinction) < 3.0 * fit.extinction_deviation
     assert fit.extinction + 2.0 * fit.extinction_deviation < 3.0 / 3000.0
 
 
 def test_less_noise_and_more_strips_are_surer():
     seen = curves(0.03, 5)
-    own, all_strips = fit_own(seen, GEOMETRY, PRIOR), fit_jointly(seen, GEOMETRY, PRIOR)
+    own, all_strips = fit_own(seen, GEOMETRY, (PRIOR,)), fit_jointly(seen, GEOMETRY, (PRIOR,))
     assert all_strips.extinction_deviation < own.extinction_deviation
     louder = replace(seen, variance=25.0 * seen.variance)
-    assert fit_jointly(louder, GEOMETRY, PRIOR).extinction_deviation > all_strips.extinction_deviation
+    assert fit_jointly(louder, GEOMETRY, (PRIOR,)).extinction_deviation > all_strips.extinction_deviation
 
 
 def test_too_few_bins_give_no_answer():
@@ -59,19 +56,19 @@ def test_too_few_bins_give_no_answer():
         fit_jointly(
             replace(seen, variance=np.where(np.arange(seen.variance.shape[1]) < 7, 1.0, 0.0) * np.ones((3, 1))),
             GEOMETRY,
-            PRIOR,
+            (PRIOR,),
         )
         is None
     )
-    assert fit_own(replace(seen, variance=np.zeros(seen.variance.shape)), GEOMETRY, PRIOR) is None
-    assert fit_agreeing(replace(seen, variance=np.zeros(seen.variance.shape)), GEOMETRY, PRIOR) is None
+    assert fit_own(replace(seen, variance=np.zeros(seen.variance.shape)), GEOMETRY, (PRIOR,)) is None
+    assert fit_agreeing(replace(seen, variance=np.zeros(seen.variance.shape)), GEOMETRY, (PRIOR,)) is None
 
 
 def test_what_stands_on_the_lane_is_found_and_hides_what_is_behind():
     seen = curves(0.03, 2)
     foot = int(np.argmax(GEOMETRY.distance > 30.0))
     seen.luminance[0, foot:] = 20.0
-    fit = fit_own(seen, GEOMETRY, PRIOR)
+    fit = fit_own(seen, GEOMETRY, (PRIOR,))
     assert np.flatnonzero(fit.hidden)[0] == pytest.approx(foot, abs=2)
     assert not fit.used[0][foot + 2 :].any()
     assert fit.extinction == pytest.approx(0.03, rel=0.35)
@@ -79,7 +76,7 @@ def test_what_stands_on_the_lane_is_found_and_hides_what_is_behind():
 
 def test_neighbours_that_agree_are_taken_and_others_left_out():
     seen = curves(0.03, 4)
-    own, best = fit_own(seen, GEOMETRY, PRIOR), fit_agreeing(seen, GEOMETRY, PRIOR)
+    own, best = fit_own(seen, GEOMETRY, (PRIOR,)), fit_agreeing(seen, GEOMETRY, (PRIOR,))
     assert agree(own, best)
     assert best.used.shape[0] == 3
     assert best.extinction_deviation < own.extinction_deviation
@@ -87,7 +84,7 @@ def test_neighbours_that_agree_are_taken_and_others_left_out():
     for seed in range(4, 8):
         seen = curves(0.03, seed)
         seen.luminance[1] = curves(0.04, seed).luminance[1]
-        kept = fit_agreeing(seen, GEOMETRY, PRIOR)
+        kept = fit_agreeing(seen, GEOMETRY, (PRIOR,))
         assert kept.extinction == pytest.approx(0.03, rel=0.04)
         assert len(kept.used) < 3 or kept.used[1].mean() < 0.7
     # Agreement is a matter of the deviations that are stated: the sharper the answers, the less may they differ.
@@ -103,8 +100,8 @@ def test_a_neighbour_of_patchy_albedo_does_not_make_an_answer_less_sure():
     for seed in range(8):
         seen, verge = curves(0.03, seed), curves(0.03, 100 + seed, road=35.0, patches=0.3)
         seen.luminance[2] = verge.luminance[2]
-        kept = fit_agreeing(seen, GEOMETRY, PRIOR)
-        assert kept.extinction_deviation <= fit_own(seen, GEOMETRY, PRIOR).extinction_deviation
+        kept = fit_agreeing(seen, GEOMETRY, (PRIOR,))
+        assert kept.extinction_deviation <= fit_own(seen, GEOMETRY, (PRIOR,)).extinction_deviation
         off.append(abs(kept.extinction / 0.03 - 1.0))
     assert np.median(off) < 0.02
     assert max(off) < 0.06
@@ -138,5 +135,5 @@ def test_both_searches_start_near_the_truth(visibility):
     found, airlight = fit_constant_albedo(seen, grid, PRIOR)
     assert abs(np.log(found / k)) < 0.3
     assert airlight == pytest.approx(AIRLIGHT, rel=0.02)
-    costs = extinction_costs(seen, ALBEDOS[1], grid, AIRLIGHT, 0.0)
+    costs = extinction_costs(seen, ALBEDOS[1], grid, PRIOR)
     assert abs(np.log(grid[np.argmin(costs)] / k)) < 0.3

@@ -42,7 +42,7 @@ def bank(start: float, clear: float = 0.0015, dense: float = 0.05, edge: float =
 
 
 def fitted(seen: StripCurves):
-    own, even = fit_own(seen, GEOMETRY, PRIOR), fit_agreeing(seen, GEOMETRY, PRIOR)
+    own, even = fit_own(seen, GEOMETRY, (PRIOR,)), fit_agreeing(seen, GEOMETRY, (PRIOR,))
     return fit_uneven(seen, GEOMETRY, PRIOR, own, even)
 
 
@@ -53,7 +53,7 @@ def test_even_fog_stays_what_it_is(extinction):
         found = fitted(seen)
         assert found.even > 0.5
         assert found.denser is None
-        assert found.fit.extinction == pytest.approx(fit_agreeing(seen, GEOMETRY, PRIOR).extinction, rel=0.05)
+        assert found.fit.extinction == pytest.approx(fit_agreeing(seen, GEOMETRY, (PRIOR,)).extinction, rel=0.05)
 
 
 @pytest.mark.parametrize("start", [60.0, 90.0, 120.0])

@@ -1,0 +1,153 @@
+"""Airlight that is not even, as photons have it: it brightens upward from the horizon, and darkens toward the road.
+
+Over dark land a line of sight that points down gathers light that has come from below, and there it is dark. How
+much, goes by the albedo of the land, which is unknown, in one factor; and by the elevation and the optical height of the
+eye in a shape that is known. The sky's brightening upward in the same picture tells of that factor.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.vision.strips.joint_kernels import JointPrior
+from fogsim.vision.strips.sky import Sky
+
+Floats = NDArray[np.float64]
+
+LEAST_SLOPE, SURELY = 0.1, 2.0
+"""Least slope of a sky, over its level [1/rad], and least in its standard deviations, for the airlight to be taken for
+uneven: even fog has none."""
+
+OTHER_LIGHT = 0.2
+"""Relative deviation of the sky's slope by what else differs: the sky above the fog, droplets, land that is not even [-].
+"""
+
+LEVEL_DEVIATION = 0.01
+"""Relative deviation of the airlight's level by that [-]."""
+
+LENS_DEVIATION = 0.1
+"""Deviation of a lens's vignetting where the sky below which it shows brightens otherwise than evenly [-]."""
+
+ANY_SLOPE = 2.0
+"""Standard deviation of the slope of a sky, over its level, above airlight that is even [1/rad]: that of the CIE overcast
+sky behind thin fog."""
+
+DROPLET_CHANCES = (0.5, 0.3, 0.2)
+"""How likely droplets of moderate and heavy radiation fog and of advection fog are beforehand [-]."""
+
+ROWS = 24
+"""Places of the sky that a straight line is laid through."""
+
+
+@dataclass(frozen=True, slots=True)
+class SlopeTable:
+    """Airlight over black land, by the optical height of the eye and the angle of the line of sight to the horizon.
+
+    Attributes
+    ----------
+    depth : (n,) float64
+        Optical heights, evenly in their logarithms [-].
+    angle : (m,) float64
+        Angles [rad].
+    below, above : (droplets, n, m) float64
+        By how much it is darker toward the road, and brighter toward the sky, than level, over 1 − the level one in units
+        of E / π [-].
+    """
+
+    depth: Floats
+    angle: Floats
+    below: Floats
+    above: Floats
+
+
+@cache
+def slope_table() -> SlopeTable:
+    """The table that FogSim carries; `tools/make_airlight_slopes.py` makes it."""
+    with (files("fogsim.vision") / "data" / "airlight_slopes.npz").open("rb") as file, np.load(file) as found:
+        return SlopeTable(*(found[name].astype(np.float64) for name in ("depth", "angle", "below", "above")))
+
+
+def darkening_priors(prior: JointPrior, sky: Sky) -> tuple[JointPrior, ...]:
+    """What sky and horizon say about airlight that is not even, by droplets; none where the sky does not brighten upward.
+
+    Parameters
+    ----------
+    prior : JointPrior
+        What they say about even airlight.
+    sky : Sky
+        The sky above the horizon.
+    """
+    least = max(LEAST_SLOPE * sky.luminance, SURELY * sky.slope_deviation)
+    if sky.is_clipped or sky.slope < least:
+        return ()
+    of_level = LEVEL_DEVIATION * sky.luminance
+    uneven = prior._replace(
+        below=math.hypot(prior.below, of_level),
+        above=math.hypot(prior.above, of_level),
+        vignetting_deviation=math.hypot(prior.vignetting_deviation, LENS_DEVIATION),
+        slope=sky.slope,
+        slope_deviation=math.hypot(sky.slope_deviation, OTHER_LIGHT * sky.slope),
+    )
+    lines = [_lines(droplets, *sky.heights) for droplets in range(len(slope_table().below))]
+    return tuple(
+        uneven._replace(droplets=droplets, rise=rise, level=level) for droplets, (rise, level) in enumerate(lines)
+    )
+
+
+@cache
+def _lines(droplets: int, lowest: float, highest: float) -> tuple[Floats, Floats]:
+    """Mean slope of how the airlight brightens between two heights [rad], and where a parabola has it at the horizon."""
+    table = slope_table()
+    height = np.linspace(lowest, highest, ROWS)
+    above = np.array([np.interp(height, table.angle, row) for row in table.above[droplets]])
+    bend, slope, level = np.polynomial.polynomial.polyfit(height, above.T, 2)[::-1]
+    return slope + bend * (lowest + highest), level
+
+
+def darkening_of_bins(grazing: Floats, below: Floats, prior: JointPrior) -> tuple[Floats, Floats]:
+    """How the airlight darkens toward bins, for `fogsim.vision.strips.joint_kernels.Bins`.
+
+    Parameters
+    ----------
+    grazing : (n,) float64
+        Angle between the line of sight and the road [rad].
+    below : (n,) float64
+        Rows below the horizon [px].
+    prior : JointPrior
+        Whether the airlight counts as even.
+
+    Returns
+    -------
+    tuple of (levels, n) float64
+        ``darker`` and ``darker_by_row``.
+    """
+    if prior.rise.size == 0:
+        nothing = np.zeros((0, below.size))
+        return nothing, nothing
+    table = slope_table()
+    at = np.clip(np.searchsorted(table.angle, grazing, side="right") - 1, 0, table.angle.size - 2)
+    step = table.angle[at + 1] - table.angle[at]
+    of_droplets = table.below[prior.droplets]
+    slope = (of_droplets[:, at + 1] - of_droplets[:, at]) / step
+    darker = of_droplets[:, at] + slope * (grazing - table.angle[at])
+    # Where the horizon is lower by a row, a bin is seen at a smaller angle.
+    return np.ascontiguousarray(darker), np.ascontiguousarray(-slope * grazing / below)
+
+
+def slope_cost(prior: JointPrior) -> float:
+    """Add what the sky's slope says of a prior to minus twice a log likelihood: even airlight may be under any sky.
+
+    Parameters
+    ----------
+    prior : JointPrior
+        Of airlight that is even or not.
+    """
+    if prior.rise.size == 0:
+        return 0.0
+    scale = ANY_SLOPE * prior.airlight
+    cost = 2.0 * math.log(prior.slope_deviation / scale) - (prior.slope / scale) ** 2
+    return cost - 2.0 * math.log(DROPLET_CHANCES[prior.droplets])

@@ -44,6 +44,9 @@ LARGE_SHAPE = 0.018
 AIRLIGHT_DEVIATION = 0.002
 """Relative deviation of the airlight behind the vehicle from the sky above it [-]."""
 
+UNEVEN_AIRLIGHT_DEVIATION = 0.015
+"""The same where it brightens upward, so that its level at the horizon is not seen but reckoned [-]."""
+
 CLIPPED_AIRLIGHT_DEVIATION = 0.03
 """The same where some of the sky is clipped [-]."""
 
@@ -208,7 +211,9 @@ class LeadContrast:
             for name in ("ratio", "deviation", "lever")
         )
         clipped = any(s.clipped for s in self._track.detections)
-        airlight = CLIPPED_AIRLIGHT_DEVIATION if clipped else AIRLIGHT_DEVIATION
+        uneven = max(s.airlight_deviation for s in self._track.detections)
+        level = UNEVEN_AIRLIGHT_DEVIATION if uneven > 0.0 else AIRLIGHT_DEVIATION
+        airlight = CLIPPED_AIRLIGHT_DEVIATION if clipped else level
         offset = max(airlight * float(np.median(lever)), 1e-6)
         fit = fit_decay(distance, contrast, noise, REGISTRATION, offset)
         if fit is None:
@@ -219,7 +224,8 @@ class LeadContrast:
         if fit is None:
             return None
         certain = contrast**2 / (noise**2 + (relative * contrast) ** 2 + offset**2)
-        shape = self._shape(fit.extinction, float(np.median(lever)))
+        # What is wrong of an uneven airlight's shape is so at the nearest range, and nearly nothing far away.
+        shape = math.hypot(self._shape(fit.extinction, float(np.median(lever))), uneven * float(np.median(lever)))
         by_shape = shape / max(_span(distance, certain), SPACING)
         return replace(fit, deviation=math.hypot(fit.deviation, by_shape, SMOOTHED * fit.extinction))
 

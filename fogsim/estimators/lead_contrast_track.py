@@ -75,6 +75,8 @@ class RearDetection:
         Contrast over that of the reference.
     clipped : bool
         Whether the sky may be brighter than it looks.
+    airlight_deviation : float
+        Relative deviation of the airlight before it, where that is not even [-].
     alike : bool
         Whether it looks like the reference, and is not only where that is expected.
     """
@@ -87,6 +89,7 @@ class RearDetection:
     box: RearBox
     contrast: ContrastRatio
     clipped: bool
+    airlight_deviation: float
     alike: bool
 
 
@@ -161,7 +164,16 @@ class ContrastTrack(TrackedVehicle[RearDetection]):
                 self._forget()
         picture, ratio, alike = self._begin(crop) if found is None else found
         detection = RearDetection(
-            number, distance, crop.depth, time, picture, crop.box_of(picture), ratio, crop.sky.is_clipped, alike
+            number,
+            distance,
+            crop.depth,
+            time,
+            picture,
+            crop.box_of(picture),
+            ratio,
+            crop.sky.is_clipped,
+            crop.sky.deviation,
+            alike,
         )
         self._missed = 0
         self._aside = crop.lateral_offset(picture)

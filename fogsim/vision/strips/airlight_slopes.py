@@ -13,6 +13,7 @@ from importlib.resources import files
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.values.camera import Camera
 from fogsim.vision.strips.joint_kernels import JointPrior
 from fogsim.vision.strips.sky import Sky
 
@@ -38,6 +39,9 @@ sky behind thin fog."""
 
 DROPLET_CHANCES = (0.5, 0.3, 0.2)
 """How likely droplets of moderate and heavy radiation fog and of advection fog are beforehand [-]."""
+
+USUAL_EXTINCTION = 0.03
+"""Extinction at which the shape of the airlight is taken where none is known yet [1/m]."""
 
 ROWS = 24
 """Places of the sky that a straight line is laid through."""
@@ -81,8 +85,7 @@ def darkening_priors(prior: JointPrior, sky: Sky) -> tuple[JointPrior, ...]:
     sky : Sky
         The sky above the horizon.
     """
-    least = max(LEAST_SLOPE * sky.luminance, SURELY * sky.slope_deviation)
-    if sky.is_clipped or sky.slope < least:
+    if not _brightens(sky):
         return ()
     of_level = LEVEL_DEVIATION * sky.luminance
     uneven = prior._replace(
@@ -96,6 +99,11 @@ def darkening_priors(prior: JointPrior, sky: Sky) -> tuple[JointPrior, ...]:
     return tuple(
         uneven._replace(droplets=droplets, rise=rise, level=level) for droplets, (rise, level) in enumerate(lines)
     )
+
+
+def _brightens(sky: Sky) -> bool:
+    """Whether the sky surely brightens upward."""
+    return not sky.is_clipped and sky.slope >= max(LEAST_SLOPE * sky.luminance, SURELY * sky.slope_deviation)
 
 
 @cache
@@ -151,3 +159,52 @@ def slope_cost(prior: JointPrior) -> float:
     scale = ANY_SLOPE * prior.airlight
     cost = 2.0 * math.log(prior.slope_deviation / scale) - (prior.slope / scale) ** 2
     return cost - 2.0 * math.log(DROPLET_CHANCES[prior.droplets])
+
+
+@dataclass(frozen=True, slots=True)
+class RowAirlight:
+    """Airlight of the rows of a level image before something on the road.
+
+    Attributes
+    ----------
+    level : float
+        At the horizon [linear grey levels].
+    share : (rows,) float64
+        Over that at the horizon [-].
+    deviation : (rows,) float64
+        Its standard deviation [-].
+    """
+
+    level: float
+    share: Floats
+    deviation: Floats
+
+
+def row_airlight(sky: Sky, camera: Camera) -> RowAirlight | None:
+    """Airlight by rows, as the sky's brightening upward tells it; None where the sky does not brighten.
+
+    Parameters
+    ----------
+    sky : Sky
+        The sky above the horizon.
+    camera : Camera
+        The assumed calibration; its roll is taken as undone.
+    """
+    if not _brightens(sky):
+        return None
+    table = slope_table()
+    level = int(np.searchsorted(table.depth, USUAL_EXTINCTION * camera.mount_height))
+    chances = np.array(DROPLET_CHANCES)
+    lines = [_lines(droplets, *sky.heights) for droplets in range(len(chances))]
+    relative = sky.slope / sky.luminance
+    darker = np.array([relative / max(rise[level] - relative * above[level], 1e-3) for rise, above in lines])
+    angle = np.arctan((camera.horizon_row - np.arange(camera.height)) / camera.focal_length)
+    at = np.abs(angle)
+    shapes = [
+        m * np.where(angle < 0.0, -np.interp(at, table.angle, below[level]), np.interp(at, table.angle, above[level]))
+        for m, below, above in zip(darker, table.below, table.above, strict=True)
+    ]
+    mean = (chances[:, None] * shapes).sum(axis=0)
+    spread = np.sqrt((chances[:, None] * (shapes - mean) ** 2).sum(axis=0))
+    higher = sum(chance * m * above[level] for chance, m, (_, above) in zip(DROPLET_CHANCES, darker, lines, strict=True))
+    return RowAirlight(sky.luminance / (1.0 + float(higher)), 1.0 + mean, np.hypot(spread, OTHER_LIGHT * mean))

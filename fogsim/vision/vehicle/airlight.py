@@ -77,18 +77,17 @@ def check_road(road: NDArray[np.float32], sky: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class RoadFall:
-    """How the road's contrast to the sky falls near the camera.
+    """How the road's contrast to the airlight falls near the camera.
 
     Attributes
     ----------
-    fall : float
-        Logarithm of the near over the far contrast [-]; by day k times `apart`, whatever the road's reflectance.
-    apart : float
-        Way from the near to the far row [m].
+    way, contrast, share : (n,) float64
+        Distances of rows of road [m], their contrast to their airlight, and that over the one at the horizon [-].
     """
 
-    fall: float
-    apart: float
+    way: NDArray[np.float64]
+    contrast: NDArray[np.float64]
+    share: NDArray[np.float64]
 
     def is_lit(self, extinction: float, deviation: float) -> bool:
         """Whether it falls by so much less than in fog by day that lamps must light what is near.
@@ -98,11 +97,28 @@ class RoadFall:
         extinction, deviation : float
             What the vehicle's contrast says, and its standard deviation [1/m].
         """
-        missing = (extinction - 2.0 * deviation) * self.apart - self.fall
-        return missing > UNEVEN + SHARE * extinction * self.apart
+        if not self.way.size:
+            return False
+        apart = float(np.ptp(self.way))
+        # Contrast that the road would have to the horizon without fog: by day the same all along it.
+        bare = 1.0 - self.share + self.share * self.contrast * np.exp((extinction - 2.0 * deviation) * self.way)
+        first, second = np.triu_indices(self.way.size, 1)
+        level = np.log(np.maximum(bare, LEAST_CONTRAST))
+        # The median of all slopes leaves out marks, a bonnet, a shadow.
+        slope = float(np.median((level[second] - level[first]) / (self.way[second] - self.way[first])))
+        return slope * apart > UNEVEN + SHARE * extinction * apart
 
 
-def road_fall(luminance_of: Callable[[slice, slice], Floats], camera: Camera, depth: float, sky: float) -> RoadFall:
+_NOWHERE = RoadFall(*(np.zeros(0) for _ in range(3)))
+
+
+def road_fall(
+    luminance_of: Callable[[slice, slice], Floats],
+    camera: Camera,
+    depth: float,
+    sky: float,
+    share: NDArray[np.float64] | None = None,
+) -> RoadFall:
     """Measure how the contrast of the road's nearest metres to the sky falls.
 
     By day (A − L)/A = (1 − R/A) e^(−kd) on a road of one reflectance. Head lamps make the nearest metres brightest, so
@@ -111,33 +127,32 @@ def road_fall(luminance_of: Callable[[slice, slice], Floats], camera: Camera, de
     Parameters
     ----------
     luminance_of : callable
-        Linear luminance of rows and columns of the level image.
+        Linear luminance of rows and columns of the level image, over `share`.
     camera : Camera
         The assumed calibration.
     depth : float
         From the camera to the vehicle's rear, ``inf`` where there is none [m].
     sky : float
-        Luminance of the sky in the same unit.
+        Luminance of the airlight at the horizon in the same unit.
+    share : (rows,) float64 or None
+        Airlight of the image's rows over that; None where it is even.
 
     Returns
     -------
     RoadFall
-        Over no way where too little of the road is seen; then nothing is lit.
+        Without rows where too little of the road is seen; then nothing is lit.
     """
     nearest = max(camera.row_distance / max(camera.height - 1.0 - camera.horizon_row, 1.0), NEAREST)
     farthest = min(FARTHEST, depth - SHADOW)
     if farthest < FARTHER * nearest:
-        return RoadFall(0.0, 0.0)
+        return _NOWHERE
     at = np.linspace(nearest, farthest, ROWS)
     contrast = np.array([1.0 - _median(luminance_of(*_row(camera, d)), sky) / sky for d in at])
     seen = contrast > LEAST_CONTRAST
     if int(seen.sum()) < ROWS // 2:
-        return RoadFall(0.0, 0.0)
-    first, second = np.triu_indices(int(seen.sum()), 1)
-    level, way = np.log(contrast[seen]), at[seen]
-    # The median of all slopes leaves out marks, a bonnet, a shadow.
-    slope = float(np.median((level[second] - level[first]) / (way[second] - way[first])))
-    return RoadFall(-slope * (farthest - nearest), farthest - nearest)
+        return _NOWHERE
+    rows = np.clip(np.rint(camera.horizon_row + camera.row_distance / at[seen]).astype(int), 0, camera.height - 1)
+    return RoadFall(at[seen], contrast[seen], np.ones(rows.size) if share is None else share[rows])
 
 
 def _row(camera: Camera, distance: float) -> tuple[slice, slice]:

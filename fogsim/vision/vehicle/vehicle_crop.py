@@ -15,7 +15,8 @@ from fogsim.vision.light.luminance import linear_pixels, linear_table
 from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels
 from fogsim.vision.lines.horizon import levelled
 from fogsim.vision.region.road_image import CannotTellError
-from fogsim.vision.strips.sky import sky_above
+from fogsim.vision.strips.airlight_slopes import RowAirlight, row_airlight
+from fogsim.vision.strips.sky import Sky, sky_above
 from fogsim.vision.vehicle.airlight import RoadFall, airlight_beside, check_road, hidden_beside, road_before, road_fall
 from fogsim.vision.vehicle.contrast_ratio import RearPicture
 from fogsim.vision.vehicle.rear_localisation import RearBox, localise_rear, search_window
@@ -51,12 +52,15 @@ class SkyReading(NamedTuple):
         What clipping takes of it; None if it is saturated, and its luminance unknown.
     is_clipped : bool
         Whether it may be brighter than it looks.
+    deviation : float
+        Relative deviation of the airlight before the vehicle from it, where that is another by elevation [-].
     """
 
     luminance: float
     noise: float
     clipping: Clipping | None
     is_clipped: bool
+    deviation: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,6 +186,7 @@ def vehicle_crop(
     luminance_of: Callable[[slice, slice], Luminance],
     read_sky: Callable[[], SkyReading],
     least_noise: float = 0.0,
+    share: NDArray[np.float64] | None = None,
 ) -> VehicleCrop:
     """Cut out of a frame where a vehicle can be.
 
@@ -197,6 +202,8 @@ def vehicle_crop(
         The method's own reading of the airlight; called where a vehicle could be seen.
     least_noise : float
         Noise of single pixels that there is at least [linear grey levels].
+    share : (rows,) float64 or None
+        Airlight of the level image's rows over that at the horizon, over which `luminance_of` is; None where it is even.
 
     Raises
     ------
@@ -216,12 +223,14 @@ def vehicle_crop(
         origin=(region[1].start, region[0].start),
         sky=sky,
         noise=max(sky.noise * noise_gain(luminance, sky.luminance, camera), least_noise),
-        road=road_fall(luminance_of, camera, depth, sky.luminance),
+        road=road_fall(luminance_of, camera, depth, sky.luminance, share),
     )
 
 
 def daytime_crop(image: Pixels, camera: Camera, depth: float, pitch_deviation: float) -> VehicleCrop:
-    """Cut out of a frame where a vehicle can be, before an even sky.
+    """Cut out of a frame where a vehicle can be, before an even sky or one that brightens upward.
+
+    In the latter case the airlight before the vehicle darkens downward, and each row is taken relative to its own.
 
     Parameters
     ----------
@@ -245,12 +254,16 @@ def daytime_crop(image: Pixels, camera: Camera, depth: float, pitch_deviation: f
         raise CannotTellError(f"a range of {depth:.1f} m is none of a vehicle ahead")
     pixels = linear_pixels(levelled(image, camera), camera)
     margin = 3.0 * pitch_deviation * camera.focal_length + 2.0
+    sky = sky_above(pixels, camera, margin)
+    airlight = None if sky is None else row_airlight(sky, camera)
+    luminance = partial(_luminance, pixels) if airlight is None else partial(_levelled_out, pixels, airlight)
     return vehicle_crop(
         camera,
         depth,
-        partial(_luminance, pixels),
-        partial(_daylight, pixels, camera, margin, depth),
+        luminance,
+        partial(_daylight, _Day(pixels, camera, margin, sky, airlight, luminance), depth),
         least_noise=0.3 * 255.0 / 2**camera.bits,
+        share=None if airlight is None else airlight.share,
     )
 
 
@@ -264,29 +277,50 @@ def _luminance(pixels: LinearPixels, rows: slice, cols: slice) -> NDArray[np.flo
     return light
 
 
-def _daylight(pixels: LinearPixels, camera: Camera, margin: float, depth: float) -> SkyReading:
+def _levelled_out(pixels: LinearPixels, airlight: RowAirlight, rows: slice, cols: slice) -> NDArray[np.float32]:
+    """Luminance over the share of the airlight that its rows have."""
+    return _luminance(pixels, rows, cols) / airlight.share[rows, None].astype(np.float32)
+
+
+class _Day(NamedTuple):
+    """A frame, the margin below its sky [px], that sky, and the airlight of its rows where that is not even."""
+
+    pixels: LinearPixels
+    camera: Camera
+    margin: float
+    sky: Sky | None
+    airlight: RowAirlight | None
+    luminance_of: Callable[[slice, slice], Luminance]
+
+
+def _daylight(day: _Day, depth: float) -> SkyReading:
     """Sky by day, or the reason why this is none."""
-    sky = sky_above(pixels, camera, margin)
+    pixels, camera, margin, sky = day.pixels, day.camera, day.margin, day.sky
     if sky is None or sky.luminance < MIN_AIRLIGHT:
         raise CannotTellError("too dark above the horizon, or no sky: this is a daytime method")
     if sky.saturated > 0.9:
         raise CannotTellError("the sky is saturated")
     bottom = min(max(math.floor(camera.horizon_row - margin), 1), camera.height)
     rows = slice(max(bottom - max(math.ceil(SKY_HEIGHT * camera.focal_length), 4), 0), bottom)
-    light = _luminance(pixels, rows, slice(camera.width // 6, camera.width - camera.width // 6))
-    core = np.abs(light - sky.luminance) <= SKY_CORE * sky.luminance + 4.0 * sky.noise
-    if sky.noise > MOST_NOISE * sky.luminance or not core.size or float(core.mean()) < SKY_SHARE:
+    light = day.luminance_of(rows, slice(camera.width // 6, camera.width - camera.width // 6))
+    level = sky.luminance if day.airlight is None else day.airlight.level
+    core = np.abs(light - level) <= SKY_CORE * level + 4.0 * sky.noise
+    if sky.noise > MOST_NOISE * level or not core.size or float(core.mean()) < SKY_SHARE:
         raise CannotTellError("what is above the horizon is no sky")
     hidden = hidden_beside(camera.focal_length, depth)
     axis = camera.principal_point[0] - camera.width // 6
-    luminance = airlight_beside(light, sky.luminance, sky.noise, axis, hidden)
+    luminance = airlight_beside(light, level, sky.noise, axis, hidden)
     clear = np.abs(light - luminance) <= 4.0 * max(sky.noise, 1.0)
     if not clear.any():
         raise CannotTellError("nowhere is the sky as bright as it is beside the vehicle")
     lost = clipping(pixels.pixels[rows, camera.width // 6 : camera.width - camera.width // 6][clear], camera)
     # What clipping takes from the sky, its noise shows; then it is no longer clipped.
     is_clipped = not lost.noise > 0.0 and sky.is_clipped
-    return SkyReading(luminance + lost.loss, max(sky.noise, lost.noise), lost, is_clipped)
+    deviation = 0.0
+    if day.airlight is not None:
+        foot = min(math.ceil(camera.horizon_row + camera.row_distance / depth), camera.height - 1)
+        deviation = float(day.airlight.deviation[max(foot, 0)])
+    return SkyReading(luminance + lost.loss, max(sky.noise, lost.noise), lost, is_clipped, deviation)
 
 
 def noise_gain(luminance: NDArray[np.float32], sky: float, camera: Camera) -> float:

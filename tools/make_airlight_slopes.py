@@ -33,7 +33,7 @@ THICKNESSES = (3.0, 7.5, 15.0)
 
 
 def slopes(thickness, depth, droplets):
-    """Airlight toward the road, and at the sky, over black ground: what they are apart from the level one, over 1 − it."""
+    """Airlight toward the road and the sky over black ground: how far from the level one, over 1 − that."""
     table = layer_table(droplets)
     log = np.log(table.thickness)
     source = np.array(
@@ -64,8 +64,8 @@ def main():
     np.savez_compressed(
         arguments.out,
         about="Airlight over black land, of lines of sight so far below or above the horizon: (level - below) and "
-        "(above - level) over 1 - level; by droplets (small to large), optical height of the eye (depth) and angle [rad]. "
-        "Command: python tools/make_airlight_slopes.py",
+        "(above - level) over 1 - level; by droplets (small to large), optical height of the eye (depth) and "
+        "angle [rad]. Command: python tools/make_airlight_slopes.py",
         depth=DEPTHS,
         angle=ANGLES,
         below=below.astype(np.float32),

@@ -74,6 +74,10 @@ shade."""
 LEAST_DEVIATION = 1e-4
 """Deviation of k that what the model leaves out makes in clear air [1/m]."""
 
+DARKENS = 0.5
+"""Chance of an airlight that darkens toward the road from which on the fog counts as even [-]: its law is that of a
+layer."""
+
 MOST_OBSTACLES = 2
 """How often what stands in the own lane is looked for anew, each time nearer."""
 
@@ -98,6 +102,11 @@ class JointRoad:
     evidence. Then the extinction is the mean up to where 95 % of the light is lost, or to the farthest road that is
     seen; `Estimate.optical_depths` has how it varies, `Estimate.denser` says where it becomes much denser.
 
+    Nor need the airlight be: over dark land it brightens upward from the horizon and darkens toward the road, in a
+    shape that radiative transfer has, for small and large droplets, and by one factor, which goes by the albedo of the
+    land and is fitted too (prior: the sky's own brightening in the picture). That is weighed against even airlight by
+    evidence; fog that it is found in counts as even (`fogsim.vision.strips.airlight_slopes`, docs/airlight.md).
+
     Own method: no paper describes it. It stands on Hautière et al. 2006 and negru2013 for the geometry of fog on a
     flat road. Daytime only; the road must be darker than the airlight.
 
@@ -110,6 +119,8 @@ class JointRoad:
     frames : int
         How many of the last frames' curves are averaged; 1 lets every frame stand alone. More average patches out,
         and lag behind a change of fog by half as many frames.
+    even_airlight : bool
+        Take the airlight for one number in any case, as Koschmieder's law has it.
 
     Raises
     ------
@@ -125,8 +136,9 @@ class JointRoad:
         *,
         pitch_deviation: PitchDeviation = PITCH_DEVIATION,
         frames: Annotated[int, Range(1, 10_000)] = 1,
+        even_airlight: bool = False,
     ) -> None:
-        self._camera, self._check = camera, ObservationCheck(camera)
+        self._camera, self._check, self._even_airlight = camera, ObservationCheck(camera), even_airlight
         self._horizon = calibrated_horizon(camera, pitch_deviation)
         self._impossible = _impossible(camera)
         self._straight = strip_geometry(camera, max(1.0, self._horizon.standard_deviation))
@@ -153,7 +165,8 @@ class JointRoad:
         Estimate
             Diagnostics: ``horizon_row`` and ``told_horizon_row`` [px], ``inflection_row`` [px], ``airlight`` and
             ``road`` [linear grey levels, 0 … 255], ``misfit`` [-], ``band`` (left, right, top, bottom) of the own
-            lane's rows in use [px], ``evenness``, how likely the fog is even [-]; or ``reason``.
+            lane's rows in use [px], ``evenness``, how likely the fog is even, and ``darkening``, how likely the
+            airlight darkens toward the road [-]; or ``reason``.
 
         Raises
         ------
@@ -181,7 +194,7 @@ class JointRoad:
         if not course.is_straight:
             self._geometry = course_geometry(self._straight, self._camera, course)
         prior = joint_prior(sky, self._camera, horizon)
-        priors = (prior, *darkening_priors(prior, sky))
+        priors = (prior,) if self._even_airlight else (prior, *darkening_priors(prior, sky))
         fit = self._fitted(pixels, sky, priors, _free_road(observation.lead), course)
         if isinstance(fit, str):
             return Estimate.invalid(self.method, fit, **found)
@@ -223,7 +236,7 @@ class JointRoad:
         curves = whole if math.isfinite(told) else curves
         # Where a sag or crest is not quite followed, the road fades as in fog that changes along the way.
         uneven = even_fog(fit, self._geometry)
-        if not course.sag.any() and fit.darker < 0.5:
+        if not course.sag.any() and fit.darker < DARKENS:
             seen = self._averaged(curves, sky)
             uneven = fit_uneven(seen, self._geometry, priors[0], own, fit, bool(course.bend.any()))
         return self._doubt(uneven, sky, curves, free, told) or uneven
@@ -286,8 +299,7 @@ class JointRoad:
         extinction = max(fit.extinction, 0.0)
         if extinction > 0:
             found["inflection_row"] = horizon + 0.5 * extinction * self._camera.row_distance
-        found["evenness"] = uneven.even
-        found["darker"] = fit.darker
+        found["evenness"], found["darkening"] = uneven.even, fit.darker
         return Estimate(
             self.method,
             extinction,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere import airlight_from_illuminance, airlight_share, fogged_radiance
+from fogsim.atmosphere import Droplets, airlight_from_illuminance, airlight_share, fogged_radiance
 from fogsim.camera import Sensor, expose
 from fogsim.render import Renderer, make_renderer
 from fogsim.scene import build_scene, vehicle_batches
@@ -155,7 +155,12 @@ def staged_traffic(vehicles: Sequence[tuple[float, StagedVehicle]], speed: float
 
 
 def foggy_radiance(
-    view: View, pose: CameraPose, camera: Camera, extinction: float, albedo: float | None = None
+    view: View,
+    pose: CameraPose,
+    camera: Camera,
+    extinction: float,
+    albedo: float | None = None,
+    droplets: Droplets = Droplets.MODERATE_RADIATION,
 ) -> NDArray[np.float32]:
     """What a camera gets of a view in homogeneous fog.
 
@@ -171,6 +176,8 @@ def foggy_radiance(
         Extinction coefficient k [1/m].
     albedo : float or None
         Albedo of the land for the airlight of photons, in a layer of `LAYER`; None for Koschmieder's.
+    droplets : Droplets
+        Their sizes, which matter to the former.
 
     Returns
     -------
@@ -182,7 +189,7 @@ def foggy_radiance(
     else:
         fog = FogField(extinction, airlight_from_illuminance(ILLUMINANCE, airlight_share(albedo)), top=LAYER)
         fog = replace(fog, ground_albedo=albedo)
-    return fogged_radiance(view, fog, pose.position, ray_from_pixel(camera, pose))
+    return fogged_radiance(view, fog, pose.position, ray_from_pixel(camera, pose), droplets)
 
 
 def foggy_image(view: View, pose: CameraPose, camera: Camera, extinction: float) -> NDArray[np.uint8]:

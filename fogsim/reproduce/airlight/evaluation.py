@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.atmosphere import Droplets
 from fogsim.camera import Sensor, expose
 from fogsim.estimators import make
 from fogsim.render import Renderer
@@ -20,7 +21,11 @@ from fogsim.reproduce.zhu2015_drive import SPEED, drive
 from fogsim.units import LUMINANCE_WEIGHTS, extinction_from_visibility
 from fogsim.values import Camera, CameraPose, Estimate, Frame, LeadMeasurement, Observation, View
 
-ROAD_METHODS = ("negru2013", "zhu2015", "huang2015_rough", "joint_road")
+PUBLISHED = ("negru2013", "zhu2015", "huang2015_rough")
+EVEN_AIRLIGHT = "joint_road, even airlight"
+"""The joint fit as it would be without airlight that darkens toward the road."""
+
+ROAD_METHODS = (*PUBLISHED, EVEN_AIRLIGHT, "joint_road")
 CHASE_METHODS = ("lead_contrast",)
 
 FRAMES = 3
@@ -61,10 +66,13 @@ class Case:
         Of the land; None for Koschmieder's fog.
     visibility : float
         V_met [m].
+    droplets : Droplets
+        Their sizes.
     """
 
     albedo: float | None
     visibility: float
+    droplets: Droplets = Droplets.MODERATE_RADIATION
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +128,7 @@ def reproduce(plan: Plan = WHOLE, *, watch: Watch = unwatched) -> Reproduction:
         for height in plan.heights:
             camera = replace(CAMERA, mount_height=height)
             found: dict[tuple[Case, str], list[Estimate]] = {}
-            for followed, number in itertools.product((_road, _chase), range(plan.drives)):
+            for followed, number in itertools.product((drive_alone, follow), range(plan.drives)):
                 for case, method, estimate in followed(renderer, camera, plan.cases, number):
                     found.setdefault((case, method), []).append(estimate)
                 steps.advance()
@@ -136,23 +144,53 @@ def reproduce(plan: Plan = WHOLE, *, watch: Watch = unwatched) -> Reproduction:
     return Reproduction("airlight", tuple(records), tables[0].rows, NOTES, picture(records), shown, tuple(sweeps))
 
 
-def _road(
+def drive_alone(
     renderer: Renderer, camera: Camera, cases: Sequence[Case], number: int
 ) -> Iterator[tuple[Case, str, Estimate]]:
-    """Drive along the road alone, in every fog."""
+    """Drive along the road alone, in every fog.
+
+    Parameters
+    ----------
+    renderer : Renderer
+        Holds the road's scene.
+    camera : Camera
+        The true calibration, and the told one.
+    cases : sequence of Case
+        The fogs.
+    number : int
+        Of the drive, which is its seed.
+
+    Yields
+    ------
+    tuple
+        Fog, method, and what that reads at the end.
+    """
     rng = np.random.default_rng([21, number])
     moments = list(drive(renderer, camera, FRAMES, lead=False, rng=rng))
     for case in cases:
         frames = [Observation(_image(one.view, one.pose, camera, case, rng), SPEED) for one in moments]
         for method in ROAD_METHODS:
-            estimator = make(method, camera)
+            estimator = (
+                make("joint_road", camera, even_airlight=True) if method == EVEN_AIRLIGHT else make(method, camera)
+            )
             yield case, method, [estimator.update(frame) for frame in frames][-1]
 
 
-def _chase(
+def follow(
     renderer: Renderer, camera: Camera, cases: Sequence[Case], number: int
 ) -> Iterator[tuple[Case, str, Estimate]]:
-    """Follow a vehicle that drives away, in every fog."""
+    """Follow a vehicle that drives away, in every fog.
+
+    Parameters
+    ----------
+    renderer, camera, cases, number
+        As of `drive_alone`.
+
+    Yields
+    ------
+    tuple
+        Fog, method, and what that reads at the end.
+    """
     rng = np.random.default_rng([22, number])
     estimators = {case: make(CHASE_METHODS[0], camera) for case in cases}
     last: dict[Case, Estimate] = {}
@@ -170,7 +208,8 @@ def _chase(
 
 
 def _image(view: View, pose: CameraPose, camera: Camera, case: Case, rng: np.random.Generator) -> NDArray[np.uint8]:
-    radiance = foggy_radiance(view, pose, camera, extinction_from_visibility(case.visibility), case.albedo)
+    k = extinction_from_visibility(case.visibility)
+    radiance = foggy_radiance(view, pose, camera, k, case.albedo, case.droplets)
     luminance = (radiance * np.array(LUMINANCE_WEIGHTS)).sum(axis=-1)
     sensor = Sensor(saturation_luminance=float(np.percentile(luminance, BRIGHTEST)) / EXPOSED)
     return expose(radiance, sensor, camera.response, rng).astype(np.uint8)

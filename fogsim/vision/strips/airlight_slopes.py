@@ -1,8 +1,8 @@
 """Airlight that is not even, as photons have it: it brightens upward from the horizon, and darkens toward the road.
 
 Over dark land a line of sight that points down gathers light that has come from below, and there it is dark. How
-much, goes by the albedo of the land, which is unknown, in one factor; and by the elevation and the optical height of the
-eye in a shape that is known. The sky's brightening upward in the same picture tells of that factor.
+much, goes by the albedo of the land, which is unknown, in one factor; and by the elevation and the optical height of
+the eye in a shape that is known. The sky's brightening upward in the same picture tells of that factor.
 """
 
 import math
@@ -24,7 +24,8 @@ LEAST_SLOPE, SURELY = 0.1, 2.0
 uneven: even fog has none."""
 
 OTHER_LIGHT = 0.2
-"""Relative deviation of the sky's slope by what else differs: the sky above the fog, droplets, land that is not even [-].
+"""Relative deviation of the sky's slope by what else differs: the sky above the fog, droplets, land that is not even
+[-].
 """
 
 LEVEL_DEVIATION = 0.01
@@ -34,8 +35,8 @@ LENS_DEVIATION = 0.1
 """Deviation of a lens's vignetting where the sky below which it shows brightens otherwise than evenly [-]."""
 
 ANY_SLOPE = 2.0
-"""Standard deviation of the slope of a sky, over its level, above airlight that is even [1/rad]: that of the CIE overcast
-sky behind thin fog."""
+"""Standard deviation of the slope of a sky, over its level, above airlight that is even [1/rad]: that of the CIE
+overcast sky behind thin fog."""
 
 DROPLET_CHANCES = (0.5, 0.3, 0.2)
 """How likely droplets of moderate and heavy radiation fog and of advection fog are beforehand [-]."""
@@ -58,8 +59,8 @@ class SlopeTable:
     angle : (m,) float64
         Angles [rad].
     below, above : (droplets, n, m) float64
-        By how much it is darker toward the road, and brighter toward the sky, than level, over 1 − the level one in units
-        of E / π [-].
+        By how much it is darker toward the road, and brighter toward the sky, than level, over 1 − the level one in
+        units of E / π [-].
     """
 
     depth: Floats
@@ -76,7 +77,7 @@ def slope_table() -> SlopeTable:
 
 
 def darkening_priors(prior: JointPrior, sky: Sky) -> tuple[JointPrior, ...]:
-    """What sky and horizon say about airlight that is not even, by droplets; none where the sky does not brighten upward.
+    """What sky and horizon say about airlight that is not even, by droplets; nothing under a sky that is even.
 
     Parameters
     ----------
@@ -108,7 +109,7 @@ def _brightens(sky: Sky) -> bool:
 
 @cache
 def _lines(droplets: int, lowest: float, highest: float) -> tuple[Floats, Floats]:
-    """Mean slope of how the airlight brightens between two heights [rad], and where a parabola has it at the horizon."""
+    """Mean slope of the airlight between two heights [rad], and where a parabola has it at the horizon."""
     table = slope_table()
     height = np.linspace(lowest, highest, ROWS)
     above = np.array([np.interp(height, table.angle, row) for row in table.above[droplets]])
@@ -206,5 +207,7 @@ def row_airlight(sky: Sky, camera: Camera) -> RowAirlight | None:
     ]
     mean = (chances[:, None] * shapes).sum(axis=0)
     spread = np.sqrt((chances[:, None] * (shapes - mean) ** 2).sum(axis=0))
-    higher = sum(chance * m * above[level] for chance, m, (_, above) in zip(DROPLET_CHANCES, darker, lines, strict=True))
+    higher = sum(
+        chance * m * above[level] for chance, m, (_, above) in zip(DROPLET_CHANCES, darker, lines, strict=True)
+    )
     return RowAirlight(sky.luminance / (1.0 + float(higher)), 1.0 + mean, np.hypot(spread, OTHER_LIGHT * mean))

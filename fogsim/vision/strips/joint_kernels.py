@@ -23,11 +23,12 @@ from fogsim.vision.strips.albedo_filter import (
 )
 
 PARAMETERS = 4
-"""Extinction, airlight, rows by which the horizon is lower, vignetting that is left; and, where the airlight is not even,
-by how much it darkens toward the road."""
+"""Extinction, airlight, rows by which the horizon is lower, vignetting that is left; and, where the airlight is not
+even, by how much it darkens toward the road."""
 
 FIRST_DEPTH, DEPTH_STEP = 0.002, math.log(200.0) / 11.0
-"""First of the optical heights of an eye by which the airlight's darkening goes [-], and the step of their logarithm."""
+"""First of the optical heights of an eye by which the airlight's darkening goes [-], and the step of their
+logarithm."""
 
 NO_LEVELS: NDArray[np.float64] = np.zeros(0)
 
@@ -99,8 +100,8 @@ class JointPrior(NamedTuple):
         By how much the sky brightens upward, as a straight line has it, and the standard deviation of that [linear grey
         levels per rad].
     rise, level : (levels,) float64
-        Slope [1/rad] of such a line over the airlight at the horizon, and by which part its level there is above that, if
-        the airlight darkens by 1 toward the road; by the optical height of the eye. None where it counts as even.
+        Slope [1/rad] of such a line over the airlight at the horizon, and by which part its level there is above that,
+        if the airlight darkens by 1 toward the road; by the optical height of the eye. None where it counts as even.
     droplets : int
         Which sizes of them the latter are of.
     """
@@ -273,7 +274,7 @@ def add_bins(whitened: Whitened, normal: NDArray[np.float64], gradient: NDArray[
 def _add_datum(
     by: NDArray[np.float64], off: float, weight: float, normal: NDArray[np.float64], gradient: NDArray[np.float64]
 ) -> float:
-    """Add a datum that is off by so much, with its derivatives, to the normal equations; returns what it adds to the cost."""
+    """Add a datum, with its derivatives, to the normal equations; returns what it adds to the cost."""
     for a in range(by.size):
         gradient[a] -= weight * off * by[a]
         for b in range(by.size):
@@ -318,7 +319,7 @@ def _add_prior(
 
 @kernel
 def darkness_by_sky(prior: JointPrior, k: float, eye: float) -> tuple[float, float]:
-    """By how much the airlight darkens toward the road, as the sky tells it; and that airlight's level at the horizon."""
+    """By how much the airlight darkens toward the road, as the sky tells it, and its level at the horizon."""
     if prior.rise.size == 0:
         return 0.0, prior.airlight
     level, on = eye_level(k, eye, prior.rise.size)

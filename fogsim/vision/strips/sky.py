@@ -131,15 +131,26 @@ def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
     # What looks everywhere different is a wood rather than a sky, which is no darker than that.
     covered = median(share) < PATCHY and scatter > SCATTERED * level
     upward = BRIGHTER * level if covered else deviation
-    lens = (shading.vignetting, shading.vignetting_deviation)
     seen = height[free] if free.size else np.zeros(1)
-    slope = (shading.slope, shading.slope_deviation, (float(seen.min()), float(seen.max())))
-    return Sky(level, deviation, upward, noise, saturated, clipped, *lens, shading.unevenness, *slope)
+    return Sky(
+        luminance=level,
+        deviation=deviation,
+        upward=upward,
+        noise=noise,
+        saturated=saturated,
+        clipped=clipped,
+        vignetting=shading.vignetting,
+        vignetting_deviation=shading.vignetting_deviation,
+        unevenness=shading.unevenness,
+        slope=shading.slope,
+        slope_deviation=shading.slope_deviation,
+        heights=(float(seen.min()), float(seen.max())),
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class _Shading:
-    """A sky's brightness at the horizon straight ahead, vignetting, their deviations, unevenness, and its slope upward."""
+    """A sky's brightness at the horizon, vignetting, their deviations, unevenness, and its slope upward."""
 
     level: float
     deviation: float

@@ -178,8 +178,8 @@ SHADING_SCALES = (0.06, 0.02, 0.006, 0.006)
 """Deviations beyond which a pixel weighs little in each iteration of the fit of a sky's shading, relative to it [-]."""
 
 TILT, BRIGHTENING, BENDING, VIGNETTING = 0.3, 1.5, 4.0, 0.5
-"""Standard deviations of a sky's slopes sideways and upward [1/rad], of the bend of the latter [1/rad²], and of its fall
-toward the corners [-], before it is looked at, relative to it."""
+"""Standard deviations of a sky's slopes sideways and upward [1/rad], of the bend of the latter [1/rad²], and of its
+fall toward the corners [-], before it is looked at, relative to it."""
 
 SHADING_COLS = 32
 """Pixels of each row that are looked at."""
@@ -192,7 +192,7 @@ ALIKE = 4.0
 def sky_shading(
     image: LinearPixels, rows: NDArray[np.int64], axis: NDArray[np.float64], bright: NDArray[np.float64], noise: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float, float]:
-    """Sky as L = a + b x + c y + e y² − d (1 − cos⁴ of the angle to the camera's axis), by least squares in Cauchy's norm.
+    """Sky as L = a + b x + c y + e y² − d (1 − cos⁴ of the angle to the camera's axis), in Cauchy's norm.
 
     Parameters
     ----------
@@ -210,8 +210,8 @@ def sky_shading(
     Returns
     -------
     tuple of (5,) and (5, 5) float64 and two floats
-        a, b, c, e, d, their covariance, the share of pixels that lie near, and the robust deviation of all of them beside
-        their noise [linear grey levels].
+        a, b, c, e, d, their covariance, the share of pixels that lie near, and the robust deviation of all of them
+        beside their noise [linear grey levels].
     """
     cols, count = image.pixels.shape[1], SHADING_COLS
     level = float(np.median(bright))

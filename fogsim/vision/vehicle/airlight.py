@@ -97,16 +97,25 @@ class RoadFall:
         extinction, deviation : float
             What the vehicle's contrast says, and its standard deviation [1/m].
         """
+        rise = self.rise(extinction - 2.0 * deviation)
+        return bool(self.way.size) and rise > UNEVEN + SHARE * extinction * float(np.ptp(self.way))
+
+    def rise(self, extinction: float) -> float:
+        """By how much the logarithm of the contrast to the horizon, had there been no fog, rises from near to far [-].
+
+        Parameters
+        ----------
+        extinction : float
+            k of the fog through which the road is seen [1/m]; then it is 0 by day on a road of one reflectance.
+        """
         if not self.way.size:
-            return False
-        apart = float(np.ptp(self.way))
-        # Contrast that the road would have to the horizon without fog: by day the same all along it.
-        bare = 1.0 - self.share + self.share * self.contrast * np.exp((extinction - 2.0 * deviation) * self.way)
-        first, second = np.triu_indices(self.way.size, 1)
+            return 0.0
+        bare = 1.0 - self.share + self.share * self.contrast * np.exp(extinction * self.way)
         level = np.log(np.maximum(bare, LEAST_CONTRAST))
+        first, second = np.triu_indices(self.way.size, 1)
         # The median of all slopes leaves out marks, a bonnet, a shadow.
         slope = float(np.median((level[second] - level[first]) / (self.way[second] - self.way[first])))
-        return slope * apart > UNEVEN + SHARE * extinction * apart
+        return slope * float(np.ptp(self.way))
 
 
 _NOWHERE = RoadFall(*(np.zeros(0) for _ in range(3)))

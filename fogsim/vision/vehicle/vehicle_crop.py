@@ -203,7 +203,8 @@ def vehicle_crop(
     least_noise : float
         Noise of single pixels that there is at least [linear grey levels].
     share : (rows,) float64 or None
-        Airlight of the level image's rows over that at the horizon, over which `luminance_of` is; None where it is even.
+        Airlight of the level image's rows over that at the horizon, over which `luminance_of` is; None where it is
+        even.
 
     Raises
     ------
@@ -279,7 +280,8 @@ def _luminance(pixels: LinearPixels, rows: slice, cols: slice) -> NDArray[np.flo
 
 def _levelled_out(pixels: LinearPixels, airlight: RowAirlight, rows: slice, cols: slice) -> NDArray[np.float32]:
     """Luminance over the share of the airlight that its rows have."""
-    return _luminance(pixels, rows, cols) / airlight.share[rows, None].astype(np.float32)
+    share: NDArray[np.float32] = airlight.share[rows].astype(np.float32)
+    return np.asarray(_luminance(pixels, rows, cols) / share[:, None], np.float32)
 
 
 class _Day(NamedTuple):

@@ -3,7 +3,7 @@ import pytest
 
 from fogsim.values import Camera, Response
 from fogsim.vision.region.road_image import CannotTellError
-from fogsim.vision.vehicle.airlight import RoadFall, airlight_beside, check_road, hidden_beside, road_before, road_fall
+from fogsim.vision.vehicle.airlight import airlight_beside, check_road, hidden_beside, road_before, road_fall
 
 NOISE = 2.0
 CAMERA = Camera(688, 515, 700.0, (343.5, 257.0), 1.3, np.radians(1.0), response=Response.LINEAR)
@@ -58,12 +58,28 @@ def test_the_roads_contrast_falls_as_fog_has_it(extinction, reflectance):
         return road_fall(luminance_of, camera, 40.0, 200.0)
 
     day, lit = row(0.0), row(0.8)
-    assert day.fall == pytest.approx(extinction * day.apart, rel=0.03)
+    assert -day.rise(0.0) == pytest.approx(extinction * np.ptp(day.way), rel=0.03)
     assert not day.is_lit(extinction, 0.0)
     assert not day.is_lit(1.1 * extinction, 0.0)
-    assert lit.fall < day.fall
+    assert lit.rise(0.0) > day.rise(0.0)
     assert lit.is_lit(extinction, 0.0) == (reflectance == 0.5)
-    assert row(4.0).fall < lit.fall
+    assert row(4.0).rise(0.0) > lit.rise(0.0)
+
+
+@pytest.mark.parametrize("extinction", [0.01, 0.06])
+def test_before_airlight_that_darkens_downward_a_road_by_day_is_not_lit(extinction):
+    camera = CAMERA
+    share = 1.0 - 0.5 * np.clip(np.arange(camera.height) - camera.horizon_row, 0.0, 200.0) / 200.0
+
+    def luminance_of(rows, cols):
+        d = camera.row_distance / (np.arange(camera.height)[rows] - camera.horizon_row)
+        seen = 200.0 * (share[rows] - (share[rows] - 0.25) * np.exp(-extinction * d)) / share[rows]
+        return np.repeat(seen[:, None], 9, axis=1).astype(np.float32)
+
+    found = road_fall(luminance_of, camera, 40.0, 200.0, share)
+    assert not found.is_lit(extinction, 0.0)
+    assert found.is_lit(3.0 * extinction, 0.0)
+    assert road_fall(luminance_of, camera, 40.0, 200.0).is_lit(extinction, 0.0)
 
 
 def test_where_little_road_is_seen_nothing_is_lit():
@@ -71,7 +87,7 @@ def test_where_little_road_is_seen_nothing_is_lit():
     for depth, light in ((10.0, 50.0), (60.0, 200.0), (60.0, 250.0)):
         even = np.full((camera.height, camera.width), light, np.float32)
         found = road_fall(lambda *where, even=even: even[where], camera, depth, 200.0)
-        assert found == RoadFall(0.0, 0.0)
+        assert not found.way.size
         assert not found.is_lit(1.0, 0.0)
 
 

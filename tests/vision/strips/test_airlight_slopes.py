@@ -1,0 +1,156 @@
+"""Airlight that darkens toward the road: its table is that of the atmosphere, and strips drawn with it come back."""
+
+import math
+
+import numpy as np
+import pytest
+
+from fogsim.atmosphere import Droplets
+from fogsim.atmosphere.fog.layer_airlight import layer_table, path_means, sines, slant_airlight, slant_share
+from fogsim.values import FogField
+from fogsim.vision.strips.airlight_slopes import (
+    DROPLET_CHANCES,
+    darkening_of_bins,
+    darkening_priors,
+    row_airlight,
+    slope_table,
+)
+from fogsim.vision.strips.joint_fit import fit_jointly
+from fogsim.vision.strips.joint_kernels import DEPTH_STEP, FIRST_DEPTH
+from fogsim.vision.strips.sky import Sky
+from fogsim.vision.strips.strip_curves import StripCurves
+from tests.vision.strips.koschmieder_strips import AIRLIGHT, CAMERA, GEOMETRY, NOISE, PRIOR, curves, transmittance
+
+HEIGHTS = (0.01, 0.19)
+KINDS = (Droplets.MODERATE_RADIATION, Droplets.HEAVY_RADIATION, Droplets.HEAVY_ADVECTION)
+
+
+def darkness(albedo, level):
+    """By how much the airlight over land darkens where over black land the level one is so much of E / π."""
+    return (1.0 - albedo) * (1.0 - level) / (level + albedo * (1.0 - level))
+
+
+def around(extinction, albedo, droplets):
+    return slant_airlight(
+        FogField(extinction, (1.0,) * 3, top=7.5 / extinction, ground_albedo=albedo), CAMERA.mount_height, droplets
+    )
+
+
+def shares(angles, extinction, albedo, droplets=Droplets.MODERATE_RADIATION):
+    """Airlight at angles above the horizon over the level one: to the sky and to the road."""
+    sine = np.sin(angles)
+    to_road = CAMERA.mount_height / np.maximum(-sine, 1e-9)
+    lost = np.where(sine < 0.0, 1.0 - np.exp(-extinction * to_road), 1.0)
+    found = around(extinction, albedo, droplets)
+    return slant_share(found, sine, lost) / slant_share(found, np.zeros(1), np.ones(1))[0]
+
+
+def sky(extinction, albedo, luminance=AIRLIGHT, droplets=Droplets.MODERATE_RADIATION):
+    """A sky that brightens as that layer has it, seen between two heights."""
+    height = np.linspace(*HEIGHTS, 24)
+    bend, slope, level = np.polyfit(height, luminance * shares(height, extinction, albedo, droplets), 2)
+    slope += bend * sum(HEIGHTS)
+    return Sky(level, 0.5, 0.5, 1.0, 0.0, 0.0, 0.0, 0.02, 0.01, slope, 0.03 * luminance, HEIGHTS)
+
+
+def strips(extinction, albedo, seed=0, droplets=Droplets.MODERATE_RADIATION):
+    """Curves before airlight that darkens toward the road."""
+    even = curves(extinction, seed)
+    share = shares(-GEOMETRY.grazing, extinction, albedo, droplets)
+    missing = AIRLIGHT * (1.0 - share) * (1.0 - transmittance(extinction))
+    return StripCurves(even.luminance - missing, np.full(missing.shape, NOISE**2), np.full(missing.shape, 2.0))
+
+
+def test_levels_of_the_kernels_are_those_of_the_table():
+    table = slope_table()
+    assert table.depth[0] == pytest.approx(FIRST_DEPTH)
+    assert np.diff(np.log(table.depth)) == pytest.approx(DEPTH_STEP)
+    assert len(table.below) == len(DROPLET_CHANCES) == len(KINDS)
+    assert sum(DROPLET_CHANCES) == pytest.approx(1.0)
+    assert (np.diff(table.angle) > 0).all()
+
+
+@pytest.mark.parametrize("visibility", [50.0, 100.0, 300.0])
+@pytest.mark.parametrize("albedo", [0.05, 0.2, 0.8])
+@pytest.mark.parametrize("kind", range(3))
+def test_the_table_is_that_of_the_atmosphere_whatever_the_albedo(visibility, albedo, kind):
+    k, droplets = math.log(20.0) / visibility, KINDS[kind]
+    angles = np.array([0.005, 0.02, 0.06, 0.15])
+    black = around(k, 0.0, droplets)
+    level = 0.34 * slant_share(black, np.zeros(1), np.ones(1))[0]
+    factor, table = darkness(albedo, level), slope_table()
+    at = np.interp(math.log(k * CAMERA.mount_height), np.log(table.depth), np.arange(table.depth.size))
+    for rows, sign in ((table.below[kind], -1.0), (table.above[kind], 1.0)):
+        low, on = int(at), at - int(at)
+        shape = np.interp(angles, table.angle, rows[low] * (1.0 - on) + rows[low + 1] * on)
+        assert 1.0 + sign * factor * shape == pytest.approx(shares(sign * angles, k, albedo, droplets), abs=0.03)
+
+
+@pytest.mark.parametrize("visibility", [50.0, 120.0, 300.0])
+@pytest.mark.parametrize("albedo", [0.05, 0.2, 0.6])
+def test_strips_over_dark_land_come_back_and_even_airlight_reads_them_too_long(visibility, albedo):
+    k = math.log(20.0) / visibility
+    priors = (PRIOR, *darkening_priors(PRIOR, sky(k, albedo)))
+    assert len(priors) == 4
+    fits = [fit_jointly(strips(k, albedo, seed), GEOMETRY, priors) for seed in range(6)]
+    off = np.array([(fit.extinction - k) / fit.extinction_deviation for fit in fits])
+    assert np.sqrt((off**2).mean()) < 2.0
+    assert np.median([fit.extinction for fit in fits]) == pytest.approx(k, rel=0.08)
+    evens = [fit_jointly(strips(k, albedo, seed), GEOMETRY, (PRIOR,)) for seed in range(6)]
+    assert np.median([fit.extinction for fit in evens]) < (0.96 if albedo < 0.5 else 0.99) * k
+    assert np.median([fit.darker for fit in fits]) > 0.9
+    assert {fit.darker for fit in evens} == {0.0}
+
+
+def test_even_airlight_under_a_sky_that_brightens_is_told_by_the_road():
+    """As an overcast sky does above thin fog: the road fades as Koschmieder's law has it."""
+    bright = sky(0.01, 0.1)
+    priors = (PRIOR._replace(airlight=bright.luminance, below=10.0, above=10.0), *darkening_priors(PRIOR, bright))
+    for visibility in (60.0, 150.0):
+        fits = [fit_jointly(curves(3.0 / visibility, seed), GEOMETRY, priors) for seed in range(4)]
+        assert np.median([fit.extinction for fit in fits]) == pytest.approx(3.0 / visibility, rel=0.04)
+        assert max(fit.darker for fit in fits) < 0.5
+
+
+def test_under_an_even_or_clipped_sky_the_airlight_counts_as_even():
+    bright = sky(0.03, 0.1)
+    flat = Sky(200.0, 1.0, 1.0, 1.0, 0.0, 0.0, slope=4.0, slope_deviation=5.0, heights=HEIGHTS)
+    unsure = Sky(200.0, 1.0, 1.0, 1.0, 0.0, 0.0, slope=100.0, slope_deviation=80.0, heights=HEIGHTS)
+    clipped = Sky(200.0, 1.0, 1.0, 1.0, 0.5, 0.5, slope=bright.slope, slope_deviation=5.0, heights=HEIGHTS)
+    for one in (flat, unsure, clipped, Sky(200.0, 1.0, 1.0, 1.0, 0.0, 0.0)):
+        assert darkening_priors(PRIOR, one) == ()
+        assert row_airlight(one, CAMERA) is None
+    darker, by_row = darkening_of_bins(GEOMETRY.grazing, GEOMETRY.below, PRIOR)
+    assert darker.shape == by_row.shape == (0, GEOMETRY.below.size)
+
+
+def test_rows_have_the_airlight_of_the_layer_within_its_deviation():
+    k, albedo = 0.03, 0.1
+    found = row_airlight(sky(k, albedo), CAMERA)
+    rows = np.array([-40, -10, -3, 3, 10, 40, 120]) + round(CAMERA.horizon_row)
+    angle = np.arctan((CAMERA.horizon_row - rows) / CAMERA.focal_length)
+    assert found.level == pytest.approx(AIRLIGHT, rel=0.02)
+    assert np.abs(found.share[rows] - shares(angle, k, albedo)).max() < 0.06
+    assert (np.abs(found.share[rows] - shares(angle, k, albedo)) < 2.5 * found.deviation[rows] + 0.01).all()
+    assert (np.diff(found.share) <= 1e-12).all()
+
+
+def test_derivative_by_row_is_that_of_the_table():
+    prior = darkening_priors(PRIOR, sky(0.03, 0.1))[0]
+    darker, by_row = darkening_of_bins(GEOMETRY.grazing, GEOMETRY.below, prior)
+    moved, _ = darkening_of_bins(GEOMETRY.grazing * (GEOMETRY.below - 0.01) / GEOMETRY.below, GEOMETRY.below, prior)
+    close = np.isclose(moved - darker, 0.01 * by_row, atol=2e-6)
+    # But where a bin lies on one of the table's angles.
+    assert close.mean() > 0.95
+
+
+def test_the_tool_makes_the_table_from_that_of_the_atmosphere():
+    table, depth = layer_table(Droplets.MODERATE_RADIATION), 0.04
+    index = int(np.argmin(np.abs(table.thickness - 7.5)))
+    means = path_means(table, table.black[index], float(table.thickness[index]), depth)
+    ours = slope_table()
+    level = float(means[sines().size // 2, -1])
+    at = np.interp(math.log(depth), np.log(ours.depth), np.arange(ours.depth.size))
+    above = np.interp(0.1, ours.angle, ours.above[0][int(at)])
+    upward = float(np.interp(math.sin(0.1), sines(), means[:, -1]))
+    assert (upward - level) / (1.0 - level) == pytest.approx(above, abs=0.02)

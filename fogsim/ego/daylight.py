@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fogsim.atmosphere import airlight_from_illuminance, airlight_share
+from fogsim.atmosphere import airlight_from_illuminance
 from fogsim.values import FogField
 
 
@@ -74,4 +74,4 @@ def in_daylight(fog: FogField, illuminance: float) -> FogField:
     illuminance : float
         Horizontal illuminance of the sky [lx].
     """
-    return replace(fog, airlight=airlight_from_illuminance(illuminance, airlight_share(fog.ground_albedo)))
+    return replace(fog, airlight=airlight_from_illuminance(illuminance, fog.airlight_share))

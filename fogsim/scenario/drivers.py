@@ -19,7 +19,12 @@ def driver_sight(scenario: Scenario) -> DriverSight | None:
     drivers = scenario.drivers
     if drivers.see_through_fog:
         return None
-    return DriverSight(scenario.light.illuminance_lx, drivers.headlamp_reach_m, drivers.reaction_time_s)
+    return DriverSight(
+        scenario.light.illuminance_lx,
+        drivers.headlamp_reach_m,
+        drivers.reaction_time_s,
+        airlight_share=scenario.fog.airlight_share,
+    )
 
 
 def driver_setup(scenario: Scenario) -> DriverSetup:

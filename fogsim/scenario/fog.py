@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from fogsim.atmosphere import Droplets
+from fogsim.atmosphere import Droplets, airlight_share
 from fogsim.obstruction import Tunnel
 from fogsim.scenario.section import (
     Distance,
@@ -143,8 +143,9 @@ class Fog(Section):
     scattered many times between sky and ground: for even fog in a layer, on flat land without tunnels."""
 
     ground_albedo: Annotated[Number, Field(ge=0, le=1)] | None = None
-    """Albedo of the land around, for `airlight: photons`: 0.05 dark asphalt or woods, 0.2 grass, 0.8 snow; 0.1 if not
-    given."""
+    """Albedo ρ of the land around: 0.05 dark asphalt or woods, 0.2 grass, 0.8 snow. The airlight's level near the
+    ground is 0.34 + 0.66 ρ of a white surface's. If not given, ρ is 0.1 for `airlight: photons`, and the level 0.95
+    else."""
 
     airlight_shading: Annotated[Number, Field(ge=0, le=1)] = 0.0
     """Dimming of the airlight for each unit of optical depth overhead; 0.1 in real fog, 0 for an even airlight."""
@@ -175,8 +176,6 @@ class Fog(Section):
     @model_validator(mode="after")
     def _even_for_photons(self) -> Self:
         if self.airlight != "photons":
-            if self.ground_albedo is not None:
-                raise ValueError("ground_albedo goes with airlight: photons")
             return self
         uneven = ("outside_visibility_m", "patches", "top_edge_m", "base_m", "scale_height_m", "airlight_shading")
         given = [key for key in (*uneven, "forward_scatter") if getattr(self, key)]
@@ -188,9 +187,14 @@ class Fog(Section):
         return self
 
     @property
-    def albedo_of_photons(self) -> float | None:
-        """Albedo of the land around for `airlight: photons`, else None."""
-        return None if self.airlight == "koschmieder" else _ALBEDO if self.ground_albedo is None else self.ground_albedo
+    def albedo(self) -> float | None:
+        """Albedo of the land around; None if it is not given and the airlight does not ask for it."""
+        return _ALBEDO if self.ground_albedo is None and self.airlight == "photons" else self.ground_albedo
+
+    @property
+    def airlight_share(self) -> float:
+        """Airlight near the ground over that of a white surface [-]."""
+        return airlight_share(self.albedo)
 
     @model_validator(mode="after")
     def _times_increase(self) -> Self:
@@ -258,7 +262,8 @@ def fog_along(
         wind=(0.0, 0.0) if fog.wind is None else _velocity(fog.wind),
         changes=_changes(fog, ground),
         airlight_shading=fog.airlight_shading,
-        ground_albedo=fog.albedo_of_photons,
+        airlight_share=fog.airlight_share,
+        ground_albedo=fog.albedo if fog.airlight == "photons" else None,
         forward_scatter=fog.forward_scatter,
         forward_scatter_width=math.radians(fog.forward_scatter_deg),
         shelters=tuple(_shelter(tunnel, fog.in_tunnels_m) for tunnel in tunnels if math.isfinite(fog.in_tunnels_m)),

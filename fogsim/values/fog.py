@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 from fogsim.errors import InputError
 
+KOSCHMIEDER_SHARE = 0.95
+"""Airlight over that of a white horizontal surface where nothing is said of the land around [-]."""
+
 
 @dataclass(frozen=True, slots=True)
 class FogBank:
@@ -168,6 +171,8 @@ class FogField:
         Places without fog; they stay where they are.
     reachable_densities : tuple of float
         Factors of the extinction coefficient that a script may bring beside those of `changes` [-].
+    airlight_share : float
+        The airlight over that of a white horizontal surface under the same sky [-]: what another daylight goes by.
     airlight_shading : float
         How much the airlight dims with each unit of optical depth overhead [-]; 0 for airlight that is the same
         everywhere. Two-stream theory of a conservative layer gives ¾ (1 − g), about 0.1 in fog.
@@ -192,6 +197,7 @@ class FogField:
     patches: FogPatches | None = None
     wind: tuple[float, float] = (0.0, 0.0)
     changes: tuple[FogChange, ...] = ()
+    airlight_share: float = KOSCHMIEDER_SHARE
     airlight_shading: float = 0.0
     ground_albedo: float | None = None
     forward_scatter: float = 0.0

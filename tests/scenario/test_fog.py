@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from fogsim.atmosphere import extinction
+from fogsim.ego.daylight import in_daylight
 from fogsim.errors import InputError
 from fogsim.scenario import build, load_scenario, resolved
+from fogsim.scenario.drivers import driver_sight
 from fogsim.units import extinction_from_visibility
 from fogsim.values import FogChange, FogField, FogPatches
 
@@ -83,7 +85,7 @@ def test_the_resolved_scenario_says_it_all_again() -> None:
         ("wind={speed_kmh: 5}", "fog.wind.from_deg: this key is missing"),
         ("banks=[{start_m: 500, end_m: 300, visibility_m: 40}]", "start_m must be less than end_m, got 500 and 300"),
         ("airlight=photon", "fog.airlight: input should be 'koschmieder' or 'photons'"),
-        ("ground_albedo=0.2", "ground_albedo goes with airlight: photons"),
+        ("ground_albedo=1.2", "fog.ground_albedo: input should be less than or equal to 1"),
         ("airlight=photons", "even fog in a layer on the ground (visibility_m, top_m), not with outside_visibility_m"),
         ("airlight_shading=-0.1", "fog.airlight_shading: input should be greater than or equal to 0"),
     ],
@@ -104,6 +106,24 @@ def test_airlight_of_photons() -> None:
     assert field.ground_albedo == 0.2
     assert field.airlight[1] == pytest.approx((0.34 + 0.66 * 0.2) * 10_000.0 / math.pi)
     assert fog("visibility_m=100").ground_albedo is None
+
+
+def test_the_land_sets_the_level_of_either_airlight() -> None:
+    even, photons_field = fog("visibility_m=100", "ground_albedo=0.1"), photons("ground_albedo=0.1")
+    assert even.ground_albedo is None
+    assert even.airlight == photons_field.airlight
+    assert even.airlight_share == photons_field.airlight_share == pytest.approx(0.406)
+    assert in_daylight(even, 500.0).airlight[1] == pytest.approx(0.406 * 500.0 / math.pi)
+    assert fog("visibility_m=100").airlight_share == 0.95
+
+
+@pytest.mark.parametrize(("setting", "share"), [("ground_albedo=0.1", 0.406), ("top_m=200", 0.95)])
+def test_drivers_see_vehicles_before_that_level(setting: str, share: float) -> None:
+    sight = driver_sight(
+        load_scenario("motorway_fog_bank", [f"fog={{visibility_m: 100, {setting.replace('=', ': ')}}}"])
+    )
+    assert sight is not None
+    assert sight.airlight_share == pytest.approx(share)
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from fogsim.atmosphere.fog.layer_airlight import horizontal_share
 from fogsim.atmosphere.fog.medium import medium_of
 from fogsim.atmosphere.fog.optical_depth_kernels import extinctions_on_ray
 from fogsim.values import FogField
+from fogsim.values.fog import KOSCHMIEDER_SHARE
 
 AIRLIGHT_TINT = (0.98, 1.0, 1.02)
 """Airlight per channel relative to its luminance: fog droplets are grey, the overcast sky slightly bluish."""
@@ -26,12 +27,12 @@ def airlight_share(ground_albedo: float | None) -> float:
     Parameters
     ----------
     ground_albedo : float or None
-        Albedo of the land around, whose level this then is, for an airlight by elevation; None for Koschmieder's.
+        Albedo of the land around, whose level this then is; None if nothing is said of it.
     """
-    return 0.95 if ground_albedo is None else horizontal_share(ground_albedo)
+    return KOSCHMIEDER_SHARE if ground_albedo is None else horizontal_share(ground_albedo)
 
 
-def airlight_from_illuminance(illuminance: float, share: float = 0.95) -> tuple[float, float, float]:
+def airlight_from_illuminance(illuminance: float, share: float = KOSCHMIEDER_SHARE) -> tuple[float, float, float]:
     """Airlight of fog under an overcast sky, L∞ = share · E_h / π per channel (physics of Koschmieder's closed form).
 
     Parameters
@@ -39,7 +40,7 @@ def airlight_from_illuminance(illuminance: float, share: float = 0.95) -> tuple[
     illuminance : float
         Horizontal illuminance E_h [lx], not negative.
     share : float
-        Airlight relative to a perfectly white horizontal diffuser, 0.8 … 1.0 in overcast fog.
+        Airlight relative to a perfectly white horizontal diffuser; see `airlight_share`.
 
     Returns
     -------

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere import airlight_from_illuminance, airlight_share, layer_thickness
+from fogsim.atmosphere import airlight_from_illuminance, layer_thickness
 from fogsim.errors import InputError
 from fogsim.obstruction import tunnels_of
 from fogsim.scenario.fog import fog_along
@@ -32,8 +32,7 @@ def fog_field(scenario: Scenario, route: NDArray[np.float64], structures: Sequen
         If the airlight is to be that of photons, and there is no such layer, it is denser than is known, or the road
         leads out of it.
     """
-    share = airlight_share(scenario.fog.albedo_of_photons)
-    airlight = airlight_from_illuminance(scenario.light.illuminance_lx, share)
+    airlight = airlight_from_illuminance(scenario.light.illuminance_lx, scenario.fog.airlight_share)
     fog = scripted_fog(scenario.timeline, fog_along(scenario.fog, airlight, route, tunnels_of(structures)))
     if fog.ground_albedo is not None:
         _check_layer(fog, float(route[:, 2].max()) + (scenario.camera.mount_height_m or 0.0))

@@ -3,7 +3,7 @@
 import dataclasses
 import math
 
-from fogsim.atmosphere import airlight_from_illuminance, airlight_share
+from fogsim.atmosphere import airlight_from_illuminance
 from fogsim.camera import USUAL_MOUNTS, AutoExposure, BodyPitch, CameraMount, CameraSensor, Metering, Sensor, Suspension
 from fogsim.scenario.schema import Scenario
 from fogsim.sensors import Gps, LeadSensor
@@ -105,8 +105,7 @@ def sensor(scenario: Scenario) -> Sensor:
         The scenario.
     """
     section = scenario.camera
-    share = airlight_share(scenario.fog.albedo_of_photons)
-    airlight = max(airlight_from_illuminance(scenario.light.illuminance_lx, share))
+    airlight = max(airlight_from_illuminance(scenario.light.illuminance_lx, scenario.fog.airlight_share))
     return Sensor(
         saturation_luminance=section.saturation_luminance_cdpm2 or airlight / AIRLIGHT_EXPOSURE,
         full_well=section.full_well_e,

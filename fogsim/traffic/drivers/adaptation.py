@@ -15,6 +15,7 @@ import numpy as np
 from fogsim.jit import kernel
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim.values.eye import flux_root, luminance_root
+from fogsim.values.fog import KOSCHMIEDER_SHARE
 
 DAY_EYE_THRESHOLD = 1e-3
 """Illuminance at the eye at which a lamp is noticed by day [lx]."""
@@ -26,9 +27,6 @@ A road lit by halogen low beams has 0.5, 0.2, 0.05 cd/m² at 10, 20, 40 m (FHWA,
 appendix I). With it Adrian's φ takes `DAY_EYE_THRESHOLD` to 1.0·10⁻⁵ lx at night, where 10⁻⁶ … 10⁻⁵ lx are known for
 roads at night. It counts for drivers whose own head lamps are dark, too: eyes take minutes to adapt further.
 """
-
-AIRLIGHT_REFLECTANCE = 0.95
-"""Reflectance of a white horizontal surface that would be as bright as the airlight [-]."""
 
 VEHICLE_SIZE = 1.5
 """Size of what a driver looks for [m]: a car's height."""
@@ -42,15 +40,17 @@ _LOG_FLUX_ROOTS = np.log10(flux_root(10.0**_LOG_LUMINANCES))
 _LOG_LUMINANCE_ROOTS = np.log10(luminance_root(10.0**_LOG_LUMINANCES))
 
 
-def airlight_luminance(illuminance: float) -> float:
+def airlight_luminance(illuminance: float, share: float = KOSCHMIEDER_SHARE) -> float:
     """Luminance of fog under an overcast sky [cd/m²].
 
     Parameters
     ----------
     illuminance : float
         Horizontal illuminance [lx].
+    share : float
+        The airlight over that of a white horizontal surface [-].
     """
-    return AIRLIGHT_REFLECTANCE * illuminance / math.pi
+    return share * illuminance / math.pi
 
 
 def _roots(luminance: float) -> tuple[float, float]:
@@ -106,7 +106,7 @@ def contrast_ratio(eyes: Adaptation, distance: float) -> float:
 
 
 @functools.lru_cache(maxsize=256)
-def adaptation(illuminance: float, glare: float = 0.0) -> Adaptation:
+def adaptation(illuminance: float, glare: float = 0.0, share: float = KOSCHMIEDER_SHARE) -> Adaptation:
     """Eyes adapted to the light of the sky, of the own head lamps, and to glare.
 
     Parameters
@@ -115,8 +115,10 @@ def adaptation(illuminance: float, glare: float = 0.0) -> Adaptation:
         Horizontal illuminance of the scene [lx].
     glare : float
         Veil inside the eye from others' head lamps [cd/m²]; see `fogsim.values.eye.veiling_luminance`.
+    share : float
+        See `airlight_luminance`.
     """
-    airlight = airlight_luminance(illuminance)
+    airlight = airlight_luminance(illuminance, share)
     luminance = airlight + HEAD_LAMP_LUMINANCE + glare
     flux, extended = _roots(min(luminance, _DAY_LUMINANCE))
     return Adaptation(airlight, luminance, DAY_EYE_THRESHOLD * (flux / _DAY_FLUX_ROOT) ** 2, flux, extended)

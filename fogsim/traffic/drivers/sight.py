@@ -19,14 +19,15 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fogsim.traffic.drivers.adaptation import AIRLIGHT_REFLECTANCE, Adaptation, adaptation
+from fogsim.traffic.drivers.adaptation import Adaptation, adaptation
 from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST
 from fogsim.traffic.drivers.own_beams import HIGH_BEAM_LIGHT
 from fogsim.traffic.drivers.sight_kernels import DISTANCE_TOLERANCE, depth_limit, judge_leaders, seen_distance
 from fogsim.units import CONTRAST_THRESHOLD, DAY_ILLUMINANCE, luminance_of
+from fogsim.values.fog import KOSCHMIEDER_SHARE
 
 LEAST_CONTRAST = 0.5
-"""No vehicle's rear has less contrast to the airlight than this, not even a white one [-]."""
+"""No vehicle's rear has less contrast to airlight as bright as a white surface than this, not even a white one [-]."""
 
 VERTICAL_ILLUMINANCE = 0.5
 """Illuminance of a vertical surface under an overcast sky over that of a horizontal one [-]."""
@@ -91,12 +92,15 @@ class DriverSight:
         drivers 1 s and more.
     contrast_threshold : float
         Smallest contrast that is noticed by day [-].
+    airlight_share : float
+        The airlight over that of a white horizontal surface [-]: before darker fog, paint stands out less.
     """
 
     illuminance: float
     headlamp_reach: float = 55.0
     reaction_time: float = 1.0
     contrast_threshold: float = CONTRAST_THRESHOLD
+    airlight_share: float = KOSCHMIEDER_SHARE
 
     def depth_limit(
         self,
@@ -130,9 +134,12 @@ class DriverSight:
         seen = float(inherent_contrast), float(intensity), float(head_lamps)
         return depth_limit(eyes, threshold, reach, float(distance), *seen)
 
+    def _adapted(self, glare: float) -> Adaptation:
+        return adaptation(self.illuminance, glare, self.airlight_share)
+
     def _eyes(self, glare: float) -> tuple[Adaptation, float, float]:
         """What kernels are told of eyes and head lamps; whole numbers would be compiled for anew."""
-        return adaptation(self.illuminance, glare), float(self.contrast_threshold), float(self.headlamp_reach)
+        return self._adapted(glare), float(self.contrast_threshold), float(self.headlamp_reach)
 
     def seen_distance(
         self,
@@ -183,7 +190,7 @@ class DriverSight:
         """
         judged = np.empty((2, facing.shape[1]))
         eyes, threshold, reach = self._eyes(0.0)
-        judge_leaders(eyes, threshold, reach, adaptation(self.illuminance, most_glare), facing, horizon, judged)
+        judge_leaders(eyes, threshold, reach, self._adapted(most_glare), facing, horizon, judged)
         return judged[0], judged[1]
 
     def sure_distance(self, maximum_extinction: float, most_glare: float = 0.0) -> float:
@@ -196,7 +203,8 @@ class DriverSight:
         most_glare : float
             Veil inside the eye that there may be at most [cd/m²].
         """
-        return self.seen_distance(maximum_extinction, LEAST_CONTRAST, head_lamps=0.0, glare=most_glare)
+        least = min(LEAST_CONTRAST, inherent_contrast((1.0, 1.0, 1.0), self.airlight_share))
+        return self.seen_distance(maximum_extinction, least, head_lamps=0.0, glare=most_glare)
 
     def hidden_distance(self, minimum_extinction: float, brightest: float = BRIGHTEST) -> float:
         """Distance from which nothing of a vehicle is seen where the fog is nowhere thinner than given [m].
@@ -213,7 +221,7 @@ class DriverSight:
         return self.seen_distance(minimum_extinction, 1.0, brightest, own) + DISTANCE_TOLERANCE
 
 
-def inherent_contrast(paint: tuple[float, float, float]) -> float:
+def inherent_contrast(paint: tuple[float, float, float], airlight_share: float = KOSCHMIEDER_SHARE) -> float:
     """Contrast of a vehicle's rear to the airlight, 0 … 1.
 
     A third of the rear is dark glass, tyres and shadow; the rest is paint under half of the sky.
@@ -222,6 +230,8 @@ def inherent_contrast(paint: tuple[float, float, float]) -> float:
     ----------
     paint : tuple of float
         Linear reflectance, 0 … 1.
+    airlight_share : float
+        The airlight over that of a white horizontal surface [-].
     """
     reflectance = luminance_of(paint) * 2.0 / 3.0
-    return max(0.0, 1.0 - VERTICAL_ILLUMINANCE * reflectance / AIRLIGHT_REFLECTANCE)
+    return max(0.0, 1.0 - VERTICAL_ILLUMINANCE * reflectance / airlight_share)

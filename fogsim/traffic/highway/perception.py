@@ -100,5 +100,5 @@ class VisibleNeighbours:
         # What is behind stands in nobody's own head lamps.
         own = head_lamp_light(int(fleet.lamps(vehicle))) if ahead < 0.0 else 0.0
         glare = high_beam_veil(float(self._fog.extinction(eye + lift))) if own > 1.0 else 0.0
-        contrast = inherent_contrast(fleet.paint(other))
+        contrast = inherent_contrast(fleet.paint(other), self._sight.airlight_share)
         return depth <= self._sight.depth_limit(distance, contrast, lit, own, glare)

@@ -75,7 +75,7 @@ class LeaderSight:
         self._sight = sight
         self._position = vehicle_getter(api, "getPosition3D")
         (self._signals,) = vehicle_getters(api, remote, ("getSignals",))
-        self._vehicles = SeenVehicles(api, remote)
+        self._vehicles = SeenVehicles(api, remote, sight.airlight_share)
         self._glare = OncomingGlare(api, fog, self._vehicles, remote)
         self._most_glare = most_glare(sight.illuminance)
         self._get_minimum_gap = vehicle_getter(api, "getMinGap")

@@ -9,6 +9,7 @@ from fogsim.traffic.drivers.own_beams import head_lamp_light
 from fogsim.traffic.drivers.sight import inherent_contrast
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
+from fogsim.values.fog import KOSCHMIEDER_SHARE
 from fogsim.values.light import MIDDLE_LAMPS, Side, dark_on
 
 OwnLamps = dict[str, int]
@@ -46,9 +47,12 @@ class SeenVehicles:
         The simulation.
     remote : bool
         True where every call is a message to another process: what is asked often is subscribed to.
+    airlight_share : float
+        The airlight that they are seen before, over that of a white horizontal surface [-].
     """
 
-    def __init__(self, api: Api, remote: bool = False) -> None:
+    def __init__(self, api: Api, remote: bool = False, airlight_share: float = KOSCHMIEDER_SHARE) -> None:
+        self._airlight_share = airlight_share
         (self._signals,) = vehicle_getters(api, remote, ("getSignals",))
         self._get_colour = vehicle_getter(api, "getColor")
         self._get_length = vehicle_getter(api, "getLength")
@@ -80,7 +84,7 @@ class SeenVehicles:
         """
         known = self._bodies.get(vehicle)
         if known is None:
-            contrast = inherent_contrast(paint(vehicle, self._get_colour(vehicle)))
+            contrast = inherent_contrast(paint(vehicle, self._get_colour(vehicle)), self._airlight_share)
             length = float(self._get_length(vehicle))
             kind = body_kind(self._get_class(vehicle), self._get_shape(vehicle), length)
             missing = dark_on(int(MIDDLE_LAMPS), Side.MIDDLE) if kind in _NO_THIRD_STOP_LAMP else 0

@@ -76,7 +76,7 @@ class VehicleSight:
         self._hidden_vehicles = HiddenVehicles(api, obstructions, remote) if obstructions else None
         self._fog = fog
         self._sight = sight
-        self._vehicles = SeenVehicles(api, remote)
+        self._vehicles = SeenVehicles(api, remote, sight.airlight_share)
         self._position, self._angle = vehicle_getters(api, remote, ("getPosition3D", "getAngle"))
         self._extinction = fog.maximum_extinction if fog.minimum_extinction == fog.maximum_extinction else None
         self._seen_through_fog = sight.sure_distance(fog.maximum_extinction)

@@ -55,6 +55,20 @@ def test_a_light_vehicle_is_lost_sooner() -> None:
     assert reach(DAY, 100.0, (white, 0.0, 1.0)) < 0.9 * reach(DAY, 100.0, (black, 0.0, 1.0))
 
 
+def test_before_darker_airlight_paint_stands_out_less() -> None:
+    over_fields = DriverSight(10_000.0, airlight_share=0.406)
+    white, black = (inherent_contrast((paint,) * 3, 0.406) for paint in (0.85, 0.0))
+    assert white == pytest.approx(1.0 - 0.85 / 3.0 / 0.406)
+    assert black == 1.0
+    assert reach(over_fields, 100.0, (white, 0.0, 1.0)) == pytest.approx(
+        100.0 * (1.0 + math.log(white) / math.log(20.0)), rel=1e-3
+    )
+    assert over_fields.sure_distance(0.03) < DAY.sure_distance(0.03)
+    assert over_fields.sure_distance(0.03) <= reach(
+        over_fields, 100.0, (inherent_contrast((1.0,) * 3, 0.406), 0.0, 0.0)
+    )
+
+
 def test_in_clear_air_by_day_everything_is_seen_and_at_night_what_the_headlamps_reach() -> None:
     assert DAY.depth_limit(1e6, 0.3, 0.0, 0.0) > 0.0
     assert reach(DARK, math.inf, (1.0, 0.0, 1.0)) == pytest.approx(55.0, abs=1e-3)

@@ -21,7 +21,7 @@ SATURATED_SHARE = 0.02
 UNKNOWN_VIGNETTING = 0.3
 """Standard deviation of a lens's vignetting where the sky does not show it [-]: most pictures are corrected."""
 
-UNEVEN, LEAST_SEEN, MOST_VIGNETTING = 0.02, 0.6, 1.5
+UNEVEN, LEAST_SEEN, MOST_VIGNETTING = 0.02, 0.7, 1.5
 """Deviation of a lens's vignetting by skies that are brighter in the middle, least share of a sky's pixels that must
 show it, and most that it can be [-]."""
 
@@ -69,6 +69,10 @@ class Sky:
         """Whether the sky may be brighter than it looks."""
         return self.clipped > SATURATED_SHARE
 
+
+BRIGHTENS, SEEN_TO_BRIGHTEN = 0.3, 0.6
+"""Slope of a sky upward over its level from which on it surely brightens [1/rad], and least share of its pixels that
+must show that [-]: it is far from what the mean of its rows says."""
 
 SKY_ROWS = 24
 """Rows of sky that are looked at."""
@@ -172,7 +176,7 @@ def _shading(
     found, covariance, seen, scatter = sky_kernels.sky_shading(image, rows, axis, bright, noise)
     level = float(found[0])
     unevenness = scatter / level if level > 0.0 else 0.0
-    if seen < LEAST_SEEN or level <= 0.0:
+    if seen < (SEEN_TO_BRIGHTEN if found[2] > BRIGHTENS * level else LEAST_SEEN) or level <= 0.0:
         return replace(unseen, unevenness=unevenness)
     vignetting = min(max(float(found[4]) / level, 0.0), MOST_VIGNETTING)
     deviation = min(math.hypot(UNEVEN, math.sqrt(covariance[4, 4]) / level), UNKNOWN_VIGNETTING)

@@ -177,9 +177,13 @@ def saturation(image: LinearPixels, rows: NDArray[np.int64], side: int) -> tuple
 SHADING_SCALES = (0.06, 0.02, 0.006, 0.006)
 """Deviations beyond which a pixel weighs little in each iteration of the fit of a sky's shading, relative to it [-]."""
 
-TILT, BRIGHTENING, BENDING, VIGNETTING = 0.3, 1.5, 4.0, 0.5
-"""Standard deviations of a sky's slopes sideways and upward [1/rad], of the bend of the latter [1/rad²], and of its
-fall toward the corners [-], before it is looked at, relative to it."""
+TILT, BRIGHTENING, VIGNETTING = 0.3, 1.5, 0.5
+"""Standard deviations of a sky's slopes sideways and upward [1/rad], and of its fall toward the corners [-], before it
+is looked at, relative to it."""
+
+LEAST_BEND, BENDING = 0.1, 2.5
+"""Standard deviation of the bend of a sky's slope upward where there is none, relative to the sky [1/rad²], and that of
+the bend over a slope [1/rad]."""
 
 SHADING_COLS = 32
 """Pixels of each row that are looked at."""
@@ -229,7 +233,8 @@ def sky_shading(
         spread = (relative * level) ** 2 + (2.0 * noise) ** 2
         normal, right = np.zeros((5, 5)), np.zeros(5)
         normal[0, 0] = 1e-6
-        for a, deviation in ((1, TILT), (2, BRIGHTENING), (3, BENDING), (4, VIGNETTING)):
+        bend = LEAST_BEND + BENDING * abs(found[2]) / level
+        for a, deviation in ((1, TILT), (2, BRIGHTENING), (3, bend), (4, VIGNETTING)):
             normal[a, a] = spread / (deviation * level) ** 2
         number, squares = _add_sky(seen, aside, height, above_axis, found, spread, normal, right)
         inverse = inverse_of(normal)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.vision.strips import albedo_filter, joint_kernels
+from fogsim.vision.strips import albedo_filter, joint_kernels, joint_start_kernels
 from fogsim.vision.strips.airlight_slopes import darkening_of_bins, slope_cost
 from fogsim.vision.strips.albedo_filter import Albedo
 from fogsim.vision.strips.joint_kernels import PARAMETERS, Bins, JointPrior, Solution
@@ -228,7 +228,7 @@ def _from_search(bins: Bins, prior: JointPrior) -> Solution:
     grid = _grid(bins, EXTINCTIONS)
     for airlight in airlights:
         around = prior._replace(airlight=airlight)
-        cost = joint_kernels.extinction_costs(bins, under_sky(ALBEDOS[1], prior), grid, around)
+        cost = joint_start_kernels.extinction_costs(bins, under_sky(ALBEDOS[1], prior), grid, around)
         best = int(np.argmin(cost))
         new = all(abs(math.log(grid[best] / k)) > ALIKE for k, _ in starts)
         if math.isfinite(cost[best]) and new:
@@ -238,7 +238,7 @@ def _from_search(bins: Bins, prior: JointPrior) -> Solution:
 
 
 def _constant_albedo(bins: Bins, prior: JointPrior) -> tuple[float, float]:
-    return joint_kernels.fit_constant_albedo(bins, _grid(bins, SIMPLE_EXTINCTIONS), prior)
+    return joint_start_kernels.fit_constant_albedo(bins, _grid(bins, SIMPLE_EXTINCTIONS), prior)
 
 
 def _grid(bins: Bins, count: int) -> Floats:
@@ -255,7 +255,7 @@ def _span(bins: Bins) -> tuple[float, float]:
 def _refined_from(bins: Bins, prior: JointPrior, start: tuple[float, float], shift: float) -> Solution:
     theta = [*start, shift, 0.0]
     if prior.rise.size:
-        theta.append(joint_kernels.darkness_by_sky(prior, start[0], bins.eye)[0])
+        theta.append(joint_start_kernels.darkness_by_sky(prior, start[0], bins.eye)[0])
     return _refined(bins, ALBEDOS[0], prior, np.array(theta), STEPS)
 
 

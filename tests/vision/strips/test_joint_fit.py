@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from fogsim.vision.strips.joint_fit import ALBEDOS, agree, fit_agreeing, fit_jointly, fit_own, strip_bins
-from fogsim.vision.strips.joint_kernels import extinction_costs, fit_constant_albedo, mean_transmittance
+from fogsim.vision.strips.joint_kernels import mean_transmittance
+from fogsim.vision.strips.joint_start_kernels import extinction_costs, fit_constant_albedo
 from tests.vision.strips.koschmieder_strips import AIRLIGHT, GEOMETRY, PRIOR, curves
 
 

@@ -76,6 +76,7 @@ class SeesFrom:
     distance: float
     reaction_time: float = 0.0
     illuminance: float = 0.0
+    airlight_share: float = 0.95
 
     def sure_distance(self, *_: float) -> float:
         return self.distance - 10.0

@@ -19,9 +19,9 @@ from fogsim.vision.strips.sky import Sky
 
 Floats = NDArray[np.float64]
 
-LEAST_SLOPE, SURELY = 0.1, 2.0
-"""Least slope of a sky, over its level [1/rad], and least in its standard deviations, for the airlight to be taken for
-uneven: even fog has none."""
+LEAST_SLOPE, SURELY = 0.6, 2.0
+"""Least slope of a sky over its level [1/rad], and least in its standard deviations, for the airlight to be taken for
+uneven. Over snow it is less, and hardly matters; rows of houses that fog hides upward have up to 0.5."""
 
 OTHER_LIGHT = 0.2
 """Relative deviation of the sky's slope by what else differs: the sky above the fog, droplets, land that is not even

@@ -2,16 +2,18 @@
 
 import os
 import signal
+import sys
 import threading
 import time
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 from early_motorway import EARLY
 
 import fogsim
 from fogsim import interruption
-from fogsim.interruption import Interruption, interruptible
+from fogsim.interruption import Interruption, ProgramSignals, interruptible
 
 
 def raise_as_numba_does() -> None:
@@ -90,6 +92,25 @@ def test_an_exception_that_is_lost_is_raised_again(monkeypatch: pytest.MonkeyPat
         signal.signal(signal.SIGALRM, alarm)
         signal.setitimer(signal.ITIMER_REAL, *timer)
     assert lost == [True]
+
+
+class Unraisable(NamedTuple):
+    """What a hook for exceptions of destructors is told, as far as it is looked at."""
+
+    exc_type: type[BaseException]
+
+
+def test_what_a_signal_has_left_half_made_complains_to_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[type[BaseException]] = []
+    monkeypatch.setattr(sys, "__unraisablehook__", lambda unraisable: told.append(unraisable.exc_type))
+    signals = ProgramSignals()
+    for error in (AttributeError, ValueError):
+        signals._note_unraisable(Unraisable(error))
+    assert told == [AttributeError, ValueError]
+    signals.last = signal.SIGINT
+    for error in (AttributeError, ValueError):
+        signals._note_unraisable(Unraisable(error))
+    assert told == [AttributeError, ValueError, ValueError]
 
 
 def test_an_error_that_a_library_has_made_of_a_signal_is_an_interruption() -> None:

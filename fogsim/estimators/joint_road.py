@@ -236,7 +236,7 @@ class JointRoad:
         curves = whole if math.isfinite(told) else curves
         # Where a sag or crest is not quite followed, the road fades as in fog that changes along the way.
         uneven = even_fog(fit, self._geometry)
-        if not course.sag.any() and fit.darker < DARKENS:
+        if not course.sag.any() and fit.darkening_chance < DARKENS:
             seen = self._averaged(curves, sky)
             uneven = fit_uneven(seen, self._geometry, priors[0], own, fit, bool(course.bend.any()))
         return self._doubt(uneven, sky, curves, free, told) or uneven
@@ -299,7 +299,7 @@ class JointRoad:
         extinction = max(fit.extinction, 0.0)
         if extinction > 0:
             found["inflection_row"] = horizon + 0.5 * extinction * self._camera.row_distance
-        found["evenness"], found["darkening"] = uneven.even, fit.darker
+        found["evenness"], found["darkening"] = uneven.even, fit.darkening_chance
         return Estimate(
             self.method,
             extinction,

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
 from fogsim.vision.strips.joint_kernels import JointPrior
+from fogsim.vision.strips.joint_start_kernels import darkness_of_slope
 from fogsim.vision.strips.sky import Sky
 
 Floats = NDArray[np.float64]
@@ -198,7 +199,7 @@ def row_airlight(sky: Sky, camera: Camera) -> RowAirlight | None:
     chances = np.array(DROPLET_CHANCES)
     lines = [_lines(droplets, *sky.heights) for droplets in range(len(chances))]
     relative = sky.slope / sky.luminance
-    darker = np.array([relative / max(rise[level] - relative * above[level], 1e-3) for rise, above in lines])
+    darker = [darkness_of_slope(relative, rise[level], above[level]) for rise, above in lines]
     angle = np.arctan((camera.horizon_row - np.arange(camera.height)) / camera.focal_length)
     at = np.abs(angle)
     shapes = [

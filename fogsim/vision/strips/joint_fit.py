@@ -100,7 +100,7 @@ class JointFit:
         Bins that took part.
     hidden : (n,) bool
         Bins of the first strip that lie behind an obstacle which stands on it.
-    darker : float
+    darkening_chance : float
         How likely the airlight darkens toward the road [-].
     """
 
@@ -112,7 +112,7 @@ class JointFit:
     misfit: float
     used: NDArray[np.bool_]
     hidden: NDArray[np.bool_]
-    darker: float = 0.0
+    darkening_chance: float = 0.0
 
 
 Priors = tuple[JointPrior, ...]
@@ -300,7 +300,7 @@ def _average(answers: list[_Answer]) -> JointFit:
         misfit=best.misfit,
         used=best.used == albedo_filter.USED,
         hidden=best.used[0] == albedo_filter.HIDDEN,
-        darker=float(weight[[not answer.is_even for answer in answers]].sum()),
+        darkening_chance=float(weight[[not answer.is_even for answer in answers]].sum()),
     )
 
 

@@ -23,6 +23,21 @@ GRAINY = 0.01
 
 
 @kernel
+def darkness_of_slope(slope: float, rise: float, above: float) -> float:
+    """By how much the airlight darkens toward the road below a sky of some slope.
+
+    Parameters
+    ----------
+    slope : float
+        Of the sky over its level [1/rad]: its slope is A m rise and its level A (1 + m above), where m is returned.
+    rise, above : float
+        See `fogsim.vision.strips.joint_kernels.JointPrior`.
+    """
+    share = min(max(slope, 0.0) / rise, 5.0)
+    return min(share / max(1.0 - share * above, 0.2), MOST_DARKER)
+
+
+@kernel
 def darkness_by_sky(prior: JointPrior, k: float, eye: float) -> tuple[float, float]:
     """By how much the airlight darkens toward the road, as the sky tells it, and its level at the horizon."""
     if prior.rise.size == 0:
@@ -30,9 +45,7 @@ def darkness_by_sky(prior: JointPrior, k: float, eye: float) -> tuple[float, flo
     level, on = eye_level(k, eye, prior.rise.size)
     rise = prior.rise[level] + on * (prior.rise[level + 1] - prior.rise[level])
     above = prior.level[level] + on * (prior.level[level + 1] - prior.level[level])
-    # slope = A m rise and level = A (1 + m above).
-    share = min(max(prior.slope / prior.airlight, 0.0) / rise, 5.0)
-    darker = min(share / max(1.0 - share * above, 0.2), MOST_DARKER)
+    darker = darkness_of_slope(prior.slope / prior.airlight, rise, above)
     return darker, prior.airlight / (1.0 + darker * above)
 
 

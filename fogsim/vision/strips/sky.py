@@ -74,8 +74,8 @@ BRIGHTENS, SEEN_TO_BRIGHTEN = 0.6, 0.6
 """Slope of a sky upward over its level from which on it surely brightens [1/rad], and least share of its pixels that
 must show that [-]: it is far from what the mean of its rows says."""
 
-HOUSES = 0.026
-"""Unevenness of a sky from which on it tells nothing of a lens's vignetting [-]."""
+LENS_UNEVENNESS = 0.026
+"""Unevenness of a sky up to which it tells of a lens's vignetting [-]."""
 
 SKY_ROWS = 24
 """Rows of sky that are looked at."""
@@ -181,11 +181,11 @@ def _shading(
     unevenness = scatter / level if level > 0.0 else 0.0
     if seen < (SEEN_TO_BRIGHTEN if found[2] > BRIGHTENS * level else LEAST_SEEN) or level <= 0.0:
         return replace(unseen, unevenness=unevenness)
-    if unevenness > HOUSES:
-        # What looks like a lens's shade are houses on both sides, which fade upward.
-        found[4], covariance[4, 4] = 0.0, (UNKNOWN_VIGNETTING * level) ** 2
-    vignetting = min(max(float(found[4]) / level, 0.0), MOST_VIGNETTING)
-    deviation = min(math.hypot(UNEVEN, math.sqrt(covariance[4, 4]) / level), UNKNOWN_VIGNETTING)
+    vignetting, deviation = 0.0, UNKNOWN_VIGNETTING
+    # What looks like a lens's shade under a more uneven sky are houses on both sides, which fade upward.
+    if unevenness <= LENS_UNEVENNESS:
+        vignetting = min(max(float(found[4]) / level, 0.0), MOST_VIGNETTING)
+        deviation = min(math.hypot(UNEVEN, math.sqrt(covariance[4, 4]) / level), UNKNOWN_VIGNETTING)
     # Mean slope over the heights that are seen.
     ends = float(height.min() + height.max())
     variance = covariance[2, 2] + 2.0 * ends * covariance[2, 3] + ends**2 * covariance[3, 3]

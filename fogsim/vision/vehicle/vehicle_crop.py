@@ -262,7 +262,7 @@ def daytime_crop(image: Pixels, camera: Camera, depth: float, pitch_deviation: f
         camera,
         depth,
         luminance,
-        partial(_daylight, _Day(pixels, camera, margin, sky, airlight, luminance), depth),
+        partial(_daylight, _DaytimeFrame(pixels, camera, margin, sky, airlight, luminance), depth),
         least_noise=0.3 * 255.0 / 2**camera.bits,
         share=None if airlight is None else airlight.share,
     )
@@ -284,7 +284,7 @@ def _levelled_out(pixels: LinearPixels, airlight: RowAirlight, rows: slice, cols
     return np.asarray(_luminance(pixels, rows, cols) / share[:, None], np.float32)
 
 
-class _Day(NamedTuple):
+class _DaytimeFrame(NamedTuple):
     """A frame, the margin below its sky [px], that sky, and the airlight of its rows where that is not even."""
 
     pixels: LinearPixels
@@ -295,7 +295,7 @@ class _Day(NamedTuple):
     luminance_of: Callable[[slice, slice], Luminance]
 
 
-def _daylight(day: _Day, depth: float) -> SkyReading:
+def _daylight(day: _DaytimeFrame, depth: float) -> SkyReading:
     """Sky by day, or the reason why this is none."""
     pixels, camera, margin, sky = day.pixels, day.camera, day.margin, day.sky
     if sky is None or sky.luminance < MIN_AIRLIGHT:

@@ -98,8 +98,8 @@ def test_strips_over_dark_land_come_back_and_even_airlight_reads_them_too_long(v
     assert np.median([fit.extinction for fit in fits]) == pytest.approx(k, rel=0.08)
     evens = [fit_jointly(strips(k, albedo, seed), GEOMETRY, (PRIOR,)) for seed in range(6)]
     assert np.median([fit.extinction for fit in evens]) < (0.96 if albedo < 0.5 else 0.99) * k
-    assert np.median([fit.darker for fit in fits]) > 0.9
-    assert {fit.darker for fit in evens} == {0.0}
+    assert np.median([fit.darkening_chance for fit in fits]) > 0.9
+    assert {fit.darkening_chance for fit in evens} == {0.0}
 
 
 def test_even_airlight_under_a_sky_that_brightens_is_told_by_the_road():
@@ -109,7 +109,7 @@ def test_even_airlight_under_a_sky_that_brightens_is_told_by_the_road():
     for visibility in (60.0, 150.0):
         fits = [fit_jointly(curves(3.0 / visibility, seed), GEOMETRY, priors) for seed in range(4)]
         assert np.median([fit.extinction for fit in fits]) == pytest.approx(3.0 / visibility, rel=0.04)
-        assert max(fit.darker for fit in fits) < 0.5
+        assert max(fit.darkening_chance for fit in fits) < 0.5
 
 
 def test_under_an_even_or_clipped_sky_the_airlight_counts_as_even():

@@ -1,7 +1,8 @@
 """Error of estimates on grades, in sags and over crests, and in bends.
 
 Grades are those of a drive through ``graded_motorway``: a frame counts to a grade if the road keeps it for the next
-150 m, else to a sag or a crest. Bends of 400 and 800 m to either side are drawn by a renderer that is not FogSim's
+150 m, else to a sag or a crest; where it ends within V_met (at least 250 m), grass lies behind it, and the frame counts
+as of the end. Bends of 400 and 800 m to either side are drawn by a renderer that is not FogSim's
 (`tests/pictures/flat_road.py`), level and in a sag, for four cameras whose pitch is off by 0.1°. For each visibility,
 kind of road and method: frames, share of valid ones, median of the error of V_met [%] with its sign, median and 95th
 percentile of its amount, and how often the 90 % interval held the truth. ``belief`` is what the grid filter makes of
@@ -36,6 +37,9 @@ SCENARIO = "graded_motorway"
 METHODS = ("joint_road", "negru2013", "zhu2015", "huang2015")
 AHEAD = 150.0
 """How far the road must keep its grade [m]."""
+END = 250.0
+"""Least way before the road's end on which its end shows [m]."""
+
 CURVED = 0.002
 """Change of the grade on the way from which the road is a sag or a crest [-]."""
 
@@ -61,8 +65,10 @@ class Profile:
         self._station = np.cumsum(np.linalg.norm(steps, axis=1))
         self._grade = steps[:, 2] / np.hypot(steps[:, 0], steps[:, 1])
 
-    def kind(self, station: float) -> str:
-        """What the road ahead of a place is."""
+    def kind(self, station: float, visibility: float) -> str:
+        """What the road ahead of a place is, as far as one sees [m]."""
+        if station + max(visibility, END) > self._station[-1]:
+            return "end"
         here, there = np.searchsorted(self._station, (station, station + AHEAD)).clip(max=len(self._grade) - 1)
         change = float(self._grade[there] - self._grade[here])
         if abs(change) > CURVED:
@@ -87,7 +93,7 @@ def drive(visibility: float, seed: int, duration: float) -> dict[tuple[str, str]
     found: dict[tuple[str, str], list[Found | None]] = {}
     for step in fogsim.run(fogsim.load_scenario(SCENARIO, settings), seed):
         for name, one in found_in(step):
-            found.setdefault((profile.kind(step.route_position), name), []).append(one)
+            found.setdefault((profile.kind(step.route_position, visibility), name), []).append(one)
     return found
 
 

@@ -124,13 +124,14 @@ def _follow_a_bend(camera: "Camera") -> None:
     """Lay strips along a road that bends and sags, which that of the pictures does not."""
     import numpy as np
 
-    from fogsim.vision.lines.road_course import RoadCourse
+    from fogsim.vision.lines.horizon import Horizon
+    from fogsim.vision.lines.road_course import unseen_course
     from fogsim.vision.lines.road_course_kernels import PIECES
     from fogsim.vision.strips.course_geometry import course_geometry
     from fogsim.vision.strips.strip_geometry import strip_geometry
 
-    curved, unknown = np.full(PIECES, 1e-4), np.zeros((PIECES, PIECES))
-    course = RoadCourse(camera.principal_point[0], camera.horizon_row, curved, curved, np.eye(1 + PIECES), unknown, 2)
+    curved = np.full(PIECES, 1e-4)
+    course = dataclasses.replace(unseen_course(camera, Horizon(camera.horizon_row, 0.3)), sag=curved, bend=curved)
     course_geometry(strip_geometry(camera, 1.0), camera, course)
 
 

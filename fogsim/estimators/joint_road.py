@@ -27,6 +27,7 @@ from fogsim.vision.lines.road_lines import seen_lines, vanishing_point_of
 from fogsim.vision.strips.airlight_edge import airlight_edge
 from fogsim.vision.strips.airlight_slopes import darkening_priors
 from fogsim.vision.strips.course_geometry import course_deviation, course_geometry
+from fogsim.vision.strips.hidden_course import HiddenCourse
 from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, no_road
 from fogsim.vision.strips.joint_fit import MODEL_DEVIATION, JointFit, Priors, fit_own, with_neighbours
 from fogsim.vision.strips.joint_prior import joint_prior
@@ -238,7 +239,8 @@ class JointRoad:
         uneven = even_fog(fit, self._geometry)
         if not course.sag.any() and fit.darkening_chance < DARKENS:
             seen = self._averaged(curves, sky)
-            uneven = fit_uneven(seen, self._geometry, priors[0], own, fit, bool(course.bend.any()))
+            hidden = HiddenCourse(self._straight, self._camera, course)
+            uneven = fit_uneven(seen, self._geometry, priors[0], own, fit, hidden)
         return self._doubt(uneven, sky, curves, free, told) or uneven
 
     def _usable(self, curves: StripCurves, sky: Sky, lowest: int) -> StripCurves:

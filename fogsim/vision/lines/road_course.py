@@ -14,7 +14,6 @@ from fogsim.vision.lines.horizon import Horizon
 from fogsim.vision.lines.road_course_kernels import (
     BEND,
     COLUMN,
-    KNOTS,
     LIMITS,
     PIECES,
     ROW,
@@ -27,16 +26,12 @@ from fogsim.vision.lines.road_course_kernels import (
 from fogsim.vision.lines.road_line_kernels import LEAST_TURN, Points, RoadLines
 from fogsim.vision.lines.road_lines import AGREES, SeenLines, straight_lines
 from fogsim.vision.lines.row_edges import RIDGE, may_lie_on_road, row_points
+from fogsim.vision.lines.sags_ahead import SagsAhead, curvature_covariance, sag_covariance, unseen_sags
 
 Floats = NDArray[np.float64]
 
-SAG_DEVIATION, BEND_DEVIATION = 1.0 / 8000.0, 1.0 / 500.0
-"""Standard deviations of vertical and of horizontal curvature where a road is curved [1/m]. Least radii of
-crests and sags are 5000 … 13 000 m and 2600 … 8800 m on motorways, 3000 … 8000 m and 2000 … 4000 m on roads outside
-towns (RAA 2008, RAL 2012; from memory)."""
-
-SAG_LENGTH, BEND_LENGTH = 150.0, 400.0
-"""Lengths over which vertical and horizontal curvature change [m]."""
+BEND_DEVIATION, BEND_LENGTH = 1.0 / 500.0, 400.0
+"""Standard deviation of horizontal curvature where a road is curved [1/m], and the length over which it changes [m]."""
 
 CURVED_SHARE = 0.3
 """Share of roads' length in sags and on crests, and of that in bends, that matter [-]."""
@@ -84,6 +79,8 @@ class RoadCourse:
         Of the horizontal curvatures, where the road bends; else 0 [1/m²].
     lines : int
         How many lines showed it; 0 for what is known without any.
+    ahead : SagsAhead
+        What is known of sags and crests that may begin farther on.
     """
 
     column: float
@@ -93,6 +90,7 @@ class RoadCourse:
     covariance: Floats
     bend_covariance: Floats
     lines: int
+    ahead: SagsAhead
 
     @property
     def is_straight(self) -> bool:
@@ -122,10 +120,17 @@ def unseen_course(camera: Camera, horizon: Horizon) -> RoadCourse:
     """
     covariance = np.zeros((1 + PIECES, 1 + PIECES))
     covariance[0, 0] = horizon.standard_deviation**2
-    covariance[1:, 1:] = CURVED_SHARE * _curvatures(SAG_DEVIATION, SAG_LENGTH)
+    covariance[1:, 1:] = CURVED_SHARE * sag_covariance()
     straight = np.zeros(PIECES)
     return RoadCourse(
-        camera.principal_point[0], horizon.row, straight, straight, covariance, np.zeros((PIECES, PIECES)), 0
+        column=camera.principal_point[0],
+        row=horizon.row,
+        sag=straight,
+        bend=straight,
+        covariance=covariance,
+        bend_covariance=np.zeros((PIECES, PIECES)),
+        lines=0,
+        ahead=unseen_sags(horizon.row, horizon.standard_deviation),
     )
 
 
@@ -193,14 +198,15 @@ def _middle(lines: RoadLines) -> float:
 def _course(fit: CourseFit, camera: Camera, horizon: Horizon) -> RoadCourse:
     """Weigh a curved road with a straight one."""
     unknown, covariance = fit.unknown, fit.covariance
-    bent = _share(unknown[BEND:], covariance[BEND:, BEND:], _curvatures(BEND_DEVIATION, BEND_LENGTH))
+    bent = _share(unknown[BEND:], covariance[BEND:, BEND:], curvature_covariance(BEND_DEVIATION, BEND_LENGTH))
     if bent < SHOWN:
         unknown, covariance = _without(unknown, covariance, slice(BEND, SLOPE))
-    sagging = _share(unknown[SAG:BEND], covariance[SAG:BEND, SAG:BEND], _curvatures(SAG_DEVIATION, SAG_LENGTH))
-    flat, flat_covariance = _without(unknown, covariance, slice(SAG, BEND))
     kept = np.array([ROW, *range(SAG, BEND)])
+    ahead = SagsAhead(unknown[kept] + horizon.row * (kept == ROW), covariance[np.ix_(kept, kept)])
+    sagging = _share(unknown[SAG:BEND], covariance[SAG:BEND, SAG:BEND], sag_covariance())
+    flat, flat_covariance = _without(unknown, covariance, slice(SAG, BEND))
     apart = (unknown - flat)[kept]
-    within = sagging * covariance[np.ix_(kept, kept)] + (1.0 - sagging) * flat_covariance[np.ix_(kept, kept)]
+    within = sagging * ahead.covariance + (1.0 - sagging) * flat_covariance[np.ix_(kept, kept)]
     if sagging < SHOWN:
         unknown, share = flat, sagging
     else:
@@ -213,6 +219,7 @@ def _course(fit: CourseFit, camera: Camera, horizon: Horizon) -> RoadCourse:
         covariance=within + share * apart[:, None] * apart[None, :],
         bend_covariance=covariance[BEND:, BEND:].copy(),
         lines=fit.lines,
+        ahead=ahead,
     )
 
 
@@ -259,12 +266,6 @@ def _precision(camera: Camera, row_deviation: float) -> Floats:
     """Inverse covariance of the fit's unknowns before the lines are seen; it belongs to all who ask."""
     out = np.zeros((SLOPE, SLOPE))
     out[COLUMN, COLUMN], out[ROW, ROW] = (TANGENT * camera.focal_length) ** -2, row_deviation**-2
-    out[SAG:BEND, SAG:BEND] = inverse_of(_curvatures(SAG_DEVIATION, SAG_LENGTH))
-    out[BEND:, BEND:] = inverse_of(_curvatures(BEND_DEVIATION, BEND_LENGTH))
+    out[SAG:BEND, SAG:BEND] = inverse_of(sag_covariance())
+    out[BEND:, BEND:] = inverse_of(curvature_covariance(BEND_DEVIATION, BEND_LENGTH))
     return out
-
-
-def _curvatures(deviation: float, length: float) -> Floats:
-    """Covariance of the pieces' curvatures on a curved road [1/m²]."""
-    knots = np.array(KNOTS[:-1])
-    return np.asarray(deviation**2 * np.exp(-np.abs(knots[:, None] - knots) / length))

@@ -13,7 +13,7 @@ from fogsim.vision.lines.row_edges import FALLING, RIDGE, RISING
 
 Floats = NDArray[np.float64]
 
-KNOTS = (0.0, 40.0, 80.0, 120.0, 200.0)
+KNOTS = (0.0, 40.0, 80.0, 120.0, 200.0, 320.0, 500.0)
 """Distances between which the road has a curvature of its own [m]; behind the last it is straight."""
 
 PIECES = len(KNOTS) - 1

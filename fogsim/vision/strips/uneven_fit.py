@@ -7,9 +7,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
-from fogsim.vision.strips import joint_fit, joint_kernels, uneven_kernels
-from fogsim.vision.strips.albedo_filter import HIDDEN, HIDDEN_COST, LEFT_OUT_COST, USED
-from fogsim.vision.strips.fog_nodes import BROAD, MEAN, NODES, UNEVENNESS, bank_nodes, fog_nodes
+from fogsim.vision.strips import joint_fit, uneven_kernels
+from fogsim.vision.strips.albedo_filter import HIDDEN, USED
+from fogsim.vision.strips.fog_evidence import (
+    UNEVEN_CHANCES,
+    EvenFog,
+    even_fog_over,
+    hidden_cost,
+    left_out,
+    of_each_bin,
+    thinned_bins,
+)
+from fogsim.vision.strips.fog_nodes import NODES, UNEVENNESS, bank_nodes, fog_nodes
+from fogsim.vision.strips.hidden_course import HiddenCourse
 from fogsim.vision.strips.joint_fit import ALBEDO_CHANCES, ALBEDOS, JointFit
 from fogsim.vision.strips.joint_kernels import Bins, JointPrior, Solution
 from fogsim.vision.strips.strip_curves import StripCurves
@@ -20,9 +30,6 @@ Floats = NDArray[np.float64]
 
 BANK_CHANCE = 0.01
 """How likely it is that a bank begins at a node [-]."""
-
-UNEVEN_CHANCES = (0.1, 0.05, 0.05, 0.05, 0.05)
-"""How likely each is beforehand; even fog is the rest [-]."""
 
 FIRST_BANK, LEAST_RISE = 5, 0.3
 """Node from which on a bank may begin, and least rise of ln k in a first fit for one to be tried [-]."""
@@ -46,20 +53,17 @@ BENT = 30.0
 NEAREST = 12.0
 """Least reach of a curve of optical depths [m]."""
 
-NEAR, TOGETHER = 30.0, 3
-"""Distance up to which bins are taken together [m], and how many."""
-
 FREE = 0.9
 """Share of bins in use from which on even fog needs no obstacles [-]."""
 
 SURELY_EVEN_SHARE = 0.99
 """Chance of even fog beyond which only that counts [-]."""
 
+UNSURE = -2.0 * math.log(1.0 - SURELY_EVEN_SHARE)
+"""By how much the cost of uneven fog may lie above that of even fog for the road's course to be doubted [-]."""
+
 STEPS, MORE_STEPS = 12, 8
 """Most Gauss–Newton steps of a first fit, and from one answer to the next."""
-
-OBSTACLE_CHANCE = 0.01
-"""How likely it is that an obstacle that no sensor tells begins in a lane at one of its rows [-]."""
 
 SWALLOWED = 1.0
 """Least optical depth of what is seen for fog ahead to be called denser [-]: it swallows most of the road there. Over
@@ -71,9 +75,6 @@ LEAST_ROAD = 0.3
 EXPLAINS, FEW = 0.5, 3
 """Share of the bins that even fog leaves out, and number of them, that uneven fog may leave out and be believed: else
 what is there is an obstacle to both [-]."""
-
-STRANGE = 2.0
-"""What an outlier adds to a cost beside its luminance's chance, where even fog is weighed against uneven [-]."""
 
 DENSER, SURELY_DENSER = math.log(2.5), 2.5
 """Rise of ln k from the near road on, beyond which fog ahead is denser, and its least in standard deviations [-]."""
@@ -122,7 +123,7 @@ def fit_uneven(
     prior: JointPrior,
     own: JointFit,
     even: JointFit,
-    bent: bool = False,
+    hidden: HiddenCourse,
 ) -> UnevenFit:
     """Fit strips with fog that may be uneven, weighed against even fog.
 
@@ -138,14 +139,14 @@ def fit_uneven(
         Sky and horizon.
     own, even : JointFit
         Fits of even fog to the own lane, and to all lanes that agree with it.
-    bent : bool
-        Whether the strips follow a road that bends, and may leave it far away.
+    hidden : HiddenCourse
+        Sags and crests that the road may have where its lines do not show them.
     """
     if even.used.mean() < LEAST_ROAD:
         return even_fog(even, geometry)
-    found = _fitted(curves, geometry, prior, even, bent)
+    found = _fitted(curves, geometry, prior, even, hidden)
     if found is not None and not _fits_all(even, curves):
-        lane = _fitted(curves.only([0]), geometry.only([0]), prior, own, bent)
+        lane = _fitted(curves.only([0]), geometry.only([0]), prior, own, hidden)
         if not _agree(even_fog(own, geometry) if lane is None else lane, found):
             found = lane
     return even_fog(even, geometry) if found is None else found
@@ -168,15 +169,14 @@ def _agree(own: UnevenFit, more: UnevenFit) -> bool:
 
 
 def _fitted(
-    curves: StripCurves, geometry: StripGeometry, prior: JointPrior, even: JointFit, bent: bool
+    curves: StripCurves, geometry: StripGeometry, prior: JointPrior, even: JointFit, hidden: HiddenCourse
 ) -> UnevenFit | None:
     """Fit of uneven fog, or None if even fog suffices."""
-    bins = _thinned(joint_fit.strip_bins(curves, geometry, prior))
+    bins = thinned_bins(joint_fit.strip_bins(curves, geometry, prior))
     farthest = float((bins.path / bins.below)[bins.noise > 0].max())
     count = min(sum(node < farthest for node in NODES) + 1, len(NODES))
-    start = np.array([max(even.extinction, 1e-5), even.airlight, even.shift, 0.0])
-    costs, left_out = zip(*(_even(bins, albedo, prior, start) for albedo in range(len(ALBEDOS))), strict=True)
-    evens = [cost - BENT * bent for cost in costs]
+    flat = [even_fog_over(bins, albedo, prior, even) for albedo in range(len(ALBEDOS))]
+    evens = [one.cost - BENT * hidden.is_bent for one in flat]
     likely = int(np.argmin(evens))
     first = uneven_kernels.first_profile(bins, fog_nodes(*UNEVENNESS[0], count).nodes, prior)
     begin = np.concatenate([first, [prior.airlight, prior.shift, 0.0]])
@@ -190,55 +190,18 @@ def _fitted(
         if unevenness not in (GENTLE, FIRST_UNEVEN):
             tried.append(_uneven(bins, likely, prior, unevenness, begin, MORE_STEPS))
     best = min(tried, key=lambda t: t.cost)
-    if _left_out(best.solution, bins) > max(EXPLAINS * left_out[likely], FEW):
+    if left_out(best.solution, bins) > max(EXPLAINS * flat[likely].left_out, FEW):
         return None
     for albedo, cost in enumerate(evens):
         if albedo != likely and cost < evens[likely] + UNLIKELY:
             tried.append(_candidate(bins, albedo, prior, best.fog, best.chance, best.solution.theta, MORE_STEPS))
-    return _weighed(even, evens, tried, bins, geometry)
-
-
-def _taken_together(distance: Floats) -> int:
-    """How many of the nearest bins are taken together."""
-    return int((distance < NEAR).sum()) // TOGETHER * TOGETHER
-
-
-def _of_each(used: NDArray[np.bool_], distance: Floats) -> NDArray[np.bool_]:
-    """(strips, n) bool of the thinned bins, for each of all bins."""
-    near = _taken_together(distance)
-    groups = near // TOGETHER
-    return np.concatenate([np.repeat(used[:, :groups], TOGETHER, axis=1), used[:, groups:]], axis=1)
-
-
-def _thinned(bins: Bins) -> Bins:
-    """Bins of the near road taken together by threes: there fog varies little from bin to bin."""
-    near = _taken_together(bins.distance)
-    if near == 0:
-        return bins
-
-    def mean(values: Floats) -> Floats:
-        grouped = values[..., :near].reshape(*values.shape[:-1], -1, TOGETHER).mean(axis=-1)
-        return np.ascontiguousarray(np.concatenate([grouped, values[..., near:]], axis=-1))
-
-    seen = (bins.noise > 0).astype(np.float64)
-    share = mean(seen)
-    of_seen = np.maximum(share, 1e-9)
-    sizes = np.where(np.arange(bins.below.size) < near, TOGETHER, 1).astype(np.float64)
-    sizes = mean(sizes)
-    return Bins(
-        luminance=mean(bins.luminance * seen) / of_seen,
-        noise=np.where(share > 0.5, mean(bins.noise) / of_seen**2 / sizes, 0.0),
-        path=mean(bins.path),
-        off_axis=mean(bins.off_axis),
-        below=mean(bins.below),
-        half=mean(bins.half) * sizes,
-        distance=mean(bins.distance),
-        extent=mean(bins.extent) * sizes,
-        grazing=mean(bins.grazing),
-        darker=bins.darker,
-        darker_by_row=bins.darker_by_row,
-        eye=bins.eye,
-    )
+    fogs = [
+        replace(one, cost=cost, extinction=even.extinction, variance=even.extinction_deviation**2)
+        for one, cost in zip(flat, evens, strict=True)
+    ]
+    if min(t.cost for t in tried) < min(evens) + UNSURE:
+        fogs += hidden.even_fogs(curves, prior, even, likely)
+    return _weighed(even, fogs, tried, bins, geometry)
 
 
 def _is_free(even: JointFit, curves: StripCurves) -> bool:
@@ -275,22 +238,6 @@ def _reach(used: NDArray[np.bool_], paths: Floats) -> float:
     return float(seen.max()) if seen.size else 0.0
 
 
-def _left_out(found: Solution, bins: Bins) -> int:
-    """How many bins a fit leaves unexplained."""
-    return int(((found.used != USED) & (bins.noise > 0)).sum())
-
-
-def _even(bins: Bins, albedo: int, prior: JointPrior, start: Floats) -> tuple[float, int]:
-    """Cost of even fog, with ln k as its parameter and what is known of that; and how many bins it leaves out."""
-    albedos = joint_fit.under_sky(ALBEDOS[albedo], prior)
-    found = joint_kernels.gauss_newton(bins, albedos, prior, start, joint_fit.MORE_STEPS)
-    k, variance = max(float(found.theta[0]), 1e-5), float(found.covariance[0, 0])
-    apart = (math.log(k) - MEAN) / BROAD
-    cost = found.cost + math.log(variance) + math.log(k * k / variance + BROAD**-2) + math.log(BROAD**2) + apart**2
-    chance = ALBEDO_CHANCES[albedo] * (1.0 - sum(UNEVEN_CHANCES))
-    return cost + _hidden_cost(found, bins) - 2.0 * math.log(chance), _left_out(found, bins)
-
-
 def _uneven(bins: Bins, albedo: int, prior: JointPrior, unevenness: int, start: Floats, steps: int) -> _Candidate:
     """Fit of fog of some unevenness."""
     fog = fog_nodes(*UNEVENNESS[unevenness], start.size - uneven_kernels.OTHERS)
@@ -317,41 +264,30 @@ def _candidate(
     found = uneven_kernels.fit_uneven(bins, albedos, prior, fog, start, steps)
     if int((found.used[0] == USED).sum()) < joint_fit.LEAST_BINS:
         return _Candidate(math.inf, found, fog, chance)
-    likelihood = found.cost + _hidden_cost(found, bins)
+    likelihood = found.cost + hidden_cost(found, bins)
     return _Candidate(likelihood - 2.0 * math.log(ALBEDO_CHANCES[albedo] * chance), found, fog, chance)
 
 
-def _hidden_cost(found: Solution, bins: Bins) -> float:
-    """What is to be added to a cost for bins behind obstacles and for outliers.
-
-    In the fit of one fog they are cheap and dear, so that what is behind an obstacle is left out whole. Beside an
-    obstacle, denser fog is another explanation, and the two are weighed fairly: either's luminance may be any.
-    """
-    hidden = (found.used == HIDDEN) & (bins.noise > 0)
-    outliers = int(((found.used == 0) & (bins.noise > 0)).sum())
-    any_luminance = math.log(float(found.theta[-3]) ** 2 / (2.0 * math.pi))
-    cost = float((any_luminance - HIDDEN_COST - np.log(bins.noise[hidden])).sum())
-    obstacles = int(hidden.any(axis=1).sum())
-    return cost - (LEFT_OUT_COST - STRANGE) * outliers - 2.0 * math.log(OBSTACLE_CHANCE) * obstacles
-
-
 def _weighed(
-    even: JointFit, evens: list[float], tried: list[_Candidate], bins: Bins, geometry: StripGeometry
+    even: JointFit, evens: list[EvenFog], tried: list[_Candidate], bins: Bins, geometry: StripGeometry
 ) -> UnevenFit | None:
-    """Average over even fog and uneven fits by their evidence."""
-    costs = np.array([*evens, *(t.cost for t in tried)])
+    """Average over even fog and uneven fits by their evidence; None if even fog over the road as seen suffices."""
+    costs = np.array([*(one.cost for one in evens), *(t.cost for t in tried)])
     weights = np.exp(-0.5 * (costs - costs.min()))
     weights /= weights.sum()
-    share, weights = float(weights[: len(evens)].sum()), weights[len(evens) :]
-    if share > SURELY_EVEN_SHARE:
+    of_even, of_tried = weights[: len(evens)], weights[len(evens) :]
+    share = float(of_even.sum())
+    if float(of_even[: len(ALBEDOS)].sum()) > SURELY_EVEN_SHARE:
         return None
-    best = tried[int(np.argmax(weights))]
-    reach = _reach(best.solution.used == USED, bins.path / bins.below)
+    best = tried[int(np.argmax(of_tried))]
+    used = even.used if share > 0.5 else best.solution.used == USED
+    seen = geometry if share > 0.5 else bins
+    reach = _reach(used, seen.path / seen.below)
     distance = _distances(reach)
-    k, k2 = share * max(even.extinction, 0.0), share * (even.extinction**2 + even.extinction_deviation**2)
-    depth = share * max(even.extinction, 0.0) * distance
-    depth2 = share * (even.extinction**2 + even.extinction_deviation**2) * distance**2
-    for weight, candidate in zip(weights, tried, strict=True):
+    k = sum(weight * max(one.extinction, 0.0) for weight, one in zip(of_even, evens, strict=True))
+    k2 = sum(weight * (one.extinction**2 + one.variance) for weight, one in zip(of_even, evens, strict=True))
+    depth, depth2 = k * distance, k2 * distance**2
+    for weight, candidate in zip(of_tried, tried, strict=True):
         if weight < 1e-3:
             continue
         mean, variance = _mean_extinction(candidate, reach)
@@ -371,8 +307,8 @@ def _weighed(
         shift=float(best.solution.theta[-2]),
         road=best.solution.road,
         misfit=best.solution.misfit,
-        used=_of_each(best.solution.used == USED, geometry.distance),
-        hidden=_of_each(best.solution.used == HIDDEN, geometry.distance)[0],
+        used=of_each_bin(best.solution.used == USED, geometry.distance),
+        hidden=of_each_bin(best.solution.used == HIDDEN, geometry.distance)[0],
     )
     return UnevenFit(fit, reach, distance, depth, deviation, share, _denser(best, reach))
 

@@ -78,7 +78,7 @@ def test_a_vehicle_ahead_is_no_bend():
 
 
 def test_rows_on_a_plane_are_those_of_rays_on_the_curve():
-    unit, height, sag = 800.0, 1.4, np.array([1e-4, 2e-4, 0.0, -1e-4])
+    unit, height, sag = 800.0, 1.4, np.array([1e-4, 2e-4, 0.0, -1e-4, 0.0, 1e-5])
     for distance in (20.0, 60.0, 110.0, 150.0):
         rise = sum(c * turned(distance, piece)[0] for piece, c in enumerate(sag))
         below = unit / distance * (1.0 - rise / height)

@@ -9,6 +9,7 @@ import pytest
 from fogsim.values import Camera
 from fogsim.vision.lines.horizon import Horizon
 from fogsim.vision.lines.road_course import RoadCourse, unseen_course
+from fogsim.vision.lines.road_course_kernels import PIECES
 from fogsim.vision.strips.course_geometry import course_deviation, course_geometry
 from fogsim.vision.strips.joint_fit import JointFit
 from fogsim.vision.strips.joint_kernels import JointPrior
@@ -16,7 +17,8 @@ from fogsim.vision.strips.strip_geometry import strip_geometry
 
 CAMERA = Camera(640, 480, 577.0, (319.5, 239.5), 1.38, math.radians(2.0))
 STRAIGHT = strip_geometry(CAMERA, 1.0)
-LEVEL = RoadCourse(319.5, CAMERA.horizon_row, np.zeros(4), np.zeros(4), np.zeros((5, 5)), np.zeros((4, 4)), 4)
+KNOWN = np.zeros((1 + PIECES, 1 + PIECES))
+LEVEL = replace(unseen_course(CAMERA, Horizon(CAMERA.horizon_row, 0.3)), covariance=KNOWN, lines=4)
 PRIOR = JointPrior(200.0, 1.0, 1.0, 0.0, 0.3, 0.0, 0.1)
 
 
@@ -40,7 +42,7 @@ def test_along_a_straight_and_level_course_strips_are_those_of_a_plane():
 
 @pytest.mark.parametrize("sag", [1.0 / 8800.0, -1.0 / 13_000.0])
 def test_rows_of_a_sag_are_nearer_and_of_a_crest_farther(sag):
-    laid = course_geometry(STRAIGHT, CAMERA, replace(LEVEL, sag=np.full(4, sag)))
+    laid = course_geometry(STRAIGHT, CAMERA, replace(LEVEL, sag=np.full(PIECES, sag)))
     row = int(np.argmin(np.abs(STRAIGHT.distance - 80.0)))
     distance = float(laid.distance[row])
     rise = 0.5 * sag * distance**2
@@ -51,14 +53,14 @@ def test_rows_of_a_sag_are_nearer_and_of_a_crest_farther(sag):
 
 
 def test_strips_shift_with_a_bend_to_the_right():
-    laid = course_geometry(STRAIGHT, CAMERA, replace(LEVEL, bend=np.full(4, 1.0 / 400.0)))
+    laid = course_geometry(STRAIGHT, CAMERA, replace(LEVEL, bend=np.full(PIECES, 1.0 / 400.0)))
     row = int(np.argmin(np.abs(STRAIGHT.distance - 60.0)))
     shift = CAMERA.focal_length * 0.5 * STRAIGHT.distance[row] / 400.0
     assert laid.left[0, row] - STRAIGHT.left[0, row] == pytest.approx(shift, rel=1e-2)
 
 
 def test_where_the_bend_is_unsure_nothing_is_read():
-    unsure = replace(LEVEL, bend=np.full(4, 1e-3), bend_covariance=np.full((4, 4), (5e-4) ** 2))
+    unsure = replace(LEVEL, bend=np.full(PIECES, 1e-3), bend_covariance=np.full((PIECES, PIECES), (5e-4) ** 2))
     laid = course_geometry(STRAIGHT, CAMERA, unsure)
     width = (laid.right - laid.left)[0]
     # 0.6 m = 5e-4 s² / 2 at s = 49 m.
@@ -74,5 +76,5 @@ def test_what_is_not_known_of_the_course_matters_the_more_the_thinner_the_fog():
 
 
 def test_a_course_that_is_known_adds_nothing_beyond_its_horizon():
-    known = replace(LEVEL, covariance=np.diag([0.09, 1e-24, 1e-24, 1e-24, 1e-24]))
+    known = replace(LEVEL, covariance=np.diag([0.09, *np.full(PIECES, 1e-24)]))
     assert deviation(0.02, known) < 1e-6

@@ -1,20 +1,30 @@
 """Fog that varies along the road, on strips drawn by Koschmieder's law with a known optical depth."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from fogsim.vision.lines.horizon import Horizon
+from fogsim.vision.lines.road_course import RoadCourse, unseen_course
+from fogsim.vision.lines.road_course_kernels import KNOTS, PIECES
+from fogsim.vision.strips.course_geometry import course_geometry
 from fogsim.vision.strips.fog_nodes import NODES, UNEVENNESS, fog_nodes
+from fogsim.vision.strips.hidden_course import HiddenCourse
 from fogsim.vision.strips.joint_fit import fit_agreeing, fit_own
 from fogsim.vision.strips.strip_curves import StripCurves
 from fogsim.vision.strips.uneven_fit import fit_uneven
 from fogsim.vision.strips.uneven_kernels import depth_at, distance_at_depth, extinction_at
 from tests.vision.strips import koschmieder_strips
-from tests.vision.strips.koschmieder_strips import AIRLIGHT, GEOMETRY, NOISE, curves
+from tests.vision.strips.koschmieder_strips import AIRLIGHT, CAMERA, GEOMETRY, NOISE, curves
 
 PRIOR = koschmieder_strips.PRIOR._replace(shift_deviation=0.2)
 """The road's lines tell the horizon; without them a bank may be a horizon that lies lower."""
+
+UNSEEN = unseen_course(CAMERA, Horizon(CAMERA.horizon_row, 0.2))
+LEVEL = replace(UNSEEN, ahead=replace(UNSEEN.ahead, covariance=np.diag([0.04, *np.full(PIECES, 1e-16)])))
+"""Lines that nobody sees, and lines that show the road to be level as far as it is seen."""
 
 Depth = Callable[[np.ndarray], np.ndarray]
 
@@ -41,9 +51,9 @@ def bank(start: float, clear: float = 0.0015, dense: float = 0.05, edge: float =
     return depth
 
 
-def fitted(seen: StripCurves):
+def fitted(seen: StripCurves, course: RoadCourse = LEVEL):
     own, even = fit_own(seen, GEOMETRY, (PRIOR,)), fit_agreeing(seen, GEOMETRY, (PRIOR,))
-    return fit_uneven(seen, GEOMETRY, PRIOR, own, even)
+    return fit_uneven(seen, GEOMETRY, PRIOR, own, even, HiddenCourse(GEOMETRY, CAMERA, course))
 
 
 @pytest.mark.parametrize("extinction", [0.002, 0.01, 0.03, 0.06])
@@ -76,6 +86,39 @@ def test_the_optical_depth_is_that_of_the_fog_within_its_deviations():
         told = found.depth < 2.5
         off += ((found.depth - wavy(found.distance)) / np.hypot(found.deviation, 0.05 * found.depth))[told].tolist()
     assert np.mean(np.abs(off) < 1.645) > 0.8
+
+
+def over_a_sag(extinction: float, curvature: float, begins: float, seed: int) -> StripCurves:
+    """Strips of a road that is level up to a distance, and sags from there on, in even fog."""
+    sag = np.where(np.array(KNOTS[:-1]) >= begins, curvature, 0.0)
+    laid = course_geometry(GEOMETRY, CAMERA, replace(UNSEEN, sag=sag))
+    rng = np.random.default_rng(seed)
+    seen = AIRLIGHT + (60.0 - AIRLIGHT) * np.exp(-extinction * laid.path / laid.below)
+    variance = np.full(seen.shape, NOISE**2)
+    return StripCurves(seen + rng.normal(0.0, NOISE, seen.shape), variance, np.full(seen.shape, 2.0))
+
+
+@pytest.mark.parametrize("begins", [40.0, 80.0, 120.0])
+@pytest.mark.parametrize("curvature", [1.0 / 8800.0, -1.0 / 13_000.0])
+def test_a_sag_or_crest_that_lines_do_not_show_is_no_uneven_fog(begins, curvature):
+    found = fitted(over_a_sag(0.015, curvature, begins, 1), UNSEEN)
+    assert found.even > 0.9
+    assert found.denser is None
+    assert found.fit.extinction == pytest.approx(0.015, abs=2.5 * found.fit.extinction_deviation)
+    assert found.fit.extinction_deviation < 0.1 * 0.015
+
+
+def test_where_lines_show_a_level_road_no_sag_explains_what_is_seen():
+    seen = over_a_sag(0.015, 1.0 / 4000.0, 40.0, 1)
+    assert fitted(seen, UNSEEN).even > 0.9
+    assert fitted(seen, LEVEL).even < 0.1
+
+
+@pytest.mark.parametrize("start", [60.0, 90.0, 120.0])
+def test_a_bank_ahead_is_no_crest_that_lines_do_not_show(start):
+    found = fitted(drawn(bank(start)), UNSEEN)
+    assert found.even < 0.1
+    assert found.denser is not None
 
 
 def test_fog_that_thins_ahead_is_no_denser_fog():

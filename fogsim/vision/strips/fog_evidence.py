@@ -1,0 +1,163 @@
+"""Evidence of even fog and of other fog, by the same reckoning: bins taken together, and what obstacles cost."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.vision.strips import joint_fit, joint_kernels
+from fogsim.vision.strips.albedo_filter import HIDDEN, HIDDEN_COST, LEFT_OUT_COST, USED
+from fogsim.vision.strips.fog_nodes import BROAD, MEAN
+from fogsim.vision.strips.joint_fit import ALBEDO_CHANCES, ALBEDOS, JointFit
+from fogsim.vision.strips.joint_kernels import Bins, JointPrior, Solution
+
+Floats = NDArray[np.float64]
+
+NEAR, TOGETHER = 30.0, 3
+"""Distance up to which bins are taken together [m], and how many."""
+
+UNEVEN_CHANCES = (0.1, 0.05, 0.05, 0.05, 0.05)
+"""How likely each unevenness is beforehand; even fog is the rest [-]."""
+
+OBSTACLE_CHANCE = 0.01
+"""How likely it is that an obstacle that no sensor tells begins in a lane at one of its rows [-]."""
+
+STRANGE = 2.0
+"""What an outlier adds to a cost beside its luminance's chance, where even fog is weighed against uneven [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class EvenFog:
+    """Even fog over some albedo and course of the road.
+
+    Attributes
+    ----------
+    cost : float
+        Minus twice the logarithm of its evidence with its chance [-].
+    extinction, variance : float
+        k [1/m], and its variance.
+    left_out : int
+        How many bins it leaves unexplained.
+    """
+
+    cost: float
+    extinction: float
+    variance: float
+    left_out: int
+
+
+def even_fog_over(bins: Bins, albedo: int, prior: JointPrior, start: JointFit) -> EvenFog:
+    """Even fog over one of the albedos, with ln k as its parameter and what is known of that.
+
+    Parameters
+    ----------
+    bins : Bins
+        Luminance, and where it was seen.
+    albedo : int
+        Which of `fogsim.vision.strips.joint_fit.ALBEDOS`.
+    prior : JointPrior
+        Sky and horizon.
+    start : JointFit
+        A fit near which to begin.
+    """
+    albedos = joint_fit.under_sky(ALBEDOS[albedo], prior)
+    first = np.array([max(start.extinction, 1e-5), start.airlight, start.shift, 0.0])
+    found = joint_kernels.gauss_newton(bins, albedos, prior, first, joint_fit.MORE_STEPS)
+    k, variance = max(float(found.theta[0]), 1e-5), float(found.covariance[0, 0])
+    apart = (math.log(k) - MEAN) / BROAD
+    cost = found.cost + math.log(variance) + math.log(k * k / variance + BROAD**-2) + math.log(BROAD**2) + apart**2
+    chance = ALBEDO_CHANCES[albedo] * (1.0 - sum(UNEVEN_CHANCES))
+    cost += hidden_cost(found, bins) - 2.0 * math.log(chance)
+    return EvenFog(cost, float(found.theta[0]), variance, left_out(found, bins))
+
+
+def left_out(found: Solution, bins: Bins) -> int:
+    """How many bins a fit leaves unexplained.
+
+    Parameters
+    ----------
+    found : Solution
+        The fit.
+    bins : Bins
+        What it is of.
+    """
+    return int(((found.used != USED) & (bins.noise > 0)).sum())
+
+
+def hidden_cost(found: Solution, bins: Bins) -> float:
+    """What is to be added to a cost for bins behind obstacles and for outliers.
+
+    In the fit of one fog they are cheap and dear, so that what is behind an obstacle is left out whole. Beside an
+    obstacle, denser fog is another explanation, and the two are weighed fairly: either's luminance may be any.
+
+    Parameters
+    ----------
+    found : Solution
+        The fit.
+    bins : Bins
+        What it is of.
+    """
+    hidden = (found.used == HIDDEN) & (bins.noise > 0)
+    outliers = int(((found.used == 0) & (bins.noise > 0)).sum())
+    any_luminance = math.log(float(found.theta[-3]) ** 2 / (2.0 * math.pi))
+    cost = float((any_luminance - HIDDEN_COST - np.log(bins.noise[hidden])).sum())
+    obstacles = int(hidden.any(axis=1).sum())
+    return cost - (LEFT_OUT_COST - STRANGE) * outliers - 2.0 * math.log(OBSTACLE_CHANCE) * obstacles
+
+
+def thinned_bins(bins: Bins) -> Bins:
+    """Bins of the near road taken together by threes: there fog varies little from bin to bin.
+
+    Parameters
+    ----------
+    bins : Bins
+        All of them.
+    """
+    near = _taken_together(bins.distance)
+    if near == 0:
+        return bins
+
+    def mean(values: Floats) -> Floats:
+        grouped = values[..., :near].reshape(*values.shape[:-1], -1, TOGETHER).mean(axis=-1)
+        return np.ascontiguousarray(np.concatenate([grouped, values[..., near:]], axis=-1))
+
+    seen = (bins.noise > 0).astype(np.float64)
+    share = mean(seen)
+    of_seen = np.maximum(share, 1e-9)
+    sizes = np.where(np.arange(bins.below.size) < near, TOGETHER, 1).astype(np.float64)
+    sizes = mean(sizes)
+    return Bins(
+        luminance=mean(bins.luminance * seen) / of_seen,
+        noise=np.where(share > 0.5, mean(bins.noise) / of_seen**2 / sizes, 0.0),
+        path=mean(bins.path),
+        off_axis=mean(bins.off_axis),
+        below=mean(bins.below),
+        half=mean(bins.half) * sizes,
+        distance=mean(bins.distance),
+        extent=mean(bins.extent) * sizes,
+        grazing=mean(bins.grazing),
+        darker=bins.darker,
+        darker_by_row=bins.darker_by_row,
+        eye=bins.eye,
+    )
+
+
+def of_each_bin(thinned: NDArray[np.bool_], distance: Floats) -> NDArray[np.bool_]:
+    """(strips, n) bool: what is told of thinned bins, told of all.
+
+    Parameters
+    ----------
+    thinned : (strips, thinned) bool
+        Of the thinned bins.
+    distance : (n,) float64
+        Of all [m].
+    """
+    near = _taken_together(distance)
+    groups = near // TOGETHER
+    return np.concatenate([np.repeat(thinned[:, :groups], TOGETHER, axis=1), thinned[:, groups:]], axis=1)
+
+
+def _taken_together(distance: Floats) -> int:
+    """How many of the nearest bins are taken together."""
+    return int((distance < NEAR).sum()) // TOGETHER * TOGETHER

@@ -1,0 +1,123 @@
+"""Even fog over a road that may sag or crest where its lines do not show it: there it fades as in uneven fog."""
+
+import functools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fogsim.values.camera import Camera
+from fogsim.vision.lines.road_course import RoadCourse
+from fogsim.vision.lines.road_course_kernels import PIECES
+from fogsim.vision.lines.sags_ahead import SAG_DEVIATION, beginning_cost, sag_from
+from fogsim.vision.strips import joint_fit
+from fogsim.vision.strips.course_geometry import course_geometry
+from fogsim.vision.strips.fog_evidence import EvenFog, even_fog_over, thinned_bins
+from fogsim.vision.strips.joint_fit import ALBEDOS, JointFit
+from fogsim.vision.strips.joint_kernels import JointPrior
+from fogsim.vision.strips.strip_curves import StripCurves
+from fogsim.vision.strips.strip_geometry import StripGeometry
+
+TRIED = (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)
+"""Curvatures that are tried first, over their standard deviation [-]."""
+
+MOST, STEPS = 3.0, 3
+"""Most curvature, over its standard deviation [-], and how often a parabola through the best three is followed."""
+
+LEAST_VARIANCE = 1e-4
+"""Least variance of the horizon's row where the road's curvature is given [px²]."""
+
+RIVAL = 20.0
+"""By how much a cost may lie above the best for a beginning to be tried over other albedos [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class HiddenCourse:
+    """Sags and crests ahead that lines would not show.
+
+    Attributes
+    ----------
+    straight : StripGeometry
+        Strips of a straight road.
+    camera : Camera
+        The assumed calibration.
+    course : RoadCourse
+        Course as the lines show it.
+    """
+
+    straight: StripGeometry
+    camera: Camera
+    course: RoadCourse
+
+    @property
+    def is_bent(self) -> bool:
+        """Whether strips follow a road that bends, and may leave it far away."""
+        return bool(self.course.bend.any())
+
+    def even_fogs(self, curves: StripCurves, prior: JointPrior, start: JointFit, albedo: int) -> list[EvenFog]:
+        """Even fog over roads that sag or crest from one of their pieces on, each with the likeliest curvature.
+
+        Parameters
+        ----------
+        curves : StripCurves
+            Luminance by bin, of the first of the strips.
+        prior : JointPrior
+            Sky and horizon, where the road is as its lines show it.
+        start : JointFit
+            Fit of even fog there.
+        albedo : int
+            The likeliest of `fogsim.vision.strips.joint_fit.ALBEDOS` there; the others are tried where roads are nearly
+            as likely as the likeliest.
+        """
+        begun = [functools.partial(self._even_fog, curves, prior, start, piece) for piece in range(1, PIECES)]
+        likeliest = [_likeliest(functools.partial(fog, albedo)) for fog in begun]
+        found = [replace(one, cost=one.cost + width) for _, one, width in likeliest]
+        least = min(one.cost for one in found)
+        for fog, (curvature, _, width), cost in zip(begun, likeliest, [one.cost for one in found], strict=True):
+            if cost < least + RIVAL:
+                others = (fog(other, curvature) for other in range(len(ALBEDOS)) if other != albedo)
+                found += [replace(one, cost=one.cost + width) for one in others]
+        return found
+
+    def _even_fog(
+        self, curves: StripCurves, prior: JointPrior, start: JointFit, piece: int, albedo: int, curvature: float
+    ) -> EvenFog:
+        """Even fog over a road that sags or crests from a piece on, with how likely that is beforehand and by lines."""
+        ahead, sag = self.course.ahead, sag_from(piece, curvature * SAG_DEVIATION)
+        row, variance = ahead.row(sag)
+        moved = row - ahead.row(np.zeros(PIECES))[0]
+        deviation = min(prior.shift_deviation, math.sqrt(max(variance, LEAST_VARIANCE)))
+        around = prior._replace(shift=prior.shift + moved, shift_deviation=deviation)
+        course = replace(self.course, row=self.camera.horizon_row + around.shift, sag=sag)
+        geometry = course_geometry(self.straight, self.camera, course).only(list(range(len(curves.variance))))
+        bins = thinned_bins(joint_fit.strip_bins(curves, geometry, around))
+        found = even_fog_over(bins, albedo, around, replace(start, shift=around.shift))
+        return replace(found, cost=found.cost + ahead.cost(sag) + beginning_cost(curvature * SAG_DEVIATION))
+
+
+def _likeliest(fog: Callable[[float], EvenFog]) -> tuple[float, EvenFog, float]:
+    """Likeliest curvature over its standard deviation, its fog, and what its width adds to the cost (Laplace)."""
+    tried = {value: fog(value) for value in TRIED}
+    curve = 1.0
+    for _ in range(STEPS):
+        at = sorted(tried)
+        middle = min(max(at.index(min(at, key=lambda value: tried[value].cost)), 1), len(at) - 2)
+        around = at[middle - 1 : middle + 2]
+        vertex, curve = _parabola(around, [tried[value].cost for value in around])
+        if curve <= 0.0 or vertex in tried:
+            break
+        tried[vertex] = fog(vertex)
+    best = min(tried, key=lambda value: tried[value].cost)
+    return best, tried[best], math.log(max(curve, 1.0))
+
+
+def _parabola(at: list[float], costs: list[float]) -> tuple[float, float]:
+    """Vertex of the parabola through three points, within what is likely, and its factor of the square."""
+    (a, b, c), (f, g, h) = at, costs
+    left, right = (g - f) / (b - a), (h - g) / (c - b)
+    curve = (right - left) / (c - a)
+    if curve <= 0.0:
+        return b, curve
+    vertex = 0.5 * (a + b - left / curve)
+    return round(min(max(vertex, -MOST), MOST), 3), curve

@@ -2,7 +2,7 @@
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,7 +29,10 @@ LEAST_VARIANCE = 1e-4
 """Least variance of the horizon's row where the road's curvature is given [px²]."""
 
 RIVAL = 20.0
-"""By how much a cost may lie above the best for a beginning to be tried over other albedos [-]."""
+"""By how much a cost may lie above the best for a course to be tried at all, and over other albedos [-]."""
+
+_AlongCourse = Callable[[int, float], EvenFog]
+"""Even fog by albedo and curvature."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +58,9 @@ class HiddenCourse:
         """Whether strips follow a road that bends, and may leave it far away."""
         return bool(self.course.bend.any())
 
-    def even_fogs(self, curves: StripCurves, prior: JointPrior, start: JointFit, albedo: int) -> list[EvenFog]:
+    def even_fogs(
+        self, curves: StripCurves, prior: JointPrior, start: JointFit, albedo: int, gain: float
+    ) -> list[EvenFog]:
         """Even fog over roads that sag or crest from one of their pieces on, each with the likeliest curvature.
 
         Parameters
@@ -69,16 +74,30 @@ class HiddenCourse:
         albedo : int
             The likeliest of `fogsim.vision.strips.joint_fit.ALBEDOS` there; the others are tried where roads are nearly
             as likely as the likeliest.
+        gain : float
+            How much of a cost uneven fog saves: courses that are much less likely than that are not tried [-].
         """
-        begun = [functools.partial(self._even_fog, curves, prior, start, piece) for piece in range(1, PIECES)]
-        likeliest = [_likeliest(functools.partial(fog, albedo)) for fog in begun]
-        found = [replace(one, cost=one.cost + width) for _, one, width in likeliest]
-        least = min(one.cost for one in found)
-        for fog, (curvature, _, width), cost in zip(begun, likeliest, [one.cost for one in found], strict=True):
+        found: list[EvenFog] = []
+        begun: list[tuple[float, _AlongCourse, float, float]] = []
+        for piece in range(1, PIECES):
+            tried = [value for value in TRIED if self._cost(piece, value) < gain + RIVAL]
+            if len(tried) < 3:
+                continue
+            along: _AlongCourse = functools.partial(self._even_fog, curves, prior, start, piece)
+            curvature, one, width = _likeliest(functools.partial(along, albedo), tried)
+            found.append(replace(one, cost=one.cost + width))
+            begun.append((found[-1].cost, along, curvature, width))
+        least = min((one.cost for one in found), default=math.inf)
+        for cost, along, curvature, width in begun:
             if cost < least + RIVAL:
-                others = (fog(other, curvature) for other in range(len(ALBEDOS)) if other != albedo)
+                others = (along(other, curvature) for other in range(len(ALBEDOS)) if other != albedo)
                 found += [replace(one, cost=one.cost + width) for one in others]
         return found
+
+    def _cost(self, piece: int, curvature: float) -> float:
+        """Minus twice the logarithm of how likely a course is, beforehand and by the lines."""
+        sag = sag_from(piece, curvature * SAG_DEVIATION)
+        return self.course.ahead.cost(sag) + beginning_cost(curvature * SAG_DEVIATION)
 
     def _even_fog(
         self, curves: StripCurves, prior: JointPrior, start: JointFit, piece: int, albedo: int, curvature: float
@@ -93,12 +112,12 @@ class HiddenCourse:
         geometry = course_geometry(self.straight, self.camera, course).only(list(range(len(curves.variance))))
         bins = thinned_bins(joint_fit.strip_bins(curves, geometry, around))
         found = even_fog_over(bins, albedo, around, replace(start, shift=around.shift))
-        return replace(found, cost=found.cost + ahead.cost(sag) + beginning_cost(curvature * SAG_DEVIATION))
+        return replace(found, cost=found.cost + self._cost(piece, curvature))
 
 
-def _likeliest(fog: Callable[[float], EvenFog]) -> tuple[float, EvenFog, float]:
+def _likeliest(fog: Callable[[float], EvenFog], first: Sequence[float]) -> tuple[float, EvenFog, float]:
     """Likeliest curvature over its standard deviation, its fog, and what its width adds to the cost (Laplace)."""
-    tried = {value: fog(value) for value in TRIED}
+    tried = {value: fog(value) for value in first}
     curve = 1.0
     for _ in range(STEPS):
         at = sorted(tried)

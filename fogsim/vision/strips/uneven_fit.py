@@ -199,8 +199,9 @@ def _fitted(
         replace(one, cost=cost, extinction=even.extinction, variance=even.extinction_deviation**2)
         for one, cost in zip(flat, evens, strict=True)
     ]
-    if min(t.cost for t in tried) < min(evens) + UNSURE:
-        fogs += hidden.even_fogs(curves, prior, even, likely)
+    gain = min(evens) - min(t.cost for t in tried)
+    if gain > -UNSURE:
+        fogs += hidden.even_fogs(curves, prior, even, likely, gain)
     return _weighed(even, fogs, tried, bins, geometry)
 
 

@@ -36,6 +36,9 @@ from fogsim.values.estimate import NORMAL_90_PERCENT
 BANK_START = 1300.0
 KEPT = 150.0
 PERIOD = 0.5  # [s] of the camera: neighbouring frames hardly say more
+PATCHED = 6
+"""Drives through patches of each length: a drive of 40 s is but three patches of 300 m long."""
+
 CLOCKS = (f"clocks.camera_period_s={PERIOD}", f"clocks.decision_period_s={PERIOD}")
 CAMERAS = (
     ("camera.width=640", "camera.height=480"),
@@ -81,9 +84,10 @@ def drives(pool: int) -> Iterator[Drive]:
     for i, visibility in enumerate(((70.0, 160.0, 350.0), (60.0, 120.0, 300.0))[pool]):
         yield Drive("even", (*common, "duration_s=30", f"fog={{visibility_m: {visibility}}}"), seed + i)
     for i, length in enumerate((30.0, 60.0, 100.0, 200.0, 300.0)):
-        patches = f"{{correlation_length_m: {length}, strength: 0.6, seed: {seed + i}}}"
-        fog = f"fog={{visibility_m: {sight}, patches: {patches}}}"
-        yield Drive(f"patches, {length:.0f} m", (*common, "duration_s=40", fog), seed + i)
+        for j in range(PATCHED):
+            patches = f"{{correlation_length_m: {length}, strength: 0.6, seed: {seed + i + 10 * j}}}"
+            fog = f"fog={{visibility_m: {sight}, patches: {patches}}}"
+            yield Drive(f"patches, {length:.0f} m", (*common, "duration_s=40", fog), seed + i + 10 * j)
     for i, edge in enumerate((20.0, 100.0, 300.0)):
         for j in range(2):
             yield Drive("bank", (*common, "duration_s=70", bank(60.0, edge)), seed + 10 * j + i)
@@ -107,7 +111,8 @@ def clear_drives(pool: int, minutes: float) -> Iterator[Drive]:
         while left > 1.0 and number < 20:
             duration = min(left, 180.0)
             haze = (2000.0, 5000.0, "inf")[number % 3]
-            settings = (*CLOCKS, *CAMERAS[pool], f"duration_s={duration:.0f}", f"fog={{visibility_m: {haze}}}")
+            fog = f"fog={{visibility_m: {haze}}}"
+            settings = (*CLOCKS, *CAMERAS[pool], f"duration_s={duration:.0f}", fog, "expect={}")
             yield Drive("clear", settings, 100 * pool + 10 * i + number, scenario)
             left, number = left - duration, number + 1
 

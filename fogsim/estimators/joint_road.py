@@ -63,7 +63,7 @@ HARDLY_UNEVEN, UNEVEN_DEVIATION = 0.05, 0.13
 """Relative deviations of the mean extinction by unevenness that the road does not show, and, where the fog is surely
 uneven, by what nodes along the way leave out [-]."""
 
-MEMORY, CHANGING, MOST_CHANGE = 5.0, 1.5, 0.15
+MEMORY, CHANGING, MOST_CHANGE = 10.0, 1.5, 0.15
 """Time over which the last pictures' extinctions tell how uneven the fog is [s], how many times their relative
 deviation that of a single one is, and the most of it [-]: fog that has changed along the way goes on to."""
 
@@ -201,8 +201,8 @@ class JointRoad:
             return Estimate.invalid(self.method, fit, **found)
         unsure = course_deviation(fit.fit, self._geometry, self._camera, course, prior, sky.noise)
         front = fit.denser or airlight_edge(pixels, self._geometry, self._camera, sky, fit, prior.shift_deviation)
-        changing = self._change(observation.time, fit.fit.extinction) * max(fit.fit.extinction, 0.0)
-        return self._estimate(fit, front, found, math.hypot(unsure, changing))
+        changing = self._change(observation.time, fit.fit.extinction)
+        return self._estimate(fit, front, found, unsure, changing)
 
     def _fitted(
         self, pixels: LinearPixels, sky: Sky, priors: Priors, free: float, course: RoadCourse
@@ -290,9 +290,15 @@ class JointRoad:
         return bool(near.sum() < MIN_ROWS // 2 or fit.used[0][near].mean() < MIN_USED)
 
     def _estimate(
-        self, uneven: UnevenFit, front: tuple[float, float, float] | None, found: dict[str, object], unsure: float
+        self,
+        uneven: UnevenFit,
+        front: tuple[float, float, float] | None,
+        found: dict[str, object],
+        unsure: float,
+        changing: float,
     ) -> Estimate:
         fit = uneven.fit
+        unevenness = math.hypot(_unevenness(uneven), changing)
         horizon = self._camera.horizon_row + fit.shift
         rows = self._geometry.first[fit.used[0]]
         left, right = self._geometry.left[0][fit.used[0]], self._geometry.right[0][fit.used[0]]
@@ -305,10 +311,10 @@ class JointRoad:
         return Estimate(
             self.method,
             extinction,
-            math.hypot(_deviation(fit), _unevenness(uneven) * extinction, unsure),
+            math.hypot(_deviation(fit), unevenness * extinction, unsure),
             diagnostics=found,
             reach=uneven.reach,
-            optical_depths=_optical_depths(uneven),
+            optical_depths=_optical_depths(uneven, unevenness),
             denser=None if front is None else DenserFog(*front),
         )
 
@@ -345,9 +351,9 @@ def _unevenness(uneven: UnevenFit) -> float:
     return math.hypot(HARDLY_UNEVEN, UNEVEN_DEVIATION * (1.0 - uneven.even))
 
 
-def _optical_depths(uneven: UnevenFit) -> OpticalDepths:
+def _optical_depths(uneven: UnevenFit, unevenness: float) -> OpticalDepths:
     """How the fog varies, what the model leaves out included in its deviations."""
-    model = math.hypot(MODEL_DEVIATION, _unevenness(uneven))
+    model = math.hypot(MODEL_DEVIATION, unevenness)
     deviation = np.hypot(OVERCONFIDENCE * uneven.deviation, model * uneven.depth)
     deviation = np.hypot(deviation, LEAST_DEVIATION * uneven.distance)
     return OpticalDepths(*(tuple(values.tolist()) for values in (uneven.distance, uneven.depth, deviation)))

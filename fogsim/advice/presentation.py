@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
 from fogsim.parameters import Range
-from fogsim.values import Belief, SpeedAdvice
+from fogsim.values import Belief, FogProfile, SpeedAdvice
 
 _EXACT = 1e-9
 """A hair of tolerance keeps exact multiples from being rounded a whole step [-]."""
@@ -37,6 +37,9 @@ class PresentedAdviser(ABC):
         Lowest speed that is ever advised [m/s].
     hold : float
         Time before the advice rises [s].
+    slowing : float
+        Deceleration with which drivers slow down for denser fog ahead [m/s²], where the belief knows of places: the
+        advice is what each place ahead asks for, and as much more as can be lost on the way there.
     """
 
     quantile: Annotated[float, Range(0.0, 1.0)] = 0.5
@@ -47,6 +50,7 @@ class PresentedAdviser(ABC):
     rounded: Literal["down", "nearest", "up"] = "down"
     minimum: Annotated[float, Range(0.0, 100.0, "m/s")] = 0.0
     hold: Annotated[float, Range(0.0, 3600.0, "s")] = 60.0
+    slowing: Annotated[float, Range(0.1, 15.0, "m/s²")] = 1.5
 
     @abstractmethod
     def speed_at(self, visibility: float) -> float:
@@ -66,15 +70,34 @@ class PresentedAdviser(ABC):
         belief, speed_limit, time, previous
             As of `Adviser.advise`.
         """
-        if belief.log_standard_deviation > self.widest_belief:
+        here = self._here(belief)
+        if here is None:
             return SpeedAdvice(previous.speed)
-        smoothed = self._smoothed(belief.visibility_quantile(self.quantile), time, previous)
-        visibility = math.exp(smoothed)
-        target = self._presented(visibility, speed_limit)
+        smoothed = self._smoothed(here, time, previous)
+        target = self._speed_for(math.exp(smoothed), belief.profile, speed_limit)
         if target > previous.speed and self.hysteresis > 0.0:
-            target = max(previous.speed, self._presented(visibility / (1.0 + self.hysteresis), speed_limit))
+            careful = self._speed_for(math.exp(smoothed) / (1.0 + self.hysteresis), belief.profile, speed_limit)
+            target = max(previous.speed, careful)
         advice = hold_rises(target, time, previous, self.hold)
         return replace(advice, smoothed=(time, smoothed)) if self.smoothing > 0.0 else advice
+
+    def _here(self, belief: Belief) -> float | None:
+        """Visibility that counts where the vehicle is [m]; None where the belief says too little."""
+        if belief.profile is None:
+            known = belief.log_standard_deviation <= self.widest_belief
+            return belief.visibility_quantile(self.quantile) if known else None
+        known = belief.profile.at(0.0)[1] <= self.widest_belief
+        return belief.profile.visibility_quantile(0.0, self.quantile) if known else None
+
+    def _speed_for(self, visibility: float, profile: FogProfile | None, limit: float) -> float:
+        """Speed that a visibility here asks for, and denser fog ahead [m/s]."""
+        speed = self.speed_at(visibility)
+        if profile is not None:
+            ahead = (profile.distance > 0.0) & (profile.standard_deviation <= self.widest_belief)
+            for distance in profile.distance[ahead].tolist():
+                there = self.speed_at(profile.visibility_quantile(distance, self.quantile))
+                speed = min(speed, math.sqrt(there**2 + 2.0 * self.slowing * distance))
+        return self._presented(speed, limit)
 
     def _smoothed(self, visibility: float, time: float, previous: SpeedAdvice) -> float:
         """Logarithm of the smoothed visibility [ln m]."""
@@ -84,8 +107,7 @@ class PresentedAdviser(ABC):
         since, before = previous.smoothed
         return before + (now - before) * -math.expm1(-max(time - since, 0.0) / self.smoothing)
 
-    def _presented(self, visibility: float, limit: float) -> float:
-        speed = self.speed_at(visibility)
+    def _presented(self, speed: float, limit: float) -> float:
         if speed >= limit:
             return math.inf
         return max(self.minimum, self._on_grid(speed) if self.rounding > 0.0 else speed)

@@ -18,6 +18,7 @@ from fogsim.ego.sensor_faults import FaultSchedule
 from fogsim.ego.shutter import Shutter, exposed
 from fogsim.ego.view_rendering import EgoView, NoView, Surrounding, ViewRenderer
 from fogsim.errors import SimulationError
+from fogsim.fusion import fuse
 from fogsim.randomness import Streams
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.schema import NO_RENDERER
@@ -258,7 +259,8 @@ class EgoEquipment:
             self._enter_fog(in_daylight(renderer.fog, light))
         pose, fog = self._pose(state, ego), field_at(renderer.fog, time)
         sections, known = meters.measure(fog), tuple(one.fault for one in faults)
-        truth = fog_truth(fog, pose, camera, renderer.signs, state, sections, self._way, known)
+        place = snapshot.route_position
+        truth = fog_truth(fog, pose, camera, renderer.signs, state, sections, self._way, known, place)
         if light < DAY_ILLUMINANCE:
             truth = replace(truth, lamp_effects=lamp_effects(state, ego, fog, truth.extinction_ahead))
         view, radiance = exposed(
@@ -279,13 +281,14 @@ class EgoEquipment:
             light=self._light_sensing.measure(state, ego, fog, light),
         )
         estimates = self._estimate(frame, observation, time)
-        belief = checked_belief(self._scenario.fusion.method, self._fusion.update(estimates, time))
+        believed = fuse(self._fusion, estimates, time, place)
+        belief = checked_belief(self._scenario.fusion.method, believed)
         return Step(
             index=index,
             time=time,
             traffic=state,
             ego=ego,
-            route_position=snapshot.route_position,
+            route_position=place,
             speed_limit=snapshot.speed_limit,
             leader=snapshot.leader,
             signal_ahead=snapshot.signal_ahead,

@@ -11,12 +11,18 @@ from numpy.typing import NDArray
 from fogsim.atmosphere import distance_at_depth, extinction
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import Camera, CameraPose, Fault, FogField, Lane, LaneKind, RoadSection, SignMap, TrafficState, Truth
+from fogsim.values.belief import THINNEST
+from fogsim.values.fog_profile import FogProfile
 
 _SIGHT_LINE = np.geomspace(1.0, 20_000.0, 400)
 """Distances ahead at which the optical depth is looked up to find how far one sees [m]."""
 
 _EYES = np.array([0.0, 0.0, 1.2])
 """Where eyes are above the road, whatever the vehicle [m]; fog over a road changes little over a truck's height."""
+
+
+_WAY = np.arange(-200.0, 1001.0, 25.0)
+"""Distances ahead along the route at which the fog is told [m]."""
 
 
 class KnownWay(NamedTuple):
@@ -43,6 +49,7 @@ def fog_truth(
     sections: tuple[RoadSection, ...] = (),
     way: KnownWay | None = None,
     faults: tuple[Fault, ...] = (),
+    place: float | None = None,
 ) -> Truth:
     """The fog at a camera, and as far as it sees along its heading, parallel to the road under it.
 
@@ -64,6 +71,8 @@ def fog_truth(
         The ego's route, and the lanes.
     faults : tuple of Fault
         Faults of its sensors in force.
+    place : float or None
+        How far the ego has come along its route [m]; None where that does not matter.
     """
     eye, level = np.array(pose.position), math.cos(pose.road_grade)
     direction = np.array([math.cos(pose.heading) * level, math.sin(pose.heading) * level, math.sin(pose.road_grade)])
@@ -81,7 +90,19 @@ def fog_truth(
         carriageways={} if way is None else way.carriageways,
         faults=faults,
         vehicle_extinctions=drivers,
+        profile=None if way is None or place is None else _way_profile(fog, way, place),
     )
+
+
+def _way_profile(fog: FogField, way: KnownWay, place: float) -> FogProfile | None:
+    """The fog along a route about a place on it [m]; None where no route is known."""
+    if way.route is None:
+        return None
+    stations = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(way.route, axis=0), axis=1))))
+    ahead = _WAY[(place + _WAY >= 0.0) & (place + _WAY <= stations[-1])]
+    at = np.stack([np.interp(place + ahead, stations, axis) for axis in way.route.T], axis=1)
+    known = np.log(np.maximum(extinction(fog, at + _EYES), THINNEST))
+    return FogProfile(ahead, known, np.zeros(ahead.size))
 
 
 def _extinctions(

@@ -3,18 +3,22 @@
 from collections.abc import Callable
 
 from fogsim import registry
+from fogsim.fusion.field_filter import FieldFilter
 from fogsim.fusion.grid_filter import GridFilter
 from fogsim.fusion.no_fusion import NoFusion
-from fogsim.fusion.protocol import Fusion
+from fogsim.fusion.protocol import Fusion, LocatedFusion, fuse
 from fogsim.registry import Registry
 
-FUSIONS: Registry[Callable[..., Fusion]] = Registry(
-    "fusion", {"grid_filter": GridFilter, "none": NoFusion}, group="fogsim.fusion", methods=("update", "reset")
+FUSIONS: Registry[Callable[..., Fusion | LocatedFusion]] = Registry(
+    "fusion",
+    {"field_filter": FieldFilter, "grid_filter": GridFilter, "none": NoFusion},
+    group="fogsim.fusion",
+    methods=("update|update_at", "reset"),
 )
 """Every fusion by name: called with keyword parameters it gives a `Fusion`."""
 
 
-def make(name: str, **options: object) -> Fusion:
+def make(name: str, **options: object) -> Fusion | LocatedFusion:
     """Build a fusion.
 
     Parameters
@@ -34,4 +38,4 @@ def make(name: str, **options: object) -> Fusion:
     return registry.make(FUSIONS, name, **options)
 
 
-__all__ = ["FUSIONS", "Fusion", "make"]
+__all__ = ["FUSIONS", "Fusion", "LocatedFusion", "fuse", "make"]

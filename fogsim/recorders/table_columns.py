@@ -11,6 +11,12 @@ from fogsim.recorders.protocol import DERIVED_QUANTITIES, AnyStep_contra, Derive
 from fogsim.units import finite_or_none, visibility_from_extinction
 from fogsim.values import Estimate, Leader, LeadMeasurement, Step, TrafficStep
 
+PLACES = (100.0, 200.0, 400.0)
+"""Distances ahead along the route whose fog has columns of its own [m]."""
+
+CLEAR_AIR = 100_000.0
+"""Visibility from which on the truth counts as clear air [m]."""
+
 
 @dataclass(frozen=True, slots=True)
 class Column(Generic[AnyStep_contra]):
@@ -43,7 +49,9 @@ def table_columns(methods: Sequence[str]) -> list[Column[Step]]:
         Names of the estimators.
     """
     columns: list[Column[Step]] = [*_CLOCK_COLUMNS, *_EGO_COLUMNS, *_NEAR_COLUMNS, *_EVENT_COLUMNS]
-    columns += [*map(_derived_column, DERIVED_QUANTITIES), *_FOG_COLUMNS, *_FAULT_COLUMNS]
+    columns += [*map(_derived_column, DERIVED_QUANTITIES), *_FOG_COLUMNS]
+    columns += [column for distance in PLACES for column in _place_columns(distance)]
+    columns += _FAULT_COLUMNS
     for method in methods:
         columns += _estimator_columns(method)
     return columns
@@ -76,6 +84,39 @@ def _believed(share: float) -> Callable[[Step, Derived], object]:
 
 def _denser_fog(step: Step, _: Derived) -> float | None:
     return None if step.belief.denser is None else step.belief.denser.distance
+
+
+def _believed_at(distance: float, share: float) -> Callable[[Step, Derived], object]:
+    def believed(step: Step, _: Derived) -> float | None:
+        profile = step.belief.profile
+        return None if profile is None else profile.visibility_quantile(distance, share)
+
+    return believed
+
+
+def _true_at(distance: float) -> Callable[[Step, Derived], object]:
+    def true(step: Step, _: Derived) -> float | None:
+        profile = step.truth.profile
+        if profile is None or not profile.distance.size or distance > profile.distance[-1]:
+            return None
+        visibility = profile.visibility_quantile(distance, 0.5)
+        return visibility if visibility < CLEAR_AIR else None
+
+    return true
+
+
+def _place_columns(distance: float) -> list[Column[Step]]:
+    """Columns of the fog at a distance ahead along the route."""
+    name, place = f"visibility_{distance:.0f}_m_ahead", f"{distance:.0f} m ahead along the route"
+    believed = ((0.5, "", "median of the belief"), (0.05, "_low", "5 % quantile"), (0.95, "_high", "95 % quantile"))
+    number = pa.float64()
+    return [
+        Column(f"true_{name}_m", number, f"at the place {place}; null for clear air", _true_at(distance)),
+        *(
+            Column(f"believed_{name}{end}_m", number, f"{what} at the place {place}", _believed_at(distance, share))
+            for share, end, what in believed
+        ),
+    ]
 
 
 def _derived_column(name: str) -> Column[Step]:

@@ -15,9 +15,11 @@ from fogsim.values.command import (
 from fogsim.values.estimate import DenserFog, Estimate, FogCategory, OpticalDepths, SignLook, fog_category
 from fogsim.values.fault import Fault, RunningFault
 from fogsim.values.fog import FogBank, FogChange, FogField, FogPatches, FogShelter
+from fogsim.values.fog_profile import FogProfile
 from fogsim.values.image import Frame, View
 from fogsim.values.light import Beam, HeadLamp, Lamp, LampLobes, Lights, LightSources, SignalLight, StreetLighting
 from fogsim.values.observation import LeadMeasurement, LightMeasurement, Observation, SignSighting
+from fogsim.values.report import FogReport
 from fogsim.values.road import (
     Lane,
     LaneEnd,
@@ -68,6 +70,8 @@ __all__ = [
     "FogChange",
     "FogField",
     "FogPatches",
+    "FogProfile",
+    "FogReport",
     "FogShelter",
     "Frame",
     "HeadLamp",

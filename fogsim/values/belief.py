@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fogsim.jit import kernel
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.estimate import DenserFog
+from fogsim.values.fog_profile import FogProfile
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,11 +25,14 @@ class Belief:
         Probability of each cell; sums to 1.
     denser : DenserFog or None
         Denser fog ahead that several estimates have told of.
+    profile : FogProfile or None
+        What is believed of places along the way, by a fusion that tells.
     """
 
     log_extinction: NDArray[np.float64]
     probability: NDArray[np.float64]
     denser: DenserFog | None = None
+    profile: FogProfile | None = None
 
     def visibility_quantile(self, share: float) -> float:
         """Visibility below which the truth lies with a given probability [m].

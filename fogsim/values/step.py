@@ -15,6 +15,7 @@ from fogsim.values.command import Command, Stretch
 from fogsim.values.estimate import Estimate
 from fogsim.values.fault import Fault
 from fogsim.values.fog import FogField
+from fogsim.values.fog_profile import FogProfile
 from fogsim.values.image import View
 from fogsim.values.observation import Observation
 from fogsim.values.road import SignMap
@@ -105,6 +106,8 @@ class Truth:
         Ids of the lanes for vehicles of each edge, from the right; empty where no network is known.
     lamp_effects : LampEffects or None
         What the ego's lamps do; None by day.
+    profile : FogProfile or None
+        The fog at places along the route behind the ego and ahead, with deviations of 0; None where no route is known.
     """
 
     extinction: float
@@ -119,6 +122,7 @@ class Truth:
     faults: tuple[Fault, ...] = ()
     carriageways: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     lamp_effects: LampEffects | None = None
+    profile: FogProfile | None = None
 
     @property
     def visibility(self) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import extinction
+from fogsim.fusion import fuse
 from fogsim.recorders import FramePanel, draw_view_from_above
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.section import Method
@@ -100,7 +101,7 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
 
     def _completed(self, step: Step) -> Step:
         estimates = (self._surrogate.estimate(step.truth.extinction_ahead, self._illuminance),)
-        belief = self._fusion.update(estimates, step.time)
+        belief = fuse(self._fusion, estimates, step.time, step.route_position)
         return dataclasses.replace(step, estimates=estimates, belief=belief)
 
 

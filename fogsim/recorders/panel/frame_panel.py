@@ -9,6 +9,7 @@ from PIL import Image, ImageDraw
 
 from fogsim.recorders.panel import camera_picture
 from fogsim.recorders.panel.camera_picture import draw_camera_picture
+from fogsim.recorders.panel.profile_chart import draw_profile
 from fogsim.recorders.panel.strip_chart import Axis, Curve, StripChart
 from fogsim.recorders.protocol import Derived
 from fogsim.recorders.style import (
@@ -119,7 +120,14 @@ class FramePanel:
         self._visibility.add(step.time, (middle, low, high, step.truth.visibility_ahead))
         advised = step.command.advice.speed
         self._speed.add(step.time, (_kmh(_speed(step)), _kmh(advised) if math.isfinite(advised) else None))
-        frame.paste(self._visibility.draw(), (_LEFT, 300))
+        chart = self._visibility.draw()
+        if step.belief.profile is not None:
+            # The road ahead takes the place of the older half of the last minute.
+            half = chart.width // 2
+            chart = chart.copy()
+            size = (half - 8, chart.height)
+            chart.paste(draw_profile(size, _VISIBILITY_AXIS, step.belief.profile, step.truth.profile), (0, 0))
+        frame.paste(chart, (_LEFT, 300))
         frame.paste(self._speed.draw(), (_LEFT, 398))
 
     def _draw_banners(self, draw: ImageDraw.ImageDraw, step: Step) -> None:

@@ -7,7 +7,7 @@ from fogsim.calibration.veil_references import usual_references
 from fogsim.errors import InputError
 from fogsim.estimators import ESTIMATORS, Estimator
 from fogsim.estimators.night.references import TakesReferences
-from fogsim.fusion import FUSIONS, Fusion
+from fogsim.fusion import FUSIONS, Fusion, LocatedFusion
 from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy, VehicleLightingPolicy
 from fogsim.metrics import SafetyStandard
 from fogsim.scenario.schema import NO_RENDERER, Scenario
@@ -73,7 +73,7 @@ def estimators(scenario: Scenario, assumed: Camera) -> tuple[Estimator, ...]:
     return made
 
 
-def fusion(scenario: Scenario) -> Fusion:
+def fusion(scenario: Scenario) -> Fusion | LocatedFusion:
     """Fusion of a scenario.
 
     Parameters

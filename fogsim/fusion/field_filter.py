@@ -1,0 +1,238 @@
+"""Belief over space: what is known of the fog at places along the way, from estimates, announcements and reports."""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Annotated
+
+import numpy as np
+
+from fogsim.errors import InputError
+from fogsim.fusion.grid_filter import GridFilter
+from fogsim.fusion.route_field import AHEAD, CELL, RouteField
+from fogsim.parameters import Range, checked_parameters
+from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
+from fogsim.values.belief import Belief
+from fogsim.values.estimate import DenserFog, Estimate, OpticalDepths
+from fogsim.values.report import FogReport
+
+FARTHEST = CELL * AHEAD
+"""How far ahead an estimate is taken to speak [m]."""
+
+CUTS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
+"""Optical depths between which a curve of them tells of stretches of their own [-]."""
+
+SHORTEST, SHARED, GRAIN = 15.0, 0.8, 0.02
+"""Shortest such stretch [m], correlation of a curve's errors at its ends, and least deviation of its depth [-]."""
+
+CLEAR, UNSURE = 4e-4, 0.7
+"""Extinction [1/m] and relative deviation [-] from which on an estimate only says that there is little fog."""
+
+STARTLED, CERTAIN, LEAST_LEAP = 3.0, 0.35, 0.3
+"""By how many standard deviations, and by how much in ln k, the belief of the here and now must differ for a leap, and
+how sure it must be of ln k [-]."""
+
+ANNOUNCED, ANNOUNCED_DEVIATION = 75.0, 0.6
+"""Length of the denser fog that is announced [m], and the standard deviation of ln k there: a front is seen, not what
+lies behind it."""
+
+
+@checked_parameters
+class FieldFilter:
+    """A Gaussian process of ln k over the way, ahead and behind, beside `GridFilter`'s belief of the here and now.
+
+    Each estimate tells of the mean extinction over the stretch that it has seen; a curve of optical depths, of several
+    stretches. Denser fog that is announced is believed where it is told; a report, where it was measured, the less the
+    older it is. What nobody has told of is known by what is near, and beyond that by nothing but that fog varies: the
+    interval widens. Where the filter of the here and now, which believes in leaps, surely differs from the field, the
+    edge of a bank has been driven through: what was believed ahead is doubted.
+
+    The scalar belief is the distribution of the mean extinction from the vehicle to where 95 % of the light is lost.
+
+    Parameters
+    ----------
+    deviation, length : float
+        Standard deviation of ln k along the way [-], and the length over which it varies [m].
+    steadiness : float
+        Time over which banks drift or dissolve [s].
+    relative_floor : float
+        Relative standard deviation that estimates of one stretch never come below, as their errors are alike [-].
+    outlier_share, wrong_reports : float
+        Share of estimates, and of reports, that say nothing, above 0 and below 1 [-].
+    correlation_time : float
+        Time after which the errors of an estimator are new ones [s]; longer than `GridFilter`'s, which forgets sooner.
+    oldest_report : float
+        Age beyond which reports do not count [s].
+
+    Raises
+    ------
+    InputError
+        If a parameter is out of the range in its annotation.
+    """
+
+    def __init__(
+        self,
+        deviation: Annotated[float, Range(0.01, 10.0)] = 2.0,
+        length: Annotated[float, Range(10.0, 1e5, "m")] = 300.0,
+        steadiness: Annotated[float, Range(1.0, 1e6, "s")] = 900.0,
+        relative_floor: Annotated[float, Range(1e-4, 10.0)] = 0.1,
+        outlier_share: Annotated[float, Range(1e-12, 0.999)] = 0.07,
+        wrong_reports: Annotated[float, Range(1e-12, 0.999)] = 0.2,
+        correlation_time: Annotated[float, Range(1e-3, 1e6, "s")] = 1.5,
+        oldest_report: Annotated[float, Range(0.0, 1e6, "s")] = 600.0,
+    ) -> None:
+        self._here = GridFilter(outlier_share=outlier_share)
+        self._field = RouteField(deviation, length, steadiness)
+        self._floor, self._outlier_share, self._wrong_reports = relative_floor, outlier_share, wrong_reports
+        self._correlation_time, self._oldest_report = correlation_time, oldest_report
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._here.reset()
+        self._field.reset()
+        self._time: float | None = None
+        self._share = 1.0
+        self._heard: set[tuple[str, int]] = set()
+
+    def update_at(
+        self, estimates: Sequence[Estimate], time: float, place: float, reports: Sequence[FogReport] = ()
+    ) -> Belief:
+        """Take in the estimates of one instant, and what others tell.
+
+        Parameters
+        ----------
+        estimates : sequence of Estimate
+            From any estimators; invalid ones tell no more than their bounds.
+        time : float
+            The instant [s], not before that of the last call.
+        place : float
+            How far the vehicle has come along its way [m].
+        reports : sequence of FogReport
+            What has come in since the last call; those of the future, too old ones, repeated ones and such that are no
+            numbers are left out.
+
+        Returns
+        -------
+        Belief
+            With its `profile`.
+
+        Raises
+        ------
+        InputError
+            If time or place are not finite, or the time goes backward.
+        """
+        if not math.isfinite(place):
+            raise InputError(f"field_filter: the place of an update must be finite, got {place!r}")
+        now = self._here.update(estimates, time)
+        if self._time is not None and time > self._time:
+            self._share = min(1.0, (time - self._time) / self._correlation_time)
+            self._field.elapse(time - self._time)
+        self._time = time
+        self._field.move_to(place)
+        for estimate in estimates:
+            self._take_in(estimate)
+        for report in reports:
+            self._hear(report, time, place)
+        self._mind_leaps(now)
+        if now.denser is not None:
+            self._expect(now.denser)
+        return self._belief(now)
+
+    def _take_in(self, estimate: Estimate) -> None:
+        """Learn what an estimate tells of the stretch that it has seen."""
+        if not estimate.valid:
+            if estimate.bounds is not None and estimate.bounds.most < math.inf:
+                most = max(estimate.bounds.most, CLEAR)
+                self._field.learn_at_most(self._sight(most), math.log(most), max(estimate.bounds.softness, 0.05))
+            return
+        k = estimate.extinction
+        if not (math.isfinite(k) and math.isfinite(estimate.standard_deviation)):
+            return
+        relative = estimate.standard_deviation / max(k, CLEAR)
+        if k < CLEAR or relative > UNSURE:
+            most = max(k + 1.3 * estimate.standard_deviation, CLEAR)
+            self._field.learn_at_most(min(estimate.reach, self._sight(most)), math.log(most), 0.3)
+            return
+        if estimate.optical_depths is None:
+            self._learn(0.0, min(estimate.reach, self._sight(k)), math.log(k), relative)
+            return
+        for start, end, value, deviation in _stretches(estimate.optical_depths):
+            self._learn(start, end, value, max(deviation, 0.5 * relative))
+
+    def _learn(self, start: float, end: float, value: float, deviation: float) -> None:
+        # The errors of pictures that follow one another are alike: each counts for the share of time that is new.
+        widened = max(deviation, self._floor) / math.sqrt(self._share)
+        self._field.learn(start, end, value, widened, self._outlier_share, self._floor)
+
+    def _hear(self, report: FogReport, time: float, place: float) -> None:
+        """Learn what somebody else has measured."""
+        age, ahead, known = time - report.time, report.place - place, (report.source, report.number)
+        numbers = (age, ahead, report.extinction, report.relative_deviation)
+        if known in self._heard or not all(map(math.isfinite, numbers)) or not 0.0 <= age <= self._oldest_report:
+            return
+        if not -FARTHEST < ahead < FARTHEST or report.extinction < 0.0 or report.relative_deviation <= 0.0:
+            return
+        self._heard.add(known)
+        value = math.log(max(report.extinction, CLEAR))
+        deviation = math.hypot(max(report.relative_deviation, self._floor), math.sqrt(self._field.variance_of_age(age)))
+        start, end = ahead - 0.5 * CELL, ahead + 0.5 * CELL
+        self._field.learn(start, end, value, deviation, self._wrong_reports, self._floor)
+
+    def _mind_leaps(self, now: Belief) -> None:
+        """Doubt the field where the belief of the here and now surely differs from it."""
+        deviation = now.log_standard_deviation
+        if deviation > CERTAIN:
+            return
+        value = float((now.probability * now.log_extinction).sum())
+        sight = self._sight(math.exp(value))
+        believed, variance = self._field.mean_extinction(0.0, sight)
+        apart = abs(value - believed)
+        if apart > max(STARTLED * math.sqrt(variance + deviation**2), LEAST_LEAP):
+            self._field.leap()
+            self._field.learn(0.0, sight, value, max(deviation, 0.1), self._outlier_share, self._floor)
+
+    def _expect(self, denser: DenserFog) -> None:
+        start = denser.distance
+        value = math.log(max(denser.extinction, CLEAR))
+        widened = ANNOUNCED_DEVIATION / math.sqrt(self._share)
+        self._field.learn(start, start + ANNOUNCED, value, widened, self._outlier_share, self._floor)
+
+    def _belief(self, now: Belief) -> Belief:
+        """The belief with its profile: of the samples' quantiles, spread evenly between one and the next."""
+        cells, samples = now.log_extinction, self._field.sighted_extinctions()
+        half = 0.5 * (cells[1] - cells[0])
+        shares = (np.arange(samples.size) + 0.5) / samples.size
+        within = np.clip(samples, cells[0], cells[-1])
+        below = np.interp(np.append(cells[:-1] + half, np.inf), *_ascending(within, shares), left=0.0, right=1.0)
+        probability = np.diff(below, prepend=0.0)
+        return Belief(cells, probability / probability.sum(), now.denser, self._field.profile())
+
+    @staticmethod
+    def _sight(extinction: float) -> float:
+        """Meteorological visibility, as far as the field goes [m]."""
+        return min(OPTICAL_DEPTH_AT_VISIBILITY / extinction, FARTHEST)
+
+
+def _stretches(curve: OpticalDepths) -> Iterator[tuple[float, float, float, float]]:
+    """Stretches of which a curve tells: start and end [m], ln of the mean extinction, and its standard deviation."""
+    distance, depth, deviation = map(np.array, (curve.distance, curve.depth, curve.standard_deviation))
+    ends = [float(np.interp(cut, depth, distance)) for cut in CUTS if cut < depth[-1]]
+    if depth[-1] < CUTS[-1]:
+        ends.append(float(distance[-1]))
+    start, reached, unsure = 0.0, 0.0, 0.0
+    for end in ends:
+        if end - start < SHORTEST:
+            continue
+        total, spread = (float(np.interp(end, distance, values)) for values in (depth, deviation))
+        more = max(total - reached, 1e-4)
+        apart = math.sqrt(max(spread**2 + unsure**2 - 2.0 * SHARED * spread * unsure, 0.0))
+        yield start, min(end, FARTHEST), math.log(more / (end - start)), math.hypot(apart, GRAIN) / more
+        start, reached, unsure = end, total, spread
+        if start >= FARTHEST:
+            return
+
+
+def _ascending(values: np.ndarray, shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Values with their shares, each value once."""
+    last = np.append(np.diff(values) > 0.0, True)
+    return values[last], shares[last]

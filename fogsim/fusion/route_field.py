@@ -1,0 +1,211 @@
+"""A normal distribution of ln k over places along the way, which moves on with the vehicle."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.fusion import route_field_kernels
+from fogsim.linear_algebra import inverse_of, matrix_product
+from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY, extinction_from_visibility
+from fogsim.values.fog_profile import FogProfile
+
+Floats = NDArray[np.float64]
+
+CELL, BEHIND, AHEAD = 25.0, 12, 40
+"""Length of a cell of the way [m], and how many are kept behind the one in which the vehicle is, and ahead of it."""
+
+COUNT = BEHIND + AHEAD + 1
+
+LOG_RANGE = 7.0
+"""ln k that a wrong measurement may have any of [-]."""
+
+LEVEL, LEVEL_DEVIATION = math.log(extinction_from_visibility(750.0)), 1.2
+"""Mean and standard deviation of a whole road's ln k before anything is known of it."""
+
+GRAIN, GRAIN_LENGTH = 0.4, 50.0
+"""Standard deviation of what else varies, from place to place [-], and the length over which it does [m]."""
+
+SAMPLES = 64
+"""Pairs of samples from which the visibility ahead is told."""
+
+WEIGHED = 41
+"""Values over which a likelihood is weighed."""
+
+
+class RouteField:
+    """ln k along the way: a level that nobody knows, and what varies about it with place and time.
+
+    What varies has a Matérn covariance over the way, σ² (1 + √3 |Δs| / ℓ) e^(−√3 |Δs| / ℓ), and some grain; it forgets
+    itself over a time T. What is learnt is
+    taken in by assumed-density filtering: the exact moments of one function of the cells, the logarithm of the mean
+    extinction over a stretch, linearised.
+
+    Parameters
+    ----------
+    deviation : float
+        σ, standard deviation of ln k along the way [-].
+    length : float
+        ℓ, over which it varies [m].
+    steadiness : float
+        T, over which banks drift or dissolve [s].
+    """
+
+    def __init__(self, deviation: float, length: float, steadiness: float) -> None:
+        self._deviation, self._length, self._steadiness = deviation, length, steadiness
+        places = CELL * np.arange(COUNT + 1)
+        apart = np.abs(places[:, None] - places)
+        smooth = (1.0 + math.sqrt(3.0) * apart / length) * np.exp(-math.sqrt(3.0) * apart / length)
+        varying = deviation**2 * smooth + GRAIN**2 * np.exp(-apart / GRAIN_LENGTH)
+        beforehand = varying + LEVEL_DEVIATION**2
+        self._varying, self._beforehand = varying[:-1, :-1], beforehand[:-1, :-1]
+        self._next = matrix_product(inverse_of(np.ascontiguousarray(self._beforehand)), beforehand[:-1, -1])
+        self._rest = float(beforehand[-1, -1] - matrix_product(self._next, beforehand[:-1, -1]))
+        # The same in every run: what is told of a distribution is not to go by chance.
+        half = np.random.default_rng(0).standard_normal((SAMPLES, AHEAD + 1))
+        self._normals = np.concatenate([half, -half])
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._mean, self._covariance = np.full(COUNT, LEVEL), self._beforehand.copy()
+        self._cell: int | None = None
+        self._place = 0.0
+
+    def move_to(self, place: float) -> None:
+        """Let the vehicle be at a place.
+
+        Parameters
+        ----------
+        place : float
+            Distance along the way [m]. One who goes back, or leaps on by more than is kept, knows nothing.
+        """
+        cell = math.floor(place / CELL)
+        if self._cell is not None and not 0 <= cell - self._cell < COUNT:
+            self.reset()
+        for _ in range(cell - (cell if self._cell is None else self._cell)):
+            route_field_kernels.roll(self._mean, self._covariance, self._next, LEVEL, self._rest)
+        self._cell, self._place = cell, place
+
+    def elapse(self, time: float) -> None:
+        """Let a time pass [s].
+
+        Parameters
+        ----------
+        time : float
+            How long.
+        """
+        self._covariance += -math.expm1(-2.0 * time / self._steadiness) * self._varying
+
+    def variance_of_age(self, age: float) -> float:
+        """By how much a measurement's variance of ln k grows with its age [-].
+
+        Parameters
+        ----------
+        age : float
+            How old it is [s].
+        """
+        return 2.0 * self._deviation**2 * -math.expm1(-max(age, 0.0) / self._steadiness)
+
+    def leap(self) -> None:
+        """Doubt what was believed of where the vehicle is and ahead: the edge of a bank has been driven through."""
+        here = np.arange(COUNT) >= BEHIND
+        self._covariance += self._beforehand * here[:, None] * here
+
+    def mean_extinction(self, start: float, end: float) -> tuple[float, float]:
+        """Mean and variance of the logarithm of the mean extinction over a stretch [ln 1/m, -].
+
+        Parameters
+        ----------
+        start, end : float
+            Its ends ahead of the vehicle [m].
+        """
+        value, _, variance = self._linearised(start, end)
+        return value, variance
+
+    def _linearised(self, start: float, end: float) -> tuple[float, Floats, float]:
+        """Logarithm of the mean extinction over a stretch: mean, covariance with all cells, and variance."""
+        value, gradient = route_field_kernels.mean_extinction(self._mean, self._weights(start, end))
+        shared, variance = route_field_kernels.spread_with(self._covariance, gradient)
+        # A mean of exponentials is above the exponential of a mean: to second order by half of what cells differ.
+        differing = float((gradient * np.diagonal(self._covariance)).sum()) - variance
+        return value + 0.5 * max(differing, 0.0), shared, variance
+
+    def learn(self, start: float, end: float, value: float, deviation: float, wrong: float, floor: float) -> None:
+        """Take in a measurement of the mean extinction over a stretch.
+
+        Parameters
+        ----------
+        start, end : float
+            Ends of the stretch ahead of the vehicle [m].
+        value, deviation : float
+            Logarithm of the mean extinction, and its standard deviation [ln 1/m, -].
+        wrong : float
+            How likely it is that it says nothing [-].
+        floor : float
+            Standard deviation that no number of measurements brings below [-]: their errors are alike.
+        """
+        before, shared, variance = self._linearised(start, end)
+        total, apart = variance + max(deviation, floor) ** 2, value - before
+        if variance <= floor**2 and apart**2 < 4.0 * total:
+            return
+        density = (1.0 - wrong) * math.exp(-0.5 * apart**2 / total) / math.sqrt(2.0 * math.pi * total)
+        right = density / (density + wrong / LOG_RANGE)
+        gain = variance / total
+        narrowed = right * gain * variance - right * (1.0 - right) * (gain * apart) ** 2
+        self._condition(shared, variance, right * gain * apart, narrowed)
+
+    def learn_at_most(self, end: float, value: float, softness: float) -> None:
+        """Take in that the mean extinction from the vehicle on is likely no more than a value.
+
+        Parameters
+        ----------
+        end : float
+            End of the stretch ahead of the vehicle [m].
+        value, softness : float
+            Logarithm of the most, and the standard deviation of that [ln 1/m, -].
+        """
+        before, shared, variance = self._linearised(0.0, end)
+        if variance <= 0.0:
+            return
+        at = before + math.sqrt(variance) * np.linspace(-4.0, 4.0, WEIGHED)
+        below = np.array([0.5 * math.erfc((one - value) / (math.sqrt(2.0) * softness)) for one in at.tolist()])
+        weights = np.exp(-0.5 * (at - before) ** 2 / variance) * (below + 1e-12)
+        weights /= weights.sum()
+        moved = float((weights * at).sum()) - before
+        left = float((weights * (at - before - moved) ** 2).sum())
+        self._condition(shared, variance, moved, variance - left)
+
+    def _condition(self, shared: Floats, variance: float, moved: float, narrowed: float) -> None:
+        route_field_kernels.condition(self._mean, self._covariance, shared / variance, moved, narrowed)
+
+    def sighted_extinctions(self) -> Floats:
+        """(samples,) float64, ascending: ln of the mean extinction up to where 95 % of the light is lost."""
+        ahead, ends = slice(BEHIND, None), self._edges()[BEHIND + 1 :]
+        lower = route_field_kernels.factor(np.ascontiguousarray(self._covariance[ahead, ahead]))
+        found = route_field_kernels.sighted_extinctions(
+            self._mean[ahead], lower, self._normals, ends, OPTICAL_DEPTH_AT_VISIBILITY
+        )
+        return np.sort(found)
+
+    def profile(self) -> FogProfile:
+        """What is believed at the middle of each cell."""
+        edges = self._edges()
+        deviation = np.sqrt(np.maximum(np.diagonal(self._covariance), 0.0))
+        return FogProfile(0.5 * (edges[1:] + edges[:-1]), self._mean.copy(), deviation)
+
+    def _edges(self) -> Floats:
+        """(cells + 1,) float64: where cells begin and end, ahead of the vehicle [m]."""
+        within = self._place - CELL * (self._cell or 0)
+        return np.asarray(CELL * (np.arange(COUNT + 1) - BEHIND) - within)
+
+    def _weights(self, start: float, end: float) -> Floats:
+        """(cells,) float64: share of a stretch that lies in each cell; of one that lies beyond all, in the last."""
+        edges = self._edges()
+        inside: Floats = np.clip(np.minimum(edges[1:], end) - np.maximum(edges[:-1], start), 0.0, None)
+        total = float(inside.sum())
+        if total > 0.0:
+            return np.asarray(inside / total)
+        nearest: Floats = np.zeros(COUNT)
+        nearest[min(max(int(np.searchsorted(edges, start)) - 1, 0), COUNT - 1)] = 1.0
+        return nearest

@@ -1,0 +1,182 @@
+"""Belief over space from estimates, announcements and reports."""
+
+import math
+
+import numpy as np
+import pytest
+
+from fogsim.errors import InputError
+from fogsim.fusion import LocatedFusion, fuse, make
+from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
+from fogsim.values import DenserFog, Estimate, FogReport, OpticalDepths
+from fogsim.values.estimate import ExtinctionBounds
+
+SPEED, PERIOD = 25.0, 0.2
+
+
+def seen(visibility: float, relative: float = 0.05, **more: object) -> Estimate:
+    k = OPTICAL_DEPTH_AT_VISIBILITY / visibility
+    return Estimate("test", k, relative * k, **more)
+
+
+def curve_of(depth, reach: float = 300.0) -> OpticalDepths:
+    distance = np.geomspace(10.0, reach, 20)
+    depths = depth(distance)
+    return OpticalDepths(*(tuple(values.tolist()) for values in (distance, depths, 0.05 * depths)))
+
+
+def driven(fusion, estimates, seconds: float = 10.0, start: float = 0.0, place: float = 0.0, reports=()):
+    belief = None
+    for i in range(round(seconds / PERIOD)):
+        time = start + i * PERIOD
+        belief = fusion.update_at(estimates, time, place + SPEED * i * PERIOD, reports if i == 0 else ())
+    return belief
+
+
+def report(place: float, visibility: float, time: float = 0.0, number: int = 1, relative: float = 0.1) -> FogReport:
+    return FogReport("car", number, place, time, OPTICAL_DEPTH_AT_VISIBILITY / visibility, relative)
+
+
+def test_even_fog_is_believed_here_and_unsure_ahead():
+    belief = driven(make("field_filter"), [seen(150.0)])
+    assert belief.visibility == pytest.approx(150.0, rel=0.06)
+    low, high = belief.visibility_quantiles((0.05, 0.95))
+    assert low < 150.0 < high
+    assert high / low < 2.5
+    deviations = [belief.profile.at(distance)[1] for distance in (10.0, 100.0, 300.0, 900.0)]
+    assert deviations == sorted(deviations)
+    assert deviations[-1] > 1.0
+    assert belief.profile.at(-100.0)[1] < 0.4
+
+
+def test_a_curve_of_optical_depths_tells_of_stretches():
+    bank = curve_of(lambda d: 0.004 * d + 0.03 * np.maximum(d - 100.0, 0.0), 190.0)
+    estimate = Estimate("test", 0.017, 0.001, reach=190.0, optical_depths=bank)
+    profile = driven(make("field_filter"), [estimate], 1.0).profile
+    assert profile.at(50.0)[0] == pytest.approx(math.log(0.004), abs=0.5)
+    assert profile.at(150.0)[0] == pytest.approx(math.log(0.034), abs=0.5)
+
+
+def test_announced_fog_is_believed_where_it_is_told():
+    fusion = make("field_filter")
+    thin = curve_of(lambda d: 0.002 * d, 150.0)
+    for i in range(20):
+        told = Estimate(
+            "test", 0.002, 2e-4, reach=150.0, optical_depths=thin, denser=DenserFog(200.0 - 5.0 * i, 20.0, 0.05)
+        )
+        belief = fusion.update_at([told], 0.2 * i, SPEED * 0.2 * i)
+    assert belief.denser is not None
+    there, deviation = belief.profile.at(belief.denser.distance + 70.0)
+    assert there == pytest.approx(math.log(0.05), abs=2.0 * deviation)
+    assert there > math.log(0.015)
+
+
+def test_a_bank_that_is_entered_is_believed_within_seconds():
+    fusion = make("field_filter")
+    driven(fusion, [seen(2000.0, 0.3)], 10.0)
+    inside = curve_of(lambda d: d * OPTICAL_DEPTH_AT_VISIBILITY / 60.0, 75.0)
+    belief = driven(fusion, [seen(60.0, reach=75.0, optical_depths=inside)], 3.0, start=10.0, place=250.0)
+    assert belief.visibility == pytest.approx(60.0, rel=0.15)
+    assert belief.profile.visibility_quantile(0.0, 0.5) == pytest.approx(60.0, rel=0.15)
+    # And what lies behind is still believed clear.
+    assert belief.profile.visibility_quantile(-200.0, 0.5) > 300.0
+
+
+def test_a_report_from_ahead_is_believed_where_it_was_measured():
+    fusion = make("field_filter")
+    thin = [seen(800.0, 0.1, reach=200.0)]
+    belief = driven(fusion, thin, 2.0, reports=[report(350.0 + 10.0 * i, 80.0, number=i) for i in range(4)])
+    assert belief.profile.visibility_quantile(320.0, 0.5) == pytest.approx(80.0, rel=0.15)
+    without = driven(make("field_filter"), thin, 2.0)
+    assert without.profile.visibility_quantile(300.0, 0.5) > 400.0
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        report(350.0, 80.0, time=5.0),
+        report(350.0, 80.0, time=-1000.0),
+        report(350.0, math.nan),
+        report(math.inf, 80.0),
+        report(350.0, 80.0, relative=0.0),
+        report(350.0, -80.0),
+        report(90_000.0, 80.0),
+    ],
+    ids=["of the future", "too old", "no number", "nowhere", "without deviation", "negative", "another road"],
+)
+def test_reports_that_cannot_be_change_nothing(bad):
+    plain = driven(make("field_filter"), [seen(800.0, 0.1)], 1.0)
+    told = driven(make("field_filter"), [seen(800.0, 0.1)], 1.0, reports=[bad])
+    np.testing.assert_array_equal(told.profile.log_extinction, plain.profile.log_extinction)
+
+
+def test_a_report_that_comes_twice_counts_once():
+    once = driven(make("field_filter"), [], 1.0, reports=[report(350.0, 80.0)])
+    twice = driven(make("field_filter"), [], 1.0, reports=[report(350.0, 80.0)] * 3)
+    np.testing.assert_array_equal(once.profile.log_extinction, twice.profile.log_extinction)
+
+
+def test_an_old_report_says_less_than_a_fresh_one():
+    fresh, old = (make("field_filter").update_at([], 200.0, 0.0, [report(300.0, 80.0, time)]) for time in (200.0, 0.0))
+    assert fresh.profile.at(300.0)[1] < old.profile.at(300.0)[1]
+
+
+def test_a_sensor_that_lies_one_time_in_five_does_not_double_the_error():
+    rng = np.random.default_rng(3)
+
+    def error(lying: float) -> float:
+        off = []
+        for _ in range(30):
+            fusion, truth = make("field_filter"), math.exp(rng.uniform(math.log(50.0), math.log(500.0)))
+            reports = []
+            for number in range(12):
+                lie = math.exp(rng.uniform(math.log(20.0), math.log(5000.0)))
+                told = lie if rng.random() < lying else truth * math.exp(rng.normal(0.0, 0.1))
+                reports.append(report(200.0 + rng.uniform(-30.0, 30.0), told, 0.0, number))
+            belief = fusion.update_at([], 0.0, 0.0, reports)
+            off.append(abs(math.log(belief.profile.visibility_quantile(200.0, 0.5) / truth)))
+        return float(np.median(off))
+
+    assert error(0.2) < 2.0 * error(0.0)
+
+
+def test_silent_methods_tell_no_more_than_their_bounds():
+    nothing = driven(make("field_filter"), [Estimate.invalid("test", "dark")], 1.0)
+    bounded = Estimate("test", 0.0, math.inf, valid=False, bounds=ExtinctionBounds(most=0.012))
+    told = driven(make("field_filter"), [bounded], 1.0)
+    assert told.profile.visibility_quantile(50.0, 0.05) > 2.0 * nothing.profile.visibility_quantile(50.0, 0.05)
+
+
+def test_no_fog_seen_leaves_the_road_ahead_open():
+    belief = driven(make("field_filter"), [Estimate("test", 0.0, 0.001, reach=200.0)], 5.0)
+    assert belief.profile.visibility_quantile(100.0, 0.05) > 400.0
+    assert belief.profile.at(800.0)[1] > 1.0
+
+
+def test_the_belief_is_a_distribution_and_stays_one_whatever_comes():
+    rng, fusion = np.random.default_rng(5), make("field_filter")
+    for i in range(300):
+        k, reach = math.exp(rng.uniform(-9.0, -1.0)), rng.uniform(5.0, 2000.0)
+        told = Estimate("test", k, k * math.exp(rng.uniform(-5.0, 3.0)), reach=reach)
+        belief = fusion.update_at([told], 0.1 * i, 40.0 * i * rng.random(), [report(rng.normal(0, 1e3), 50.0, 0.0, i)])
+        assert belief.probability.sum() == pytest.approx(1.0)
+        assert (belief.probability >= 0.0).all()
+        assert np.isfinite(belief.profile.log_extinction).all()
+        assert (belief.profile.standard_deviation > 0.0).all()
+
+
+def test_reset_forgets_and_places_must_be_numbers():
+    fusion = make("field_filter")
+    driven(fusion, [seen(60.0)], 5.0)
+    fusion.reset()
+    fresh = make("field_filter").update_at([], 0.0, 0.0)
+    np.testing.assert_array_equal(fusion.update_at([], 0.0, 0.0).probability, fresh.probability)
+    with pytest.raises(InputError, match="place"):
+        fusion.update_at([], 1.0, math.nan)
+
+
+def test_either_kind_of_fusion_can_be_asked():
+    assert isinstance(make("field_filter"), LocatedFusion)
+    assert not isinstance(make("grid_filter"), LocatedFusion)
+    assert fuse(make("grid_filter"), [seen(100.0)], 0.0, 10.0).profile is None
+    assert fuse(make("field_filter"), [seen(100.0)], 0.0, 10.0).profile is not None

@@ -1,15 +1,17 @@
 """Rounding, smoothing, hysteresis and hold, which all advisers share."""
 
+import dataclasses
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 
 from fogsim.advice import ADVISERS
 from fogsim.advice.presentation import PresentedAdviser
 from fogsim.kinematics import safe_speed
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
-from fogsim.values import SpeedAdvice
+from fogsim.values import Belief, FogProfile, SpeedAdvice
 from fogsim.values.belief import certain_belief
 
 LIMIT = 130 / 3.6
@@ -77,3 +79,46 @@ def test_smoothing_goes_on_while_a_rise_is_held() -> None:
     assert held[:19] == [pytest.approx(60.0)] * 19
     assert held[19] == pytest.approx(80.0)
     assert held[-1] == math.inf
+
+
+def believed(visibilities: dict[float, float], deviation: float = 0.2, here: float = 2000.0) -> Belief:
+    """A belief that knows of places: visibility [m] by distance ahead [m]."""
+    places = np.array(list(visibilities))
+    logs = np.log(OPTICAL_DEPTH_AT_VISIBILITY / np.array(list(visibilities.values())))
+    profile = FogProfile(places, logs, np.full(places.size, deviation))
+    return dataclasses.replace(certain_belief(OPTICAL_DEPTH_AT_VISIBILITY / here), profile=profile)
+
+
+def advised(belief: Belief, **parameters: Any) -> float:
+    adviser = ADVISERS["stopping_sight_distance"](rounding=0.01, **parameters)
+    return float(adviser.advise(belief, LIMIT, 0.0, SpeedAdvice()).speed)
+
+
+def test_a_bank_ahead_is_slowed_down_for_no_earlier_than_need_be() -> None:
+    in_bank = safe_speed(60.0, 2.5, 3.4)
+    speeds_on_the_way = []
+    for ahead in (400.0, 200.0, 100.0, 0.0):
+        belief = believed({-100.0: 2000.0, ahead - 1e-3: 2000.0, ahead: 60.0, 1000.0: 60.0})
+        speeds_on_the_way.append(advised(belief, quantile=0.5, slowing=1.5))
+        expected = math.sqrt(in_bank**2 + 2.0 * 1.5 * ahead)
+        assert speeds_on_the_way[-1] == pytest.approx(math.inf if expected >= LIMIT else expected, abs=0.05)
+    assert speeds_on_the_way == sorted(speeds_on_the_way, reverse=True)
+
+
+def test_places_of_which_too_little_is_known_do_not_count() -> None:
+    bank = {-100.0: 2000.0, 0.0: 2000.0, 50.0: 30.0, 1000.0: 30.0}
+    profile = believed(bank).profile
+    assert profile is not None
+    unsure = dataclasses.replace(profile, standard_deviation=np.array([0.2, 0.2, 2.0, 2.0]))
+    belief = dataclasses.replace(believed(bank), profile=unsure)
+    assert advised(belief, quantile=0.5) == math.inf
+    assert advised(believed(bank), quantile=0.5) < 20.0
+    lost = dataclasses.replace(belief, profile=dataclasses.replace(profile, standard_deviation=np.full(4, 2.0)))
+    held = ADVISERS["stopping_sight_distance"]().advise(lost, LIMIT, 0.0, SpeedAdvice(12.0))
+    assert held.speed == 12.0
+
+
+def test_a_careful_quantile_counts_at_each_place() -> None:
+    bank = {-100.0: 300.0, 0.0: 300.0, 100.0: 80.0, 1000.0: 80.0}
+    careful, median = (advised(believed(bank, 0.5), quantile=share) for share in (0.25, 0.5))
+    assert careful < median

@@ -2,9 +2,10 @@
 
 import math
 
+import numpy as np
 import pytest
 
-from fogsim.ego.fog_truth import fog_truth
+from fogsim.ego.fog_truth import KnownWay, fog_truth
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, CameraPose, FogBank, FogField, SignMap
 
@@ -36,3 +37,24 @@ def test_a_bank_ahead_ends_the_sight_as_far_within_as_its_optical_depth_says() -
         FogField(0.0, (1.0,) * 3, banks=(bank,)), CameraPose((0.0, 0.0, 1.4), heading=math.pi), CAMERA, SignMap()
     )
     assert behind.extinction_ahead == 0.0
+
+
+def test_the_fog_along_the_route_is_told_as_far_as_the_route_goes() -> None:
+    route = np.array([[0.0, 0.0, 0.0], [400.0, 0.0, 0.0], [400.0, 300.0, 0.0]])
+    # A slab across the second leg of the way, 100 m beyond its corner.
+    bank = FogBank(origin=(400.0, 0.0), axis=(0.0, 1.0), start=100.0, end=1000.0, edge=1.0, extra_extinction=0.05)
+    fog = FogField(0.002, (1.0,) * 3, banks=(bank,))
+    told = fog_truth(fog, POSE, CAMERA, SignMap(), way=KnownWay(route), place=100.0).profile
+    assert told is not None
+    assert (told.distance[0], told.distance[-1]) == (-100.0, 600.0)
+    assert told.at(350.0) == pytest.approx((math.log(0.002), 0.0))
+    assert told.at(450.0) == pytest.approx((math.log(0.052), 0.0))
+    assert fog_truth(fog, POSE, CAMERA, SignMap(), way=KnownWay(route)).profile is None
+    assert fog_truth(fog, POSE, CAMERA, SignMap(), place=100.0).profile is None
+
+
+def test_clear_air_along_the_route_has_a_logarithm_too() -> None:
+    way = KnownWay(np.array([[0.0, 0.0, 0.0], [400.0, 0.0, 0.0]]))
+    told = fog_truth(FogField(0.0, (1.0,) * 3), POSE, CAMERA, SignMap(), way=way, place=0.0).profile
+    assert told is not None
+    assert told.log_extinction == pytest.approx(math.log(1e-6))

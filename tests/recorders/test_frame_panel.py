@@ -10,7 +10,7 @@ from fogsim.recorders import FramePanel
 from fogsim.recorders.panel.camera_picture import draw_camera_picture, scale_image
 from fogsim.recorders.panel.strip_chart import Axis, Curve, StripChart
 from fogsim.recorders.style import ALARM, AMBER, BELIEF, TRUTH
-from fogsim.values import Collision, Ending, Frame, Lamp, Leader, Step
+from fogsim.values import Collision, Ending, FogProfile, Frame, Lamp, Leader, Step
 from tests.recorders.synthetic import drive, estimate, make_step
 
 
@@ -123,3 +123,18 @@ def test_a_logarithmic_axis_has_equal_ratios_at_equal_distances_and_ends() -> No
     assert axis.height(200.0) == pytest.approx(0.5)
     assert axis.height(1.0) == 0.0
     assert axis.height(math.inf) == 1.0
+
+
+def test_the_fog_along_the_road_is_drawn_where_it_is_believed() -> None:
+    step = make_step()
+    places = np.arange(-200.0, 801.0, 25.0)
+    believed = FogProfile(places, np.linspace(-6.0, -3.0, places.size), np.full(places.size, 0.3))
+    told = dataclasses.replace(step, belief=dataclasses.replace(step.belief, profile=believed))
+    true = dataclasses.replace(told.truth, profile=dataclasses.replace(believed, log_extinction=np.full(41, -5.0)))
+    without, with_belief, with_both = draw(step), draw(told), draw(dataclasses.replace(told, truth=true))
+    left, right = slice(656, 820), slice(840, 1000)
+    assert differs(without, with_belief, slice(300, 392), left)
+    assert not differs(without, with_belief, slice(300, 392), right)
+    assert (with_belief[300:392, left] == BELIEF).all(axis=-1).any()
+    assert (with_both[300:392, left] == TRUTH).all(axis=-1).any()
+    assert not (with_belief[300:392, left] == TRUTH).all(axis=-1).any()

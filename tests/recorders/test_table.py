@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
@@ -14,7 +15,7 @@ from fogsim.files.row_log import read_rows
 from fogsim.metrics import step_metrics
 from fogsim.recorders import TableRecorder
 from fogsim.recorders.table import ROWS_PER_GROUP
-from fogsim.values import Collision, Ending, Estimate, Lamp, Leader, LeadMeasurement, Step
+from fogsim.values import Collision, Ending, Estimate, FogProfile, Lamp, Leader, LeadMeasurement, Step
 from tests.recorders.synthetic import METHODS, drive, estimate, make_step
 
 
@@ -90,7 +91,10 @@ def test_a_step_becomes_a_row(tmp_path: Path) -> None:
         "negru2013_standard_deviation_per_m": None,
     }
     assert {name: row[name] for name in expected} == expected
-    assert set(row) - set(expected) == {"stopping_sight_distance_m", "visibility_margin_m"}
+    of_places = {name for name in row if "_m_ahead" in name}
+    assert len(of_places) == 12
+    assert all(row[name] is None for name in of_places)
+    assert set(row) - set(expected) - of_places == {"stopping_sight_distance_m", "visibility_margin_m"}
 
 
 def test_what_is_without_limit_or_absent_is_null(tmp_path: Path) -> None:
@@ -195,3 +199,26 @@ def test_a_run_without_steps_is_an_empty_table(tmp_path: Path) -> None:
     table = pq.read_table(write(tmp_path / "steps.parquet", [], complete=False))
     assert table.num_rows == 0
     assert "joint_road_visibility_m" in table.column_names
+
+
+def test_what_is_believed_of_places_ahead_has_columns_with_the_truth_beside_it(tmp_path: Path) -> None:
+    step = make_step()
+    places = np.array([0.0, 100.0, 300.0])
+    believed = FogProfile(places, np.log([0.01, 0.02, 0.02]), np.array([0.1, 0.3, 0.3]))
+    told = dataclasses.replace(
+        step,
+        belief=dataclasses.replace(step.belief, profile=believed),
+        truth=dataclasses.replace(step.truth, profile=FogProfile(places, np.log([0.01, 0.03, 1e-6]), np.zeros(3))),
+    )
+    row = only_row(write(tmp_path / "steps.parquet", [told]))
+    assert row["believed_visibility_100_m_ahead_m"] == pytest.approx(math.log(20.0) / 0.02)
+    low, high = (row[f"believed_visibility_100_m_ahead_{end}_m"] for end in ("low", "high"))
+    assert low == pytest.approx(math.log(20.0) / 0.02 * math.exp(-1.645 * 0.3), rel=1e-3)
+    assert high == pytest.approx(math.log(20.0) / 0.02 * math.exp(1.645 * 0.3), rel=1e-3)
+    assert row["true_visibility_100_m_ahead_m"] == pytest.approx(math.log(20.0) / 0.03)
+    # Beyond what is known of the road there is no truth to tell, and no belief but the last.
+    assert row["true_visibility_400_m_ahead_m"] is None
+    assert row["believed_visibility_400_m_ahead_m"] == row["believed_visibility_200_m_ahead_m"]
+    plain = only_row(write(tmp_path / "plain.parquet", [step]))
+    assert plain["believed_visibility_100_m_ahead_m"] is None
+    assert plain["true_visibility_100_m_ahead_m"] is None

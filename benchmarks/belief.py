@@ -45,7 +45,7 @@ FOG = OPTICAL_DEPTH_AT_VISIBILITY / 1000.0
 PLACES = (50.0, 100.0, 200.0, 400.0)
 LEAD, DELAY, REPORT_DEVIATION = 300.0, 1.0, 0.1
 BANK_START, ENTERED, SETTLING = 1300.0, 60.0, 5.0
-FUSIONS = ("grid_filter", "field_filter", "reported")
+FUSIONS = ("mixture_filter", "grid_filter", "field_filter", "reported")
 DOCS = Path(__file__).resolve().parents[1] / "docs" / "estimators.md"
 MARK, END = "<!-- table: belief -->", "<!-- end of belief -->"
 

@@ -5,13 +5,14 @@ from collections.abc import Callable
 from fogsim import registry
 from fogsim.fusion.field_filter import FieldFilter
 from fogsim.fusion.grid_filter import GridFilter
+from fogsim.fusion.mixture_filter import MixtureFilter
 from fogsim.fusion.no_fusion import NoFusion
 from fogsim.fusion.protocol import Fusion, LocatedFusion, fuse
 from fogsim.registry import Registry
 
 FUSIONS: Registry[Callable[..., Fusion | LocatedFusion]] = Registry(
     "fusion",
-    {"field_filter": FieldFilter, "grid_filter": GridFilter, "none": NoFusion},
+    {"field_filter": FieldFilter, "grid_filter": GridFilter, "mixture_filter": MixtureFilter, "none": NoFusion},
     group="fogsim.fusion",
     methods=("update|update_at", "reset"),
 )

@@ -173,7 +173,7 @@ def test_time_must_be_finite_and_not_go_back(instant):
 
 
 def test_names_and_parameters_are_checked():
-    assert list(FUSIONS) == ["field_filter", "grid_filter", "none"]
+    assert list(FUSIONS) == ["field_filter", "grid_filter", "mixture_filter", "none"]
     with pytest.raises(UnknownNameError, match="grid_filter"):
         make("grid_filtre")
     with pytest.raises(InputError, match="drift"):

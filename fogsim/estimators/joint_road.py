@@ -24,10 +24,8 @@ from fogsim.vision.lines.horizon import (
 )
 from fogsim.vision.lines.road_course import RoadCourse, road_course, unseen_course
 from fogsim.vision.lines.road_lines import seen_lines, vanishing_point_of
-from fogsim.vision.strips.airlight_edge import airlight_edge
 from fogsim.vision.strips.airlight_slopes import darkening_priors
 from fogsim.vision.strips.course_geometry import course_deviation, course_geometry
-from fogsim.vision.strips.hidden_course import HiddenCourse
 from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, no_road
 from fogsim.vision.strips.joint_fit import MODEL_DEVIATION, JointFit, Priors, fit_own, with_neighbours
 from fogsim.vision.strips.joint_prior import joint_prior
@@ -41,7 +39,9 @@ from fogsim.vision.strips.strip_curves import (
     without_rows_below,
 )
 from fogsim.vision.strips.strip_geometry import StripGeometry, strip_geometry
-from fogsim.vision.strips.uneven_fit import UnevenFit, even_fog, fit_uneven
+from fogsim.vision.uneven.airlight_edge import airlight_edge
+from fogsim.vision.uneven.hidden_course import HiddenCourse
+from fogsim.vision.uneven.uneven_fit import UnevenFit, even_fog, fit_uneven
 
 MIN_COLS, MIN_ROWS = 32, 16
 """A road narrower than this, or lower below its horizon, shows no curve [px]."""

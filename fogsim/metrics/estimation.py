@@ -219,3 +219,52 @@ class BeliefError:
             "belief_latency_s": errors["latency_s"],
             "belief_coverage_share": errors["coverage_share"],
         }
+
+
+PLACES = (100, 200)
+"""Distances ahead at which a belief about places is held against the fog there [m]."""
+
+
+@dataclass(slots=True)
+class BeliefAheadError:
+    """Error of what is believed of places ahead, where the fog there is below 1000 m."""
+
+    meanings: ClassVar[Mapping[str, str]] = {
+        f"belief_{distance}_m_ahead_{key}": f"{meaning} at the place {distance} m ahead along the route, where it is "
+        "below 1000 m; none by a fusion that does not tell of places"
+        for distance in PLACES
+        for key, meaning in (
+            ("median_error_percent", "median error of the believed visibility"),
+            ("coverage_share", "share of steps in which the 90 % interval held the true visibility"),
+        )
+    }
+    _errors: dict[int, list[float]] = field(default_factory=lambda: {distance: [] for distance in PLACES})
+    _held: dict[int, int] = field(default_factory=lambda: dict.fromkeys(PLACES, 0))
+
+    def update(self, sample: Sample) -> None:
+        """Take in one step.
+
+        Parameters
+        ----------
+        sample : Sample
+            The step, and what is derived from it.
+        """
+        believed, true = sample.step.belief.profile, sample.step.truth.profile
+        if believed is None or true is None or not true.distance.size:
+            return
+        for distance in PLACES:
+            truth = true.visibility_quantile(distance, 0.5)
+            if distance > true.distance[-1] or truth >= FOG_LIMIT:
+                continue
+            low, middle, high = (believed.visibility_quantile(distance, one) for one in (0.05, 0.5, 0.95))
+            self._errors[distance].append(relative_error(middle, truth))
+            self._held[distance] += low <= truth <= high
+
+    def result(self) -> dict[str, JsonValue]:
+        """Say error and coverage at each distance."""
+        said: dict[str, JsonValue] = {}
+        for distance in PLACES:
+            errors = self._errors[distance]
+            said[f"belief_{distance}_m_ahead_median_error_percent"] = quantile(errors, 0.5)
+            said[f"belief_{distance}_m_ahead_coverage_share"] = share(self._held[distance], len(errors))
+        return said

@@ -8,7 +8,7 @@ from typing import Generic, TypeVar
 from fogsim.errors import SimulationError
 from fogsim.metrics.cross_sections import TrafficThroughput
 from fogsim.metrics.crossing import TrafficEncroachment
-from fogsim.metrics.estimation import BeliefError, EstimatorErrors
+from fogsim.metrics.estimation import BeliefAheadError, BeliefError, EstimatorErrors
 from fogsim.metrics.lighting import Lighting
 from fogsim.metrics.metric import JsonValue, Metric, Sample
 from fogsim.metrics.motion import Comfort, Compliance, Motion
@@ -43,6 +43,7 @@ METRICS: Registry[MetricFactory] = Registry(
         "comfort": lambda _: Comfort(),
         "lighting": lambda _: Lighting(),
         "belief": lambda _: BeliefError(),
+        "belief_ahead": lambda _: BeliefAheadError(),
         "estimators": lambda _: EstimatorErrors(),
         "traffic_collisions": lambda _: TrafficCollisions(),
         "traffic_conflicts": lambda standard: TrafficConflicts(standard.time_to_collision),

@@ -15,6 +15,42 @@ from fogsim.values import Step
 MOST_PICTURES = 8
 """Pictures in a report."""
 
+AHEAD = 200.0
+"""Distance ahead along the route of the place whose believed fog is drawn [m]."""
+
+
+@dataclass(slots=True)
+class AheadCurves:
+    """Visibility at a place `AHEAD` of the ego over time [m]: true (None in clear air), and believed.
+
+    Attributes
+    ----------
+    time, truth, low, belief, high : list
+        Time [s]; `low` and `high` are the ends of the 90 % interval. Empty where nothing is believed of places.
+    """
+
+    time: list[float] = field(default_factory=list)
+    truth: list[float | None] = field(default_factory=list)
+    low: list[float] = field(default_factory=list)
+    belief: list[float] = field(default_factory=list)
+    high: list[float] = field(default_factory=list)
+
+    def add(self, step: Step) -> None:
+        """Take in one step.
+
+        Parameters
+        ----------
+        step : Step
+            The finished step.
+        """
+        believed, true = step.belief.profile, step.truth.profile
+        if believed is None or true is None or not true.distance.size or true.distance[-1] < AHEAD:
+            return
+        self.time.append(step.time)
+        self.truth.append(finite_or_none(true.visibility_quantile(AHEAD, 0.5)))
+        for quantiles, share in ((self.low, 0.05), (self.belief, 0.5), (self.high, 0.95)):
+            quantiles.append(believed.visibility_quantile(AHEAD, share))
+
 
 @dataclass(slots=True)
 class Curves:
@@ -29,6 +65,8 @@ class Curves:
         By method, (time [s], visibility [m]) of each valid estimate of fog.
     collisions : list of float
         Instants of collisions [s].
+    ahead : AheadCurves
+        What was believed of a place ahead.
     """
 
     time: list[float] = field(default_factory=list)
@@ -44,6 +82,7 @@ class Curves:
     high: list[float] = field(default_factory=list)
     estimates: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
     collisions: list[float] = field(default_factory=list)
+    ahead: AheadCurves = field(default_factory=AheadCurves)
 
     def add(self, step: Step, derived: Derived) -> None:
         """Take in one step.
@@ -66,6 +105,7 @@ class Curves:
         for quantiles, share in ((self.low, 0.05), (self.belief, 0.5), (self.high, 0.95)):
             quantiles.append(step.belief.visibility_quantile(share))
         self.collisions.extend(hit.time for hit in step.collisions)
+        self.ahead.add(step)
         self._add_estimates(step)
 
     def _add_estimates(self, step: Step) -> None:

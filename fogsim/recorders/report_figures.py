@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
-from fogsim.recorders.report_data import Curves
+from fogsim.recorders.report_data import AHEAD, AheadCurves, Curves
 from fogsim.recorders.style import ON_LIGHT, method_colours
 from fogsim.units import KMH_PER_MPS
 
@@ -42,12 +42,17 @@ def draw_figures(curves: Curves, time_to_collision_threshold: float = 3.0) -> li
     def figure(heights: Sequence[float], draw: Callable[[Sequence[Axes]], None]) -> bytes:
         return figure_over_time(curves.time, curves.collisions, heights, draw)
 
+    ahead: list[tuple[str, bytes]] = []
+    if curves.ahead.time:
+        said = f"Visibility at the place {AHEAD:.0f} m ahead along the road: true, and believed with its 90 % interval."
+        ahead.append((said, figure((2.9,), lambda axes: _draw_ahead(axes[0], curves.ahead))))
     return [
         (
             "Meteorological visibility: what was true ahead of the camera, what each method said frame by frame, "
             "and what was believed with its 90 % interval.",
             figure((3.4,), lambda axes: _draw_visibility(axes[0], curves)),
         ),
+        *ahead,
         (
             "Speed of the ego, the advice in force and the speed limit.",
             figure((2.5,), lambda axes: _draw_speed(axes[0], curves)),
@@ -159,6 +164,16 @@ def _draw_visibility(axis: Axes, curves: Curves) -> None:
     axis.plot(
         curves.time, shown_visibility(curves.truth), color=TRUTH, linewidth=1.8, linestyle=dashes, label="truth ahead"
     )
+    scale_visibility(axis)
+
+
+def _draw_ahead(axis: Axes, curves: AheadCurves) -> None:
+    low, high = (np.clip(plottable(values), *_ends()) for values in (curves.low, curves.high))
+    axis.fill_between(curves.time, low, high, color=BELIEF, alpha=0.18, linewidth=0, label="90 % interval")
+    believed = np.clip(plottable(curves.belief), *_ends())
+    axis.plot(curves.time, believed, color=BELIEF, linewidth=1.6, label=f"believed {AHEAD:.0f} m ahead")
+    truth = shown_visibility(curves.truth)
+    axis.plot(curves.time, truth, color=TRUTH, linewidth=1.8, linestyle=(0, (5, 1.5)), label="truth there")
     scale_visibility(axis)
 
 

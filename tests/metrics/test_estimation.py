@@ -1,12 +1,14 @@
 """Errors of estimators and belief: figures by hand."""
 
+import dataclasses
 import math
 
+import numpy as np
 import pytest
 
 from fogsim.metrics import JsonValue
 from fogsim.units import extinction_from_visibility
-from fogsim.values import Estimate
+from fogsim.values import Estimate, FogProfile, Step
 from tests.metrics.summaries import summarise
 from tests.recorders.synthetic import belief, estimate, make_step
 
@@ -84,3 +86,31 @@ def test_latency_is_the_lag_of_what_follows_the_fog(lag: float) -> None:
     assert summary["belief_latency_s"] == lag
     if not lag:
         assert summary["belief_bias_percent"] == pytest.approx(10.0, abs=1.0)
+
+
+def knowing_places(index: int, believed: float, true: float, until: float = 400.0) -> Step:
+    """A step that believes in one visibility everywhere, and in which another is true."""
+    places = np.array([-100.0, until])
+    logs = np.log([extinction_from_visibility(visibility) for visibility in (believed, true)])
+    step = make_step(index, time=float(index))
+    profiles = [
+        FogProfile(places, np.full(2, log), np.full(2, deviation))
+        for log, deviation in zip(logs, (0.1, 0.0), strict=True)
+    ]
+    return dataclasses.replace(
+        step,
+        belief=dataclasses.replace(step.belief, profile=profiles[0]),
+        truth=dataclasses.replace(step.truth, profile=profiles[1]),
+    )
+
+
+def test_the_belief_about_places_ahead_is_judged_where_there_is_fog() -> None:
+    steps = [knowing_places(0, 110.0, 100.0), knowing_places(1, 150.0, 100.0), knowing_places(2, 150.0, 5000.0)]
+    summary = summarise(steps)
+    for distance in (100, 200):
+        assert summary[f"belief_{distance}_m_ahead_median_error_percent"] == pytest.approx(10.0)
+        assert summary[f"belief_{distance}_m_ahead_coverage_share"] == pytest.approx(0.5)
+    near = summarise([knowing_places(0, 110.0, 100.0, until=150.0)])
+    assert near["belief_100_m_ahead_coverage_share"] == 1.0
+    assert near["belief_200_m_ahead_coverage_share"] is None
+    assert summarise([make_step()])["belief_100_m_ahead_median_error_percent"] is None

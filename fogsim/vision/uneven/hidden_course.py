@@ -13,11 +13,11 @@ from fogsim.vision.lines.road_course_kernels import PIECES
 from fogsim.vision.lines.sags_ahead import SAG_DEVIATION, beginning_cost, sag_from
 from fogsim.vision.strips import joint_fit
 from fogsim.vision.strips.course_geometry import course_geometry
-from fogsim.vision.strips.fog_evidence import EvenFog, even_fog_over, thinned_bins
 from fogsim.vision.strips.joint_fit import ALBEDOS, JointFit
 from fogsim.vision.strips.joint_kernels import JointPrior
 from fogsim.vision.strips.strip_curves import StripCurves
 from fogsim.vision.strips.strip_geometry import StripGeometry
+from fogsim.vision.uneven.fog_evidence import EvenFog, even_fog_over, thinned_bins
 
 TRIED = (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)
 """Curvatures that are tried first, over their standard deviation [-]."""

@@ -14,7 +14,7 @@ from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.strips import strip_kernels
 from fogsim.vision.strips.sky import Sky
 from fogsim.vision.strips.strip_geometry import StripGeometry
-from fogsim.vision.strips.uneven_fit import UnevenFit
+from fogsim.vision.uneven.uneven_fit import UnevenFit
 
 ASIDE = 0.3
 """How far to either side rows are looked at [rad]."""

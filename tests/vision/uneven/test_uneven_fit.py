@@ -10,12 +10,12 @@ from fogsim.vision.lines.horizon import Horizon
 from fogsim.vision.lines.road_course import RoadCourse, unseen_course
 from fogsim.vision.lines.road_course_kernels import KNOTS, PIECES
 from fogsim.vision.strips.course_geometry import course_geometry
-from fogsim.vision.strips.fog_nodes import NODES, UNEVENNESS, fog_nodes
-from fogsim.vision.strips.hidden_course import HiddenCourse
 from fogsim.vision.strips.joint_fit import fit_agreeing, fit_own
 from fogsim.vision.strips.strip_curves import StripCurves
-from fogsim.vision.strips.uneven_fit import fit_uneven
-from fogsim.vision.strips.uneven_kernels import depth_at, distance_at_depth, extinction_at
+from fogsim.vision.uneven.fog_nodes import NODES, UNEVENNESS, fog_nodes
+from fogsim.vision.uneven.hidden_course import HiddenCourse
+from fogsim.vision.uneven.uneven_fit import fit_uneven
+from fogsim.vision.uneven.uneven_kernels import depth_at, distance_at_depth, extinction_at
 from tests.vision.strips import koschmieder_strips
 from tests.vision.strips.koschmieder_strips import AIRLIGHT, CAMERA, GEOMETRY, NOISE, curves
 

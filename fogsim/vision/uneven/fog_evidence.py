@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from fogsim.vision.strips import joint_fit, joint_kernels
 from fogsim.vision.strips.albedo_filter import HIDDEN, HIDDEN_COST, LEFT_OUT_COST, USED
-from fogsim.vision.strips.fog_nodes import BROAD, MEAN
 from fogsim.vision.strips.joint_fit import ALBEDO_CHANCES, ALBEDOS, JointFit
 from fogsim.vision.strips.joint_kernels import Bins, JointPrior, Solution
+from fogsim.vision.uneven.fog_nodes import BROAD, MEAN
 
 Floats = NDArray[np.float64]
 

@@ -7,9 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
-from fogsim.vision.strips import joint_fit, uneven_kernels
+from fogsim.vision.strips import joint_fit
 from fogsim.vision.strips.albedo_filter import HIDDEN, USED
-from fogsim.vision.strips.fog_evidence import (
+from fogsim.vision.strips.joint_fit import ALBEDO_CHANCES, ALBEDOS, JointFit
+from fogsim.vision.strips.joint_kernels import Bins, JointPrior, Solution
+from fogsim.vision.strips.strip_curves import StripCurves
+from fogsim.vision.strips.strip_geometry import StripGeometry
+from fogsim.vision.uneven import uneven_kernels
+from fogsim.vision.uneven.fog_evidence import (
     UNEVEN_CHANCES,
     EvenFog,
     even_fog_over,
@@ -18,13 +23,9 @@ from fogsim.vision.strips.fog_evidence import (
     of_each_bin,
     thinned_bins,
 )
-from fogsim.vision.strips.fog_nodes import NODES, UNEVENNESS, bank_nodes, fog_nodes
-from fogsim.vision.strips.hidden_course import HiddenCourse
-from fogsim.vision.strips.joint_fit import ALBEDO_CHANCES, ALBEDOS, JointFit
-from fogsim.vision.strips.joint_kernels import Bins, JointPrior, Solution
-from fogsim.vision.strips.strip_curves import StripCurves
-from fogsim.vision.strips.strip_geometry import StripGeometry
-from fogsim.vision.strips.uneven_kernels import FogNodes
+from fogsim.vision.uneven.fog_nodes import NODES, UNEVENNESS, bank_nodes, fog_nodes
+from fogsim.vision.uneven.hidden_course import HiddenCourse
+from fogsim.vision.uneven.uneven_kernels import FogNodes
 
 Floats = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from fogsim.linear_algebra import inverse_of
 from fogsim.vision.strips import joint_kernels
-from fogsim.vision.strips.uneven_kernels import FogNodes
+from fogsim.vision.uneven.uneven_kernels import FogNodes
 
 NODES = (0.0, *(12.0 * 1.4**i for i in range(5)), *(60.0 * 1.2**i for i in range(14)))
 """Nodes of the path [m]: nearly two rows apart, in a camera of 800 px·m, where the road is far."""

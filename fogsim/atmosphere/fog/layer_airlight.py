@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from fogsim.atmosphere.fog.layer_airlight_kernels import BEND, ELEVATIONS, PATHS
 from fogsim.errors import InputError
 from fogsim.values import FogField
+from fogsim.values.fog import airlight_share
 
 _PIECES = 4
 """Places on a line of sight between two paths of the table."""
@@ -68,17 +69,6 @@ def layer_table(droplets: str) -> LayerTable:
             reflectance=found[f"{droplets}_reflectance"],
             transmittance=found[f"{droplets}_transmittance"],
         )
-
-
-def horizontal_share(albedo: float) -> float:
-    """Airlight seen level near the ground over that of a white horizontal diffuser, E / π: 0.34 + 0.66 ρ.
-
-    Parameters
-    ----------
-    albedo : float
-        Albedo ρ of the land around [-], 0 … 1.
-    """
-    return 0.34 + 0.66 * albedo
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,7 +185,7 @@ def _slant_airlight(thickness: float, depth: float, albedo: float, droplets: str
         return np.asarray(values[low] + (values[low + 1] - values[low]) * on)
 
     source = between(table.black) + albedo * between(table.per_albedo)
-    share = path_means(table, source, thickness, depth) / horizontal_share(albedo)
+    share = path_means(table, source, thickness, depth) / airlight_share(albedo)
     brighter = (1.0 - albedo * between(table.reflectance)) / between(table.transmittance)
     return SlantAirlight(share.astype(np.float32), float(brighter))
 

@@ -12,7 +12,6 @@ import make_airlight_table
 from fogsim.atmosphere import fogged_radiance
 from fogsim.atmosphere.fog.koschmieder import daytime_luminance, transmittance
 from fogsim.atmosphere.fog.layer_airlight import (
-    horizontal_share,
     layer_table,
     path_means,
     sines,
@@ -23,6 +22,7 @@ from fogsim.atmosphere.lamps.phase_function import Droplets, phase_function
 from fogsim.errors import InputError
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, CameraPose, FogBank, FogField, FogPatches, View
+from fogsim.values.fog import airlight_share
 from tests.atmosphere.tables import read_table
 
 COUNTS = read_table("monte_carlo_airlight.csv")
@@ -32,7 +32,7 @@ RHO = 0.1
 
 def field_of(visibility: float, top: float, albedo: float) -> FogField:
     """Fog whose airlight has the level of a ground of illuminance π."""
-    level = (horizontal_share(albedo),) * 3
+    level = (airlight_share(albedo),) * 3
     return FogField(extinction_from_visibility(visibility), level, top=top, ground_albedo=albedo)
 
 
@@ -169,7 +169,7 @@ def test_a_black_target_at_the_visibility_has_five_percent_of_contrast(visibilit
 def test_the_level_is_that_of_a_horizontal_line_of_sight() -> None:
     for albedo in ALBEDOS:
         level = seen(field_of(100.0, 250.0, albedo), 1.3, 0.0)
-        assert level == pytest.approx(horizontal_share(albedo), rel=0.02)
+        assert level == pytest.approx(airlight_share(albedo), rel=0.02)
 
 
 def test_transmittance_is_that_of_koschmieder() -> None:

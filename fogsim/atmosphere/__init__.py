@@ -4,7 +4,7 @@ from fogsim.atmosphere.air import Air
 from fogsim.atmosphere.fog.airlight import airlight_from_illuminance
 from fogsim.atmosphere.fog.frustum import FrustumGrid, frustum_grid, radiance_through_grid
 from fogsim.atmosphere.fog.koschmieder import fogged_radiance
-from fogsim.atmosphere.fog.layer_airlight import layer_thickness, slant_airlight, slant_share
+from fogsim.atmosphere.fog.layer_airlight import layer_thickness, side_light, slant_airlight, slant_share
 from fogsim.atmosphere.fog.medium import field_at, with_change
 from fogsim.atmosphere.fog.optical_depth import (
     FieldAccess,
@@ -40,6 +40,7 @@ __all__ = [
     "optical_depth",
     "optical_depth_along",
     "radiance_through_grid",
+    "side_light",
     "slant_airlight",
     "slant_share",
     "veiling_luminance",

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from fogsim.atmosphere.fog.layer_airlight_kernels import BEND, ELEVATIONS, PATHS
 from fogsim.errors import InputError
 from fogsim.values import FogField
+from fogsim.values.daylight import SideLight
 from fogsim.values.fog import airlight_share
 
 _PIECES = 4
@@ -39,6 +40,8 @@ class LayerTable:
         Over black ground, and what an albedo of 1 adds [-].
     reflectance, transmittance : (n,) float64
         Of the layer, for the light of the ground and for that of an overcast sky [-].
+    vertical_black, vertical_per_albedo : (n,) float64
+        Light of a vertical surface near the ground over E, as `black` and `per_albedo` [-].
     """
 
     thickness: NDArray[np.float64]
@@ -48,6 +51,8 @@ class LayerTable:
     per_albedo: NDArray[np.float64]
     reflectance: NDArray[np.float64]
     transmittance: NDArray[np.float64]
+    vertical_black: NDArray[np.float64]
+    vertical_per_albedo: NDArray[np.float64]
 
 
 @cache
@@ -68,7 +73,30 @@ def layer_table(droplets: str) -> LayerTable:
             per_albedo=found[f"{droplets}_per_albedo"].astype(np.float64),
             reflectance=found[f"{droplets}_reflectance"],
             transmittance=found[f"{droplets}_transmittance"],
+            vertical_black=found[f"{droplets}_vertical_black"],
+            vertical_per_albedo=found[f"{droplets}_vertical_per_albedo"],
         )
+
+
+def side_light(field: FogField, droplets: str) -> SideLight:
+    """Light of surfaces in a layer that are not level, near the ground.
+
+    Parameters
+    ----------
+    field : FogField
+        The fog at one time, with an albedo of the ground.
+    droplets : str
+        A member of `Droplets`.
+
+    Raises
+    ------
+    InputError
+        If the table does not have so thick a layer.
+    """
+    table, albedo = layer_table(droplets), field.ground_albedo or 0.0
+    at = math.log(layer_thickness(field.extinction, field.top - field.ground))
+    upright = np.interp(at, np.log(table.thickness), table.vertical_black + albedo * table.vertical_per_albedo)
+    return SideLight(float(upright), albedo)
 
 
 @dataclass(frozen=True, slots=True)

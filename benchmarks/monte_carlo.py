@@ -1,6 +1,7 @@
 """Photons in fog: veils, halos of lamps, airlight by day, to which the models of `fogsim.atmosphere` are compared.
 
     python benchmarks/monte_carlo.py airlight tests/data/monte_carlo_airlight.csv --photons 400000
+    python benchmarks/monte_carlo.py surroundings tests/data/monte_carlo_surroundings.csv --photons 400000
     python benchmarks/monte_carlo.py halo tests/data/monte_carlo_halo.csv --photons 1000000
     python benchmarks/monte_carlo.py lobes tests/data/monte_carlo_lobes.csv --photons 4000000
     python benchmarks/monte_carlo.py origins fogsim/atmosphere/data/light_origins.csv --photons 6000000
@@ -19,6 +20,7 @@ import numpy as np
 from photon_paths import (
     LAMP_SIZES,
     STEP,
+    between_trees,
     from_layer,
     halo,
     likely_cosines,
@@ -119,6 +121,46 @@ def write_airlight(out, photons):
                 found = from_layer(photons, rng, cosines, k * top, k * eye, math.sin(math.radians(look)))
                 numbers = (visibility, top, eye, look, *found, *flux)
                 file.write(f"{fog}," + ",".join(f"{n:.5g}" for n in numbers) + "\n")
+
+
+OPEN, EVEN = (math.inf, 0.0), (math.inf, 0.0, 1.0)
+SURROUNDINGS = {
+    "open land, even sky": (OPEN, EVEN),
+    "trees 5 m high, 10 m from the eye": ((10.0, 5.0), EVEN),
+    "trees 15 m high, 30 m from the eye": ((30.0, 15.0), EVEN),
+    "trees 15 m high, 10 m from the eye": ((10.0, 15.0), EVEN),
+    "trees 15 m high, 5 m from the eye": ((5.0, 15.0), EVEN),
+    "clouds of 100 m, under a bright one": (OPEN, (100.0, 0.5, 1.0)),
+    "clouds of 100 m, under a dark one": (OPEN, (100.0, 0.5, -1.0)),
+    "clouds of 500 m, under a bright one": (OPEN, (500.0, 0.5, 1.0)),
+    "clouds of 500 m, under a dark one": (OPEN, (500.0, 0.5, -1.0)),
+}
+"""Trees (distance, height [m]) and clouds (side [m], how much brighter and darker than the mean, which) by name."""
+
+ALONG = (-10.0, -5.0, -2.0, 0.0, 2.0, 5.0, 10.0, 30.0)
+
+
+def write_surroundings(out, photons):
+    """Table of airlight along a road between trees, and under patchy clouds."""
+    cosines, top, eye, rho = likely_cosines(phase_table("moderate_radiation")), 250.0, 1.3, 0.1
+    with out.open("w", encoding="utf-8") as file:
+        file.write("# Airlight along a road, up to it or out of the layer, over what the path takes, in E / pi,\n")
+        file.write("# E being the illuminance of the road; standard errors; E over that of the even sky without fog.\n")
+        file.write("# Layer of 250 m, moderate radiation fog, land of albedo 0.1, eye at 1.3 m; black trees on both\n")
+        file.write("# sides of it, square clouds 1.5 and 0.5 times as bright as the mean.\n")
+        file.write(f"# Command: python benchmarks/monte_carlo.py surroundings {out} --photons {photons}\n")
+        file.write("surroundings,visibility,elevation,airlight,error,illuminance\n")
+        for (name, (trees, clouds)), visibility in itertools.product(SURROUNDINGS.items(), (50, 100, 400)):
+            rng, k = np.random.default_rng(1), extinction_from_visibility(visibility)
+            fixed = (photons, rng, cosines, k, top, eye, rho)
+            illuminance, _ = between_trees(*fixed, 2.0, trees, clouds)
+            for look in ALONG:
+                slope = math.sin(math.radians(look))
+                distance = eye / -slope if slope < 0 else (top - eye) / max(slope, 1e-6)
+                lost = -math.expm1(-k * distance) * illuminance
+                found, error = between_trees(*fixed, slope, trees, clouds)
+                numbers = (visibility, look, found / lost, error / lost, illuminance)
+                file.write(f'"{name}",' + ",".join(f"{n:.4g}" for n in numbers) + "\n")
 
 
 def write_halo(out, photons):
@@ -248,12 +290,12 @@ def write_veil(out, paths):
 def main():
     """Write a table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=("airlight", "halo", "lobes", "origins", "road", "veil"))
+    parser.add_argument("what", choices=("airlight", "halo", "lobes", "origins", "road", "surroundings", "veil"))
     parser.add_argument("out", type=Path)
     parser.add_argument("--photons", type=int, default=400_000)
     arguments = parser.parse_args()
     writers = {"halo": write_halo, "lobes": write_lobes, "origins": write_origins}
-    writers |= {"airlight": write_airlight, "road": write_road, "veil": write_veil}
+    writers |= {"airlight": write_airlight, "road": write_road, "veil": write_veil, "surroundings": write_surroundings}
     writers[arguments.what](arguments.out, arguments.photons)
 
 

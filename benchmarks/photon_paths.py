@@ -333,3 +333,68 @@ def from_layer(paths, rng, cosines, thickness, height, sine):
             x, y, z = turned(x, y, z, cosine, 2.0 * math.pi * rng.random())
     ground, sky, squares = ground / paths, sky / paths, squares / paths
     return ground, sky, math.sqrt(ground * (1.0 - ground) / paths), math.sqrt(max(squares - sky * sky, 0.0) / paths)
+
+
+@njit(cache=False)
+def between_trees(paths, rng, cosines, k, top, eye, albedo, sine, trees, clouds):  # noqa: C901, PLR0912, PLR0915
+    """Light that a line of sight along a road gathers between two rows of black trees, under a sky of patches.
+
+    Traced backward, in metres, and relative to the luminance of a white surface under the open, even sky without fog.
+    `sine` is that of the line's elevation, above 1 for all light that falls on the road. `trees`: distance of both rows
+    from the line of sight and their height [m]. `clouds`: side of square patches of the sky [m], by how much one is
+    brighter than the mean and the next darker [-], and 1 where the eye is under the middle of a bright one, −1 of a
+    dark one. Returns the mean and its standard error; what is behind the fog does not count.
+    """
+    beside, high = trees
+    size, strength, bright = clouds
+    total = squares = 0.0
+    for _ in range(paths):
+        up = math.sqrt(rng.random()) if sine > 1.0 else sine
+        turn = 2.0 * math.pi * rng.random() if sine > 1.0 else 0.0
+        flat = math.sqrt(max(0.0, 1.0 - up * up))
+        dx, dy, dz = flat * math.cos(turn), flat * math.sin(turn), up
+        x, y, z, weight, behind = 0.0, 0.0, 0.0 if sine > 1.0 else eye, 1.0, sine <= 1.0
+        while True:
+            length = -math.log(1.0 - rng.random()) / k
+            if dz < 0.0:
+                length = min(length, -z / dz)
+            elif dz > 0.0:
+                length = min(length, (top - z) / dz)
+            onward = (x + length * dx, y + length * dy, z + length * dz)
+            if abs(onward[1]) > beside and abs(y) <= beside:
+                at = z + dz * (math.copysign(beside, dy) - y) / dy
+                if at < high:
+                    weight = 0.0
+                    break
+            elif abs(y) > beside and (abs(onward[1]) < beside or onward[1] * y < 0.0):
+                at = z + dz * (math.copysign(beside, y) - y) / dy
+                if at < high:
+                    weight = 0.0
+                    break
+            x, y, z = onward
+            if z >= top - 1e-9:
+                weight *= 0.0 if behind else 3.0 / 7.0 * (1.0 + 2.0 * dz)
+                if strength > 0.0:
+                    sign = math.cos(math.pi * x / size) * math.cos(math.pi * y / size)
+                    weight *= 1.0 + bright * math.copysign(strength, sign)
+                break
+            if z <= 1e-9:
+                if behind:
+                    weight = 0.0
+                    break
+                weight, z = weight * albedo, 0.0
+                if rng.random() >= weight:
+                    weight = 0.0
+                    break
+                weight = 1.0
+                dz, turn = math.sqrt(rng.random()), 2.0 * math.pi * rng.random()
+                flat = math.sqrt(max(0.0, 1.0 - dz * dz))
+                dx, dy = flat * math.cos(turn), flat * math.sin(turn)
+                continue
+            behind = False
+            cosine = cosines[int(rng.random() * len(cosines))]
+            dx, dy, dz = turned(dx, dy, dz, cosine, 2.0 * math.pi * rng.random())
+        total += weight
+        squares += weight * weight
+    mean = total / paths
+    return mean, math.sqrt(max(squares / paths - mean * mean, 0.0) / paths)

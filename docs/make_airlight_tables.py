@@ -1,8 +1,10 @@
-"""Fill the tables of docs/airlight.md: ``python docs/make_airlight_tables.py RECORDS``.
+"""Fill the tables of docs/airlight.md: ``python docs/make_airlight_tables.py [RECORDS]``.
 
-RECORDS is what ``fogsim reproduce airlight --json --out docs/pictures`` prints.
+RECORDS is what ``fogsim reproduce airlight --json --out docs/pictures`` prints; without it only the table of photon
+counts between trees and under clouds is filled, from what ``benchmarks/monte_carlo.py surroundings`` wrote.
 """
 
+import csv
 import json
 import sys
 from collections.abc import Iterator
@@ -12,6 +14,9 @@ from typing import Any
 from make_tables import filled
 
 PAGE = Path(__file__).parent / "airlight.md"
+COUNTS = Path(__file__).parents[1] / "tests" / "data" / "monte_carlo_surroundings.csv"
+SHOWN = "100"
+"""V_met of the counts that are shown [m]."""
 
 Record = dict[str, Any]
 
@@ -25,6 +30,18 @@ def by_elevation(records: list[Record], *, lands: bool) -> tuple[tuple[str, ...]
         found = {one["elevation_deg"]: one["airlight"] for one in here if one["condition"] == name}
         rows.append((name, *(f"{found[elevation]:.2f}" for elevation in elevations)))
     return ("", *(f"{elevation:g}°" for elevation in elevations)), rows
+
+
+def surroundings() -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Airlight by elevation between trees and under clouds."""
+    lines = COUNTS.read_text(encoding="utf-8").splitlines()
+    counts = [row for row in csv.DictReader(line for line in lines if line[0] != "#") if row["visibility"] == SHOWN]
+    headings = ("", *dict.fromkeys(f"{row['elevation']}°" for row in counts), "E")
+    rows = []
+    for name in dict.fromkeys(row["surroundings"] for row in counts):
+        here = [row for row in counts if row["surroundings"] == name]
+        rows.append((name, *(f"{float(row['airlight']):.2f}" for row in here), f"{float(here[0]['illuminance']):.2f}"))
+    return headings, rows
 
 
 def read(records: list[Record], height: float) -> Iterator[tuple[str, ...]]:
@@ -47,9 +64,12 @@ def cell(record: Record) -> str:
 
 def main() -> None:
     """Write the page anew."""
+    text = filled(PAGE.read_text(encoding="utf-8"), "surroundings", *surroundings())
+    if len(sys.argv) < 2:
+        PAGE.write_text(text, encoding="utf-8")
+        return
     lines = Path(sys.argv[1]).read_text(encoding="utf-8").splitlines()
     records = [json.loads(line) for line in lines]
-    text = PAGE.read_text(encoding="utf-8")
     for marker, lands in (("lands", True), ("conditions", False)):
         text = filled(text, marker, *by_elevation(records, lands=lands))
     for marker, height in (("car", 1.3), ("lorry", 2.5)):

@@ -188,6 +188,8 @@ def test_estimates_and_belief_hold_the_truth_on_every_grade(grade: float, visibi
         found = [step.estimates[number] for step in steps]
         assert all(one.valid for one in found) or coarse, name
         found = [one for one in found if one.valid]
+        if not found and name != "joint_road":
+            continue  # coarse, and before airlight over fields the road hardly stands out there
         error = [abs(one.visibility / visibility - 1.0) for one in found]
         apart = [abs(one.extinction - math.log(20.0) / visibility) / one.standard_deviation for one in found]
         assert np.median(apart) < 2.0, name

@@ -136,10 +136,11 @@ def test_a_vehicle_knows_which_of_its_lamps_are_switched_on() -> None:
 
 
 def test_estimators_are_told_a_calibration_that_may_be_wrong() -> None:
-    # An estimator that trusts the pitch it is told.
+    # An estimator that trusts the pitch it is told, before a road that stands out.
+    snow = "fog={visibility_m: 80, ground_albedo: 0.8}"
     trusting = ("estimators=[{method: joint_road, parameters: {pitch_deviation: 0.0001}}]", "advice=none")
-    wrong = small("fog.visibility_m=80", "camera.told.pitch_error_deg=0.5", "duration_s=0.5", *trusting)
-    right = small("fog.visibility_m=80", "duration_s=0.5", *trusting)
+    wrong = small(snow, "camera.told.pitch_error_deg=0.5", "duration_s=0.5", *trusting)
+    right = small(snow, "duration_s=0.5", *trusting)
     (*_, a), (*_, b) = fogsim.run(right, seed=1), fogsim.run(wrong, seed=1)
     assert np.array_equal(a.observation.image, b.observation.image)
     assert b.observation.frame.camera.pitch - a.observation.frame.camera.pitch == pytest.approx(np.radians(0.5))

@@ -106,20 +106,32 @@ def half_flux(radiance):
     return float(np.sum(0.5 * (radiance[1:] + radiance[:-1]) * np.diff(square)))
 
 
+def vertical_light(ground, above):
+    """Light of a vertical surface near the ground, over that of one which sees luminance 1 everywhere.
+
+    Parameters: luminance of the ground, and of what is above, for each elevation of `LOOKS`.
+    """
+    elevation = np.linspace(0.0, 0.5 * math.pi, 9001)
+    seen = np.interp(np.degrees(elevation), LOOKS, above) * np.cos(elevation) ** 2
+    return 0.5 * ground + 2.0 / math.pi * float(np.trapezoid(seen, elevation))
+
+
 def layer(matrix, thickness):
     """Reflectance of the layer from below, its transmittance of the sky's light, and source functions.
 
     The latter (levels, lines of sight) over E / π, E that on the ground: over black ground, and what an albedo of 1
-    adds. They are linear in the albedo, for the light between ground and layer is a geometric series.
+    adds. They are linear in the albedo, for the light between ground and layer is a geometric series. So is the light
+    of a vertical surface over E, the last two.
     """
     count = len(LOOKS)
     overcast = 3.0 / 7.0 * (1.0 + 2.0 * np.sin(np.radians(LOOKS)))
     heights, by_ground, radiance = solved(matrix, thickness, 1.0, np.zeros(count))
-    reflectance = half_flux(radiance[0, count:])
+    reflectance, upright_by_ground = half_flux(radiance[0, count:]), vertical_light(1.0, radiance[0, count:])
     _, by_sky, radiance = solved(matrix, thickness, 0.0, overcast)
     transmittance = half_flux(radiance[0, count:])
-    black = by_sky / transmittance
-    return heights, reflectance, transmittance, black, by_ground - reflectance * black
+    black, upright = by_sky / transmittance, vertical_light(0.0, radiance[0, count:]) / transmittance
+    more = by_ground - reflectance * black, upright_by_ground - reflectance * upright
+    return heights, reflectance, transmittance, (black, more[0]), (upright, more[1])
 
 
 def main():
@@ -135,7 +147,8 @@ def main():
         arguments.out,
         about="Source function of airlight in a plane layer of fog under a CIE overcast sky, over E / pi, E of the "
         "ground: black + albedo * per_albedo, by thickness (optical), place (share of it above the ground), elevation "
-        "[degrees]. Albedo 0 to 1. Command: python tools/make_airlight_table.py",
+        "[degrees]. vertical: light of a vertical surface near the ground, over E, likewise. Albedo 0 to 1. "
+        "Command: python tools/make_airlight_table.py",
         thickness=THICKNESSES,
         place=PLACES,
         elevation=np.concatenate((-LOOKS[list(KEPT[:0:-1])], LOOKS[list(KEPT)])),
@@ -144,15 +157,18 @@ def main():
 
 
 def table_of(droplets):
-    """Arrays of the table for droplets: `black`, `per_albedo` (float16), `reflectance`, `transmittance`."""
+    """Arrays of the table for droplets: `black`, `per_albedo` (float16), and for each thickness four numbers."""
     matrix, count = scattering(droplets), len(LOOKS)
     kept = [count - 1 - n for n in KEPT[:0:-1]] + [count + n for n in KEPT]
-    rows = {"black": [], "per_albedo": [], "reflectance": [], "transmittance": []}
+    names = ("black", "per_albedo", "reflectance", "transmittance", "vertical_black", "vertical_per_albedo")
+    rows = {name: [] for name in names}
     for thickness in THICKNESSES:
-        heights, back, through, dark, more = layer(matrix, thickness)
-        for source, name in ((dark, "black"), (more, "per_albedo")):
+        heights, back, through, sources, upright = layer(matrix, thickness)
+        for source, name in zip(sources, ("black", "per_albedo"), strict=True):
             at = [np.interp(thickness * PLACES, heights, column) for column in source[:, kept].T]
             rows[name].append(np.array(at, dtype=np.float16).T)
+        for light, name in zip(upright, ("vertical_black", "vertical_per_albedo"), strict=True):
+            rows[name].append(light)
         rows["reflectance"].append(back)
         rows["transmittance"].append(through)
     return {name: np.array(values) for name, values in rows.items()}

@@ -1,10 +1,10 @@
 """Pure physics of light in fog: extinction, optical depth, airlight, lamplight, and what is visible in it."""
 
 from fogsim.atmosphere.air import Air
-from fogsim.atmosphere.fog.airlight import airlight_from_illuminance, airlight_share
+from fogsim.atmosphere.fog.airlight import airlight_from_illuminance
 from fogsim.atmosphere.fog.frustum import FrustumGrid, frustum_grid, radiance_through_grid
 from fogsim.atmosphere.fog.koschmieder import fogged_radiance
-from fogsim.atmosphere.fog.layer_airlight import horizontal_share, layer_thickness, slant_airlight, slant_share
+from fogsim.atmosphere.fog.layer_airlight import layer_thickness, side_light, slant_airlight, slant_share
 from fogsim.atmosphere.fog.medium import field_at, with_change
 from fogsim.atmosphere.fog.optical_depth import (
     FieldAccess,
@@ -31,17 +31,16 @@ __all__ = [
     "Pavement",
     "TunnelLight",
     "airlight_from_illuminance",
-    "airlight_share",
     "distance_at_depth",
     "extinction",
     "field_at",
     "fogged_radiance",
     "frustum_grid",
-    "horizontal_share",
     "layer_thickness",
     "optical_depth",
     "optical_depth_along",
     "radiance_through_grid",
+    "side_light",
     "slant_airlight",
     "slant_share",
     "veiling_luminance",

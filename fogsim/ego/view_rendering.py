@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere import Air, TunnelLight
+from fogsim.atmosphere import Air, TunnelLight, side_light
 from fogsim.camera import averaged, middle_samples, supersampled
 from fogsim.ego.near_scene import FEW_LANES, NearScene
 from fogsim.errors import InputError
@@ -42,6 +42,7 @@ from fogsim.values import (
     TrafficState,
     View,
 )
+from fogsim.values.daylight import EVEN_LIGHT
 from fogsim.values.scene import Instance
 
 DARKEST_SKY = 1e-4
@@ -236,6 +237,8 @@ class ViewRenderer:
         self._mount = LampMount()
         self._tunnels = tunnels_of(network.structures)
         self._air = Air(self.fog, scenario.fog.droplets)
+        photons = self.fog.ground_albedo is not None
+        self._sides = side_light(self.fog, scenario.fog.droplets) if photons else EVEN_LIGHT
         self._renderer: Renderer | None = None
         self._unlit_renderer: Renderer | None = None
         self._is_closed = False
@@ -276,11 +279,12 @@ class ViewRenderer:
         self._daylight, self._sky = illuminance, self._sky_of(illuminance)
         self._streets = self._streets and replace(self._streets, sky_illuminance=self._sky)
         if self._renderer is not None:
-            self._renderer.set_daylight(self._sky)
+            self._renderer.set_daylight(self._sky, self._sides)
 
     def _make_renderer(self) -> Renderer:
         self._free_renderer()
         self._renderer = make_renderer(self._scenario.renderer, self._near_scene.scene, self._sky)
+        self._renderer.set_daylight(self._sky, self._sides)
         return self._renderer
 
     def _free_renderer(self) -> None:

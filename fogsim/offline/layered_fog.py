@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere import Droplets, airlight_share, slant_airlight, slant_share
+from fogsim.atmosphere import Droplets, slant_airlight, slant_share
 from fogsim.errors import InputError
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, CameraPose, FogField
+from fogsim.values.fog import airlight_share
 from fogsim.values.pinhole import ray_from_pixel
 
 Floats = NDArray[np.float64]
@@ -44,8 +45,8 @@ class FogLayer:
 
     @property
     def level(self) -> float:
-        """Airlight seen level over that of Koschmieder's fog under the same sky [-]."""
-        return airlight_share(self.ground_albedo) / airlight_share(None)
+        """Airlight seen level over the luminance of the sky above, on the mean that of a white surface below it [-]."""
+        return airlight_share(self.ground_albedo)
 
     def light(self, distance: Floats, sine: Floats, visibility: float, mount_height: float) -> tuple[Floats, Floats]:
         """What becomes of light on lines of sight.

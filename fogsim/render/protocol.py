@@ -5,6 +5,7 @@ from typing import Protocol
 
 from fogsim.errors import FogSimError
 from fogsim.values.camera import Camera, CameraPose
+from fogsim.values.daylight import EVEN_LIGHT, SideLight
 from fogsim.values.image import View
 from fogsim.values.scene import Batch
 
@@ -19,13 +20,15 @@ class RenderError(FogSimError, RuntimeError):
 class Renderer(Protocol):
     """Draws one scene for any camera."""
 
-    def set_daylight(self, illuminance: float) -> None:
+    def set_daylight(self, illuminance: float, sides: SideLight = EVEN_LIGHT) -> None:
         """Draw by another daylight from now on.
 
         Parameters
         ----------
         illuminance : float
             Horizontal illuminance of the sky [lx], not negative.
+        sides : SideLight
+            What of it reaches surfaces that are not level.
         """
         ...
 

@@ -23,6 +23,7 @@ from fogsim.render.pyrender_scene import (
 )
 from fogsim.render.shading.pavement import reflectance_by_sine
 from fogsim.values.camera import Camera, CameraPose
+from fogsim.values.daylight import EVEN_LIGHT, SideLight
 from fogsim.values.image import View
 from fogsim.values.pinhole import ray_from_pixel
 from fogsim.values.scene import Batch, Scene
@@ -61,13 +62,15 @@ class PyrenderReference:
             self._nodes.add_node(part.node)
         self._drawer: Any = None
 
-    def set_daylight(self, illuminance: float) -> None:
+    def set_daylight(self, illuminance: float, sides: SideLight = EVEN_LIGHT) -> None:  # noqa: ARG002 - see below
         """Draw by another daylight from now on; what pyrender draws is a share of it.
 
         Parameters
         ----------
         illuminance : float
             Horizontal illuminance of the sky [lx], not negative.
+        sides : SideLight
+            Not looked at: pyrender's shapes are lit once, as under an even sky.
         """
         self._white = max(illuminance / np.pi, 1e-6)
         self._zenith = zenith_luminance(illuminance) * np.array(SKY_TINT)

@@ -13,6 +13,7 @@ from fogsim.render.lens import lens_of
 from fogsim.render.protocol import RenderError
 from fogsim.render.shading import Shading
 from fogsim.values.camera import Camera, CameraPose
+from fogsim.values.daylight import EVEN_LIGHT, SideLight
 from fogsim.values.image import View
 from fogsim.values.scene import LEVELS_OF_DETAIL, Batch, Scene, Surface
 
@@ -52,15 +53,17 @@ class SceneRenderer:
         self._still = len(shape)
         self._chosen = _room(0)
 
-    def set_daylight(self, illuminance: float) -> None:
+    def set_daylight(self, illuminance: float, sides: SideLight = EVEN_LIGHT) -> None:
         """Draw by another daylight from now on.
 
         Parameters
         ----------
         illuminance : float
             Horizontal illuminance of the sky [lx], not negative.
+        sides : SideLight
+            What of it reaches surfaces that are not level.
         """
-        self._shading.set_daylight(illuminance)
+        self._shading.set_daylight(illuminance, sides)
 
     def render(self, vehicles: Sequence[Batch], camera: Camera, pose: CameraPose, lamplight: bool = False) -> View:
         """Draw the scene and the vehicles (see `Renderer.render`).

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.atmosphere import Droplets, airlight_from_illuminance, airlight_share, fogged_radiance
+from fogsim.atmosphere import Droplets, airlight_from_illuminance, fogged_radiance
 from fogsim.camera import Sensor, expose
 from fogsim.render import Renderer, make_renderer
 from fogsim.scene import build_scene, vehicle_batches
@@ -23,6 +23,7 @@ from fogsim.values import (
     TrafficState,
     View,
 )
+from fogsim.values.fog import airlight_share
 from fogsim.values.pinhole import ray_from_pixel
 
 ILLUMINANCE = 10_000.0  # [lx] an overcast day

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from fogsim.atmosphere import Droplets, airlight_share
+from fogsim.atmosphere import Droplets
 from fogsim.obstruction import Tunnel
 from fogsim.scenario.section import (
     Distance,
@@ -26,9 +26,7 @@ from fogsim.scenario.section import (
 )
 from fogsim.units import KMH_PER_MPS, extinction_from_visibility
 from fogsim.values import FogBank, FogChange, FogField, FogPatches, FogShelter
-
-_ALBEDO = 0.1
-"""Of land between asphalt and grass, which FogSim draws."""
+from fogsim.values.fog import GROUND_ALBEDO, airlight_share
 
 
 class Bank(Section):
@@ -142,10 +140,9 @@ class Fog(Section):
     """Light that the fog adds by day: the same everywhere, or by elevation and path as photons have it, which are
     scattered many times between sky and ground: for even fog in a layer, on flat land without tunnels."""
 
-    ground_albedo: Annotated[Number, Field(ge=0, le=1)] | None = None
-    """Albedo ρ of the land around: 0.05 dark asphalt or woods, 0.2 grass, 0.8 snow. The airlight's level near the
-    ground is 0.34 + 0.66 ρ of a white surface's. If not given, ρ is 0.1 for `airlight: photons`, and the level 0.95
-    else."""
+    ground_albedo: Annotated[Number, Field(ge=0, le=1)] = GROUND_ALBEDO
+    """Albedo ρ of the land around: 0.05 dark asphalt or woods, 0.1 grass and roads, 0.2 dry grass, 0.8 snow. The
+    airlight's level near the ground is 0.34 + 0.66 ρ of a white surface's."""
 
     airlight_shading: Annotated[Number, Field(ge=0, le=1)] = 0.0
     """Dimming of the airlight for each unit of optical depth overhead; 0.1 in real fog, 0 for an even airlight."""
@@ -187,14 +184,9 @@ class Fog(Section):
         return self
 
     @property
-    def albedo(self) -> float | None:
-        """Albedo of the land around; None if it is not given and the airlight does not ask for it."""
-        return _ALBEDO if self.ground_albedo is None and self.airlight == "photons" else self.ground_albedo
-
-    @property
     def airlight_share(self) -> float:
         """Airlight near the ground over that of a white surface [-]."""
-        return airlight_share(self.albedo)
+        return airlight_share(self.ground_albedo)
 
     @model_validator(mode="after")
     def _times_increase(self) -> Self:
@@ -263,7 +255,7 @@ def fog_along(
         changes=_changes(fog, ground),
         airlight_shading=fog.airlight_shading,
         airlight_share=fog.airlight_share,
-        ground_albedo=fog.albedo if fog.airlight == "photons" else None,
+        ground_albedo=fog.ground_albedo if fog.airlight == "photons" else None,
         forward_scatter=fog.forward_scatter,
         forward_scatter_width=math.radians(fog.forward_scatter_deg),
         shelters=tuple(_shelter(tunnel, fog.in_tunnels_m) for tunnel in tunnels if math.isfinite(fog.in_tunnels_m)),

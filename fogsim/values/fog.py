@@ -6,8 +6,25 @@ from dataclasses import dataclass
 
 from fogsim.errors import InputError
 
-KOSCHMIEDER_SHARE = 0.95
-"""Airlight over that of a white horizontal surface where nothing is said of the land around [-]."""
+GROUND_ALBEDO = 0.1
+"""Albedo of the land around where nothing is said of it [-]: in visible light, grass and asphalt have about as much."""
+
+
+def airlight_share(ground_albedo: float = GROUND_ALBEDO) -> float:
+    """Airlight seen level near the ground over that of a white horizontal diffuser, E / π: 0.34 + 0.66 ρ.
+
+    That is its luminance in a layer of fog under an overcast sky, E being the illuminance of the ground.
+
+    Parameters
+    ----------
+    ground_albedo : float
+        Albedo ρ of the land around [-], 0 … 1.
+    """
+    return 0.34 + 0.66 * ground_albedo
+
+
+AIRLIGHT_SHARE = airlight_share()
+"""Airlight over that of a white horizontal diffuser where nothing is said of the land around [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,7 +214,7 @@ class FogField:
     patches: FogPatches | None = None
     wind: tuple[float, float] = (0.0, 0.0)
     changes: tuple[FogChange, ...] = ()
-    airlight_share: float = KOSCHMIEDER_SHARE
+    airlight_share: float = AIRLIGHT_SHARE
     airlight_shading: float = 0.0
     ground_albedo: float | None = None
     forward_scatter: float = 0.0

@@ -71,7 +71,7 @@ def test_json_is_all_there_is_on_stdout_and_the_same_each_time(folder: Path) -> 
     environment = {**os.environ, "COLUMNS": "200", "NO_COLOR": "1"}
     runs = [
         subprocess.run(
-            [*command, "--method", "negru2013"], capture_output=True, timeout=120, env=environment, check=True
+            [*command, "--method", "joint_road"], capture_output=True, timeout=120, env=environment, check=True
         )
         for _ in range(2)
     ]
@@ -79,11 +79,10 @@ def test_json_is_all_there_is_on_stdout_and_the_same_each_time(folder: Path) -> 
     records = [json.loads(line) for line in runs[0].stdout.decode().splitlines()]
     assert [record["frame"] for record in records] == ["drive/0.png", "drive/1.png", "drive/2.png"]
     for record in records:
-        assert set(record) == KEYS
+        assert set(record) == KEYS | ({"denser_fog_m", "reach_m", "optical_depths"} if record["valid"] else set())
     told = [record for record in records if record["valid"] is True]
     assert told
     for record in told:
-        # The method's own mechanism is off by some per cent here (docs/estimators.md).
         assert record["visibility_m"] == pytest.approx(80.0, rel=0.1)
         assert record["visibility_low_m"] < record["visibility_m"] < record["visibility_high_m"]
         assert record["category"] == "dense"
@@ -152,7 +151,7 @@ def test_a_guessed_camera_is_written_and_good_to_use(estimate, folder: Path) -> 
     assert "mount_height_m: 1.38  # as stated" in out
     assert estimate(*guess)[0] == 2
     assert estimate(*guess, "--overwrite")[0] == 0
-    code, out, _ = estimate("drive", "--camera", "guess.yaml", "--method", "negru2013", "--json")
+    code, out, _ = estimate("drive", "--camera", "guess.yaml", "--method", "joint_road", "--json")
     assert code == 0
     found = [record["visibility_m"] for line in out.splitlines() if (record := json.loads(line))["valid"]]
     assert found

@@ -19,17 +19,17 @@ def visibilities(results) -> list[float]:
 
 
 def test_images_say_the_visibility_in_which_they_were_drawn(drive) -> None:
-    results = list(estimate_images(drive.folder / "images", drive.camera, "negru2013"))
+    results = list(estimate_images(drive.folder / "images", drive.camera, "joint_road"))
     assert [result.picture.name for result in results] == [str(p) for p in sorted((drive.folder / "images").iterdir())]
     found = visibilities(results)
     # It may abstain where traffic is close; where it tells, it is right.
-    # README: a p95 of 0.7 % at 100 m for negru2013 with the horizon known.
+    # Before airlight over fields negru2013 is 12 % off in single frames; the joint fit is right.
     assert found == pytest.approx([120.0] * len(found), rel=0.03)
     assert len(found) >= len(drive.frames) // 2
 
 
 def test_a_video_says_nearly_the_same_as_its_frames(drive) -> None:
-    results = list(estimate_images(drive.folder / "drive.mp4", drive.camera, "negru2013"))
+    results = list(estimate_images(drive.folder / "drive.mp4", drive.camera, "joint_road"))
     assert [result.picture.name for result in results] == list(range(len(drive.frames)))
     assert [result.picture.time for result in results] == pytest.approx([0.1 * i for i in range(len(results))])
     found = visibilities(results)

@@ -39,7 +39,7 @@ def test_a_guessed_camera_is_good_enough_to_estimate_with(drive, tmp_path: Path)
         guess_camera(source, mount_height=HEIGHT, field_of_view=true_field_of_view(drive)),
     )
     camera = load_camera(tmp_path / "camera.yaml")
-    estimates = [result.estimates[0] for result in estimate_images(drive.folder / "images", camera, "negru2013")]
+    estimates = [result.estimates[0] for result in estimate_images(drive.folder / "images", camera, "joint_road")]
     found = [estimate.visibility for estimate in estimates if estimate.valid]
     assert len(found) >= len(drive.frames) // 2
     assert found == pytest.approx([120.0] * len(found), rel=0.06)

@@ -28,8 +28,8 @@ def test_exposure_is_automatic_unless_it_is_fixed(overrides: list[str], automati
 
 
 def test_a_fixed_exposure_puts_the_airlight_at_60_percent() -> None:
-    """Airlight of 10 000 lx: 0.95 · 10 000 / π · 1.02 in the brightest channel."""
-    assert build.sensor(scenario()).saturation_luminance == pytest.approx(0.95 * 1e4 / math.pi * 1.02 / 0.6)
+    """Airlight of 10 000 lx: 0.406 · 10 000 / π · 1.02 in the brightest channel."""
+    assert build.sensor(scenario()).saturation_luminance == pytest.approx(0.406 * 1e4 / math.pi * 1.02 / 0.6)
     assert build.sensor(scenario("camera.saturation_luminance_cdpm2=4000")).saturation_luminance == 4000.0
 
 

@@ -109,15 +109,15 @@ def test_airlight_of_photons() -> None:
 
 
 def test_the_land_sets_the_level_of_either_airlight() -> None:
-    even, photons_field = fog("visibility_m=100", "ground_albedo=0.1"), photons("ground_albedo=0.1")
+    even, photons_field = fog("visibility_m=100", "ground_albedo=0.8"), photons("ground_albedo=0.8")
     assert even.ground_albedo is None
     assert even.airlight == photons_field.airlight
-    assert even.airlight_share == photons_field.airlight_share == pytest.approx(0.406)
-    assert in_daylight(even, 500.0).airlight[1] == pytest.approx(0.406 * 500.0 / math.pi)
-    assert fog("visibility_m=100").airlight_share == 0.95
+    assert even.airlight_share == photons_field.airlight_share == pytest.approx(0.868)
+    assert in_daylight(even, 500.0).airlight[1] == pytest.approx(0.868 * 500.0 / math.pi)
+    assert fog("visibility_m=100").airlight_share == photons().airlight_share == pytest.approx(0.406)
 
 
-@pytest.mark.parametrize(("setting", "share"), [("ground_albedo=0.1", 0.406), ("top_m=200", 0.95)])
+@pytest.mark.parametrize(("setting", "share"), [("ground_albedo=0.8", 0.868), ("top_m=200", 0.406)])
 def test_drivers_see_vehicles_before_that_level(setting: str, share: float) -> None:
     sight = driver_sight(
         load_scenario("motorway_fog_bank", [f"fog={{visibility_m: 100, {setting.replace('=', ': ')}}}"])

@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere.fog.frustum import FrustumGrid
-from fogsim.atmosphere.fog.layer_airlight import horizontal_share
 from fogsim.atmosphere.fog.medium import medium_of
 from fogsim.atmosphere.fog.optical_depth_kernels import extinctions_on_ray
 from fogsim.values import FogField
-from fogsim.values.fog import KOSCHMIEDER_SHARE
+from fogsim.values.fog import AIRLIGHT_SHARE
 
 AIRLIGHT_TINT = (0.98, 1.0, 1.02)
 """Airlight per channel relative to its luminance: fog droplets are grey, the overcast sky slightly bluish."""
@@ -21,18 +20,7 @@ _DEEPEST = 2000.0
 _LEVELS = 800
 
 
-def airlight_share(ground_albedo: float | None) -> float:
-    """Airlight near the ground relative to a perfectly white horizontal diffuser, E / π.
-
-    Parameters
-    ----------
-    ground_albedo : float or None
-        Albedo of the land around, whose level this then is; None if nothing is said of it.
-    """
-    return KOSCHMIEDER_SHARE if ground_albedo is None else horizontal_share(ground_albedo)
-
-
-def airlight_from_illuminance(illuminance: float, share: float = KOSCHMIEDER_SHARE) -> tuple[float, float, float]:
+def airlight_from_illuminance(illuminance: float, share: float = AIRLIGHT_SHARE) -> tuple[float, float, float]:
     """Airlight of fog under an overcast sky, L∞ = share · E_h / π per channel (physics of Koschmieder's closed form).
 
     Parameters
@@ -40,7 +28,7 @@ def airlight_from_illuminance(illuminance: float, share: float = KOSCHMIEDER_SHA
     illuminance : float
         Horizontal illuminance E_h [lx], not negative.
     share : float
-        Airlight relative to a perfectly white horizontal diffuser; see `airlight_share`.
+        Airlight relative to a perfectly white horizontal diffuser; see `fogsim.values.fog.airlight_share`.
 
     Returns
     -------

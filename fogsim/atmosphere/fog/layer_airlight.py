@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from fogsim.atmosphere.fog.layer_airlight_kernels import BEND, ELEVATIONS, PATHS
 from fogsim.errors import InputError
 from fogsim.values import FogField
+from fogsim.values.daylight import SideLight
+from fogsim.values.fog import airlight_share
 
 _PIECES = 4
 """Places on a line of sight between two paths of the table."""
@@ -38,6 +40,8 @@ class LayerTable:
         Over black ground, and what an albedo of 1 adds [-].
     reflectance, transmittance : (n,) float64
         Of the layer, for the light of the ground and for that of an overcast sky [-].
+    vertical_black, vertical_per_albedo : (n,) float64
+        Light of a vertical surface near the ground over E, as `black` and `per_albedo` [-].
     """
 
     thickness: NDArray[np.float64]
@@ -47,6 +51,8 @@ class LayerTable:
     per_albedo: NDArray[np.float64]
     reflectance: NDArray[np.float64]
     transmittance: NDArray[np.float64]
+    vertical_black: NDArray[np.float64]
+    vertical_per_albedo: NDArray[np.float64]
 
 
 @cache
@@ -67,18 +73,30 @@ def layer_table(droplets: str) -> LayerTable:
             per_albedo=found[f"{droplets}_per_albedo"].astype(np.float64),
             reflectance=found[f"{droplets}_reflectance"],
             transmittance=found[f"{droplets}_transmittance"],
+            vertical_black=found[f"{droplets}_vertical_black"],
+            vertical_per_albedo=found[f"{droplets}_vertical_per_albedo"],
         )
 
 
-def horizontal_share(albedo: float) -> float:
-    """Airlight seen level near the ground over that of a white horizontal diffuser, E / π: 0.34 + 0.66 ρ.
+def side_light(field: FogField, droplets: str) -> SideLight:
+    """Light of surfaces in a layer that are not level, near the ground.
 
     Parameters
     ----------
-    albedo : float
-        Albedo ρ of the land around [-], 0 … 1.
+    field : FogField
+        The fog at one time, with an albedo of the ground.
+    droplets : str
+        A member of `Droplets`.
+
+    Raises
+    ------
+    InputError
+        If the table does not have so thick a layer.
     """
-    return 0.34 + 0.66 * albedo
+    table, albedo = layer_table(droplets), field.ground_albedo or 0.0
+    at = math.log(layer_thickness(field.extinction, field.top - field.ground))
+    upright = np.interp(at, np.log(table.thickness), table.vertical_black + albedo * table.vertical_per_albedo)
+    return SideLight(float(upright), albedo)
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,7 +213,7 @@ def _slant_airlight(thickness: float, depth: float, albedo: float, droplets: str
         return np.asarray(values[low] + (values[low + 1] - values[low]) * on)
 
     source = between(table.black) + albedo * between(table.per_albedo)
-    share = path_means(table, source, thickness, depth) / horizontal_share(albedo)
+    share = path_means(table, source, thickness, depth) / airlight_share(albedo)
     brighter = (1.0 - albedo * between(table.reflectance)) / between(table.transmittance)
     return SlantAirlight(share.astype(np.float32), float(brighter))
 

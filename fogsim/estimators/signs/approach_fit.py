@@ -33,8 +33,9 @@ SMALL_FACE = 0.05
 """Relative deviation of the contrast of faces too small for their areas to be told apart, which the looks at a sign
 share: how far their light spreads, how large they are taken to be [-]."""
 
-BRIGHTNESS, BRIGHTNESS_DEVIATION = 0.5, 0.35
-"""What a white face would send without fog over the airlight, divided by its reflectance, and its deviation [-]."""
+BRIGHTNESS, BRIGHTNESS_DEVIATION = 1.0, 0.5
+"""What a white face would send without fog over the airlight, divided by its reflectance, and its deviation [-]: a
+vertical surface gets about half of a level one's light, the airlight has 0.37 over woods and 0.87 over snow."""
 
 HUBER, ROUNDS, COARSE = 2.0, 2, 6
 """Standard deviations from which on a look counts less [-], rounds of weighing, and every how manieth k they need."""

@@ -27,7 +27,7 @@ EDGES = 0.3
 FIRST_NOISE = 1.0
 """Standard deviation of a pixel before it is measured [linear grey levels]."""
 
-SYMBOL = 0.05
+SYMBOL = 0.12
 """Standard deviation of a symbol's mean light, relative to the picture's there [-]."""
 
 UNKNOWN = 1e6
@@ -145,7 +145,7 @@ def face_light(
     fit = _placed(seen, right, down, face, state, weight, (state, PLACED))
     columns = face.columns(right, down, state)
     # An error of the layout is the same in many pixels: it does not average out as noise does.
-    unsure = LAYOUT * abs(float(fit.solved[1] - fit.solved[0]))
+    unsure = LAYOUT * abs(float(fit.solved[1] - fit.solved[0] if face.is_even else fit.solved[4]))
     wider = 1.0 + unsure**2 * float((weight * columns[:, 0]).sum())
     return _line(face, columns, fit.solved, wider * fit.covariance)
 

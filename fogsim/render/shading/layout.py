@@ -33,6 +33,8 @@ class Light(NamedTuple):
     ----------
     white : float
         Radiance of a level white surface [cd/m²].
+    vertical, below : float
+        What reaches a vertical surface, and one that faces down, over what reaches a level one [-].
     zenith : (3,) float64
         Radiance of the zenith [cd/m²].
     terrain : (4,) float64
@@ -44,6 +46,8 @@ class Light(NamedTuple):
     """
 
     white: float
+    vertical: float
+    below: float
     zenith: Wide
     terrain: Wide
     lamp_masks: Numbers

@@ -21,6 +21,7 @@ from fogsim.render.shading.surfaces import set_background_surfaces, set_surfaces
 from fogsim.render.shading.terrain import shade_terrain
 from fogsim.render.shading.texture import Row, memory_for_row
 from fogsim.values.camera import Camera, CameraPose
+from fogsim.values.daylight import EVEN_LIGHT, SideLight
 from fogsim.values.image import View
 from fogsim.values.scene import Pavement, Surface
 
@@ -60,8 +61,11 @@ class Shading:
             table.faces,
             table.first_face,
         )
+        white, zenith = _white_and_zenith(illuminance)
         light = Light(
-            *_white_and_zenith(illuminance),
+            white,
+            *EVEN_LIGHT,
+            zenith=zenith,
             terrain=np.array((height, *reflectance)),
             lamp_masks=np.array([lighting_bits(surface) for surface in Surface], np.int32),
             lamp_radiance=np.array([lamp_radiance(surface) for surface in Surface]),
@@ -71,16 +75,19 @@ class Shading:
         # For each band.
         self._rows, self._spans = [memory_for_row(0), memory_for_row(0)], [_room(0, 0), _room(0, 0)]
 
-    def set_daylight(self, illuminance: float) -> None:
+    def set_daylight(self, illuminance: float, sides: SideLight = EVEN_LIGHT) -> None:
         """Shade by another daylight from now on.
 
         Parameters
         ----------
         illuminance : float
             Horizontal illuminance of the sky [lx].
+        sides : SideLight
+            What of it reaches surfaces that are not level.
         """
         white, zenith = _white_and_zenith(illuminance)
-        self._scene = self._scene._replace(light=self._scene.light._replace(white=white, zenith=zenith))
+        light = self._scene.light._replace(white=white, zenith=zenith, vertical=sides.vertical, below=sides.below)
+        self._scene = self._scene._replace(light=light)
 
     def view(
         self, triangle_ids: NDArray[np.int32], drawing: Drawing, camera: Camera, pose: CameraPose, lamplight: bool

@@ -11,6 +11,7 @@ from fogsim.render.shading import layout
 from fogsim.render.shading.layout import Array, Copies, Light, Meshes, Spans, Wide
 from fogsim.render.shading.lines import PERIOD
 from fogsim.render.vectors import Triple, Vector, columns_times, cross, dot, plus, row, rows_times, scaled, unit
+from fogsim.values.daylight import EVEN_LIGHT
 from fogsim.values.light import DARK_SHIFT, MIDDLE, NEVER_APART, Side
 from fogsim.values.scene import Surface
 
@@ -30,17 +31,22 @@ OBJECT, ROAD, TERRAIN = layout.OBJECT, layout.ROAD, layout.TERRAIN
 
 
 @kernel
-def light_share(x: float, y: float, z: float) -> float:
+def light_share(
+    x: float, y: float, z: float, vertical: float = EVEN_LIGHT.vertical, below: float = EVEN_LIGHT.below
+) -> float:
     """What reaches a surface with that unit normal of the overcast sky's light and, from below, of the ground's.
 
-    A little more comes from one side so that shapes read. A level surface gets exactly 1.
+    A little more comes from one side so that shapes read. A level surface gets 1.
 
     Parameters
     ----------
     x, y, z : float
         The normal: east, north, up.
+    vertical, below : float
+        What vertical surfaces get on the mean of all sides, and those that face down [-].
     """
-    return 0.5 + 0.5 * z + 0.06 * (1.0 - z) + 0.07 * (0.5 * x - 0.86 * y)
+    by_height = vertical + (0.5 * (1.0 - below) + (0.5 * (1.0 + below) - vertical) * z) * z
+    return by_height + 0.07 * (0.5 * x - 0.86 * y)
 
 
 @kernel
@@ -132,7 +138,7 @@ def set_surfaces(
         a = unit(columns_times(straight, row(normals, i)))
         if kind == _ROAD:
             kinds[number] = ROAD
-            surface[number, WHITE] = light.white * light_share(a[0], a[1], a[2])
+            surface[number, WHITE] = light.white * light_share(a[0], a[1], a[2], light.vertical, light.below)
             _set_lane(surface, number, meshes.road, colours, (i, j, k), planes)
             continue
         kinds[number] = OBJECT
@@ -150,9 +156,9 @@ def set_surfaces(
         shining = masks[kind] < 0 or lit != 0
         glow = row(lamps, kind) if shining else (0.0, 0.0, 0.0)
         white = (
-            light.white * light_share(a[0], a[1], a[2]),
-            light.white * light_share(b[0], b[1], b[2]),
-            light.white * light_share(c[0], c[1], c[2]),
+            light.white * light_share(a[0], a[1], a[2], light.vertical, light.below),
+            light.white * light_share(b[0], b[1], b[2], light.vertical, light.below),
+            light.white * light_share(c[0], c[1], c[2], light.vertical, light.below),
         )
         _set_colours(surface, number, (LIGHT, LOW, HIGH), tints, white, glow, planes)
         if lamplight:

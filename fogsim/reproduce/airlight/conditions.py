@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fogsim.atmosphere import Droplets, fogged_radiance, horizontal_share
+from fogsim.atmosphere import Droplets, fogged_radiance
 from fogsim.reproduce.result import Cell, TitledTable
 from fogsim.units import extinction_from_visibility
 from fogsim.values import FogField, View
+from fogsim.values.fog import AIRLIGHT_SHARE, airlight_share
 
 ELEVATIONS = (-10.0, -5.0, -2.0, 0.0, 2.0, 5.0, 10.0, 30.0)
 """Of the lines of sight [degrees]."""
@@ -71,7 +72,7 @@ def airlight(condition: Condition, elevation: float, distance: float | None = No
     slope = math.sin(math.radians(elevation))
     if distance is None:
         distance = condition.eye / -slope if slope < 0 else (condition.top - condition.eye) / max(slope, 1e-6)
-    level = (0.95 if condition.albedo is None else horizontal_share(condition.albedo),) * 3
+    level = (AIRLIGHT_SHARE if condition.albedo is None else airlight_share(condition.albedo),) * 3
     extinction = extinction_from_visibility(condition.visibility)
     field = FogField(extinction, level, top=condition.top, ground_albedo=condition.albedo)
     ray = np.zeros((3, 3))

@@ -14,6 +14,7 @@ from PIL import Image
 from fogsim.reproduce.airlight.conditions import Condition, airlight
 from fogsim.reproduce.result import Cell
 from fogsim.units import extinction_from_visibility
+from fogsim.values.fog import AIRLIGHT_SHARE
 
 Records = Sequence[Mapping[str, Cell]]
 
@@ -57,7 +58,7 @@ def _draw_airlight(axes: Axes) -> None:
     for albedo, colour in _COLOURS.items():
         over = Condition("", albedo)
         axes.plot(up, [airlight(over, one) for one in up.tolist()], colour, label=f"land of albedo {albedo:g}")
-    axes.axhline(0.95, color="0.5", ls="--", label="Koschmieder, as drawn")
+    axes.axhline(AIRLIGHT_SHARE, color="0.5", ls="--", label="Koschmieder, over land of albedo 0.1")
     axes.axvline(0.0, color="0.8", lw=1)
     axes.set(xlabel="elevation [°]", ylabel="airlight / (1 − T), over E/π", title="Airlight up to road or sky")
     axes.legend(fontsize=8)

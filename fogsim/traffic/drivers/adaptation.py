@@ -15,10 +15,13 @@ import numpy as np
 from fogsim.jit import kernel
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim.values.eye import flux_root, luminance_root
-from fogsim.values.fog import KOSCHMIEDER_SHARE
+from fogsim.values.fog import AIRLIGHT_SHARE
 
 DAY_EYE_THRESHOLD = 1e-3
-"""Illuminance at the eye at which a lamp is noticed by day [lx]."""
+"""Illuminance at the eye at which a lamp is noticed by day, before fog of `BRIGHT_LUMINANCE` and more [lx]."""
+
+BRIGHT_LUMINANCE = 302.0
+"""Luminance before which no lamp needs more light to be noticed than before less [cd/m²]."""
 
 HEAD_LAMP_LUMINANCE = 0.28
 """Luminance to which eyes are adapted in the light of the own head lamps alone [cd/m²].
@@ -40,7 +43,7 @@ _LOG_FLUX_ROOTS = np.log10(flux_root(10.0**_LOG_LUMINANCES))
 _LOG_LUMINANCE_ROOTS = np.log10(luminance_root(10.0**_LOG_LUMINANCES))
 
 
-def airlight_luminance(illuminance: float, share: float = KOSCHMIEDER_SHARE) -> float:
+def airlight_luminance(illuminance: float, share: float = AIRLIGHT_SHARE) -> float:
     """Luminance of fog under an overcast sky [cd/m²].
 
     Parameters
@@ -62,6 +65,7 @@ def _roots(luminance: float) -> tuple[float, float]:
 
 _DAY_LUMINANCE = airlight_luminance(DAY_ILLUMINANCE)
 _DAY_FLUX_ROOT, _DAY_LUMINANCE_ROOT = _roots(_DAY_LUMINANCE)
+_BRIGHT_FLUX_ROOT, _ = _roots(BRIGHT_LUMINANCE)
 
 
 class Adaptation(NamedTuple):
@@ -98,15 +102,17 @@ def contrast_ratio(eyes: Adaptation, distance: float) -> float:
     distance : float
         Distance of the vehicle, which makes it small [m].
     """
+    # By day Koschmieder's law knows one threshold, for small and large, in dim light and in bright.
+    if eyes.luminance >= _DAY_LUMINANCE:
+        return 1.0
     by_size = distance / _MINUTES
     least = eyes.flux_root * by_size + eyes.luminance_root
     by_day = _DAY_FLUX_ROOT * by_size + _DAY_LUMINANCE_ROOT
-    # By day Koschmieder's law knows one threshold, for small and large, in dim light and in bright.
-    return max((least / by_day) ** 2 * _DAY_LUMINANCE / min(eyes.luminance, _DAY_LUMINANCE), 1.0)
+    return max((least / by_day) ** 2 * _DAY_LUMINANCE / eyes.luminance, 1.0)
 
 
 @functools.lru_cache(maxsize=256)
-def adaptation(illuminance: float, glare: float = 0.0, share: float = KOSCHMIEDER_SHARE) -> Adaptation:
+def adaptation(illuminance: float, glare: float = 0.0, share: float = AIRLIGHT_SHARE) -> Adaptation:
     """Eyes adapted to the light of the sky, of the own head lamps, and to glare.
 
     Parameters
@@ -120,8 +126,8 @@ def adaptation(illuminance: float, glare: float = 0.0, share: float = KOSCHMIEDE
     """
     airlight = airlight_luminance(illuminance, share)
     luminance = airlight + HEAD_LAMP_LUMINANCE + glare
-    flux, extended = _roots(min(luminance, _DAY_LUMINANCE))
-    return Adaptation(airlight, luminance, DAY_EYE_THRESHOLD * (flux / _DAY_FLUX_ROOT) ** 2, flux, extended)
+    flux, extended = _roots(min(luminance, BRIGHT_LUMINANCE))
+    return Adaptation(airlight, luminance, DAY_EYE_THRESHOLD * (flux / _BRIGHT_FLUX_ROOT) ** 2, flux, extended)
 
 
 NIGHT_EYE_THRESHOLD = adaptation(0.0).eye_threshold

@@ -24,10 +24,7 @@ from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST
 from fogsim.traffic.drivers.own_beams import HIGH_BEAM_LIGHT
 from fogsim.traffic.drivers.sight_kernels import DISTANCE_TOLERANCE, depth_limit, judge_leaders, seen_distance
 from fogsim.units import CONTRAST_THRESHOLD, DAY_ILLUMINANCE, luminance_of
-from fogsim.values.fog import KOSCHMIEDER_SHARE
-
-LEAST_CONTRAST = 0.5
-"""No vehicle's rear has less contrast to airlight as bright as a white surface than this, not even a white one [-]."""
+from fogsim.values.fog import AIRLIGHT_SHARE
 
 VERTICAL_ILLUMINANCE = 0.5
 """Illuminance of a vertical surface under an overcast sky over that of a horizontal one [-]."""
@@ -100,7 +97,7 @@ class DriverSight:
     headlamp_reach: float = 55.0
     reaction_time: float = 1.0
     contrast_threshold: float = CONTRAST_THRESHOLD
-    airlight_share: float = KOSCHMIEDER_SHARE
+    airlight_share: float = AIRLIGHT_SHARE
 
     def depth_limit(
         self,
@@ -203,7 +200,7 @@ class DriverSight:
         most_glare : float
             Veil inside the eye that there may be at most [cd/m²].
         """
-        least = min(LEAST_CONTRAST, inherent_contrast((1.0, 1.0, 1.0), self.airlight_share))
+        least = inherent_contrast((1.0, 1.0, 1.0), self.airlight_share)
         return self.seen_distance(maximum_extinction, least, head_lamps=0.0, glare=most_glare)
 
     def hidden_distance(self, minimum_extinction: float, brightest: float = BRIGHTEST) -> float:
@@ -221,7 +218,7 @@ class DriverSight:
         return self.seen_distance(minimum_extinction, 1.0, brightest, own) + DISTANCE_TOLERANCE
 
 
-def inherent_contrast(paint: tuple[float, float, float], airlight_share: float = KOSCHMIEDER_SHARE) -> float:
+def inherent_contrast(paint: tuple[float, float, float], airlight_share: float = AIRLIGHT_SHARE) -> float:
     """Contrast of a vehicle's rear to the airlight, 0 … 1.
 
     A third of the rear is dark glass, tyres and shadow; the rest is paint under half of the sky.

@@ -9,7 +9,7 @@ from fogsim.traffic.drivers.own_beams import head_lamp_light
 from fogsim.traffic.drivers.sight import inherent_contrast
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
-from fogsim.values.fog import KOSCHMIEDER_SHARE
+from fogsim.values.fog import AIRLIGHT_SHARE
 from fogsim.values.light import MIDDLE_LAMPS, Side, dark_on
 
 OwnLamps = dict[str, int]
@@ -51,7 +51,7 @@ class SeenVehicles:
         The airlight that they are seen before, over that of a white horizontal surface [-].
     """
 
-    def __init__(self, api: Api, remote: bool = False, airlight_share: float = KOSCHMIEDER_SHARE) -> None:
+    def __init__(self, api: Api, remote: bool = False, airlight_share: float = AIRLIGHT_SHARE) -> None:
         self._airlight_share = airlight_share
         (self._signals,) = vehicle_getters(api, remote, ("getSignals",))
         self._get_colour = vehicle_getter(api, "getColor")

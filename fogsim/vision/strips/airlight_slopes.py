@@ -39,8 +39,10 @@ ANY_SLOPE = 2.0
 """Standard deviation of the slope of a sky, over its level, above airlight that is even [1/rad]: that of the CIE
 overcast sky behind thin fog."""
 
-DROPLET_CHANCES = (0.5, 0.3, 0.2)
-"""How likely droplets of moderate and heavy radiation fog and of advection fog are beforehand [-]."""
+DROPLET_CHANCES = (0.65, 0.25, 0.1)
+"""How likely droplets of moderate and heavy radiation fog and of advection fog are beforehand [-]. A picture hardly
+tells them apart, so that these weights are the bias: with 0.2 for advection fog, radiation fog was read 11 % too short
+over the darkest land, and by the right droplets alone 3 to 5 %."""
 
 USUAL_EXTINCTION = 0.03
 """Extinction at which the shape of the airlight is taken where none is known yet [1/m]."""

@@ -17,7 +17,7 @@ LAYER = FogField(0.02, (1000.0, 1000.0, 1000.0), top=60.0, top_edge=20.0)
 
 
 def test_airlight_is_that_of_a_white_diffuser_times_its_share() -> None:
-    assert luminance_of(airlight_from_illuminance(10_000.0)) == pytest.approx(0.95 * 10_000.0 / math.pi, rel=3e-3)
+    assert luminance_of(airlight_from_illuminance(10_000.0)) == pytest.approx(0.406 * 10_000.0 / math.pi, rel=3e-3)
     assert airlight_from_illuminance(0.0) == (0.0, 0.0, 0.0)
 
 

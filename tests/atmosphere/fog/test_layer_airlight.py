@@ -12,17 +12,19 @@ import make_airlight_table
 from fogsim.atmosphere import fogged_radiance
 from fogsim.atmosphere.fog.koschmieder import daytime_luminance, transmittance
 from fogsim.atmosphere.fog.layer_airlight import (
-    horizontal_share,
     layer_table,
     path_means,
+    side_light,
     sines,
     slant_airlight,
 )
 from fogsim.atmosphere.fog.layer_airlight_kernels import PATHS
 from fogsim.atmosphere.lamps.phase_function import Droplets, phase_function
 from fogsim.errors import InputError
+from fogsim.render.shading.surfaces import light_share
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, CameraPose, FogBank, FogField, FogPatches, View
+from fogsim.values.fog import airlight_share
 from tests.atmosphere.tables import read_table
 
 COUNTS = read_table("monte_carlo_airlight.csv")
@@ -32,7 +34,7 @@ RHO = 0.1
 
 def field_of(visibility: float, top: float, albedo: float) -> FogField:
     """Fog whose airlight has the level of a ground of illuminance π."""
-    level = (horizontal_share(albedo),) * 3
+    level = (airlight_share(albedo),) * 3
     return FogField(extinction_from_visibility(visibility), level, top=top, ground_albedo=albedo)
 
 
@@ -128,7 +130,7 @@ def test_light_is_conserved(droplets: Droplets) -> None:
 
 def test_a_thin_layer_scatters_once() -> None:
     droplets = Droplets.HEAVY_RADIATION
-    *_, transmittance, black, _ = make_airlight_table.layer(make_airlight_table.scattering(droplets), 1e-4)
+    _, _, transmittance, (black, _), _ = make_airlight_table.layer(make_airlight_table.scattering(droplets), 1e-4)
     assert transmittance == pytest.approx(1.0, abs=1e-3)
     angle, turn = np.meshgrid(np.linspace(0, math.pi, 20_001), math.pi * (np.arange(100) + 0.5) / 100, indexing="ij")
     weight = phase_function(droplets)(angle) * np.sin(angle)
@@ -146,9 +148,10 @@ def test_the_table_is_what_its_tool_makes(layer: int) -> None:
     for droplets in (Droplets.HEAVY_ADVECTION, Droplets.MODERATE_RADIATION):
         table = layer_table(droplets)
         matrix, thickness = make_airlight_table.scattering(droplets), float(table.thickness[layer])
-        heights, reflectance, transmittance, black, _ = make_airlight_table.layer(matrix, thickness)
+        heights, reflectance, transmittance, (black, _), upright = make_airlight_table.layer(matrix, thickness)
         assert table.reflectance[layer] == pytest.approx(reflectance, abs=1e-4)
         assert table.transmittance[layer] == pytest.approx(transmittance, abs=1e-4)
+        assert (table.vertical_black[layer], table.vertical_per_albedo[layer]) == pytest.approx(upright, abs=1e-4)
         level = np.interp(thickness * table.place, heights, black[:, len(make_airlight_table.LOOKS)])
         assert table.black[layer, :, len(table.elevation) // 2] == pytest.approx(level, rel=2e-3)
 
@@ -169,7 +172,7 @@ def test_a_black_target_at_the_visibility_has_five_percent_of_contrast(visibilit
 def test_the_level_is_that_of_a_horizontal_line_of_sight() -> None:
     for albedo in ALBEDOS:
         level = seen(field_of(100.0, 250.0, albedo), 1.3, 0.0)
-        assert level == pytest.approx(horizontal_share(albedo), rel=0.02)
+        assert level == pytest.approx(airlight_share(albedo), rel=0.02)
 
 
 def test_transmittance_is_that_of_koschmieder() -> None:
@@ -203,3 +206,21 @@ def test_an_eye_above_the_layer_and_unknown_layers_are_refused() -> None:
         slant_airlight(field_of(100.0, 1.0, RHO), 1.3, "moderate_radiation")
     with pytest.raises(InputError, match=r"optical thickness up to 100, got 149.8"):
         slant_airlight(field_of(5.0, 250.0, RHO), 1.3, "moderate_radiation")
+
+
+@pytest.mark.parametrize("tilt", [0, 30, 60])
+@pytest.mark.parametrize(
+    ("visibility", "albedo"), [(50.0, 0.0), (100.0, 0.1), (100.0, 0.8), (400.0, 0.1), (400.0, 1.0)]
+)
+def test_surfaces_get_the_light_of_what_they_see(visibility: float, albedo: float, tilt: int) -> None:
+    """Against the radiance of drawn lines of sight, over all that is before a surface tilted up from the vertical."""
+    field, elevation = field_of(visibility, 250.0, albedo), np.radians(np.arange(-89.5, 90.0))
+    light = [seen(field, 0.02, math.degrees(one)) if one > 0 else albedo for one in elevation.tolist()]
+    up, turn = math.sin(math.radians(tilt)), np.radians(np.arange(0.5, 360.0))
+    facing = np.outer(np.sin(elevation), up + 0.0 * turn)
+    facing += np.outer(np.cos(elevation), math.cos(math.radians(tilt)) * np.cos(turn))
+    weight = np.maximum(facing, 0.0) * np.cos(elevation)[:, None]
+    expected = float((np.array(light)[:, None] * weight).sum() / weight.sum())
+    sides = side_light(field, "moderate_radiation")
+    # The sky's brightness does not go by the square of the tilt alone.
+    assert light_share(0.0, 0.0, up, *sides) == pytest.approx(expected, rel=0.02 if tilt == 0 else 0.06)

@@ -18,14 +18,15 @@ from fogsim.traffic.drivers.adaptation import (
 
 def test_lamps_are_noticed_at_known_illuminances_at_both_ends() -> None:
     assert pytest.approx(1e-5, rel=0.05) == NIGHT_EYE_THRESHOLD
-    assert adaptation(1000.0).eye_threshold == DAY_EYE_THRESHOLD == adaptation(1e5).eye_threshold
+    assert adaptation(2500.0).eye_threshold == DAY_EYE_THRESHOLD == adaptation(1e5).eye_threshold
+    assert adaptation(1000.0, share=0.95).eye_threshold == DAY_EYE_THRESHOLD > adaptation(1000.0).eye_threshold
 
 
 @pytest.mark.parametrize("distance", [10.0, 100.0])
 @pytest.mark.parametrize("illuminance", [0.1, 3.0, 30.0, 300.0])
 def test_contrast_follows_adrians_threshold(illuminance: float, distance: float) -> None:
     """ΔL_th / L over that by day, as `visibility_level.threshold` has it, within the jump of its branches."""
-    luminance, day = adaptation(illuminance).luminance, 0.95 * 1000.0 / math.pi
+    luminance, day = adaptation(illuminance).luminance, 0.406 * 1000.0 / math.pi
     size = 2.0 * math.tan(0.5 * VEHICLE_SIZE / distance)  # the small angle, as an angle's own size
     small, large = (threshold(x, angular_size(size, 1.0), exposure_time=2.0) / x for x in (luminance, day))
     assert contrast_ratio(adaptation(illuminance), distance) == pytest.approx(float(small / large), rel=0.02)
@@ -42,6 +43,6 @@ def test_thresholds_rise_into_the_night_and_are_those_of_the_day_from_1000_lx_on
 
 
 def test_no_jump_where_adrians_branches_meet() -> None:
-    join = (0.6 - HEAD_LAMP_LUMINANCE) * math.pi / 0.95
+    join = (0.6 - HEAD_LAMP_LUMINANCE) * math.pi / 0.406
     below, above = (adaptation(join * share).eye_threshold for share in (0.9999, 1.0001))
     assert above / below == pytest.approx(1.0, abs=1e-3)

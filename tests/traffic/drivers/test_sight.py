@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.traffic.drivers.adaptation import DAY_EYE_THRESHOLD, adaptation
+from fogsim.traffic.drivers.adaptation import DAY_EYE_THRESHOLD, HEAD_LAMP_LUMINANCE, adaptation, airlight_luminance
 from fogsim.traffic.drivers.lamp_intensity import BRIGHTEST, rear_intensity
-from fogsim.traffic.drivers.sight import LEAST_CONTRAST, DriverSight, inherent_contrast
+from fogsim.traffic.drivers.sight import DriverSight, inherent_contrast
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Lamp
 
@@ -46,27 +46,29 @@ def test_a_rear_fog_lamp_is_seen_farther_than_a_tail_lamp_and_all_lamps_less_far
 def test_by_day_a_black_vehicle_is_seen_up_to_the_meteorological_visibility(
     visibility: float, illuminance: float
 ) -> None:
-    assert reach(DriverSight(illuminance), visibility, (1.0, 0.0, 1.0)) == pytest.approx(visibility, rel=5e-4)
+    """But for what the own head lamps light of the fog, 0.2 % of the airlight at 1000 lx."""
+    by_head_lamps = math.log1p(HEAD_LAMP_LUMINANCE / airlight_luminance(illuminance)) / math.log(20.0)
+    assert by_head_lamps < 1e-3
+    lost = visibility * (1.0 - by_head_lamps)
+    assert reach(DriverSight(illuminance), visibility, (1.0, 0.0, 0.0)) == pytest.approx(lost, rel=1e-5)
 
 
 def test_a_light_vehicle_is_lost_sooner() -> None:
     black, white = inherent_contrast((0.02, 0.02, 0.02)), inherent_contrast((0.8, 0.8, 0.8))
-    assert 0.5 < white < black <= 1.0
+    assert 0.3 < white < black <= 1.0
     assert reach(DAY, 100.0, (white, 0.0, 1.0)) < 0.9 * reach(DAY, 100.0, (black, 0.0, 1.0))
 
 
 def test_before_darker_airlight_paint_stands_out_less() -> None:
-    over_fields = DriverSight(10_000.0, airlight_share=0.406)
-    white, black = (inherent_contrast((paint,) * 3, 0.406) for paint in (0.85, 0.0))
+    over_snow = DriverSight(10_000.0, airlight_share=0.868)
+    white, black = (inherent_contrast((paint,) * 3) for paint in (0.85, 0.0))
     assert white == pytest.approx(1.0 - 0.85 / 3.0 / 0.406)
     assert black == 1.0
-    assert reach(over_fields, 100.0, (white, 0.0, 1.0)) == pytest.approx(
+    assert reach(DAY, 100.0, (white, 0.0, 1.0)) == pytest.approx(
         100.0 * (1.0 + math.log(white) / math.log(20.0)), rel=1e-3
     )
-    assert over_fields.sure_distance(0.03) < DAY.sure_distance(0.03)
-    assert over_fields.sure_distance(0.03) <= reach(
-        over_fields, 100.0, (inherent_contrast((1.0,) * 3, 0.406), 0.0, 0.0)
-    )
+    assert DAY.sure_distance(0.03) < over_snow.sure_distance(0.03)
+    assert DAY.sure_distance(0.03) <= reach(DAY, 100.0, (inherent_contrast((1.0,) * 3), 0.0, 0.0))
 
 
 def test_in_clear_air_by_day_everything_is_seen_and_at_night_what_the_headlamps_reach() -> None:
@@ -144,9 +146,9 @@ def test_bounds_hold_and_are_close(illuminance: float, visibility: float) -> Non
     sight, k = DriverSight(illuminance), extinction_from_visibility(visibility)
     sure, hidden = sight.sure_distance(k), sight.hidden_distance(k)
     assert 0.0 <= reach(sight, visibility, LIT) - sight.seen_distance(k, *LIT) <= 0.011
-    assert sure == pytest.approx(reach(sight, visibility, (LEAST_CONTRAST, 0.0, 0.0)), abs=0.11)
-    assert hidden == pytest.approx(reach(sight, visibility, (1.0, BRIGHTEST, 1.0)), abs=0.02)
     white = inherent_contrast((1.0, 1.0, 1.0))
+    assert sure == pytest.approx(reach(sight, visibility, (white, 0.0, 0.0)), abs=0.11)
+    assert hidden == pytest.approx(reach(sight, visibility, (1.0, BRIGHTEST, 1.0)), abs=0.02)
     for distance in np.linspace(0.1, sure, 50) if sure else ():
         assert k * distance <= sight.depth_limit(distance, white, 0.0, 0.0)
     for distance in np.geomspace(hidden, 10.0 * hidden, 50):
@@ -163,7 +165,7 @@ def test_bounds_in_clear_air() -> None:
 def test_glare_raises_both_thresholds() -> None:
     """A veil of glare counts like so much more light that the eye is adapted to, as Adrian's equations have it."""
     dazzled = adaptation(0.0, glare=1.0)
-    assert dazzled.eye_threshold == pytest.approx(adaptation(1.0 * math.pi / 0.95).eye_threshold)
+    assert dazzled.eye_threshold == pytest.approx(adaptation(1.0 * math.pi / 0.406).eye_threshold)
     assert dazzled.eye_threshold > 2.0 * DARK_THRESHOLD
     assert reach(NIGHT, 400.0, UNLIT, glare=1.0) < 0.85 * reach(NIGHT, 400.0, UNLIT)
     assert reach(NIGHT, 400.0, LIT, glare=1.0) < 0.95 * reach(NIGHT, 400.0, LIT)

@@ -16,6 +16,7 @@ from highway_env.vehicle.kinematics import Vehicle
 from fogsim.atmosphere import FieldAccess, airlight_from_illuminance
 from fogsim.errors import InputError, SimulationError
 from fogsim.traffic import DriverSight
+from fogsim.traffic.drivers.lamp_intensity import rear_intensity
 from fogsim.traffic.drivers.sight import inherent_contrast
 from fogsim.traffic.highway import HighwayTraffic, OtherRoadsError, road_network
 from fogsim.units import extinction_from_visibility
@@ -129,10 +130,11 @@ def collisions_of_a_driver(visibility: float) -> tuple[list[Collision], float]:
     for _ in range(15 * 15):
         traffic.advance(Command())
         hits += seen(traffic).collisions
-    contrast = inherent_contrast(tuple(seen(traffic).state.paint[2]))
+    state = seen(traffic).state
+    contrast, lamps = inherent_contrast(tuple(state.paint[2])), rear_intensity(int(state.lamps[2]))
     traffic.close()
     assert driver.speed < 1.0
-    return hits, math.log(contrast / 0.05) / extinction_from_visibility(visibility)
+    return hits, DriverSight(DAY).seen_distance(extinction_from_visibility(visibility), contrast, lamps)
 
 
 def test_drivers_stop_in_clear_air() -> None:

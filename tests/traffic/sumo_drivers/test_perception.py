@@ -26,6 +26,7 @@ from fogsim.traffic.drivers.speed_choice import within_sight
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink, load_libsumo
 from fogsim.traffic.sumo_drivers.leader_sight import LeaderSight
 from fogsim.values import Collision, Command, FogBank, FogField, Lamp
+from fogsim.values.fog import AIRLIGHT_SHARE
 
 NET = Path(__file__).resolve().parents[3] / "scenarios" / "motorway_fog_bank" / "motorway.net.xml"
 EMERGENCY_DECELERATION = 9.0  # SUMO's default of a passenger car
@@ -76,7 +77,7 @@ class SeesFrom:
     distance: float
     reaction_time: float = 0.0
     illuminance: float = 0.0
-    airlight_share: float = 0.95
+    airlight_share: float = AIRLIGHT_SHARE
 
     def sure_distance(self, *_: float) -> float:
         return self.distance - 10.0

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from fogsim.atmosphere import distance_at_depth, extinction
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import Camera, CameraPose, Fault, FogField, Lane, LaneKind, RoadSection, SignMap, TrafficState, Truth
-from fogsim.values.belief import THINNEST
-from fogsim.values.fog_profile import FogProfile
+from fogsim.values.belief import THINNEST, FogProfile
 
 _SIGHT_LINE = np.geomspace(1.0, 20_000.0, 400)
 """Distances ahead at which the optical depth is looked up to find how far one sees [m]."""

@@ -42,7 +42,7 @@ from fogsim.values import (
     TrafficState,
     View,
 )
-from fogsim.values.daylight import EVEN_LIGHT
+from fogsim.values.fog import EVEN_LIGHT
 from fogsim.values.scene import Instance
 
 DARKEST_SKY = 1e-4

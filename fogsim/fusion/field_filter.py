@@ -13,7 +13,7 @@ from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.belief import Belief
 from fogsim.values.estimate import DenserFog, Estimate, OpticalDepths
-from fogsim.values.report import FogReport
+from fogsim.values.observation import FogReport
 
 FARTHEST = CELL * AHEAD
 """How far ahead an estimate is taken to speak [m]."""

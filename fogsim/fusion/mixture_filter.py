@@ -15,7 +15,7 @@ from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.belief import Belief
 from fogsim.values.estimate import Estimate
-from fogsim.values.report import FogReport
+from fogsim.values.observation import FogReport
 
 Floats = NDArray[np.float64]
 

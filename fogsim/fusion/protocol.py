@@ -5,7 +5,7 @@ from typing import Protocol, runtime_checkable
 
 from fogsim.values.belief import Belief
 from fogsim.values.estimate import Estimate
-from fogsim.values.report import FogReport
+from fogsim.values.observation import FogReport
 
 
 class Fusion(Protocol):

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from fogsim.fusion import route_field_kernels
 from fogsim.linear_algebra import inverse_of, matrix_product
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY, extinction_from_visibility
-from fogsim.values.fog_profile import FogProfile
+from fogsim.values.belief import FogProfile
 
 Floats = NDArray[np.float64]
 

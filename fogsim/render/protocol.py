@@ -5,7 +5,7 @@ from typing import Protocol
 
 from fogsim.errors import FogSimError
 from fogsim.values.camera import Camera, CameraPose
-from fogsim.values.daylight import EVEN_LIGHT, SideLight
+from fogsim.values.fog import EVEN_LIGHT, SideLight
 from fogsim.values.image import View
 from fogsim.values.scene import Batch
 

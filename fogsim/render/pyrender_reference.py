@@ -23,7 +23,7 @@ from fogsim.render.pyrender_scene import (
 )
 from fogsim.render.shading.pavement import reflectance_by_sine
 from fogsim.values.camera import Camera, CameraPose
-from fogsim.values.daylight import EVEN_LIGHT, SideLight
+from fogsim.values.fog import EVEN_LIGHT, SideLight
 from fogsim.values.image import View
 from fogsim.values.pinhole import ray_from_pixel
 from fogsim.values.scene import Batch, Scene

@@ -13,7 +13,7 @@ from fogsim.render.lens import lens_of
 from fogsim.render.protocol import RenderError
 from fogsim.render.shading import Shading
 from fogsim.values.camera import Camera, CameraPose
-from fogsim.values.daylight import EVEN_LIGHT, SideLight
+from fogsim.values.fog import EVEN_LIGHT, SideLight
 from fogsim.values.image import View
 from fogsim.values.scene import LEVELS_OF_DETAIL, Batch, Scene, Surface
 

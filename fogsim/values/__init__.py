@@ -1,6 +1,6 @@
 """The plain frozen values that the stages of FogSim hand to one another."""
 
-from fogsim.values.belief import Belief
+from fogsim.values.belief import Belief, FogProfile
 from fogsim.values.camera import Camera, CameraPose, Response
 from fogsim.values.command import (
     Command,
@@ -15,11 +15,9 @@ from fogsim.values.command import (
 from fogsim.values.estimate import DenserFog, Estimate, FogCategory, OpticalDepths, SignLook, fog_category
 from fogsim.values.fault import Fault, RunningFault
 from fogsim.values.fog import FogBank, FogChange, FogField, FogPatches, FogShelter
-from fogsim.values.fog_profile import FogProfile
 from fogsim.values.image import Frame, View
 from fogsim.values.light import Beam, HeadLamp, Lamp, LampLobes, Lights, LightSources, SignalLight, StreetLighting
-from fogsim.values.observation import LeadMeasurement, LightMeasurement, Observation, SignSighting
-from fogsim.values.report import FogReport
+from fogsim.values.observation import FogReport, LeadMeasurement, LightMeasurement, Observation, SignSighting
 from fogsim.values.road import (
     Lane,
     LaneEnd,

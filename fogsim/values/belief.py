@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,52 @@ from numpy.typing import NDArray
 from fogsim.jit import kernel
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.estimate import DenserFog
-from fogsim.values.fog_profile import FogProfile
+
+
+@dataclass(frozen=True, slots=True)
+class FogProfile:
+    """Normal distributions of ln k at places along the way, behind a vehicle and ahead of it.
+
+    Attributes
+    ----------
+    distance : (n,) float64
+        Distance ahead of the vehicle [m], ascending; negative behind it.
+    log_extinction : (n,) float64
+        Mean, and median, of ln k with k in 1/m.
+    standard_deviation : (n,) float64
+        Of ln k [-].
+    """
+
+    distance: NDArray[np.float64]
+    log_extinction: NDArray[np.float64]
+    standard_deviation: NDArray[np.float64]
+
+    def at(self, distance: float) -> tuple[float, float]:
+        """Mean and standard deviation of ln k at a place; beyond either end those of the end [-].
+
+        Parameters
+        ----------
+        distance : float
+            Distance ahead [m].
+        """
+        mean, deviation = (
+            float(np.interp(distance, self.distance, values))
+            for values in (self.log_extinction, self.standard_deviation)
+        )
+        return mean, deviation
+
+    def visibility_quantile(self, distance: float, share: float) -> float:
+        """Visibility below which the truth lies at a place with a given probability [m].
+
+        Parameters
+        ----------
+        distance : float
+            Distance ahead [m].
+        share : float
+            Probability, above 0 and below 1.
+        """
+        mean, deviation = self.at(distance)
+        return OPTICAL_DEPTH_AT_VISIBILITY * math.exp(NormalDist().inv_cdf(share) * deviation - mean)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,7 @@
 import itertools
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from fogsim.errors import InputError
 
@@ -265,3 +266,21 @@ class FogField:
             raise InputError(
                 f"airlight by elevation is known of an even layer of fog on flat land, not with {', '.join(found)}"
             )
+
+
+class SideLight(NamedTuple):
+    """Daylight of surfaces that are not level.
+
+    Attributes
+    ----------
+    vertical, below : float
+        Illuminance of a vertical surface, on the mean of all sides, and of one that faces down, over that of a level
+        one [-].
+    """
+
+    vertical: float
+    below: float
+
+
+EVEN_LIGHT = SideLight(0.56, 0.12)
+"""That under a sky which is about as bright everywhere, above dark ground."""

@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.units import visibility_from_extinction
-from fogsim.values.belief import Belief
+from fogsim.values.belief import Belief, FogProfile
 from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.command import Command, Stretch
 from fogsim.values.estimate import Estimate
 from fogsim.values.fault import Fault
 from fogsim.values.fog import FogField
-from fogsim.values.fog_profile import FogProfile
 from fogsim.values.image import View
 from fogsim.values.observation import Observation
 from fogsim.values.road import SignMap

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from fogsim.atmosphere.fog.layer_airlight_kernels import BEND, ELEVATIONS, PATHS
 from fogsim.errors import InputError
 from fogsim.values import FogField
-from fogsim.values.daylight import SideLight
-from fogsim.values.fog import airlight_share
+from fogsim.values.fog import SideLight, airlight_share
 
 _PIECES = 4
 """Places on a line of sight between two paths of the table."""

@@ -21,7 +21,7 @@ from fogsim.render.shading.surfaces import set_background_surfaces, set_surfaces
 from fogsim.render.shading.terrain import shade_terrain
 from fogsim.render.shading.texture import Row, memory_for_row
 from fogsim.values.camera import Camera, CameraPose
-from fogsim.values.daylight import EVEN_LIGHT, SideLight
+from fogsim.values.fog import EVEN_LIGHT, SideLight
 from fogsim.values.image import View
 from fogsim.values.scene import Pavement, Surface
 

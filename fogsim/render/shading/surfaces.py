@@ -11,7 +11,7 @@ from fogsim.render.shading import layout
 from fogsim.render.shading.layout import Array, Copies, Light, Meshes, Spans, Wide
 from fogsim.render.shading.lines import PERIOD
 from fogsim.render.vectors import Triple, Vector, columns_times, cross, dot, plus, row, rows_times, scaled, unit
-from fogsim.values.daylight import EVEN_LIGHT
+from fogsim.values.fog import EVEN_LIGHT
 from fogsim.values.light import DARK_SHIFT, MIDDLE, NEVER_APART, Side
 from fogsim.values.scene import Surface
 

@@ -30,6 +30,7 @@ from fogsim.vision.strips.course_geometry import course_deviation, course_geomet
 from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, no_road
 from fogsim.vision.strips.joint_fit import MODEL_DEVIATION, JointFit, Priors, fit_own, with_neighbours
 from fogsim.vision.strips.joint_prior import joint_prior
+from fogsim.vision.strips.shade import divided_road, is_sure
 from fogsim.vision.strips.sky import Sky, sky_above
 from fogsim.vision.strips.strip_curves import (
     StripCurves,
@@ -214,6 +215,12 @@ class JointRoad:
         curves = self._usable(strip_curves(pixels, self._geometry, sky.noise, self._camera, free), sky, lowest)
         whole, told = curves, free
         own = fit = fit_own(self._averaged(curves, sky), self._geometry, priors)
+        if not self._earlier.maxlen and not is_sure(own, curves):
+            divided = divided_road(pixels, curves, self._geometry, self._camera, priors, self._horizon, sky.noise, free)
+            if divided is not None:
+                self._geometry = divided.geometry
+                uneven = even_fog(divided.fit, divided.geometry)
+                return self._doubt(uneven, sky, divided.curves, free, told) or uneven
         for _ in range(MOST_OBSTACLES):
             if own is None or fit is None:
                 break

@@ -30,7 +30,7 @@ from fogsim.vision.strips.course_geometry import course_deviation, course_geomet
 from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, no_road
 from fogsim.vision.strips.joint_fit import MODEL_DEVIATION, JointFit, Priors, fit_own, with_neighbours
 from fogsim.vision.strips.joint_prior import joint_prior
-from fogsim.vision.strips.shade import divided_road, is_sure
+from fogsim.vision.strips.shade import DividedRoad, divided_road, is_sure
 from fogsim.vision.strips.sky import Sky, sky_above
 from fogsim.vision.strips.strip_curves import (
     StripCurves,
@@ -80,9 +80,9 @@ DARKENS = 0.5
 layer."""
 
 SUNLIT = 0.3
-"""Luminance of the road over the airlight's beyond which the sun lights it [-]: asphalt reflects no more of the sky's light.
-The sun's light too is reflected more at grazing angles, by a share that nobody knows, which then looks like fog: what is
-beyond counts as the deviation of the road's luminance, relative to it, along the road."""
+"""Luminance of the road over the airlight's beyond which the sun lights it [-]: asphalt reflects no more of the sky's
+light. The sun's light too is reflected more at grazing angles, by a share that nobody knows, which looks like fog: what
+is beyond counts as the deviation of the road's luminance along the way, relative to it."""
 
 MOST_OBSTACLES = 2
 """How often what stands in the own lane is looked for anew, each time nearer."""
@@ -224,12 +224,9 @@ class JointRoad:
         curves = self._usable(strip_curves(pixels, self._geometry, sky.noise, self._camera, free), sky, lowest)
         whole, told = curves, free
         own = fit = fit_own(self._averaged(curves, sky), self._geometry, priors)
-        if not self._earlier.maxlen and not is_sure(own, curves):
-            divided = divided_road(pixels, curves, self._geometry, self._camera, priors, self._horizon, sky.noise, free)
-            if divided is not None:
-                self._geometry, self._shaded = divided.geometry, divided.share
-                uneven = even_fog(divided.fit, divided.geometry)
-                return self._doubt(uneven, sky, divided.curves, free, told) or uneven
+        if divided := self._divided(own, pixels, curves, sky, priors, free):
+            uneven = even_fog(divided.fit, divided.geometry)
+            return self._doubt(uneven, sky, divided.curves, free, told) or uneven
         for _ in range(MOST_OBSTACLES):
             if own is None or fit is None:
                 break
@@ -256,6 +253,18 @@ class JointRoad:
             seen = self._averaged(curves, sky)
             uneven = fit_uneven(seen, self._geometry, priors[0], own, fit, bool(course.bend.any()))
         return self._doubt(uneven, sky, curves, free, told) or uneven
+
+    def _divided(
+        self, own: JointFit | None, pixels: LinearPixels, curves: StripCurves, sky: Sky, priors: Priors, free: float
+    ) -> DividedRoad | None:
+        """Road in sun and shade, where the own lane's fit does not explain it; None elsewhere."""
+        if self._earlier.maxlen or is_sure(own, curves):
+            return None
+        told, geometry = self._horizon, self._geometry
+        found = divided_road(pixels, curves, geometry, self._camera, priors, told, sky.noise, free)
+        if found is not None:
+            self._geometry, self._shaded = found.geometry, found.share
+        return found
 
     def _usable(self, curves: StripCurves, sky: Sky, lowest: int) -> StripCurves:
         """Leave out the own bonnet, and what is clipped."""

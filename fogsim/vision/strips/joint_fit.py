@@ -242,6 +242,15 @@ def _constant_albedo(bins: Bins, prior: JointPrior) -> tuple[float, float]:
 
 
 def extinction_grid(bins: Bins, count: int) -> Floats:
+    """Extinctions that show, evenly in ln k [1/m].
+
+    Parameters
+    ----------
+    bins : Bins
+        Where the bins are.
+    count : int
+        How many.
+    """
     least, most = _span(bins)
     return np.exp(np.linspace(math.log(least), math.log(most), count))
 

@@ -34,8 +34,8 @@ the sun's, and the least share of bins that have both [-]: texture gains 0.3 to 
 varies along the way leaves every bin with one of both."""
 
 LIT, SHADED = 0.65, 0.35
-"""From where on, and up to where, in the logarithm between shade and sun, a pixel is lit or shaded [-]: between them lie
-penumbrae."""
+"""From where on, and up to where, in the logarithm between shade and sun, a pixel is lit or shaded [-]: between them
+lie penumbrae."""
 
 PLAIN = 5.0
 """Least gap between what is lit and what is shaded, in deviations of pixels [-]: else noise would decide."""
@@ -200,9 +200,11 @@ def _divided(
     if (seen[0] & (read[0].variance[0] > 0)).sum() < ENOUGH:
         read.reverse()
     variance = [np.where(seen, one.variance, 0.0) for one in read]
-    both = StripCurves(*(
-        np.stack(values, axis=1).reshape(-1, passed.shape[1])
-        for values in ([one.luminance for one in read], variance, [one.scatter for one in read])
-    ))
+    both = StripCurves(
+        *(
+            np.stack(values, axis=1).reshape(-1, passed.shape[1])
+            for values in ([one.luminance for one in read], variance, [one.scatter for one in read])
+        )
+    )
     some = [strip for strip, one in enumerate(both.variance) if strip == 0 or (one > 0).sum() >= LEAST_BINS]
     return both.only(some), geometry.only([strip // 2 for strip in some])

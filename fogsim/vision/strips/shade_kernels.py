@@ -88,7 +88,9 @@ def pieces_of(image: LinearPixels, rows: NDArray[np.int64], left: Floats, right:
 
 
 @kernel
-def _first_levels(pieces: Floats, noise: Floats, passed: Floats, airlight: float, stride: int, ends: int) -> tuple[float, float]:
+def _first_levels(
+    pieces: Floats, noise: Floats, passed: Floats, airlight: float, stride: int, ends: int
+) -> tuple[float, float]:
     """Luminance without fog below and above which are all but one in so many pieces; 0 where few are seen clearly."""
     found, count = np.empty(pieces.size), 0
     for strip in range(noise.shape[0]):

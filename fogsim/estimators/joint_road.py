@@ -27,7 +27,7 @@ from fogsim.vision.lines.road_lines import seen_lines, vanishing_point_of
 from fogsim.vision.strips.airlight_edge import airlight_edge
 from fogsim.vision.strips.airlight_slopes import darkening_priors
 from fogsim.vision.strips.course_geometry import course_deviation, course_geometry
-from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, no_road
+from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, is_ramp, no_road
 from fogsim.vision.strips.joint_fit import MODEL_DEVIATION, JointFit, Priors, fit_own, with_neighbours
 from fogsim.vision.strips.joint_prior import joint_prior
 from fogsim.vision.strips.shade import DividedRoad, divided_road, is_sure
@@ -224,9 +224,8 @@ class JointRoad:
         curves = self._usable(strip_curves(pixels, self._geometry, sky.noise, self._camera, free), sky, lowest)
         whole, told = curves, free
         own = fit = fit_own(self._averaged(curves, sky), self._geometry, priors)
-        if divided := self._divided(own, pixels, curves, sky, priors, free):
-            uneven = even_fog(divided.fit, divided.geometry)
-            return self._doubt(uneven, sky, divided.curves, free, told) or uneven
+        if shaded := self._in_shade(own, pixels, curves, sky, priors, free):
+            return shaded
         for _ in range(MOST_OBSTACLES):
             if own is None or fit is None:
                 break
@@ -254,17 +253,28 @@ class JointRoad:
             uneven = fit_uneven(seen, self._geometry, priors[0], own, fit, bool(course.bend.any()))
         return self._doubt(uneven, sky, curves, free, told) or uneven
 
-    def _divided(
-        self, own: JointFit | None, pixels: LinearPixels, curves: StripCurves, sky: Sky, priors: Priors, free: float
-    ) -> DividedRoad | None:
-        """Road in sun and shade, where the own lane's fit does not explain it; None elsewhere."""
-        if self._earlier.maxlen or is_sure(own, curves):
+    def _in_shade(
+        self,
+        own: JointFit | None,
+        pixels: LinearPixels,
+        curves: StripCurves,
+        sky: Sky,
+        priors: Priors,
+        free: float,
+    ) -> UnevenFit | None:
+        """Fit of a road in sun and shade, where that of the own lane does not explain it, if it is to be believed."""
+        if self._earlier.maxlen or is_sure(own, curves) or is_ramp(curves, self._geometry, self._camera):
             return None
-        told, geometry = self._horizon, self._geometry
-        found = divided_road(pixels, curves, geometry, self._camera, priors, told, sky.noise, free)
-        if found is not None:
-            self._geometry, self._shaded = found.geometry, found.share
-        return found
+        whole, told, camera = self._geometry, self._horizon, self._camera
+        divided = divided_road(pixels, curves, whole, camera, priors, told, sky.noise, free)
+        if divided is None:
+            return None
+        self._geometry, self._shaded = divided.geometry, divided.share
+        uneven = even_fog(divided.fit, divided.geometry)
+        if not self._doubt(uneven, sky, divided.curves, free, free):
+            return uneven
+        self._geometry, self._shaded = whole, 0.0
+        return None
 
     def _usable(self, curves: StripCurves, sky: Sky, lowest: int) -> StripCurves:
         """Leave out the own bonnet, and what is clipped."""

@@ -30,7 +30,7 @@ from fogsim.vision.strips.course_geometry import course_deviation, course_geomet
 from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, is_ramp, no_road
 from fogsim.vision.strips.joint_fit import MODEL_DEVIATION, JointFit, Priors, fit_own, with_neighbours
 from fogsim.vision.strips.joint_prior import joint_prior
-from fogsim.vision.strips.shade import DividedRoad, divided_road, is_sure
+from fogsim.vision.strips.shade import divided_road, is_sure
 from fogsim.vision.strips.sky import Sky, sky_above
 from fogsim.vision.strips.strip_curves import (
     StripCurves,

@@ -83,7 +83,8 @@ def pieces_of(image: LinearPixels, rows: NDArray[np.int64], left: Floats, right:
             step = (high - low) / (PIECES * SAMPLES)
             # From both sides inward: a mirrored image gives the same.
             for j in range(PIECES * SAMPLES // 2):
-                apart, row = (j + 0.5) * step + 0.5, rows[0, i] + j % SAMPLES * (rows[1, i] - rows[0, i]) // (SAMPLES - 1)
+                apart = (j + 0.5) * step + 0.5
+                row = rows[0, i] + j % SAMPLES * (rows[1, i] - rows[0, i]) // (SAMPLES - 1)
                 first, last = max(math.floor(low + apart), 0), min(math.ceil(high - apart), cols - 1)
                 out[strip, i, j // SAMPLES] += pixel_luminance(image, row, min(first, cols - 1)) / SAMPLES
                 out[strip, i, PIECES - 1 - j // SAMPLES] += pixel_luminance(image, row, max(last, 0)) / SAMPLES

@@ -25,8 +25,8 @@ Floats = NDArray[np.float64]
 SURE, ALL_USED = 0.045, 0.97
 """Relative deviation of k up to which, and share of its bins in use from which on, the own lane needs no shade [-]."""
 
-EXTINCTIONS = 28
-"""Extinctions of the search, evenly in ln k: 10 to 15 % apart."""
+EXTINCTIONS, FINER = 28, 7
+"""Extinctions of the search, evenly in ln k and a quarter apart, and how many more about the best of them."""
 
 LEAST_GAIN, MOST_RATIO, LEAST_MIXED = 1.0, 0.6, 0.05
 """What a division is to gain in minus twice the log likelihood of a piece, the most that the shade's luminance is of
@@ -167,7 +167,11 @@ def shade_levels(
     if found.shaded > MOST_RATIO * found.lit or found.mixed < LEAST_MIXED:
         return None
     whole = fit_levels(pieces, bins, grid, prior, noise, False)
-    return found if whole.cost - found.cost > LEAST_GAIN else None
+    if whole.cost - found.cost < LEAST_GAIN:
+        return None
+    step = math.log(grid[1] / grid[0])
+    around = found.extinction * np.exp(np.linspace(-step, step, FINER + 2)[1:-1])
+    return fit_levels(pieces, bins, around, prior, noise, True)
 
 
 def _seen_or_told(prior: JointPrior, told: Horizon, camera: Camera) -> tuple[JointPrior, JointPrior]:

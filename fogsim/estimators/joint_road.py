@@ -79,10 +79,14 @@ DARKENS = 0.5
 """Chance of an airlight that darkens toward the road from which on the fog counts as even [-]: its law is that of a
 layer."""
 
-SUNLIT = 0.3
+SUNLIT, BRIGHTENS = 0.3, 2.0
 """Luminance of the road over the airlight's beyond which the sun lights it [-]: asphalt reflects no more of the sky's
-light. The sun's light too is reflected more at grazing angles, by a share that nobody knows, which looks like fog: what
-is beyond counts as the deviation of the road's luminance along the way, relative to it."""
+light. The sun's light too is reflected more at grazing angles, by a share that nobody knows, which looks like fog: so
+many times what is beyond counts as the deviation of the road's luminance along the way, relative to it [-]."""
+
+SHADE_DEPTH = 3.0
+"""Least optical depth through which sun and shade are told apart for an estimate by them [-]: before it the road's own
+brightening toward grazing angles makes as much."""
 
 MOST_OBSTACLES = 2
 """How often what stands in the own lane is looked for anew, each time nearer."""
@@ -261,20 +265,24 @@ class JointRoad:
         sky: Sky,
         priors: Priors,
         free: float,
-    ) -> UnevenFit | None:
-        """Fit of a road in sun and shade, where that of the own lane does not explain it, if it is to be believed."""
+    ) -> UnevenFit | str:
+        """Fit of a road in sun and shade, where that of the own lane does not explain it, or why it tells too little.
+
+        Empty where there is no shade, or what seems so is no road.
+        """
         if self._earlier.maxlen or is_sure(own, curves) or is_ramp(curves, self._geometry, self._camera):
-            return None
+            return ""
         whole, told, camera = self._geometry, self._horizon, self._camera
         divided = divided_road(pixels, curves, whole, camera, priors, told, sky.noise, free)
         if divided is None:
-            return None
+            return ""
         self._geometry, self._shaded = divided.geometry, divided.share
         uneven = even_fog(divided.fit, divided.geometry)
         if not self._doubt(uneven, sky, divided.curves, free, free):
-            return uneven
+            deep = uneven.reach * uneven.fit.extinction >= SHADE_DEPTH
+            return uneven if deep else "sun and shade lie on too little of the road to tell the fog"
         self._geometry, self._shaded = whole, 0.0
-        return None
+        return ""
 
     def _usable(self, curves: StripCurves, sky: Sky, lowest: int) -> StripCurves:
         """Leave out the own bonnet, and what is clipped."""
@@ -372,7 +380,7 @@ def _deviation(fit: JointFit) -> float:
     """Standard deviation of the extinction, what the model leaves out included [1/m]."""
     share = fit.road / fit.airlight
     # A change of the road's luminance changes its contrast to the airlight, and so k, by R / (A − R) as much.
-    sunlit = max(share - SUNLIT, 0.0) * share / max(1.0 - share, LEAST_CONTRAST)
+    sunlit = BRIGHTENS * max(share - SUNLIT, 0.0) * share / max(1.0 - share, LEAST_CONTRAST)
     model = math.hypot(MODEL_DEVIATION, sunlit) * fit.extinction
     return math.hypot(OVERCONFIDENCE * fit.extinction_deviation, model, LEAST_DEVIATION)
 

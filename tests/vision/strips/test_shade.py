@@ -25,7 +25,7 @@ TOLD = Horizon(CAMERA.horizon_row, 1.0)
 def picture(extinction, luminance, noise=1.0):
     """A picture of a road of some luminance without fog below a sky of the airlight's."""
     light = AIRLIGHT + (luminance - AIRLIGHT) * np.exp(-extinction * np.hypot(AHEAD, ACROSS))
-    light = np.where(ROWS > CAMERA.horizon_row, light, AIRLIGHT)
+    light = np.where(CAMERA.horizon_row < ROWS, light, AIRLIGHT)
     return np.clip(np.rint(light + np.random.default_rng(1).normal(0.0, noise, light.shape)), 0, 255).astype(np.uint8)
 
 

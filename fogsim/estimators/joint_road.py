@@ -28,7 +28,7 @@ from fogsim.vision.strips.airlight_edge import airlight_edge
 from fogsim.vision.strips.airlight_slopes import darkening_priors
 from fogsim.vision.strips.course_geometry import course_deviation, course_geometry
 from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, is_ramp, no_road
-from fogsim.vision.strips.joint_fit import MODEL_DEVIATION, JointFit, Priors, fit_own, with_neighbours
+from fogsim.vision.strips.joint_fit import ALIKE, MODEL_DEVIATION, JointFit, Priors, fit_own, with_neighbours
 from fogsim.vision.strips.joint_prior import joint_prior
 from fogsim.vision.strips.shade import divided_road, is_sure
 from fogsim.vision.strips.sky import Sky, sky_above
@@ -79,13 +79,13 @@ DARKENS = 0.5
 """Chance of an airlight that darkens toward the road from which on the fog counts as even [-]: its law is that of a
 layer."""
 
-SUNLIT, BRIGHTENS = 0.3, 2.0
+SUNLIT = 0.3
 """Luminance of the road over the airlight's beyond which the sun lights it [-]: asphalt reflects no more of the sky's
-light. The sun's light too is reflected more at grazing angles, by a share that nobody knows, which looks like fog: so
-many times what is beyond counts as the deviation of the road's luminance along the way, relative to it [-]."""
+light. The sun's light too is reflected more at grazing angles, by a share that nobody knows, which looks like fog: what
+is beyond counts as the deviation of the road's luminance along the way, relative to it."""
 
 SHADE_DEPTH = 3.0
-"""Least optical depth through which sun and shade are told apart for an estimate by them [-]: before it the road's own
+"""Least optical depth through which sun and shade are told apart for them to tell of fog [-]: before it the road's own
 brightening toward grazing angles makes as much."""
 
 MOST_OBSTACLES = 2
@@ -268,7 +268,7 @@ class JointRoad:
     ) -> UnevenFit | str:
         """Fit of a road in sun and shade, where that of the own lane does not explain it, or why it tells too little.
 
-        Empty where there is no shade, or what seems so is no road.
+        Empty where there is no shade, or where what seems so is refused and the own lane tells about the same.
         """
         if self._earlier.maxlen or is_sure(own, curves) or is_ramp(curves, self._geometry, self._camera):
             return ""
@@ -278,11 +278,14 @@ class JointRoad:
             return ""
         self._geometry, self._shaded = divided.geometry, divided.share
         uneven = even_fog(divided.fit, divided.geometry)
-        if not self._doubt(uneven, sky, divided.curves, free, free):
-            deep = uneven.reach * uneven.fit.extinction >= SHADE_DEPTH
-            return uneven if deep else "sun and shade lie on too little of the road to tell the fog"
+        why = self._doubt(uneven, sky, divided.curves, free, free)
+        if not why:
+            k = uneven.fit.extinction
+            return uneven if k < CLEAR or uneven.reach * k >= SHADE_DEPTH else "sun and shade lie on too little of the road to tell the fog"
         self._geometry, self._shaded = whole, 0.0
-        return ""
+        if own is None or own.extinction <= 0.0:
+            return why
+        return "" if abs(math.log(own.extinction / divided.fit.extinction)) < ALIKE else why
 
     def _usable(self, curves: StripCurves, sky: Sky, lowest: int) -> StripCurves:
         """Leave out the own bonnet, and what is clipped."""
@@ -380,7 +383,7 @@ def _deviation(fit: JointFit) -> float:
     """Standard deviation of the extinction, what the model leaves out included [1/m]."""
     share = fit.road / fit.airlight
     # A change of the road's luminance changes its contrast to the airlight, and so k, by R / (A − R) as much.
-    sunlit = BRIGHTENS * max(share - SUNLIT, 0.0) * share / max(1.0 - share, LEAST_CONTRAST)
+    sunlit = max(share - SUNLIT, 0.0) * share / max(1.0 - share, LEAST_CONTRAST)
     model = math.hypot(MODEL_DEVIATION, sunlit) * fit.extinction
     return math.hypot(OVERCONFIDENCE * fit.extinction_deviation, model, LEAST_DEVIATION)
 

@@ -79,10 +79,10 @@ DARKENS = 0.5
 """Chance of an airlight that darkens toward the road from which on the fog counts as even [-]: its law is that of a
 layer."""
 
-SUNLIT = 0.3
+SUNLIT, BRIGHTENS = 0.3, 1.5
 """Luminance of the road over the airlight's beyond which the sun lights it [-]: asphalt reflects no more of the sky's
-light. The sun's light too is reflected more at grazing angles, by a share that nobody knows, which looks like fog: what
-is beyond counts as the deviation of the road's luminance along the way, relative to it."""
+light. The sun's light too is reflected more at grazing angles, by a share that nobody knows, which looks like fog: so
+many times what is beyond counts as the deviation of the road's luminance along the way, relative to it [-]."""
 
 SHADE_DEPTH = 3.0
 """Least optical depth through which sun and shade are told apart for them to tell of fog [-]: before it the road's own
@@ -268,7 +268,7 @@ class JointRoad:
     ) -> UnevenFit | str:
         """Fit of a road in sun and shade, where that of the own lane does not explain it, or why it tells too little.
 
-        Empty where there is no shade, or where what seems so is refused and the own lane tells about the same.
+        Empty where there is no shade, or where what seems so is refused, and tells little or what the own lane tells.
         """
         if self._earlier.maxlen or is_sure(own, curves) or is_ramp(curves, self._geometry, self._camera):
             return ""
@@ -278,14 +278,15 @@ class JointRoad:
             return ""
         self._geometry, self._shaded = divided.geometry, divided.share
         uneven = even_fog(divided.fit, divided.geometry)
-        why = self._doubt(uneven, sky, divided.curves, free, free)
+        why, k = self._doubt(uneven, sky, divided.curves, free, free), uneven.fit.extinction
+        depth = uneven.reach * k
+        if not why and (k < CLEAR or depth >= SHADE_DEPTH):
+            return uneven
         if not why:
-            k = uneven.fit.extinction
-            return uneven if k < CLEAR or uneven.reach * k >= SHADE_DEPTH else "sun and shade lie on too little of the road to tell the fog"
+            return "sun and shade lie on too little of the road to tell the fog"
         self._geometry, self._shaded = whole, 0.0
-        if own is None or own.extinction <= 0.0:
-            return why
-        return "" if abs(math.log(own.extinction / divided.fit.extinction)) < ALIKE else why
+        alike = own is not None and own.extinction > 0.0 and abs(math.log(own.extinction / k)) < ALIKE
+        return "" if alike or depth < LEAST_DEPTH else why
 
     def _usable(self, curves: StripCurves, sky: Sky, lowest: int) -> StripCurves:
         """Leave out the own bonnet, and what is clipped."""
@@ -383,7 +384,7 @@ def _deviation(fit: JointFit) -> float:
     """Standard deviation of the extinction, what the model leaves out included [1/m]."""
     share = fit.road / fit.airlight
     # A change of the road's luminance changes its contrast to the airlight, and so k, by R / (A − R) as much.
-    sunlit = max(share - SUNLIT, 0.0) * share / max(1.0 - share, LEAST_CONTRAST)
+    sunlit = BRIGHTENS * max(share - SUNLIT, 0.0) * share / max(1.0 - share, LEAST_CONTRAST)
     model = math.hypot(MODEL_DEVIATION, sunlit) * fit.extinction
     return math.hypot(OVERCONFIDENCE * fit.extinction_deviation, model, LEAST_DEVIATION)
 

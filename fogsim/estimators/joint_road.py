@@ -84,10 +84,6 @@ SUNLIT, BRIGHTENS = 0.3, 1.5
 light. The sun's light too is reflected more at grazing angles, by a share that nobody knows, which looks like fog: so
 many times what is beyond counts as the deviation of the road's luminance along the way, relative to it [-]."""
 
-SHADE_DEPTH = 3.0
-"""Least optical depth through which sun and shade are told apart for them to tell of fog [-]: before it the road's own
-brightening toward grazing angles makes as much."""
-
 MOST_OBSTACLES = 2
 """How often what stands in the own lane is looked for anew, each time nearer."""
 
@@ -266,7 +262,7 @@ class JointRoad:
         priors: Priors,
         free: float,
     ) -> UnevenFit | str:
-        """Fit of a road in sun and shade, where that of the own lane does not explain it, or why it tells too little.
+        """Fit of a road in sun and shade, where the own lane's does not explain it, or why it is not to be believed.
 
         Empty where there is no shade, or where what seems so is refused, and tells little or what the own lane tells.
         """
@@ -279,14 +275,11 @@ class JointRoad:
         self._geometry, self._shaded = divided.geometry, divided.share
         uneven = even_fog(divided.fit, divided.geometry)
         why, k = self._doubt(uneven, sky, divided.curves, free, free), uneven.fit.extinction
-        depth = uneven.reach * k
-        if not why and (k < CLEAR or depth >= SHADE_DEPTH):
-            return uneven
         if not why:
-            return "sun and shade lie on too little of the road to tell the fog"
+            return uneven
         self._geometry, self._shaded = whole, 0.0
         alike = own is not None and own.extinction > 0.0 and abs(math.log(own.extinction / k)) < ALIKE
-        return "" if alike or depth < LEAST_DEPTH else why
+        return "" if alike or uneven.reach * k < LEAST_DEPTH else why
 
     def _usable(self, curves: StripCurves, sky: Sky, lowest: int) -> StripCurves:
         """Leave out the own bonnet, and what is clipped."""

@@ -26,9 +26,10 @@ from fogsim.vision.lines.road_course import RoadCourse, road_course, unseen_cour
 from fogsim.vision.lines.road_lines import seen_lines, vanishing_point_of
 from fogsim.vision.strips.airlight_slopes import darkening_priors
 from fogsim.vision.strips.course_geometry import course_deviation, course_geometry
-from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, no_road
-from fogsim.vision.strips.joint_fit import MODEL_DEVIATION, JointFit, Priors, fit_own, with_neighbours
+from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, is_ramp, no_road
+from fogsim.vision.strips.joint_fit import ALIKE, MODEL_DEVIATION, JointFit, Priors, fit_own, with_neighbours
 from fogsim.vision.strips.joint_prior import joint_prior
+from fogsim.vision.strips.shade import divided_road, is_sure
 from fogsim.vision.strips.sky import Sky, sky_above
 from fogsim.vision.strips.strip_curves import (
     StripCurves,
@@ -79,6 +80,11 @@ DARKENS = 0.5
 """Chance of an airlight that darkens toward the road from which on the fog counts as even [-]: its law is that of a
 layer."""
 
+SUNLIT, BRIGHTENS = 0.3, 1.5
+"""Luminance of the road over the airlight's beyond which the sun lights it [-]: asphalt reflects no more of the sky's
+light. The sun's light too is reflected more at grazing angles, by a share that nobody knows, which looks like fog: so
+many times what is beyond counts as the deviation of the road's luminance along the way, relative to it [-]."""
+
 MOST_OBSTACLES = 2
 """How often what stands in the own lane is looked for anew, each time nearer."""
 
@@ -102,6 +108,10 @@ class JointRoad:
     Fog need not be even: ln k at nodes along the way, smooth to some degree or other, is weighed against one k by
     evidence. Then the extinction is the mean up to where 95 % of the light is lost, or to the farthest road that is
     seen; `Estimate.optical_depths` has how it varies, `Estimate.denser` says where it becomes much denser.
+
+    Where the own lane's fit is not sure, sun and shade on the road are looked for. If it has two luminances, whose
+    pixels lie beside one another, strips are divided into what is lit and what is shaded, and even fog is fitted to
+    both (`fogsim.vision.strips.shade`); with one picture at a time only.
 
     Nor need the airlight be: over dark land it brightens upward from the horizon and darkens toward the road, in a
     shape that radiative transfer has, for small and large droplets, and by one factor, which goes by the albedo of the
@@ -143,7 +153,7 @@ class JointRoad:
         self._horizon = calibrated_horizon(camera, pitch_deviation)
         self._impossible = _impossible(camera)
         self._straight = strip_geometry(camera, max(1.0, self._horizon.standard_deviation))
-        self._geometry = self._straight
+        self._geometry, self._shaded = self._straight, 0.0
         self._earlier: deque[tuple[StripCurves, Sky]] = deque(maxlen=int(frames) - 1)
         self._before: deque[tuple[float, float]] = deque()
 
@@ -166,8 +176,8 @@ class JointRoad:
         Estimate
             Diagnostics: ``horizon_row`` and ``told_horizon_row`` [px], ``inflection_row`` [px], ``airlight`` and
             ``road`` [linear grey levels, 0 … 255], ``misfit`` [-], ``band`` (left, right, top, bottom) of the own
-            lane's rows in use [px], ``evenness``, how likely the fog is even, and ``darkening``, how likely the
-            airlight darkens toward the road [-]; or ``reason``.
+            lane's rows in use [px], ``evenness``, how likely the fog is even, ``darkening``, how likely the airlight
+            darkens toward the road, and ``shaded``, the part of the road that lies in shade [-]; or ``reason``.
 
         Raises
         ------
@@ -191,7 +201,7 @@ class JointRoad:
         if why := lit_by_lamps(level, self._camera, observation.lead):
             return Estimate.invalid(self.method, why, **found)
         horizon, course = self._seen_course(pixels)
-        self._geometry = self._straight
+        self._geometry, self._shaded = self._straight, 0.0
         if not course.is_straight:
             self._geometry = course_geometry(self._straight, self._camera, course)
         prior = joint_prior(sky, self._camera, horizon)
@@ -215,6 +225,8 @@ class JointRoad:
         curves = self._usable(strip_curves(pixels, self._geometry, sky.noise, self._camera, free), sky, lowest)
         whole, told = curves, free
         own = fit = fit_own(self._averaged(curves, sky), self._geometry, priors)
+        if shaded := self._in_shade(own, pixels, curves, sky, priors, free):
+            return shaded
         for _ in range(MOST_OBSTACLES):
             if own is None or fit is None:
                 break
@@ -242,6 +254,34 @@ class JointRoad:
             hidden = HiddenCourse(self._straight, self._camera, course)
             uneven = fit_uneven(seen, self._geometry, priors[0], own, fit, hidden)
         return self._doubt(uneven, sky, curves, free, told) or uneven
+
+    def _in_shade(
+        self,
+        own: JointFit | None,
+        pixels: LinearPixels,
+        curves: StripCurves,
+        sky: Sky,
+        priors: Priors,
+        free: float,
+    ) -> UnevenFit | str:
+        """Fit of a road in sun and shade, where the own lane's does not explain it, or why it is not to be believed.
+
+        Empty where there is no shade, or where what seems so is refused, and tells little or what the own lane tells.
+        """
+        if self._earlier.maxlen or is_sure(own, curves) or is_ramp(curves, self._geometry, self._camera):
+            return ""
+        whole, told, camera = self._geometry, self._horizon, self._camera
+        divided = divided_road(pixels, curves, whole, camera, priors, told, sky.noise, free)
+        if divided is None:
+            return ""
+        self._geometry, self._shaded = divided.geometry, divided.share
+        uneven = even_fog(divided.fit, divided.geometry)
+        why, k = self._doubt(uneven, sky, divided.curves, free, free), uneven.fit.extinction
+        if not why:
+            return uneven
+        self._geometry, self._shaded = whole, 0.0
+        alike = own is not None and own.extinction > 0.0 and abs(math.log(own.extinction / k)) < ALIKE
+        return "" if alike or uneven.reach * k < LEAST_DEPTH else why
 
     def _usable(self, curves: StripCurves, sky: Sky, lowest: int) -> StripCurves:
         """Leave out the own bonnet, and what is clipped."""
@@ -307,7 +347,7 @@ class JointRoad:
         extinction = max(fit.extinction, 0.0)
         if extinction > 0:
             found["inflection_row"] = horizon + 0.5 * extinction * self._camera.row_distance
-        found["evenness"], found["darkening"] = uneven.even, fit.darkening_chance
+        found["evenness"], found["darkening"], found["shaded"] = uneven.even, fit.darkening_chance, self._shaded
         return Estimate(
             self.method,
             extinction,
@@ -343,7 +383,11 @@ def _too_little_seen(uneven: UnevenFit, told: float) -> str:
 
 def _deviation(fit: JointFit) -> float:
     """Standard deviation of the extinction, what the model leaves out included [1/m]."""
-    return math.hypot(OVERCONFIDENCE * fit.extinction_deviation, MODEL_DEVIATION * fit.extinction, LEAST_DEVIATION)
+    share = fit.road / fit.airlight
+    # A change of the road's luminance changes its contrast to the airlight, and so k, by R / (A − R) as much.
+    sunlit = BRIGHTENS * max(share - SUNLIT, 0.0) * share / max(1.0 - share, LEAST_CONTRAST)
+    model = math.hypot(MODEL_DEVIATION, sunlit) * fit.extinction
+    return math.hypot(OVERCONFIDENCE * fit.extinction_deviation, model, LEAST_DEVIATION)
 
 
 def _unevenness(uneven: UnevenFit) -> float:

@@ -163,7 +163,7 @@ def _answers(curves: StripCurves, geometry: StripGeometry, prior: JointPrior, ne
     best = _from_search(bins, prior) if near is None else _from_near(bins, near, prior)
     tried = ALBEDOS if best.misfit > EXPLAINED else ALBEDOS[:SMOOTH]
     found = [best] + [_refined(bins, albedo, prior, best.theta, MORE_STEPS) for albedo in tried[1:]]
-    cost, is_even = slope_cost(prior), prior.rise.size == 0
+    cost, is_even = slope_cost(prior) + prior.cost, prior.rise.size == 0
     chances = ALBEDO_CHANCES[: len(found)]
     return [
         _Answer(f.cost + cost - 2.0 * math.log(chance), f, is_even) for f, chance in zip(found, chances, strict=True)
@@ -225,7 +225,7 @@ def _from_search(bins: Bins, prior: JointPrior) -> Solution:
     airlights = [prior.airlight]
     if prior.below > UNSURE_AIRLIGHT * prior.airlight:
         airlights.append(float(np.median(bins.luminance[0][bins.noise[0] > 0][-FAR_BINS:])))
-    grid = _grid(bins, EXTINCTIONS)
+    grid = extinction_grid(bins, EXTINCTIONS)
     for airlight in airlights:
         around = prior._replace(airlight=airlight)
         cost = joint_start_kernels.extinction_costs(bins, under_sky(ALBEDOS[1], prior), grid, around)
@@ -238,10 +238,19 @@ def _from_search(bins: Bins, prior: JointPrior) -> Solution:
 
 
 def _constant_albedo(bins: Bins, prior: JointPrior) -> tuple[float, float]:
-    return joint_start_kernels.fit_constant_albedo(bins, _grid(bins, SIMPLE_EXTINCTIONS), prior)
+    return joint_start_kernels.fit_constant_albedo(bins, extinction_grid(bins, SIMPLE_EXTINCTIONS), prior)
 
 
-def _grid(bins: Bins, count: int) -> Floats:
+def extinction_grid(bins: Bins, count: int) -> Floats:
+    """Extinctions that show, evenly in ln k [1/m].
+
+    Parameters
+    ----------
+    bins : Bins
+        Where the bins are.
+    count : int
+        How many.
+    """
     least, most = _span(bins)
     return np.exp(np.linspace(math.log(least), math.log(most), count))
 

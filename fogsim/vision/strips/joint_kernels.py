@@ -101,6 +101,8 @@ class JointPrior(NamedTuple):
         if the airlight darkens by 1 toward the road; by the optical height of the eye. None where it counts as even.
     droplets : int
         Which sizes of them the latter are of.
+    cost : float
+        Minus twice the logarithm of how likely it is among several, over what its deviations differ by [-].
     """
 
     airlight: float
@@ -116,6 +118,7 @@ class JointPrior(NamedTuple):
     rise: NDArray[np.float64] = NO_LEVELS
     level: NDArray[np.float64] = NO_LEVELS
     droplets: int = 0
+    cost: float = 0.0
 
 
 class Solution(NamedTuple):

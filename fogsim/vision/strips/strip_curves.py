@@ -19,6 +19,9 @@ Floats = NDArray[np.float64]
 GRAIN = 0.5
 """Size of pieces of road whose albedo counts as independent beside the patches [m]."""
 
+ALL_PIXELS = np.array([[-math.inf], [math.inf]])
+"""Limits that every pixel is within [linear grey levels]."""
+
 HALF_VEHICLE = 1.3
 """Half the width that a tracked vehicle ahead may hide, its offset in the lane included [m]."""
 
@@ -59,6 +62,7 @@ def strip_curves(
     camera: Camera,
     free: float = math.inf,
     known: StripCurves | None = None,
+    limits: Floats | None = None,
 ) -> StripCurves:
     """Read the strips.
 
@@ -76,6 +80,8 @@ def strip_curves(
         Depth up to which the own lane is free; a vehicle ahead hides what is behind [m].
     known : StripCurves or None
         What was read of a road that is free further on: only what the vehicle hides is read again.
+    limits : (strips, 2, n) float64 or None
+        Least and greatest luminance of pixels that count [linear grey levels]; all if None.
     """
     vehicle = np.array([math.inf, -math.inf, -math.inf])
     if math.isfinite(free):
@@ -91,9 +97,11 @@ def strip_curves(
     )
     metres = (geometry.right - geometry.left) * (geometry.distance / camera.focal_length)
     pieces = np.maximum(metres / GRAIN, 1.0) * np.maximum(geometry.extent / GRAIN, 1.0)
+    if limits is None:
+        limits = np.broadcast_to(ALL_PIXELS, (len(out), 2, geometry.first.size)).copy()
     for strip, values in enumerate(out):
         bins = strip_kernels.StripBins(rows, np.stack([geometry.left[strip], geometry.right[strip]]), pieces[strip])
-        strip_kernels.strip_bins(image, table, bins, vehicle, noise, values, known is not None)
+        strip_kernels.strip_bins(image, table, bins, vehicle, limits[strip], noise, values, known is not None)
     return StripCurves(out[:, 0], out[:, 1], out[:, 2])
 
 

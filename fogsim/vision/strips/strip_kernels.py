@@ -99,6 +99,7 @@ def strip_bins(
     table: NDArray[np.float32],
     bins: StripBins,
     vehicle: NDArray[np.float64],
+    limits: NDArray[np.float64],
     noise: float,
     out: NDArray[np.float64],
     again: bool,
@@ -115,6 +116,8 @@ def strip_bins(
         Where to look.
     vehicle : (3,) float64
         Columns between which a vehicle hides the road, and the row of its foot, from which on upward it does.
+    limits : (2, n) float64
+        Least and greatest luminance of pixels that count [linear grey levels].
     noise : float
         Deviation of single pixels [linear grey levels].
     out : (3, n) float64
@@ -141,8 +144,10 @@ def strip_bins(
             apart = (j + 0.5) * step + 0.5
             for col in (math.floor(low + apart), math.ceil(sides[1, i] - apart)):
                 if not (hides and vehicle[0] <= col <= vehicle[1]):
-                    samples[taken] = pixel_luminance(image, row, min(max(col, 0), cols - 1))
-                    taken += 1
+                    value = pixel_luminance(image, row, min(max(col, 0), cols - 1))
+                    if limits[0, i] <= value <= limits[1, i]:
+                        samples[taken] = value
+                        taken += 1
             row = row + 1 if row < rows[1, i] else rows[0, i]
         if taken < 2 or taken < 0.25 * wanted:
             continue

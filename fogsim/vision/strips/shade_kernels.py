@@ -1,0 +1,210 @@
+"""Compiled search for sun and shade on a road in fog: two luminances without fog, and one extinction for both."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+from fogsim.vision.light.pixel_kernels import LinearPixels, pixel_luminance
+from fogsim.vision.strips.joint_kernels import Bins, JointPrior, mean_transmittance
+
+Floats = NDArray[np.float64]
+
+PIECES, SAMPLES = 6, 3
+"""Pieces that a bin of a strip is cut into across the road, half a metre wide, since a shadow's edge mostly runs along
+or aslant it, and the pixels of each that are averaged."""
+
+MOST_BINS = 60
+"""Bins of a strip that are looked at, or up to twice as many."""
+
+UNEVEN, TEXTURE = 0.01, 0.1
+"""Deviations of pieces by compression and by the road's texture, relative to the airlight and to the road [-]."""
+
+ROUNDS = 5
+"""Rounds of telling sun from shade and of fitting both."""
+
+CLEAR, FEWEST, ENDS = 0.4, 20, 10
+"""Transmittance from which on pieces tell the first guess [-], how few tell none, and which part of them, the darkest
+and the brightest, is beyond that guess: one in so many."""
+
+DARKEST = 0.02
+"""Least luminance of a road over the airlight's [-]."""
+
+
+class Levels(NamedTuple):
+    """A road that sun and shade divide.
+
+    Attributes
+    ----------
+    extinction : float
+        k [1/m].
+    airlight, lit, shaded : float
+        Luminance of the airlight, and of the road in sun and in shade without fog [linear grey levels].
+    cost : float
+        Minus twice the log likelihood, over the number of pieces; infinite if there are too few.
+    share, mixed : float
+        Parts of the pieces that are shaded, and of the bins that have both, weighed by what is left of their light [-].
+    """
+
+    extinction: float
+    airlight: float
+    lit: float
+    shaded: float
+    cost: float
+    share: float
+    mixed: float
+
+
+@kernel
+def pieces_of(image: LinearPixels, rows: NDArray[np.int64], left: Floats, right: Floats) -> Floats:
+    """Luminance of the pieces of every bin.
+
+    Parameters
+    ----------
+    image : LinearPixels
+        The image.
+    rows : (2, n) int64
+        First and last row of each bin.
+    left, right : (strips, n) float64
+        Columns between which the strips lie.
+
+    Returns
+    -------
+    (strips, n, PIECES) float64
+        From left to right [linear grey levels].
+    """
+    (strips, count), cols = left.shape, image.pixels.shape[1]
+    out = np.zeros((strips, count, PIECES))
+    for strip in range(strips):
+        for i in range(count):
+            low, high = left[strip, i], right[strip, i]
+            step = (high - low) / (PIECES * SAMPLES)
+            # From both sides inward: a mirrored image gives the same.
+            for j in range(PIECES * SAMPLES // 2):
+                apart = (j + 0.5) * step + 0.5
+                row = rows[0, i] + j % SAMPLES * (rows[1, i] - rows[0, i]) // (SAMPLES - 1)
+                first, last = max(math.floor(low + apart), 0), min(math.ceil(high - apart), cols - 1)
+                out[strip, i, j // SAMPLES] += pixel_luminance(image, row, min(first, cols - 1)) / SAMPLES
+                out[strip, i, PIECES - 1 - j // SAMPLES] += pixel_luminance(image, row, max(last, 0)) / SAMPLES
+    return out
+
+
+@kernel
+def _first_levels(
+    pieces: Floats, noise: Floats, passed: Floats, airlight: float, stride: int, ends: int
+) -> tuple[float, float]:
+    """Luminance without fog below and above which are all but one in so many pieces; 0 where few are seen clearly."""
+    found, count = np.empty(pieces.size), 0
+    for strip in range(noise.shape[0]):
+        for i in range(0, noise.shape[1], stride):
+            if noise[strip, i] > 0.0 and passed[strip, i] > CLEAR:
+                for value in pieces[strip, i]:
+                    found[count] = airlight + (value - airlight) / passed[strip, i]
+                    count += 1
+    if count < FEWEST:
+        return 0.0, 0.0
+    ordered = np.sort(found[:count])
+    return float(ordered[count - 1 - count // ends]), float(ordered[count // ends])
+
+
+@kernel
+def _told_apart(
+    pieces: Floats, noise: Floats, passed: Floats, levels: Levels, grey: float, stride: int, sums: Floats
+) -> Levels:
+    """Cost and shares of levels; `sums` (2, 5) gets what pieces in sun and in shade say, in Cauchy's norm."""
+    sums[:] = 0.0
+    cost, light, dark, mixed, number = 0.0, 0.0, 0.0, 0.0, 0
+    for strip in range(noise.shape[0]):
+        for i in range(0, noise.shape[1], stride):
+            if noise[strip, i] <= 0.0:
+                continue
+            t, shades = passed[strip, i], 0
+            bright = levels.airlight + (levels.lit - levels.airlight) * t
+            dim = levels.airlight + (levels.shaded - levels.airlight) * t
+            for value in pieces[strip, i]:
+                c = 1 if abs(value - dim) < abs(value - bright) else 0
+                spread = grey + (TEXTURE * (levels.shaded if c else levels.lit) * t) ** 2
+                rest = value - (dim if c else bright)
+                weight = 1.0 / (spread + rest * rest)
+                cost += 2.0 * math.log1p(rest * rest / spread) + math.log(spread)
+                sums[c, 0] += weight
+                sums[c, 1] += weight * t
+                sums[c, 2] += weight * t * t
+                sums[c, 3] += weight * value
+                sums[c, 4] += weight * t * value
+                shades += c
+            number += PIECES
+            light += PIECES * t * t
+            dark += shades * t * t
+            mixed += PIECES * t * t if 0 < shades < PIECES else 0.0
+    return Levels(
+        levels.extinction,
+        levels.airlight,
+        levels.lit,
+        levels.shaded,
+        cost / max(number, 1),
+        dark / max(light, 1e-9),
+        mixed / max(light, 1e-9),
+    )
+
+
+@kernel
+def _fitted(levels: Levels, sums: Floats, prior: JointPrior, divided: bool) -> Levels:
+    """Airlight and levels of least squares."""
+    known = 1.0 / (prior.below if levels.airlight < prior.airlight else prior.above) ** 2
+    left, right = known, known * prior.airlight
+    for c in range(2):
+        if sums[c, 2] > 0.0:
+            left += sums[c, 0] - sums[c, 1] ** 2 / sums[c, 2]
+            right += sums[c, 3] - sums[c, 1] * sums[c, 4] / sums[c, 2]
+    airlight, found = right / left, np.array([levels.lit, levels.shaded])
+    for c in range(2):
+        if sums[c, 2] > 0.0:
+            found[c] = max(airlight + (sums[c, 4] - airlight * sums[c, 1]) / sums[c, 2], DARKEST * airlight)
+    shaded = found[1] if divided else found[0]
+    return Levels(levels.extinction, airlight, found[0], shaded, levels.cost, levels.share, levels.mixed)
+
+
+@kernel
+def fit_levels(
+    pieces: Floats, bins: Bins, extinctions: Floats, prior: JointPrior, pixel: float, divided: bool
+) -> Levels:
+    """Find the extinction with which a road has two levels, in sun and in shade, or only one.
+
+    Parameters
+    ----------
+    pieces : (strips, n, PIECES) float64
+        See `pieces_of`.
+    bins : Bins
+        Where the bins are.
+    extinctions : (m,) float64
+        What is tried [1/m].
+    prior : JointPrior
+        Sky and horizon.
+    pixel : float
+        Deviation of single pixels [linear grey levels].
+    divided : bool
+        Whether there are two.
+    """
+    (strips, count), noise = bins.noise.shape, bins.noise
+    passed, sums, stride = np.empty((strips, count)), np.empty((2, 5)), max(count // MOST_BINS, 1)
+    grey = pixel * pixel / SAMPLES + (UNEVEN * prior.airlight) ** 2
+    best = Levels(0.0, prior.airlight, 0.0, 0.0, np.inf, 0.0, 0.0)
+    for k in extinctions:
+        for strip in range(strips):
+            for i in range(0, count, stride):
+                below = bins.below[i] - prior.shift
+                passed[strip, i] = mean_transmittance(below, bins.half[i], bins.path[strip, i], k)[0]
+        lit, shaded = _first_levels(pieces, noise, passed, prior.airlight, stride, ENDS if divided else 2)
+        if lit <= 0.0:
+            continue
+        levels = Levels(k, prior.airlight, lit, shaded if divided else lit, np.inf, 0.0, 0.0)
+        for _ in range(ROUNDS):
+            levels = _told_apart(pieces, noise, passed, levels, grey, stride, sums)
+            levels = _fitted(levels, sums, prior, divided)
+        levels = _told_apart(pieces, noise, passed, levels, grey, stride, sums)
+        if levels.cost < best.cost:
+            best = levels
+    return best

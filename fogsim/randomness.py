@@ -13,9 +13,9 @@ class Streams:
     ----------
     traffic_seed : int
         Seed handed to the traffic simulation, in 0 … 2³¹ − 1.
-    fog, camera, sensors, driver, faults, gps : numpy.random.Generator
-        Generators for fog fields, camera noise, the vehicle's other sensors, drivers, faults of sensors
-        and satellite positioning.
+    fog, camera, sensors, driver, faults, gps, reports : numpy.random.Generator
+        Generators for fog fields, camera noise, the vehicle's other sensors, drivers, faults of sensors, satellite
+        positioning, and what others report of the fog.
     """
 
     traffic_seed: int
@@ -25,6 +25,7 @@ class Streams:
     driver: np.random.Generator
     faults: np.random.Generator
     gps: np.random.Generator
+    reports: np.random.Generator
 
 
 def spawn_streams(seed: int) -> Streams:
@@ -40,7 +41,7 @@ def spawn_streams(seed: int) -> Streams:
     ValueError
         If the seed is negative.
     """
-    traffic, fog, camera, sensors, driver, faults, gps = np.random.SeedSequence(seed).spawn(7)
+    traffic, fog, camera, sensors, driver, faults, gps, reports = np.random.SeedSequence(seed).spawn(8)
     return Streams(
         traffic_seed=int(traffic.generate_state(1, np.uint32)[0] >> 1),
         fog=np.random.default_rng(fog),
@@ -49,6 +50,7 @@ def spawn_streams(seed: int) -> Streams:
         driver=np.random.default_rng(driver),
         faults=np.random.default_rng(faults),
         gps=np.random.default_rng(gps),
+        reports=np.random.default_rng(reports),
     )
 
 

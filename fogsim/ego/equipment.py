@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from fogsim.atmosphere import field_at, with_change
 from fogsim.camera import Delivered, FaultyLens, FrameDelivery, knocked, mounted_pose, unexposed
 from fogsim.ego.daylight import Ramp, in_daylight
+from fogsim.ego.fog_reports import FogReports
 from fogsim.ego.fog_truth import KnownWay, carriageways, fog_truth
 from fogsim.ego.frame_watch import FrameWatch, LeadHistory
 from fogsim.ego.light_sensing import LightSensing, lamp_effects
@@ -77,6 +78,7 @@ class EgoEquipment:
         self._view_renderer: EgoView | None = None
         self._streams: Streams | None = None
         self._meters: RoadMeters | None = None
+        self._reporters: FogReports | None = None
         self._way = KnownWay()
         self._network: tuple[RoadNetwork, SignMap] | None = None
         self._sign_faults: tuple[FaultKind, ...] = ()
@@ -123,6 +125,7 @@ class EgoEquipment:
         if self._view_renderer is None:
             self._network = road, _ = network()
             self._meters = RoadMeters(self._scenario, road.route, road.route_limits)
+            self._reporters = FogReports(self._scenario, road.route)
             self._way = KnownWay(road.route, carriageways(road.lanes))
             self._sensors.enter_road(road.structures)
         self._schedule = FaultSchedule(streams.faults)
@@ -138,6 +141,8 @@ class EgoEquipment:
         self._watch.reset()
         self._leads.reset()
         self._streams = streams
+        if self._reporters is not None:
+            self._reporters.reset(streams.reports)
         self._light = Ramp(self._scenario.light.illuminance_lx)
         self._daylight = self._light.first
         if self._fog is None:
@@ -249,7 +254,8 @@ class EgoEquipment:
             If `start_run` has not been called, or it is closed.
         """
         streams, meters, schedule, network = self._streams, self._meters, self._schedule, self._network
-        if streams is None or meters is None or schedule is None or network is None:
+        reporters = self._reporters
+        if streams is None or meters is None or schedule is None or network is None or reporters is None:
             raise SimulationError("the run has not been started, or is closed")
         faults = schedule.at(time)
         renderer, state, ego = self._view_of_world(faults), snapshot.state, snapshot.ego
@@ -279,9 +285,10 @@ class EgoEquipment:
             camera_setback=self._setback,
             lamps=ALL_LAMPS & int(state.lamps[ego]),
             light=self._light_sensing.measure(state, ego, fog, light),
+            reports=reporters.heard(time, state, ego, fog),
         )
         estimates = self._estimate(frame, observation, time)
-        believed = fuse(self._fusion, estimates, time, place)
+        believed = fuse(self._fusion, estimates, time, place, observation.reports)
         belief = checked_belief(self._scenario.fusion.method, believed)
         return Step(
             index=index,

@@ -65,16 +65,22 @@ class LocatedFusion(Protocol):
         ...
 
 
-def fuse(fusion: Fusion | LocatedFusion, estimates: Sequence[Estimate], time: float, place: float) -> Belief:
+def fuse(
+    fusion: Fusion | LocatedFusion,
+    estimates: Sequence[Estimate],
+    time: float,
+    place: float,
+    reports: Sequence[FogReport] = (),
+) -> Belief:
     """Ask a fusion of either kind.
 
     Parameters
     ----------
     fusion : Fusion or LocatedFusion
         The fusion.
-    estimates, time, place
+    estimates, time, place, reports
         As of `LocatedFusion.update_at`.
     """
     if isinstance(fusion, LocatedFusion):
-        return fusion.update_at(estimates, time, place)
+        return fusion.update_at(estimates, time, place, reports)
     return fusion.update(estimates, time)

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from fogsim.scenario.report_schema import Reports
 from fogsim.scenario.section import Distance, Id, Length, Number, Period, Place, Section, Share, Time
 from fogsim.values.fault import (
     Blackout,
@@ -443,6 +444,9 @@ class Sensors(Section):
 
     sign_reach_m: Length = 250.0
     """Distance up to which the map tells of signs ahead."""
+
+    reports: Reports = Reports()
+    """What others tell of the fog where they are."""
 
     faults: tuple[AnyFault, ...] = ()
     """What is wrong with sensors, the camera among them, and when."""

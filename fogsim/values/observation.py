@@ -89,6 +89,34 @@ class LightMeasurement:
 
 
 @dataclass(frozen=True, slots=True)
+class FogReport:
+    """One measurement of the fog by another vehicle or by a sensor beside the road.
+
+    Attributes
+    ----------
+    source : str
+        Who has measured.
+    number : int
+        Which of the source's reports it is: a report that comes twice counts once.
+    place : float
+        Where, as a distance along the receiver's route [m].
+    time : float
+        When [s].
+    extinction : float
+        Extinction coefficient [1/m].
+    relative_deviation : float
+        Standard deviation of that relative to it, as the source tells it [-].
+    """
+
+    source: str
+    number: int
+    place: float
+    time: float
+    extinction: float
+    relative_deviation: float
+
+
+@dataclass(frozen=True, slots=True)
 class Observation:
     """What one vehicle has at one instant.
 
@@ -108,6 +136,8 @@ class Observation:
         Own lamps that are switched on, whether each of them burns or not; None where the vehicle does not tell.
     light : LightMeasurement or None
         What the light sensor tells; None without one.
+    reports : tuple of FogReport
+        What others have told of the fog since the instant before.
     """
 
     frame: Frame | NDArray[np.uint8] | NDArray[np.uint16]
@@ -117,6 +147,7 @@ class Observation:
     camera_setback: float = 0.0
     lamps: Lamp | None = None
     light: LightMeasurement | None = None
+    reports: tuple[FogReport, ...] = ()
 
     @property
     def image(self) -> NDArray[np.uint8] | NDArray[np.uint16]:
@@ -247,31 +278,3 @@ def _paint_sign(picture: NDArray[np.uint8], sign: SignSighting, camera: Camera, 
         return
     inside = ((np.arange(left, right) - u) / wide) ** 2 + ((np.arange(top, bottom)[:, None] - v) / tall) ** 2 <= 1.0
     picture[top:bottom, left:right][inside] = sign_map_values(sign.kind, sign.distance, sign.diameter)
-
-
-@dataclass(frozen=True, slots=True)
-class FogReport:
-    """One measurement of the fog by another vehicle or by a sensor beside the road.
-
-    Attributes
-    ----------
-    source : str
-        Who has measured.
-    number : int
-        Which of the source's reports it is: a report that comes twice counts once.
-    place : float
-        Where, as a distance along the receiver's route [m].
-    time : float
-        When [s].
-    extinction : float
-        Extinction coefficient [1/m].
-    relative_deviation : float
-        Standard deviation of that relative to it, as the source tells it [-].
-    """
-
-    source: str
-    number: int
-    place: float
-    time: float
-    extinction: float
-    relative_deviation: float

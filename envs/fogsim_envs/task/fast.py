@@ -101,7 +101,7 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
 
     def _completed(self, step: Step) -> Step:
         estimates = (self._surrogate.estimate(step.truth.extinction_ahead, self._illuminance),)
-        belief = fuse(self._fusion, estimates, step.time, step.route_position)
+        belief = fuse(self._fusion, estimates, step.time, step.route_position, step.observation.reports)
         return dataclasses.replace(step, estimates=estimates, belief=belief)
 
 

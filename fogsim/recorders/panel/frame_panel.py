@@ -29,8 +29,8 @@ from fogsim.recorders.style import (
     font,
     method_colours,
 )
-from fogsim.units import KMH_PER_MPS
-from fogsim.values import Collision, Estimate, Lamp, Step
+from fogsim.units import KMH_PER_MPS, visibility_from_extinction
+from fogsim.values import Collision, Estimate, FogReport, Lamp, Step
 
 PANEL_WIDTH = 384
 FRAME_WIDTH = camera_picture.WIDTH + PANEL_WIDTH
@@ -43,6 +43,9 @@ _LEFT, _RIGHT = camera_picture.WIDTH + 16, FRAME_WIDTH - 16
 _SPEED_X, _ADVICE_X, _LIMIT_X = _LEFT, _LEFT + 148, _RIGHT - 27
 _BANNER_TIME = 3.0
 """How long a collision stays on the picture [s]."""
+
+_NEWS = 30.0
+"""Age up to which a report is drawn [s]."""
 
 _MOST_METHODS = 4
 """Estimators for which there is a line."""
@@ -86,6 +89,7 @@ class FramePanel:
             (width, 70), _SPEED_AXIS, (Curve(ADVICE, (1,)), Curve(TEXT, (0,))), "speed and advice [km/h]"
         )
         self._collision: Collision | None = None
+        self._reports: list[FogReport] = []
         self._background = _draw_background()
 
     def draw(self, step: Step, derived: Derived) -> NDArray[np.uint8]:
@@ -126,9 +130,15 @@ class FramePanel:
             half = chart.width // 2
             chart = chart.copy()
             size = (half - 8, chart.height)
-            chart.paste(draw_profile(size, _VISIBILITY_AXIS, step.belief.profile, step.truth.profile), (0, 0))
+            believed, true = step.belief.profile, step.truth.profile
+            chart.paste(draw_profile(size, _VISIBILITY_AXIS, believed, true, self._reported(step)), (0, 0))
         frame.paste(chart, (_LEFT, 300))
         frame.paste(self._speed.draw(), (_LEFT, 398))
+
+    def _reported(self, step: Step) -> list[tuple[float, float]]:
+        """Distance ahead and visibility of what others have told lately [m, m]."""
+        self._reports = [one for one in (*self._reports, *step.observation.reports) if step.time - one.time <= _NEWS]
+        return [(one.place - step.route_position, visibility_from_extinction(one.extinction)) for one in self._reports]
 
     def _draw_banners(self, draw: ImageDraw.ImageDraw, step: Step) -> None:
         if step.collisions:

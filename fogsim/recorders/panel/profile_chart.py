@@ -6,7 +6,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from fogsim.recorders.panel.strip_chart import Axis
-from fogsim.recorders.style import BELIEF, BELIEF_BAND, GROUND, LINE, MUTED, TEXT, TRUTH, WELL, font
+from fogsim.recorders.style import ADVICE, BELIEF, BELIEF_BAND, GROUND, LINE, MUTED, TEXT, TRUTH, WELL, font
 from fogsim.values import FogProfile
 
 NEAREST, FARTHEST = -100.0, 500.0
@@ -14,11 +14,20 @@ NEAREST, FARTHEST = -100.0, 500.0
 
 _TICKS = (0.0, 200.0, 400.0)
 _OVERSAMPLING = 2
+_DOT = 5
+"""Radius of the dot of a report, before the chart is shrunk [px]."""
+
 _FOOT = 12
 """Space for the distances below the curves [px]."""
 
 
-def draw_profile(size: tuple[int, int], axis: Axis, believed: FogProfile, true: FogProfile | None) -> Image.Image:
+def draw_profile(
+    size: tuple[int, int],
+    axis: Axis,
+    believed: FogProfile,
+    true: FogProfile | None,
+    reported: Sequence[tuple[float, float]] = (),
+) -> Image.Image:
     """Draw the visibility at places along the road, the vehicle's own a fine line.
 
     Parameters
@@ -31,6 +40,8 @@ def draw_profile(size: tuple[int, int], axis: Axis, believed: FogProfile, true: 
         What is believed: its median and its 90 % interval.
     true : FogProfile or None
         What is true, if that is known.
+    reported : sequence of (float, float)
+        Distance ahead and visibility that others have told of lately [m, m].
     """
     width, height = size[0] * _OVERSAMPLING, (size[1] - _FOOT) * _OVERSAMPLING
     image = Image.new("RGB", (width, height), WELL)
@@ -50,6 +61,10 @@ def draw_profile(size: tuple[int, int], axis: Axis, believed: FogProfile, true: 
         told = points(true, 0.5)
         for start in range(0, len(told) - 1, 3):
             draw.line(told[start : start + 3], fill=TRUTH, width=2 * _OVERSAMPLING)
+    for distance, visibility in reported:
+        if NEAREST <= distance <= FARTHEST:
+            x, y = _across(distance, width), _up(visibility, axis, height)
+            draw.ellipse([(x - _DOT, y - _DOT), (x + _DOT, y + _DOT)], fill=ADVICE)
     chart = Image.new("RGB", size, GROUND)
     chart.paste(image.reduce(_OVERSAMPLING), (0, 0))
     draw = ImageDraw.Draw(chart)

@@ -1,0 +1,67 @@
+"""The keys of a scenario file about what others tell of the fog: sensors beside the road, and other vehicles."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from fogsim.scenario.section import Distance, Length, Number, Period, Section, Share, Time
+
+HALF_A_MILE = 804.672
+
+
+class ReportsFrom(Section):
+    """Whoever measures the fog and tells others."""
+
+    deviation: Annotated[Number, Field(gt=0, le=2)] = 0.1
+    """Standard deviation of a measurement of k, relative to it; a forward-scatter sensor has some 10 %."""
+
+    wrong: Share = 0.0
+    """Share of measurements that are of any visibility between 20 m and 5 km: droplets on the lens, spray, insects."""
+
+    delay_s: Time = 0.5
+    """Time from a measurement to its arrival."""
+
+    loss: Share = 0.0
+    """Share of reports that do not arrive."""
+
+
+class RoadsideReports(ReportsFrom):
+    """Visibility sensors beside the ego's route, as on California's Highway 99."""
+
+    every_m: Length = HALF_A_MILE
+    """Distance from one to the next; half a mile there."""
+
+    first_m: Distance = 0.0
+    """Where the first one stands on the ego's route."""
+
+    period_s: Period = 30.0
+    """Time between two reports of one sensor."""
+
+    delay_s: Time = 5.0
+    """Time from a measurement to its arrival; an operator who must confirm it takes minutes."""
+
+
+class VehicleReports(ReportsFrom):
+    """Vehicles that measure the fog where they are, as by a camera of their own, and tell those behind by radio."""
+
+    equipped: Share = 0.05
+    """Share of the vehicles that do."""
+
+    range_m: Length = 500.0
+    """Distance over which they are heard."""
+
+    period_s: Period = 1.0
+    """Time between two reports of one vehicle."""
+
+    loss: Share = 0.1
+    """Share of reports that do not arrive."""
+
+
+class Reports(Section):
+    """Who tells the ego of the fog elsewhere; nobody if not given. `fusion: field_filter` makes use of it."""
+
+    roadside: RoadsideReports | None = None
+    """Sensors beside the road."""
+
+    vehicles: VehicleReports | None = None
+    """Other vehicles on its road."""

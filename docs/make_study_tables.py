@@ -46,6 +46,13 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
         OVERDRIVING,
         COLLISIONS,
     ),
+    "who_tells_of_the_bank": (
+        ("belief_200_m_ahead_median_error_percent", "belief 200 m ahead: error [%]", 1.0, 0),
+        ("belief_200_m_ahead_coverage_share", "held [%]", 100.0, 0),
+        ("belief_coverage_share", "here and now: held [%]", 100.0, 0),
+        EGO,
+        ("hardest_braking_mps2", "hardest braking [m/s²]", 1.0, 1),
+    ),
     "lighting_policies": (
         ("mean_own_sight_m", "own sight [m]", 1.0, 1),
         ("high_beam_time_share", "high beams [% of time]", 100.0, 0),

@@ -51,7 +51,7 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
         ("belief_200_m_ahead_coverage_share", "held [%]", 100.0, 0),
         ("belief_coverage_share", "here and now: held [%]", 100.0, 0),
         EGO,
-        ("hardest_braking_mps2", "hardest braking [m/s²]", 1.0, 1),
+        ("max_deceleration_mps2", "hardest braking [m/s²]", 1.0, 1),
     ),
     "lighting_policies": (
         ("mean_own_sight_m", "own sight [m]", 1.0, 1),

@@ -9,6 +9,7 @@ import numpy as np
 from fogsim.errors import InputError
 from fogsim.fusion.grid_filter import GridFilter
 from fogsim.fusion.route_field import AHEAD, CELL, RouteField
+from fogsim.fusion.route_field_kernels import shares_in_cells
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.belief import Belief
@@ -198,14 +199,11 @@ class FieldFilter:
         self._field.learn(start, start + ANNOUNCED, value, widened, self._outlier_share, self._floor)
 
     def _belief(self, now: Belief) -> Belief:
-        """The belief with its profile: of the samples' quantiles, spread evenly between one and the next."""
+        """The belief with its profile."""
         cells, samples = now.log_extinction, self._field.sighted_extinctions()
-        half = 0.5 * (cells[1] - cells[0])
-        shares = (np.arange(samples.size) + 0.5) / samples.size
-        within = np.clip(samples, cells[0], cells[-1])
-        below = np.interp(np.append(cells[:-1] + half, np.inf), *_ascending(within, shares), left=0.0, right=1.0)
-        probability = np.diff(below, prepend=0.0)
-        return Belief(cells, probability / probability.sum(), now.denser, self._field.profile())
+        first, step = float(cells[0]), float(cells[1] - cells[0])
+        probability = shares_in_cells(samples, first, step, cells.size)
+        return Belief(cells, probability, now.denser, self._field.profile())
 
     @staticmethod
     def _sight(extinction: float) -> float:
@@ -230,9 +228,3 @@ def _stretches(curve: OpticalDepths) -> Iterator[tuple[float, float, float, floa
         start, reached, unsure = end, total, spread
         if start >= FARTHEST:
             return
-
-
-def _ascending(values: np.ndarray, shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Values with their shares, each value once."""
-    last = np.append(np.diff(values) > 0.0, True)
-    return values[last], shares[last]

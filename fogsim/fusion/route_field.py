@@ -125,11 +125,8 @@ class RouteField:
 
     def _linearised(self, start: float, end: float) -> tuple[float, Floats, float]:
         """Logarithm of the mean extinction over a stretch: mean, covariance with all cells, and variance."""
-        value, gradient = route_field_kernels.mean_extinction(self._mean, self._weights(start, end))
-        shared, variance = route_field_kernels.spread_with(self._covariance, gradient)
-        # A mean of exponentials is above the exponential of a mean: to second order by half of what cells differ.
-        differing = float((gradient * np.diagonal(self._covariance)).sum()) - variance
-        return value + 0.5 * max(differing, 0.0), shared, variance
+        weights = route_field_kernels.stretch_weights(COUNT, CELL, self._rear(), start, end)
+        return route_field_kernels.linearised(self._mean, self._covariance, weights)
 
     def learn(self, start: float, end: float, value: float, deviation: float, wrong: float, floor: float) -> None:
         """Take in a measurement of the mean extinction over a stretch.
@@ -181,7 +178,7 @@ class RouteField:
 
     def sighted_extinctions(self) -> Floats:
         """(samples,) float64, ascending: ln of the mean extinction up to where 95 % of the light is lost."""
-        ahead, ends = slice(BEHIND, None), self._edges()[BEHIND + 1 :]
+        ahead, ends = slice(BEHIND, None), np.asarray(self._rear() + CELL * np.arange(BEHIND + 1, COUNT + 1))
         lower = route_field_kernels.factor(np.ascontiguousarray(self._covariance[ahead, ahead]))
         found = route_field_kernels.sighted_extinctions(
             self._mean[ahead], lower, self._normals, ends, OPTICAL_DEPTH_AT_VISIBILITY
@@ -190,22 +187,10 @@ class RouteField:
 
     def profile(self) -> FogProfile:
         """What is believed at the middle of each cell."""
-        edges = self._edges()
         deviation = np.sqrt(np.maximum(np.diagonal(self._covariance), 0.0))
-        return FogProfile(0.5 * (edges[1:] + edges[:-1]), self._mean.copy(), deviation)
+        middles = np.asarray(self._rear() + CELL * (np.arange(COUNT) + 0.5))
+        return FogProfile(middles, self._mean.copy(), np.asarray(deviation))
 
-    def _edges(self) -> Floats:
-        """(cells + 1,) float64: where cells begin and end, ahead of the vehicle [m]."""
-        within = self._place - CELL * (self._cell or 0)
-        return np.asarray(CELL * (np.arange(COUNT + 1) - BEHIND) - within)
-
-    def _weights(self, start: float, end: float) -> Floats:
-        """(cells,) float64: share of a stretch that lies in each cell; of one that lies beyond all, in the last."""
-        edges = self._edges()
-        inside: Floats = np.clip(np.minimum(edges[1:], end) - np.maximum(edges[:-1], start), 0.0, None)
-        total = float(inside.sum())
-        if total > 0.0:
-            return np.asarray(inside / total)
-        nearest: Floats = np.zeros(COUNT)
-        nearest[min(max(int(np.searchsorted(edges, start)) - 1, 0), COUNT - 1)] = 1.0
-        return nearest
+    def _rear(self) -> float:
+        """Where the hindmost cell begins, ahead of the vehicle [m]."""
+        return CELL * ((self._cell or 0) - BEHIND) - self._place

@@ -74,6 +74,82 @@ def spread_with(covariance: Floats, gradient: Floats) -> tuple[Floats, float]:
 
 
 @kernel
+def stretch_weights(count: int, cell: float, rear: float, start: float, end: float) -> Floats:
+    """Share of a stretch that lies in each cell; of one beyond all cells or without length, in the nearest.
+
+    Parameters
+    ----------
+    count : int
+        How many cells.
+    cell, rear : float
+        Length of one [m], and where the hindmost begins ahead of the vehicle [m], below 0.
+    start, end : float
+        Ends of the stretch ahead of the vehicle [m].
+    """
+    weights, total = np.zeros(count), 0.0
+    for i in range(count):
+        inside = min(rear + (i + 1) * cell, end) - max(rear + i * cell, start)
+        if inside > 0.0:
+            weights[i] = inside
+            total += inside
+    if total > 0.0:
+        return weights / total
+    weights[min(max(math.floor((start - rear) / cell), 0), count - 1)] = 1.0
+    return weights
+
+
+@kernel
+def linearised(mean: Floats, covariance: Floats, weights: Floats) -> tuple[float, Floats, float]:
+    """Logarithm of the mean extinction over a stretch: mean, covariance with all cells, and variance.
+
+    A mean of exponentials is above the exponential of a mean: to second order by half of what the cells differ.
+
+    Parameters
+    ----------
+    mean, covariance : (n,) and (n, n) float64
+        Of the cells.
+    weights : (n,) float64
+        Share of the stretch that lies in each.
+    """
+    value, gradient = mean_extinction(mean, weights)
+    shared, variance = spread_with(covariance, gradient)
+    differing = -variance
+    for i in range(mean.size):
+        differing += gradient[i] * covariance[i, i]
+    return value + 0.5 * max(differing, 0.0), shared, variance
+
+
+@kernel
+def shares_in_cells(samples: Floats, first: float, step: float, count: int) -> Floats:
+    """Probability of each of evenly spaced cells by samples, spread evenly between one and the next.
+
+    Parameters
+    ----------
+    samples : (n,) float64
+        Ascending.
+    first, step : float
+        Middle of the first cell, and from one to the next.
+    count : int
+        How many; what lies beyond either end counts to the cell there.
+    """
+    out, before, j = np.zeros(count), 0.0, 0
+    for i in range(count):
+        edge = first + (i + 0.5) * step
+        while j < samples.size and samples[j] <= edge:
+            j += 1
+        if j == samples.size or i == count - 1:
+            below = 1.0
+        elif j == 0:
+            below = 0.0
+        else:
+            apart = samples[j] - samples[j - 1]
+            below = (j - 0.5 + (edge - samples[j - 1]) / apart) / samples.size
+        out[i] = below - before
+        before = below
+    return out
+
+
+@kernel
 def roll(mean: Floats, covariance: Floats, weights: Floats, level: float, rest: float) -> None:
     """Leave the hindmost cell and enter the next one ahead, in place.
 

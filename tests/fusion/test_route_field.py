@@ -142,3 +142,24 @@ def test_cholesky_and_samples_agree_with_numpy():
 
 def test_the_same_field_has_the_same_samples():
     assert np.array_equal(field().sighted_extinctions(), field().sighted_extinctions())
+
+
+def test_a_stretch_lies_in_cells_by_its_length_and_one_beyond_all_in_the_nearest():
+    weights = route_field_kernels.stretch_weights(4, 25.0, -50.0, -10.0, 15.0)
+    assert weights == pytest.approx([0.0, 0.4, 0.6, 0.0])
+    assert route_field_kernels.stretch_weights(4, 25.0, -50.0, 60.0, 90.0).tolist() == [0.0, 0.0, 0.0, 1.0]
+    assert route_field_kernels.stretch_weights(4, 25.0, -50.0, -90.0, -80.0).tolist() == [1.0, 0.0, 0.0, 0.0]
+    assert route_field_kernels.stretch_weights(4, 25.0, -50.0, 10.0, 10.0).tolist() == [0.0, 0.0, 1.0, 0.0]
+
+
+def test_samples_become_shares_of_cells():
+    samples = np.sort(np.random.default_rng(2).normal(3.0, 1.0, 4000))
+    shares = route_field_kernels.shares_in_cells(samples, -2.0, 0.5, 21)
+    cells = -2.0 + 0.5 * np.arange(21)
+    assert shares.sum() == pytest.approx(1.0)
+    assert (shares >= 0.0).all()
+    assert (shares * cells).sum() == pytest.approx(samples.mean(), abs=0.01)
+    assert shares == pytest.approx(np.histogram(samples, np.append(cells - 0.25, 8.25))[0] / 4000, abs=2e-3)
+    # What is the same in all samples is in one cell; what lies beyond the cells, in the last.
+    assert route_field_kernels.shares_in_cells(np.full(8, 3.1), 0.0, 1.0, 6).tolist() == [0, 0, 0, 1, 0, 0]
+    assert route_field_kernels.shares_in_cells(np.full(8, 99.0), 0.0, 1.0, 6).tolist() == [0, 0, 0, 0, 0, 1]

@@ -44,8 +44,9 @@ LARGE_SHAPE = 0.018
 AIRLIGHT_DEVIATION = 0.002
 """Relative deviation of the airlight behind the vehicle from the sky above it [-]."""
 
-UNEVEN_AIRLIGHT_DEVIATION = 0.015
-"""The same where it brightens upward, so that its level at the horizon is not seen but reckoned [-]."""
+RECKONED_LEVEL = 0.4
+"""Deviation of its level at the horizon where that is not seen but reckoned, over that of its darkening down to the
+nearest rear's foot [-]: both go by how much the sky brightens upward."""
 
 CLIPPED_AIRLIGHT_DEVIATION = 0.03
 """The same where some of the sky is clipped [-]."""
@@ -74,7 +75,8 @@ class LeadContrast:
     is placed by its likeness to the nearest picture. A picture's contrast over that one's is a line through the
     airlight: dark parts tell the most, lamps that were lit since are left out, and as contrast is relative to the sky's
     luminance, exposure cancels. k is the rate at which it falls while the range changes: no flat road, no horizon and
-    no reflectance enters, and a constant error of the range changes nothing.
+    no reflectance enters, and a constant error of the range, as of the setback, changes k by a few percent: pictures
+    are then compared at sizes that are not quite the same.
 
     Own method, after the contrast of preceding vehicles in Mori et al. 2007. Daytime only. Remembers the track; another
     vehicle begins a new one. What does not look like the same vehicle at another range does not count.
@@ -212,7 +214,7 @@ class LeadContrast:
         )
         clipped = any(s.clipped for s in self._track.detections)
         uneven = max(s.airlight_deviation for s in self._track.detections)
-        level = UNEVEN_AIRLIGHT_DEVIATION if uneven > 0.0 else AIRLIGHT_DEVIATION
+        level = math.hypot(AIRLIGHT_DEVIATION, RECKONED_LEVEL * uneven)
         airlight = CLIPPED_AIRLIGHT_DEVIATION if clipped else level
         offset = max(airlight * float(np.median(lever)), 1e-6)
         fit = fit_decay(distance, contrast, noise, REGISTRATION, offset)

@@ -38,6 +38,12 @@ def test_over_dark_land_those_that_reckon_with_it_do_not(done: Reproduction, met
     assert read(done, method, 0.1) == pytest.approx(100.0, rel=0.15)
 
 
+def test_contrast_of_the_vehicle_ahead_is_taken_to_the_airlight_of_its_rows_over_snow_too(done: Reproduction) -> None:
+    found = [one for one in done.records if (one["method"], one["ground_albedo"]) == (CHASE_METHODS[0], 0.8)]
+    assert found[0]["bias_pct"] == pytest.approx(0.0, abs=4.0)
+    assert found[0]["interval_coverage"] == 1.0
+
+
 def test_the_table_has_a_row_for_each_method_and_fog(done: Reproduction) -> None:
     heading, *rows = done.table
     assert heading == ("method", "fog", "100 m")

@@ -44,7 +44,7 @@ AWAY = 5.0
 """By how much it is faster [m/s]."""
 
 RANGE_DEVIATION = 0.25
-"""Noise of its range [m]."""
+"""Noise of its range, from the camera to its rear [m]."""
 
 NOTES = (
     "Fog of 250 m, CIE overcast sky, flat Lambertian land of one albedo; small droplets (moderate radiation fog). The "
@@ -192,7 +192,7 @@ def follow(
         Fog, method, and what that reads at the end.
     """
     rng = np.random.default_rng([22, number])
-    estimators = {case: make(CHASE_METHODS[0], camera) for case in cases}
+    estimators = {case: make(CHASE_METHODS[0], camera, setback=0.0) for case in cases}
     last: dict[Case, Estimate] = {}
     vehicle = StagedVehicle(paint=(float(rng.uniform(*PAINTS)),) * 3)
     for ahead in np.arange(FIRST_RANGE, LAST_RANGE, RANGE_STEP).tolist():

@@ -124,8 +124,9 @@ def test_under_an_even_or_clipped_sky_the_airlight_counts_as_even():
     assert darker.shape == by_row.shape == (0, GEOMETRY.below.size)
 
 
-def test_rows_have_the_airlight_of_the_layer_within_its_deviation():
-    k, albedo = 0.03, 0.1
+@pytest.mark.parametrize("albedo", [0.1, 0.4, 0.8])
+def test_rows_have_the_airlight_of_the_layer_within_its_deviation(albedo):
+    k = 0.03
     found = row_airlight(sky(k, albedo), CAMERA)
     rows = np.array([-40, -10, -3, 3, 10, 40, 120]) + round(CAMERA.horizon_row)
     angle = np.arctan((CAMERA.horizon_row - rows) / CAMERA.focal_length)

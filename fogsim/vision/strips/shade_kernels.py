@@ -29,7 +29,7 @@ CLEAR, FEWEST, ENDS = 0.4, 20, 10
 """Transmittance from which on pieces tell the first guess [-], how few tell none, and which part of them, the darkest
 and the brightest, is beyond that guess: one in so many."""
 
-STEPS, MOST = 256, 2.0
+STEPS, MOST = 1024, 2.0
 """Steps of luminance in which the first guess is told, and the most of it, over the airlight's [-]."""
 
 DARKEST = 0.02

@@ -25,8 +25,9 @@ Floats = NDArray[np.float64]
 SURE, ALL_USED = 0.045, 0.97
 """Relative deviation of k up to which, and share of its bins in use from which on, the own lane needs no shade [-]."""
 
-EXTINCTIONS, FINER = 28, 7
-"""Extinctions of the search, evenly in ln k and a quarter apart, and how many more about the best of them."""
+EXTINCTIONS, FINER = 28, 15
+"""Extinctions of the search, evenly in ln k and a quarter apart, and how many more about the best of them: strips are
+divided only once, by what these say."""
 
 LEAST_GAIN, MOST_RATIO, LEAST_MIXED = 1.0, 0.6, 0.05
 """What a division is to gain in minus twice the log likelihood of a piece, the most that the shade's luminance is of
@@ -42,9 +43,6 @@ PLAIN = 5.0
 
 LEAST_BINS, ENOUGH = 4, 16
 """Fewest bins of a strip in sun or in shade, and of the own lane in shade to be what the road is judged by."""
-
-ROUNDS = 2
-"""How often strips are divided and fitted, each time with the fog of the fit before."""
 
 NOTHING = np.zeros(0, np.bool_)
 """Bins in use of an answer that is only a start."""
@@ -131,16 +129,10 @@ def divided_road(
     if levels is None:
         return None
     told_too = (*_seen_or_told(priors[0], told, camera), *priors[1:])
-    found = None
-    for _ in range(ROUNDS):
-        some, laid = _divided(pixels, curves, geometry, levels, noise, camera, free)
-        near = JointFit(levels.extinction, 0.0, levels.airlight, priors[0].shift, levels.lit, 1.0, NOTHING, NOTHING)
-        fit = fit_jointly(some, laid, told_too, near)
-        if fit is None or fit.extinction <= 0.0:
-            break
-        found = DividedRoad(some, laid, fit, levels.share)
-        levels = levels._replace(extinction=fit.extinction, airlight=fit.airlight)
-    return found
+    some, laid = _divided(pixels, curves, geometry, levels, noise, camera, free)
+    near = JointFit(levels.extinction, 0.0, levels.airlight, priors[0].shift, levels.lit, 1.0, NOTHING, NOTHING)
+    fit = fit_jointly(some, laid, told_too, near)
+    return None if fit is None or fit.extinction <= 0.0 else DividedRoad(some, laid, fit, levels.share)
 
 
 def shade_levels(
@@ -193,7 +185,7 @@ def _divided(
     free: float,
 ) -> tuple[StripCurves, StripGeometry]:
     """Strips in shade and in sun, each lane's after the other."""
-    passed = np.exp(-levels.extinction * geometry.path / geometry.below)
+    passed = np.exp(-levels.extinction * geometry.path / np.maximum(geometry.below, 1e-9))
     dark, light = math.log(levels.shaded), math.log(levels.lit)
     above, under = (math.exp(dark + part * (light - dark)) for part in (LIT, SHADED))
     seen = (curves.variance > 0) & ((above - under) * passed > PLAIN * noise)

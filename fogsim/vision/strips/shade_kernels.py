@@ -29,6 +29,9 @@ CLEAR, FEWEST, ENDS = 0.4, 20, 10
 """Transmittance from which on pieces tell the first guess [-], how few tell none, and which part of them, the darkest
 and the brightest, is beyond that guess: one in so many."""
 
+STEPS, MOST = 1024, 2.0
+"""Steps of luminance in which the first guess is told, and the most of it, over the airlight's [-]."""
+
 DARKEST = 0.02
 """Least luminance of a road over the airlight's [-]."""
 
@@ -92,59 +95,81 @@ def pieces_of(image: LinearPixels, rows: NDArray[np.int64], left: Floats, right:
 
 
 @kernel
-def _first_levels(
-    pieces: Floats, noise: Floats, passed: Floats, airlight: float, stride: int, ends: int
-) -> tuple[float, float]:
+def _first_levels(pieces: Floats, passed: Floats, airlight: float, ends: int) -> tuple[float, float]:
     """Luminance without fog below and above which are all but one in so many pieces; 0 where few are seen clearly."""
-    found, count = np.empty(pieces.size), 0
-    for strip in range(noise.shape[0]):
-        for i in range(0, noise.shape[1], stride):
-            if noise[strip, i] > 0.0 and passed[strip, i] > CLEAR:
-                for value in pieces[strip, i]:
-                    found[count] = airlight + (value - airlight) / passed[strip, i]
-                    count += 1
+    tally, count, unit = np.zeros(STEPS, np.int64), 0, MOST / STEPS * airlight
+    for i in range(passed.size):
+        if passed[i] > CLEAR:
+            for value in pieces[i]:
+                luminance = airlight + (value - airlight) / passed[i]
+                tally[min(max(int(luminance / unit), 0), STEPS - 1)] += 1
+                count += 1
     if count < FEWEST:
         return 0.0, 0.0
-    ordered = np.sort(found[:count])
-    return float(ordered[count - 1 - count // ends]), float(ordered[count // ends])
+    low, high, below, above = 0, STEPS - 1, tally[0], tally[STEPS - 1]
+    while below <= count // ends:
+        low += 1
+        below += tally[low]
+    while above <= count // ends:
+        high -= 1
+        above += tally[high]
+    return (high + 0.5) * unit, (low + 0.5) * unit
 
 
 @kernel
-def _told_apart(
-    pieces: Floats, noise: Floats, passed: Floats, levels: Levels, grey: float, stride: int, sums: Floats
-) -> Levels:
-    """Cost and shares of levels; `sums` (2, 5) gets what pieces in sun and in shade say, in Cauchy's norm."""
+def _told_apart(pieces: Floats, passed: Floats, levels: Levels, grey: float, sums: Floats) -> None:
+    """Write to `sums` (2, 5) what pieces in sun and in shade say, in Cauchy's norm."""
     sums[:] = 0.0
-    cost, light, dark, mixed, number = 0.0, 0.0, 0.0, 0.0, 0
-    for strip in range(noise.shape[0]):
-        for i in range(0, noise.shape[1], stride):
-            if noise[strip, i] <= 0.0:
-                continue
-            t, shades = passed[strip, i], 0
-            bright = levels.airlight + (levels.lit - levels.airlight) * t
-            dim = levels.airlight + (levels.shaded - levels.airlight) * t
-            for value in pieces[strip, i]:
-                c = 1 if abs(value - dim) < abs(value - bright) else 0
-                spread = grey + (TEXTURE * (levels.shaded if c else levels.lit) * t) ** 2
-                rest = value - (dim if c else bright)
-                weight = 1.0 / (spread + rest * rest)
-                cost += 2.0 * math.log1p(rest * rest / spread) + math.log(spread)
-                sums[c, 0] += weight
-                sums[c, 1] += weight * t
-                sums[c, 2] += weight * t * t
-                sums[c, 3] += weight * value
-                sums[c, 4] += weight * t * value
-                shades += c
-            number += PIECES
-            light += PIECES * t * t
-            dark += shades * t * t
-            mixed += PIECES * t * t if 0 < shades < PIECES else 0.0
+    for i in range(passed.size):
+        t = passed[i]
+        bright = levels.airlight + (levels.lit - levels.airlight) * t
+        dim = levels.airlight + (levels.shaded - levels.airlight) * t
+        wide, narrow = grey + (TEXTURE * levels.lit * t) ** 2, grey + (TEXTURE * levels.shaded * t) ** 2
+        lit, lit_light, dark, dark_light = 0.0, 0.0, 0.0, 0.0
+        for value in pieces[i]:
+            over, under = value - bright, value - dim
+            if abs(under) < abs(over):
+                weight = 1.0 / (narrow + under * under)
+                dark += weight
+                dark_light += weight * value
+            else:
+                weight = 1.0 / (wide + over * over)
+                lit += weight
+                lit_light += weight * value
+        for c, weight, light in ((0, lit, lit_light), (1, dark, dark_light)):
+            sums[c, 0] += weight
+            sums[c, 1] += weight * t
+            sums[c, 2] += weight * t * t
+            sums[c, 3] += light
+            sums[c, 4] += light * t
+
+
+@kernel
+def _judged(pieces: Floats, passed: Floats, levels: Levels, grey: float) -> Levels:
+    """Levels with their cost and shares."""
+    cost, light, dark, mixed = 0.0, 0.0, 0.0, 0.0
+    for i in range(passed.size):
+        t, shades, product = passed[i], 0, 1.0
+        bright = levels.airlight + (levels.lit - levels.airlight) * t
+        dim = levels.airlight + (levels.shaded - levels.airlight) * t
+        wide, narrow = grey + (TEXTURE * levels.lit * t) ** 2, grey + (TEXTURE * levels.shaded * t) ** 2
+        for value in pieces[i]:
+            over, under = value - bright, value - dim
+            if abs(under) < abs(over):
+                shades += 1
+                product *= (narrow + under * under) ** 2 / narrow
+            else:
+                product *= (wide + over * over) ** 2 / wide
+        cost += math.log(product)
+        light += t * t
+        dark += shades * t * t / PIECES
+        mixed += t * t if 0 < shades < PIECES else 0.0
     return Levels(
         levels.extinction,
         levels.airlight,
         levels.lit,
         levels.shaded,
-        cost / max(number, 1),
+        cost / max(passed.size * PIECES, 1),
         dark / max(light, 1e-9),
         mixed / max(light, 1e-9),
     )
@@ -188,23 +213,26 @@ def fit_levels(
     divided : bool
         Whether there are two.
     """
-    (strips, count), noise = bins.noise.shape, bins.noise
-    passed, sums, stride = np.empty((strips, count)), np.empty((2, 5)), max(count // MOST_BINS, 1)
+    count = bins.noise.shape[1]
+    used = np.argwhere(bins.noise[:, :: max(count // MOST_BINS, 1)] > 0.0)
+    used[:, 1] *= max(count // MOST_BINS, 1)
+    seen, passed, sums = np.empty((len(used), PIECES)), np.empty(len(used)), np.empty((2, 5))
+    for j in range(len(used)):
+        seen[j] = pieces[used[j, 0], used[j, 1]]
     grey = pixel * pixel / SAMPLES + (UNEVEN * prior.airlight) ** 2
     best = Levels(0.0, prior.airlight, 0.0, 0.0, np.inf, 0.0, 0.0)
     for k in extinctions:
-        for strip in range(strips):
-            for i in range(0, count, stride):
-                below = bins.below[i] - prior.shift
-                passed[strip, i] = mean_transmittance(below, bins.half[i], bins.path[strip, i], k)[0]
-        lit, shaded = _first_levels(pieces, noise, passed, prior.airlight, stride, ENDS if divided else 2)
+        for j in range(len(used)):
+            strip, i = used[j]
+            passed[j] = mean_transmittance(bins.below[i] - prior.shift, bins.half[i], bins.path[strip, i], k)[0]
+        lit, shaded = _first_levels(seen, passed, prior.airlight, ENDS if divided else 2)
         if lit <= 0.0:
             continue
         levels = Levels(k, prior.airlight, lit, shaded if divided else lit, np.inf, 0.0, 0.0)
         for _ in range(ROUNDS):
-            levels = _told_apart(pieces, noise, passed, levels, grey, stride, sums)
+            _told_apart(seen, passed, levels, grey, sums)
             levels = _fitted(levels, sums, prior, divided)
-        levels = _told_apart(pieces, noise, passed, levels, grey, stride, sums)
+        levels = _judged(seen, passed, levels, grey)
         if levels.cost < best.cost:
             best = levels
     return best

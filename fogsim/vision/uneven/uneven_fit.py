@@ -273,7 +273,7 @@ def _candidate(
 def _weighed(
     even: JointFit, evens: list[EvenFog], tried: list[_Candidate], bins: Bins, geometry: StripGeometry
 ) -> UnevenFit | None:
-    """Average over even fog and uneven fits by their evidence; None if even fog over the road as seen suffices."""
+    """Average over even fog and uneven fits by their evidence; None if even fog suffices, or explains no road."""
     costs = np.array([*(one.cost for one in evens), *(t.cost for t in tried)])
     weights = np.exp(-0.5 * (costs - costs.min()))
     weights /= weights.sum()
@@ -285,6 +285,8 @@ def _weighed(
     used = even.used if share > 0.5 else best.solution.used == USED
     seen = geometry if share > 0.5 else bins
     reach = _reach(used, seen.path / seen.below)
+    if reach <= 0.0:
+        return None
     distance = _distances(reach)
     k = sum(weight * max(one.extinction, 0.0) for weight, one in zip(of_even, evens, strict=True))
     k2 = sum(weight * (one.extinction**2 + one.variance) for weight, one in zip(of_even, evens, strict=True))

@@ -12,7 +12,7 @@ SMALL = (EARLY, "camera.width=320", "camera.height=240", "duration_s=1", "fog.vi
 
 
 def steps(*faults: str) -> list[Step]:
-    written = [*SMALL, f"sensors.faults=[{', '.join(faults)}]"]
+    written = [*SMALL, "fusion=grid_filter", f"sensors.faults=[{', '.join(faults)}]"]
     return list(fogsim.run(fogsim.load_scenario("motorway_fog_bank", written), seed=2))
 
 

@@ -180,3 +180,16 @@ def test_either_kind_of_fusion_can_be_asked():
     assert not isinstance(make("grid_filter"), LocatedFusion)
     assert fuse(make("grid_filter"), [seen(100.0)], 0.0, 10.0).profile is None
     assert fuse(make("field_filter"), [seen(100.0)], 0.0, 10.0).profile is not None
+
+
+def test_who_drives_on_blindly_knows_less_and_less_of_the_road_ahead():
+    fusion = make("field_filter")
+    driven(fusion, [seen(150.0, reach=150.0)], 10.0)
+    known = [
+        driven(fusion, [Estimate.invalid("test", "black")], 2.0, start=10.0 + 2.0 * i, place=250.0 + 50.0 * i)
+        for i in range(6)
+    ]
+    deviations = [belief.profile.at(50.0)[1] for belief in known]
+    assert deviations == sorted(deviations)
+    assert deviations[-1] > 1.0
+    assert known[-1].log_standard_deviation > 2.0 * known[0].log_standard_deviation

@@ -116,7 +116,7 @@ def test_an_unknown_key_inside_a_list(folder: Path) -> None:
         ("visibility_m: 60", "visibility_m: 0", r"fog\.banks\.0\.visibility_m: .* greater than or equal to 1; got 0"),
         ("outside_visibility_m: 2000", "visibility_m: 2000", r"fog: give either visibility_m .* not both"),
         ("[joint_road,", "[joint_rode,", r"estimators\.0: unknown estimator 'joint_rode'; did you mean 'joint_road'\?"),
-        ("fusion: grid_filter", "fusion: kalman", r"fusion: unknown fusion 'kalman'; known: grid_filter"),
+        ("fusion: field_filter", "fusion: kalman", r"fusion: unknown fusion 'kalman'; known: field_filter"),
         (
             "reaction_time: 2.0",
             "reaction: 2.0",

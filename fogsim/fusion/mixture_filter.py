@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from fogsim.errors import InputError
 from fogsim.fusion.grid_filter import CELLS, LOG_HIGH, LOG_LOW
+from fogsim.mixture import majority, reduced
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.belief import Belief
@@ -21,9 +22,6 @@ Floats = NDArray[np.float64]
 
 FORGOTTEN = 0.05
 """Probability of correctness below which a measurement is dropped [-]."""
-
-ROUNDS = 50
-"""Most rounds of k-means; on a line it settles in fewer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,67 +124,12 @@ class MixtureFilter:
     def _belief(self, values: Floats, weights: Floats) -> Belief:
         if not values.size:
             return Belief(self._log_extinction, np.full(CELLS, 1.0 / CELLS))
-        majority = heaviest_cluster(values, weights, self._clusters)
-        normal = NormalDist(*mixture_moments(values[majority], weights[majority]))
+        kept = majority(values.tolist(), weights.tolist(), self._clusters)
+        mean, deviation = reduced(values[kept].tolist(), weights[kept].tolist())
+        # Measurements that are all the same are no surer than one.
+        normal = NormalDist(mean, max(deviation, 1.0 / (math.sqrt(2.0 * math.pi) * float(weights[kept].max()))))
         edges = 0.5 * (self._log_extinction[1:] + self._log_extinction[:-1])
         beyond = np.array([normal.cdf(OPTICAL_DEPTH_AT_VISIBILITY / math.exp(edge)) for edge in edges.tolist()])
         # The larger k, the smaller V: what is above an edge in ln k is below it in V.
         probability = -np.diff(np.concatenate([[1.0], beyond, [0.0]]))
         return Belief(self._log_extinction, np.maximum(probability, 0.0) / np.maximum(probability, 0.0).sum())
-
-
-def mixture_moments(values: Floats, weights: Floats) -> tuple[float, float]:
-    """Mean and standard deviation of a mixture of measurements (belaroussi2015, eq. 2) [m].
-
-    Parameters
-    ----------
-    values : (n,) float64
-        Measured visibilities [m], at least one.
-    weights : (n,) float64
-        Their probabilities of being correct, above 0.
-
-    Returns
-    -------
-    tuple of float
-        Of a single measurement, for which the equation is 0 / 0, its own: 1 / (√(2π) p).
-    """
-    total = float(weights.sum())
-    mean = float((weights * values).sum()) / total
-    own = 1.0 / (math.sqrt(2.0 * math.pi) * float(weights.max()))
-    if values.size < 2:
-        return mean, own
-    variance = float((weights * (values - mean) ** 2).sum()) / ((values.size - 1) / values.size * total)
-    return mean, math.sqrt(variance) if variance > 0.0 else own
-
-
-def heaviest_cluster(values: Floats, weights: Floats, clusters: int) -> NDArray[np.bool_]:
-    """Part weighted values by k-means, and tell which are in the heaviest cluster.
-
-    Parameters
-    ----------
-    values : (n,) float64
-        The values, at least one.
-    weights : (n,) float64
-        Their weights, above 0.
-    clusters : int
-        How many clusters at the most; they begin at evenly spaced quantiles.
-
-    Returns
-    -------
-    (n,) bool
-        Of clusters that are equally heavy, the one of smaller values.
-    """
-    order = np.argsort(values, kind="stable")
-    below = (np.cumsum(weights[order]) - 0.5 * weights[order]) / weights.sum()
-    centres = np.unique(np.interp((np.arange(clusters) + 0.5) / clusters, below, values[order]))
-    nearest = np.zeros(values.size, np.int64)
-    for _ in range(ROUNDS):
-        nearest = np.abs(values[:, None] - centres).argmin(axis=1)
-        heavy = np.array([weights[nearest == one].sum() for one in range(centres.size)])
-        sums = np.array([(weights * values)[nearest == one].sum() for one in range(centres.size)])
-        moved = np.where(heavy > 0.0, sums / np.maximum(heavy, 1e-300), centres)
-        if np.array_equal(moved, centres):
-            break
-        centres = moved
-    heavy = np.array([weights[nearest == one].sum() for one in range(centres.size)])
-    return np.asarray(nearest == int(heavy.argmax()))

@@ -7,7 +7,7 @@ import pytest
 
 from fogsim.errors import InputError
 from fogsim.fusion import make
-from fogsim.fusion.mixture_filter import heaviest_cluster, mixture_moments
+from fogsim.mixture import majority
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import Estimate
 
@@ -17,21 +17,9 @@ def seen(visibility: float, method: str = "test") -> Estimate:
     return Estimate(method, k, 0.1 * k)
 
 
-def test_the_moments_are_those_of_the_paper():
-    mean, deviation = mixture_moments(np.array([240.0, 250.0, 260.0]), np.array([1.0, 1.0, 0.5]))
-    assert (mean, deviation**2) == (pytest.approx(248.0), pytest.approx(84.0))
-    assert mixture_moments(np.array([100.0]), np.array([1.0])) == pytest.approx((100.0, 0.398942), rel=1e-5)
-    assert mixture_moments(np.array([100.0, 100.0]), np.array([1.0, 0.5]))[1] == pytest.approx(0.398942, rel=1e-5)
-
-
-def test_k_means_keeps_the_majority_and_leaves_out_what_lies_above_and_below():
-    values = np.array([40.0, 100.0, 101.0, 99.0, 102.0, 400.0])
-    assert heaviest_cluster(values, np.ones(6), 3).tolist() == [False, True, True, True, True, False]
-    assert heaviest_cluster(values, np.ones(6), 1).all()
-    # By weight, not by number.
-    heavy = heaviest_cluster(np.array([100.0, 101.0, 300.0]), np.array([1.0, 1.0, 5.0]), 2)
-    assert heavy.tolist() == [False, False, True]
-    assert heaviest_cluster(np.array([100.0]), np.ones(1), 3).all()
+def test_one_cluster_takes_in_all():
+    assert majority([40.0, 100.0, 101.0, 99.0, 102.0, 400.0], [1.0] * 6, 1).all()
+    assert majority([40.0, 100.0, 101.0, 99.0, 102.0, 400.0], [1.0] * 6, 3).tolist() == [False, *[True] * 4, False]
 
 
 def test_outliers_are_set_aside_by_three_clusters_and_not_by_one():

@@ -8,11 +8,11 @@ from typing import Annotated, Self
 
 from fogsim.errors import InputError
 from fogsim.estimators.image_check import ObservationCheck
-from fogsim.estimators.signs.mixture import majority, reduced
 from fogsim.estimators.signs.operating_range import OperatingRange
 from fogsim.estimators.signs.regions import PoseDeviation
 from fogsim.estimators.signs.track import SignTrack
 from fogsim.estimators.signs.watch import SignWatch, Watched, sign_looks
+from fogsim.mixture import majority, reduced
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import extinction_from_visibility, visibility_from_extinction
 from fogsim.values.camera import Camera

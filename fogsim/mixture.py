@@ -1,4 +1,7 @@
-"""Many signs' visibilities as one: outliers set aside by clusters, the rest reduced to a normal distribution."""
+"""Many measured visibilities as one: outliers set aside by clusters, the rest reduced to a normal distribution.
+
+After belaroussi2015, sections 4.3 and 4.4.
+"""
 
 import math
 from collections.abc import Sequence
@@ -12,38 +15,40 @@ CLUSTERS = 3
 _ROUNDS = 50
 
 
-def majority(values: Sequence[float], weights: Sequence[float]) -> NDArray[np.bool_]:
-    """Which values are in the weightiest of three clusters, by weighted k-means on a line.
+def majority(values: Sequence[float], weights: Sequence[float], clusters: int = CLUSTERS) -> NDArray[np.bool_]:
+    """Which values are in the weightiest of some clusters, by weighted k-means on a line.
 
     Parameters
     ----------
     values : sequence of float
-        Visibilities of single signs.
+        Visibilities of single measurements.
     weights : sequence of float
         p(c) of each, more than 0.
+    clusters : int
+        How many; 1 takes in all.
 
     Returns
     -------
     (n,) bool
-        All of them, where there are fewer than four: there is no majority among three.
+        All of them, where there are no more than clusters: there is no majority among three.
     """
     x, w = np.asarray(values, dtype=np.float64), np.asarray(weights, dtype=np.float64)
-    if len(x) <= CLUSTERS:
+    if len(x) <= clusters:
         return np.ones(len(x), dtype=bool)
     order = np.argsort(x, kind="stable")
     share = (np.cumsum(w[order]) - 0.5 * w[order]) / w.sum()
-    middles = np.interp((np.arange(CLUSTERS) + 0.5) / CLUSTERS, share, x[order])
+    middles = np.interp((np.arange(clusters) + 0.5) / clusters, share, x[order])
     nearest = np.zeros(len(x), dtype=np.intp)
     for _ in range(_ROUNDS):
         nearest = np.argmin(np.abs(x[:, None] - middles), axis=1)
         moved = [
             np.average(x[nearest == i], weights=w[nearest == i]) if (nearest == i).any() else middles[i]
-            for i in range(CLUSTERS)
+            for i in range(clusters)
         ]
         if np.array_equal(moved, middles):
             break
         middles = np.array(moved)
-    return np.asarray(nearest == np.argmax([w[nearest == i].sum() for i in range(CLUSTERS)]))
+    return np.asarray(nearest == np.argmax([w[nearest == i].sum() for i in range(clusters)]))
 
 
 def reduced(values: Sequence[float], weights: Sequence[float]) -> tuple[float, float]:

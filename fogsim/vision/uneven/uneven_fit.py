@@ -51,6 +51,10 @@ UNLIKELY = 30.0
 BENT = 30.0
 """How much more evidence uneven fog needs on a road that bends, which strips may leave far away [-]."""
 
+HIDDEN_COURSE, MOSTLY = 20.0, 0.5
+"""How much more evidence uneven fog needs where a sag or crest that lines do not show explains most of what it does, and
+how much that is [-]: such a course is tried in pieces, and so fits less well than it would."""
+
 NEAREST = 12.0
 """Least reach of a curve of optical depths [m]."""
 
@@ -202,7 +206,10 @@ def _fitted(
     ]
     gain = min(evens) - min(t.cost for t in tried)
     if gain > -UNSURE:
-        fogs += hidden.even_fogs(curves, prior, even, likely, gain)
+        courses = hidden.even_fogs(curves, prior, even, likely, gain)
+        explained = min(evens) - min((one.cost for one in courses), default=math.inf)
+        doubt = HIDDEN_COURSE if explained > MOSTLY * gain else 0.0
+        fogs += [replace(one, cost=one.cost - doubt) for one in courses]
     return _weighed(even, fogs, tried, bins, geometry)
 
 

@@ -52,7 +52,7 @@ BENT = 30.0
 """How much more evidence uneven fog needs on a road that bends, which strips may leave far away [-]."""
 
 HIDDEN_COURSE, MOSTLY = 20.0, 0.5
-"""How much more evidence uneven fog needs where a sag or crest that lines do not show explains most of what it explains,
+"""How much more evidence uneven fog needs where a sag or crest that lines do not show explains most of what it does,
 and how much that is [-]: a course is tried in pieces, and so fits less well than it would."""
 
 NEAREST = 12.0

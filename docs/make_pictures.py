@@ -88,7 +88,7 @@ def main() -> None:
     overlay("120", 6).save(OUT / "estimate.jpg", quality=88)
     fault_sheet().save(OUT / "sensor_faults.jpg", quality=88)
     demo_frame(39.5).save(OUT / "denser_fog.jpg", quality=88)
-    demo_frame(91.0).save(OUT / "demo.jpg", quality=88)
+    demo_frame(98.0).save(OUT / "demo.jpg", quality=88)
 
 
 if __name__ == "__main__":

@@ -26,6 +26,7 @@ from fogsim.vision.lines.road_course import RoadCourse, road_course, unseen_cour
 from fogsim.vision.lines.road_lines import seen_lines, vanishing_point_of
 from fogsim.vision.strips.airlight_slopes import darkening_priors
 from fogsim.vision.strips.course_geometry import course_deviation, course_geometry
+from fogsim.vision.strips.droplet_memory import DropletMemory
 from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, is_ramp, no_road
 from fogsim.vision.strips.joint_fit import ALIKE, MODEL_DEVIATION, JointFit, Priors, fit_own, with_neighbours
 from fogsim.vision.strips.joint_prior import joint_prior
@@ -156,12 +157,14 @@ class JointRoad:
         self._geometry, self._shaded = self._straight, 0.0
         self._earlier: deque[tuple[StripCurves, Sky]] = deque(maxlen=int(frames) - 1)
         self._before: deque[tuple[float, float]] = deque()
+        self._droplets = DropletMemory()
 
     def reset(self) -> None:
         """Forget all earlier frames."""
         self._check.reset()
         self._earlier.clear()
         self._before.clear()
+        self._droplets = DropletMemory()
 
     def update(self, observation: Observation) -> Estimate:
         """Estimate the fog from one image, and the range of the lead vehicle if it is tracked.
@@ -205,10 +208,11 @@ class JointRoad:
         if not course.is_straight:
             self._geometry = course_geometry(self._straight, self._camera, course)
         prior = joint_prior(sky, self._camera, horizon)
-        priors = (prior,) if self._even_airlight else (prior, *darkening_priors(prior, sky))
+        priors = (prior,) if self._even_airlight else (prior, *darkening_priors(prior, sky, self._droplets.chances))
         fit = self._fitted(pixels, sky, priors, _free_road(observation.lead), course)
         if isinstance(fit, str):
             return Estimate.invalid(self.method, fit, **found)
+        self._droplets.learn(fit.fit.droplets, observation.time, observation.speed)
         unsure = course_deviation(fit.fit, self._geometry, self._camera, course, prior, sky.noise)
         front = fit.denser or airlight_edge(pixels, self._geometry, self._camera, sky, fit, prior.shift_deviation)
         changing = self._change(observation.time, fit.fit.extinction)

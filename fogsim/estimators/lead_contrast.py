@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.estimators.image_check import ObservationCheck
-from fogsim.estimators.lead_contrast_track import SPACING, ContrastTrack, RearDetection
+from fogsim.estimators.lead_contrast_track import DENSEST, SPACING, ContrastTrack, RearDetection
 from fogsim.estimators.tracked_vehicle import SmoothedRanges
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
@@ -17,6 +17,7 @@ from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
 from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation
 from fogsim.vision.region.road_image import CannotTellError
+from fogsim.vision.strips.airlight_slopes import USUAL_EXTINCTION
 from fogsim.vision.vehicle.airlight import RoadFall
 from fogsim.vision.vehicle.contrast_ratio import HALF_BODY, LARGE
 from fogsim.vision.vehicle.decay_fit import DecayFit, fit_decay
@@ -62,6 +63,9 @@ WORST = 0.4
 
 SURELY = 2.5
 """Standard deviations by which the contrast must grow with the range for it to be no vehicle's [-]."""
+
+LEAST_EXTINCTION = 0.003
+"""Least extinction with which the airlight before the vehicle is reckoned [1/m]."""
 
 CLEAR = OPTICAL_DEPTH_AT_VISIBILITY / 500.0
 """Extinction that an unsure estimate must surely be below to say "little fog" [1/m]."""
@@ -161,8 +165,10 @@ class LeadContrast:
         try:
             number = self._ranges.add(observation.time, lead)
             likely = float(self._ranges.smoothed([number], np.array([lead.distance]))[0])
-            crop = daytime_crop(image, self._camera, likely + self._setback, self._pitch_deviation)
             fit = self._fit()
+            about = USUAL_EXTINCTION if fit is None else min(max(fit.extinction, LEAST_EXTINCTION), DENSEST)
+            self._track.relevel(about)
+            crop = daytime_crop(image, self._camera, likely + self._setback, self._pitch_deviation, about)
             densest = math.inf if fit is None else max(fit.extinction + 2.0 * fit.deviation, 0.0)
             detection = self._track.look(
                 crop, number, lead.distance, observation.time, surprise=surprise, densest=densest

@@ -8,7 +8,7 @@ from fogsim.vision.region.road_image import CannotTellError
 from fogsim.vision.vehicle.contrast_ratio import ContrastRatio, RearPicture, contrast_ratio
 from fogsim.vision.vehicle.rear_localisation import RearBox
 from fogsim.vision.vehicle.registration import RoadBehind, register_rear
-from fogsim.vision.vehicle.vehicle_crop import VehicleCrop
+from fogsim.vision.vehicle.vehicle_crop import LevelledRows, VehicleCrop
 
 SPACING = 1.0
 """Change of range that makes a new picture worth keeping [m]; between, a picture only shows where the vehicle is."""
@@ -51,6 +51,9 @@ UNPLACED = 0.15
 GAP = 3.0
 """Time without the vehicle after which it is another one, where frames have a time [s]."""
 
+RELEVELLED = 0.15
+"""Change of ln k from which the airlight before known pictures is reckoned anew [-]."""
+
 DENSEST = 0.1
 """Densest fog that is thought of before a track says more [1/m]."""
 
@@ -79,6 +82,8 @@ class RearDetection:
         Relative deviation of the airlight before it, where that is not even [-].
     alike : bool
         Whether it looks like the reference, and is not only where that is expected.
+    levelled : LevelledRows or None
+        How its rows were taken relative to their own airlight; None where that is even.
     """
 
     number: int
@@ -91,6 +96,7 @@ class RearDetection:
     clipped: bool
     airlight_deviation: float
     alike: bool
+    levelled: LevelledRows | None
 
 
 class ContrastTrack(TrackedVehicle[RearDetection]):
@@ -174,6 +180,7 @@ class ContrastTrack(TrackedVehicle[RearDetection]):
             crop.sky.is_clipped,
             crop.sky.deviation,
             alike,
+            crop.levelled,
         )
         self._missed = 0
         self._aside = crop.lateral_offset(picture)
@@ -184,6 +191,20 @@ class ContrastTrack(TrackedVehicle[RearDetection]):
         if self.reference is None or detection.depth < NEARER * self.reference.depth:
             self._compare_all(detection)
         return detection
+
+    def relevel(self, extinction: float) -> None:
+        """Take all pictures relative to their own airlight anew, where that was reckoned with quite another extinction.
+
+        Parameters
+        ----------
+        extinction : float
+            What is known by now [1/m].
+        """
+        if self.reference is None or all(_is_near(one.levelled, extinction) for one in self.detections):
+            return
+        number = next(i for i, one in enumerate(self.detections) if self._is_reference(one))
+        self.detections = [_relevelled(one, extinction) for one in self.detections]
+        self._compare_all(self.detections[number])
 
     def _keep_new(self, detection: RearDetection) -> None:
         """Keep a detection from a new range; one from a known range tells whether fog has changed, or replaces it."""
@@ -248,6 +269,19 @@ class ContrastTrack(TrackedVehicle[RearDetection]):
                 self._compare_all(min(self.detections, key=lambda one: one.depth))
             else:
                 self._forget()
+
+
+def _is_near(levelled: LevelledRows | None, extinction: float) -> bool:
+    return levelled is None or abs(math.log(extinction / levelled.extinction)) < RELEVELLED
+
+
+def _relevelled(detection: RearDetection, extinction: float) -> RearDetection:
+    if detection.levelled is None:
+        return detection
+    change = detection.levelled.change(extinction)
+    contrast = 1.0 - (1.0 - detection.picture.contrast) * change[:, None]
+    levelled = replace(detection.levelled, extinction=extinction)
+    return replace(detection, picture=replace(detection.picture, contrast=contrast), levelled=levelled)
 
 
 def _likeness_if_fixed(crop: VehicleCrop, reference: RearDetection) -> float:

@@ -61,7 +61,14 @@ class Moment:
 
 
 def drive(
-    renderer: Renderer, camera: Camera, frames: int, *, lead: bool, rng: np.random.Generator, wear: float = WEAR
+    renderer: Renderer,
+    camera: Camera,
+    frames: int,
+    *,
+    lead: bool,
+    rng: np.random.Generator,
+    wear: float = WEAR,
+    period: float = PERIOD,
 ) -> Iterator[Moment]:
     """Drive along the road.
 
@@ -79,6 +86,8 @@ def drive(
         What decides on place, pitch, wear and the vehicle ahead.
     wear : float
         Change of the road's albedo along the way [-].
+    period : float
+        Between frames [s].
     """
     front, error = rng.uniform(START, END), rng.normal(0.0, PITCH_ERROR)
     gap, closing = rng.uniform(NEAREST, FARTHEST), rng.uniform(-1.0, 1.0)
@@ -89,9 +98,9 @@ def drive(
         )
         cars = [(front + gap, 0.0)] if lead else []
         view = renderer.render(vehicle_batches(standing_cars(cars), None), camera, pose)
-        measured = LeadMeasurement(gap + rng.normal(0.0, RANGE_ERROR), closing / PERIOD) if lead else None
+        measured = LeadMeasurement(gap + rng.normal(0.0, RANGE_ERROR), closing / period) if lead else None
         yield Moment(worn(view, camera, pose, knots), pose, measured)
-        front += SPEED * PERIOD
+        front += SPEED * period
         gap = max(gap + closing, 0.5 * NEAREST)
 
 

@@ -22,6 +22,12 @@ CAMERAS = {
 SETBACK = 1.7
 SIDE = 2
 RANGES = tuple(float(d) for d in range(25, 91, 5))
+EVEN = ((0.0,), (1.0,))
+DARK_LAND = {
+    30.0: ((-10, -5, -2, 0, 2, 5, 10, 30), (0.58, 0.71, 0.87, 1.0, 1.11, 1.22, 1.40, 2.00)),
+    400.0: ((-10, -5, -2, 0, 2, 5, 10, 30), (0.61, 0.69, 0.81, 1.0, 1.22, 1.39, 1.64, 2.36)),
+}
+"""Airlight over that at the horizon by elevation [deg], over land of albedo 0.1, by V_met [m] (docs/airlight.md)."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +57,8 @@ class Rear:
 
 
 @functools.lru_cache(maxsize=256)
-def paint(camera, rears, visibility, seed, airlight=200.0, pitch=0.0, beam=0.0):
-    """Image of a grainy road with kerbs, lit by a beam, rears on it, and fog; `SIDE`² samples a pixel."""
+def paint(camera, rears, visibility, seed, airlight=200.0, pitch=0.0, beam=0.0, light=EVEN):
+    """Image of a grainy road with kerbs, lit by a beam, rears on it, and fog whose airlight goes by elevation."""
     rng = np.random.default_rng(seed)
     at = (np.arange(SIDE) + 0.5) / SIDE - 0.5
     y, x = ((np.arange(n)[:, None] + at).ravel() for n in (camera.height, camera.width))
@@ -72,26 +78,27 @@ def paint(camera, rears, visibility, seed, airlight=200.0, pitch=0.0, beam=0.0):
     road *= np.where(right < 5.5, 0.3, 0.2)
     road[np.abs(right - 1.75) < 0.08] = 0.7
     road *= 1.0 + beam * (6.0 / np.maximum(ground, 2.0)) ** 2
-    fine = (road - 1.0) * left + 1.0
+    share = np.interp(-np.degrees(np.arctan(slope)), *light)
+    fine = (road - share) * left + share
     for rear in sorted(rears, key=lambda r: -r.depth):
         height = camera.mount_height - rear.depth * slope
         across = x * rear.depth - rear.aside
         hit = (np.abs(across) < 0.5 * rear.width) & (height > 0) & (height < rear.height)
-        across, height = (np.broadcast_to(one, hit.shape)[hit] for one in (across, height))
-        fine[hit] = (rear.shade(across, height) - 1.0) * np.exp(-LN20 / visibility * rear.depth) + 1.0
+        across, height, before = (np.broadcast_to(one, hit.shape)[hit] for one in (across, height, share))
+        fine[hit] = (rear.shade(across, height) - before) * np.exp(-LN20 / visibility * rear.depth) + before
     parts = [fine[i::SIDE, j::SIDE] for i in range(SIDE) for j in range(SIDE)]
     linear = airlight / 255.0 * sum(parts) / len(parts)
     signal = 255.0 * respond(np.clip(linear, 0.0, 1.0), camera.response)
     return np.clip(np.rint(signal + rng.normal(0.0, 1.2, signal.shape)), 0, 255).astype(np.uint8)
 
 
-def drive(visibility, rears, seed=0, camera=CAMERA, noise=0.25, bias=0.0, gains=None, told=None, beam=0.0):
+def drive(visibility, rears, seed=0, camera=CAMERA, noise=0.25, bias=0.0, gains=None, told=None, beam=0.0, light=EVEN):
     """Observations of the first of each frame's rears, once a second."""
     rng = np.random.default_rng(seed)
     depths = told or [frame[0].depth for frame in rears]
     for i, (frame, depth) in enumerate(zip(rears, depths, strict=True)):
         gain = 200.0 * (gains[i] if gains else 1.0)
-        image = paint(camera, frame, visibility, 1000 * seed + i, gain, rng.normal(0.0, np.radians(0.1)), beam=beam)
+        image = paint(camera, frame, visibility, 1000 * seed + i, gain, rng.normal(0.0, np.radians(0.1)), beam, light)
         speed = depths[min(i + 1, len(depths) - 1)] - depths[max(i - 1, 0)]
         speed /= min(i + 1, len(depths) - 1) - max(i - 1, 0)
         lead = LeadMeasurement(depth - SETBACK + bias + rng.normal(0.0, noise), speed)
@@ -128,6 +135,21 @@ def test_intervals_hold_the_truth_and_are_not_idle():
     inside = [abs(off(e, v)) * LN20 / v < 1.645 * e.standard_deviation for v, e in found]
     assert sum(inside) >= 6
     assert all(e.standard_deviation < 0.08 * LN20 / v for v, e in found)
+
+
+@pytest.mark.parametrize("visibility", sorted(DARK_LAND))
+def test_airlight_that_darkens_toward_the_road_is_reckoned_with_the_extinction_that_is_found(visibility):
+    ranges = np.linspace(12.0, min(0.9 * visibility, 160.0), 20).tolist()
+    # Exposed so that the sky is not clipped.
+    look, errors, even = {"gains": [0.55] * len(ranges), "noise": 0.1}, [], []
+    for seed in range(2):
+        rears = away(ranges, look=seed)
+        found = every(drive(visibility, rears, seed, light=DARK_LAND[visibility], **look))[-1]
+        errors.append(100 * off(found, visibility))
+        even.append(every(drive(visibility, rears, seed, **look))[-1].standard_deviation)
+        assert abs(off(found, visibility)) * LN20 / visibility < 2.0 * found.standard_deviation
+        assert found.standard_deviation > 1.5 * even[-1]
+    assert abs(np.median(errors)) < 15
 
 
 @pytest.mark.parametrize("name", sorted(CAMERAS))

@@ -28,8 +28,8 @@ EVEN_AIRLIGHT = "joint_road, even airlight"
 ROAD_METHODS = (*PUBLISHED, EVEN_AIRLIGHT, "joint_road")
 CHASE_METHODS = ("lead_contrast",)
 
-FRAMES = 3
-"""Of a drive; the last one's estimate counts."""
+FRAMES, PERIOD = 10, 1.0
+"""Frames of a drive alone, of which the last one's estimate counts, and the time between [s]."""
 
 EXPOSED, BRIGHTEST = 0.65, 95.0
 """Share of saturation at which the camera holds a percentile of the picture's luminance, as FogSim's does."""
@@ -166,9 +166,12 @@ def drive_alone(
         Fog, method, and what that reads at the end.
     """
     rng = np.random.default_rng([21, number])
-    moments = list(drive(renderer, camera, FRAMES, lead=False, rng=rng))
+    moments = list(drive(renderer, camera, FRAMES, lead=False, rng=rng, period=PERIOD))
     for case in cases:
-        frames = [Observation(_image(one.view, one.pose, camera, case, rng), SPEED) for one in moments]
+        frames = [
+            Observation(Frame(PERIOD * number, _image(one.view, one.pose, camera, case, rng), camera), SPEED)
+            for number, one in enumerate(moments)
+        ]
         for method in ROAD_METHODS:
             estimator = (
                 make("joint_road", camera, even_airlight=True) if method == EVEN_AIRLIGHT else make(method, camera)

@@ -6,6 +6,7 @@ the eye in a shape that is known. The sky's brightening upward in the same pictu
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -79,7 +80,9 @@ def slope_table() -> SlopeTable:
         return SlopeTable(*(found[name].astype(np.float64) for name in ("depth", "angle", "below", "above")))
 
 
-def darkening_priors(prior: JointPrior, sky: Sky) -> tuple[JointPrior, ...]:
+def darkening_priors(
+    prior: JointPrior, sky: Sky, chances: tuple[float, ...] = DROPLET_CHANCES
+) -> tuple[JointPrior, ...]:
     """What sky and horizon say about airlight that is not even, by droplets; nothing under a sky that is even.
 
     Parameters
@@ -88,6 +91,8 @@ def darkening_priors(prior: JointPrior, sky: Sky) -> tuple[JointPrior, ...]:
         What they say about even airlight.
     sky : Sky
         The sky above the horizon.
+    chances : tuple of float
+        How likely each kind of droplets is [-].
     """
     if not _brightens(sky):
         return ()
@@ -101,7 +106,8 @@ def darkening_priors(prior: JointPrior, sky: Sky) -> tuple[JointPrior, ...]:
     )
     lines = [_lines(droplets, *sky.heights) for droplets in range(len(slope_table().below))]
     return tuple(
-        uneven._replace(droplets=droplets, rise=rise, level=level) for droplets, (rise, level) in enumerate(lines)
+        uneven._replace(droplets=droplets, rise=rise, level=level, cost=prior.cost - 2.0 * math.log(chances[droplets]))
+        for droplets, (rise, level) in enumerate(lines)
     )
 
 
@@ -161,8 +167,7 @@ def slope_cost(prior: JointPrior) -> float:
     if prior.rise.size == 0:
         return 0.0
     scale = ANY_SLOPE * prior.airlight
-    cost = 2.0 * math.log(prior.slope_deviation / scale) - (prior.slope / scale) ** 2
-    return cost - 2.0 * math.log(DROPLET_CHANCES[prior.droplets])
+    return 2.0 * math.log(prior.slope_deviation / scale) - (prior.slope / scale) ** 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,7 +189,7 @@ class RowAirlight:
     deviation: Floats
 
 
-def row_airlight(sky: Sky, camera: Camera) -> RowAirlight | None:
+def row_airlight(sky: Sky, camera: Camera, extinction: float = USUAL_EXTINCTION) -> RowAirlight | None:
     """Airlight by rows, as the sky's brightening upward tells it; None where it is not seen whether that brightens.
 
     Over snow it hardly does, and yet a contrast that fog leaves 5 % of changes by a fifth.
@@ -195,25 +200,31 @@ def row_airlight(sky: Sky, camera: Camera) -> RowAirlight | None:
         The sky above the horizon.
     camera : Camera
         The assumed calibration; its roll is taken as undone.
+    extinction : float
+        About that of the fog [1/m].
     """
     if sky.is_clipped or sky.slope <= SURELY * sky.slope_deviation:
         return None
-    table = slope_table()
-    level = int(np.searchsorted(table.depth, USUAL_EXTINCTION * camera.mount_height))
-    chances = np.array(DROPLET_CHANCES)
-    lines = [_lines(droplets, *sky.heights) for droplets in range(len(chances))]
-    relative = sky.slope / sky.luminance
-    darker = [darkness_of_slope(relative, rise[level], above[level]) for rise, above in lines]
+    table, chances = slope_table(), np.array(DROPLET_CHANCES)
+    between = _between_depths(extinction * camera.mount_height)
+    lines = [[between(part) for part in _lines(droplets, *sky.heights)] for droplets in range(len(chances))]
+    slope = sky.slope / sky.luminance
+    darker = np.array([darkness_of_slope(slope, float(rise), float(above)) for rise, above in lines])
     angle = np.arctan((camera.horizon_row - np.arange(camera.height)) / camera.focal_length)
     at = np.abs(angle)
-    shapes = [
-        m * np.where(angle < 0.0, -np.interp(at, table.angle, below[level]), np.interp(at, table.angle, above[level]))
-        for m, below, above in zip(darker, table.below, table.above, strict=True)
+    shapes = darker[:, None] * [
+        np.where(angle < 0.0, -np.interp(at, table.angle, between(below)), np.interp(at, table.angle, between(above)))
+        for below, above in zip(table.below, table.above, strict=True)
     ]
-    mean = (chances[:, None] * shapes).sum(axis=0)
-    spread = np.sqrt((chances[:, None] * (shapes - mean) ** 2).sum(axis=0))
-    higher = sum(
-        chance * m * above[level] for chance, m, (_, above) in zip(DROPLET_CHANCES, darker, lines, strict=True)
-    )
+    mean = chances @ shapes
+    spread = np.sqrt(chances @ (shapes - mean) ** 2)
+    higher = chances @ (darker * [above for _, above in lines])
     unsure = math.hypot(OTHER_LIGHT, sky.slope_deviation / sky.slope)
     return RowAirlight(sky.luminance / (1.0 + float(higher)), 1.0 + mean, np.hypot(spread, unsure * mean))
+
+
+def _between_depths(depth: float) -> Callable[[Floats], Floats]:
+    """How rows of the table by optical heights of the eye are read at another one."""
+    at = float(np.interp(math.log(depth), np.log(slope_table().depth), np.arange(slope_table().depth.size)))
+    low = min(int(at), slope_table().depth.size - 2)
+    return lambda rows: np.asarray(rows[low] + (at - low) * (rows[low + 1] - rows[low]), np.float64)

@@ -102,6 +102,9 @@ class JointFit:
         Bins of the first strip that lie behind an obstacle which stands on it.
     darkening_chance : float
         How likely the airlight darkens toward the road [-].
+    droplets : tuple of float
+        Logarithm of how likely this picture is with each kind of droplets, if it darkens, over the likeliest [-]; none
+        where it was not tried.
     """
 
     extinction: float
@@ -113,6 +116,7 @@ class JointFit:
     used: NDArray[np.bool_]
     hidden: NDArray[np.bool_]
     darkening_chance: float = 0.0
+    droplets: tuple[float, ...] = ()
 
 
 Priors = tuple[JointPrior, ...]
@@ -120,11 +124,16 @@ Priors = tuple[JointPrior, ...]
 
 @dataclass(frozen=True, slots=True)
 class _Answer:
-    """A solution, its cost with what is likely beforehand, and whether its airlight is even."""
+    """A solution, its cost with what is likely beforehand, and under which prior."""
 
     cost: float
     solution: Solution
-    is_even: bool
+    prior: JointPrior
+
+    @property
+    def is_even(self) -> bool:
+        """Whether its airlight is."""
+        return self.prior.rise.size == 0
 
 
 def fit_jointly(
@@ -163,11 +172,9 @@ def _answers(curves: StripCurves, geometry: StripGeometry, prior: JointPrior, ne
     best = _from_search(bins, prior) if near is None else _from_near(bins, near, prior)
     tried = ALBEDOS if best.misfit > EXPLAINED else ALBEDOS[:SMOOTH]
     found = [best] + [_refined(bins, albedo, prior, best.theta, MORE_STEPS) for albedo in tried[1:]]
-    cost, is_even = slope_cost(prior) + prior.cost, prior.rise.size == 0
+    cost = slope_cost(prior) + prior.cost
     chances = ALBEDO_CHANCES[: len(found)]
-    return [
-        _Answer(f.cost + cost - 2.0 * math.log(chance), f, is_even) for f, chance in zip(found, chances, strict=True)
-    ]
+    return [_Answer(f.cost + cost - 2.0 * math.log(chance), f, prior) for f, chance in zip(found, chances, strict=True)]
 
 
 def strip_bins(curves: StripCurves, geometry: StripGeometry, prior: JointPrior) -> Bins:
@@ -310,7 +317,18 @@ def _average(answers: list[_Answer]) -> JointFit:
         used=best.used == albedo_filter.USED,
         hidden=best.used[0] == albedo_filter.HIDDEN,
         darkening_chance=float(weight[[not answer.is_even for answer in answers]].sum()),
+        droplets=_droplets(answers),
     )
+
+
+def _droplets(answers: list[_Answer]) -> tuple[float, ...]:
+    """Log likelihoods of the kinds of droplets, over the likeliest."""
+    uneven = [one for one in answers if not one.is_even]
+    found = []
+    for kind in sorted({one.prior.droplets for one in uneven}):
+        costs = [one.cost - one.prior.cost for one in uneven if one.prior.droplets == kind]
+        found.append(float(np.logaddexp.reduce([-0.5 * cost for cost in costs])))
+    return tuple(one - max(found) for one in found)
 
 
 def fit_agreeing(curves: StripCurves, geometry: StripGeometry, priors: Priors) -> JointFit | None:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -15,7 +15,7 @@ from fogsim.vision.light.luminance import linear_pixels, linear_table
 from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels
 from fogsim.vision.lines.horizon import levelled
 from fogsim.vision.region.road_image import CannotTellError
-from fogsim.vision.strips.airlight_slopes import RowAirlight, row_airlight
+from fogsim.vision.strips.airlight_slopes import USUAL_EXTINCTION, RowAirlight, row_airlight
 from fogsim.vision.strips.sky import Sky, sky_above
 from fogsim.vision.vehicle.airlight import RoadFall, airlight_beside, check_road, hidden_beside, road_before, road_fall
 from fogsim.vision.vehicle.contrast_ratio import RearPicture
@@ -64,6 +64,43 @@ class SkyReading(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
+class LevelledRows:
+    """Rows that were taken relative to their own airlight, as it is with some extinction.
+
+    Attributes
+    ----------
+    sky : Sky
+        The sky that brightens upward.
+    camera : Camera
+        The assumed calibration.
+    rows, above : slice
+        Rows of the image that were cut out, and those above the horizon where the airlight is read.
+    extinction : float
+        With which their airlight was reckoned [1/m].
+    """
+
+    sky: Sky
+    camera: Camera
+    rows: slice
+    above: slice
+    extinction: float
+
+    def change(self, extinction: float) -> NDArray[np.float64]:
+        """By which factor luminance over the airlight is another with another extinction, (rows,) float64 [-].
+
+        Parameters
+        ----------
+        extinction : float
+            The other one [1/m].
+        """
+        was, now = (row_airlight(self.sky, self.camera, k) for k in (self.extinction, extinction))
+        if was is None or now is None:
+            return np.ones(self.rows.stop - self.rows.start)
+        change = was.share / now.share
+        return np.asarray(change[self.rows] / change[self.above].mean(), np.float64)
+
+
+@dataclass(frozen=True, slots=True)
 class VehicleCrop:
     """Where in an image the vehicle ahead is looked for.
 
@@ -83,6 +120,8 @@ class VehicleCrop:
         Deviation of its single pixels [linear grey levels].
     road : RoadFall
         How the contrast of the nearest road falls.
+    levelled : LevelledRows or None
+        How rows were taken relative to their own airlight; None where that is even.
     """
 
     camera: Camera
@@ -92,6 +131,7 @@ class VehicleCrop:
     sky: SkyReading
     noise: float
     road: RoadFall
+    levelled: LevelledRows | None = None
 
     @property
     def scale(self) -> float:
@@ -228,7 +268,9 @@ def vehicle_crop(
     )
 
 
-def daytime_crop(image: Pixels, camera: Camera, depth: float, pitch_deviation: float) -> VehicleCrop:
+def daytime_crop(
+    image: Pixels, camera: Camera, depth: float, pitch_deviation: float, extinction: float = USUAL_EXTINCTION
+) -> VehicleCrop:
     """Cut out of a frame where a vehicle can be, before an even sky or one that brightens upward.
 
     In the latter case the airlight before the vehicle darkens downward, and each row is taken relative to its own.
@@ -243,6 +285,8 @@ def daytime_crop(image: Pixels, camera: Camera, depth: float, pitch_deviation: f
         From the camera to the vehicle's rear [m].
     pitch_deviation : float
         Standard deviation of the true pitch about the assumed one [rad].
+    extinction : float
+        About that of the fog, by which the airlight darkens downward [1/m].
 
     Raises
     ------
@@ -256,9 +300,9 @@ def daytime_crop(image: Pixels, camera: Camera, depth: float, pitch_deviation: f
     pixels = linear_pixels(levelled(image, camera), camera)
     margin = 3.0 * pitch_deviation * camera.focal_length + 2.0
     sky = sky_above(pixels, camera, margin)
-    airlight = None if sky is None else row_airlight(sky, camera)
+    airlight = None if sky is None else row_airlight(sky, camera, extinction)
     luminance = partial(_luminance, pixels) if airlight is None else partial(_levelled_out, pixels, airlight)
-    return vehicle_crop(
+    crop = vehicle_crop(
         camera,
         depth,
         luminance,
@@ -266,6 +310,11 @@ def daytime_crop(image: Pixels, camera: Camera, depth: float, pitch_deviation: f
         least_noise=0.3 * 255.0 / 2**camera.bits,
         share=None if airlight is None else airlight.share,
     )
+    if sky is None or airlight is None:
+        return crop
+    first, count = crop.origin[1], crop.luminance.shape[0]
+    rows = slice(first, first + count)
+    return replace(crop, levelled=LevelledRows(sky, camera, rows, _rows_above(camera, margin), extinction))
 
 
 def _luminance(pixels: LinearPixels, rows: slice, cols: slice) -> NDArray[np.float32]:
@@ -295,6 +344,12 @@ class _DaytimeFrame(NamedTuple):
     luminance_of: Callable[[slice, slice], Luminance]
 
 
+def _rows_above(camera: Camera, margin: float) -> slice:
+    """Rows in which the airlight is read."""
+    bottom = min(max(math.floor(camera.horizon_row - margin), 1), camera.height)
+    return slice(max(bottom - max(math.ceil(SKY_HEIGHT * camera.focal_length), 4), 0), bottom)
+
+
 def _daylight(day: _DaytimeFrame, depth: float) -> SkyReading:
     """Sky by day, or the reason why this is none."""
     pixels, camera, margin, sky = day.pixels, day.camera, day.margin, day.sky
@@ -302,8 +357,7 @@ def _daylight(day: _DaytimeFrame, depth: float) -> SkyReading:
         raise CannotTellError("too dark above the horizon, or no sky: this is a daytime method")
     if sky.saturated > 0.9:
         raise CannotTellError("the sky is saturated")
-    bottom = min(max(math.floor(camera.horizon_row - margin), 1), camera.height)
-    rows = slice(max(bottom - max(math.ceil(SKY_HEIGHT * camera.focal_length), 4), 0), bottom)
+    rows = _rows_above(camera, margin)
     light = day.luminance_of(rows, slice(camera.width // 6, camera.width - camera.width // 6))
     level = sky.luminance if day.airlight is None else day.airlight.level
     core = np.abs(light - level) <= SKY_CORE * level + 4.0 * sky.noise

@@ -102,6 +102,16 @@ def test_strips_over_dark_land_come_back_and_even_airlight_reads_them_too_long(v
     assert {fit.darkening_chance for fit in evens} == {0.0}
 
 
+@pytest.mark.parametrize("kind", [0, 2])
+def test_strips_tell_droplets_apart_over_many_pictures(kind):
+    k = 0.03
+    priors = (PRIOR, *darkening_priors(PRIOR, sky(k, 0.1, droplets=KINDS[kind])))
+    told = [fit_jointly(strips(k, 0.1, seed, KINDS[kind]), GEOMETRY, priors).droplets for seed in range(8)]
+    assert all(len(one) == 3 and max(one) == 0.0 for one in told)
+    assert np.argmax(np.median(told, axis=0)) == kind
+    assert fit_jointly(strips(k, 0.1), GEOMETRY, (PRIOR,)).droplets == ()
+
+
 def test_even_airlight_under_a_sky_that_brightens_is_told_by_the_road():
     """As an overcast sky does above thin fog: the road fades as Koschmieder's law has it."""
     bright = sky(0.01, 0.1)
@@ -134,6 +144,14 @@ def test_rows_have_the_airlight_of_the_layer_within_its_deviation(albedo):
     assert np.abs(found.share[rows] - shares(angle, k, albedo)).max() < 0.06
     assert (np.abs(found.share[rows] - shares(angle, k, albedo)) < 2.5 * found.deviation[rows] + 0.01).all()
     assert (np.diff(found.share) <= 1e-12).all()
+
+
+@pytest.mark.parametrize("k", [0.01, 0.06, 0.5])
+def test_rows_are_closer_with_the_extinction_that_is_known(k):
+    angle = np.arctan((CAMERA.horizon_row - np.arange(CAMERA.height)) / CAMERA.focal_length)
+    truth = shares(angle, k, 0.05)
+    usual, known = (row_airlight(sky(k, 0.05), CAMERA, one).share for one in (0.03, k))
+    assert np.abs(known - truth).max() < 0.8 * np.abs(usual - truth).max()
 
 
 def test_derivative_by_row_is_that_of_the_table():

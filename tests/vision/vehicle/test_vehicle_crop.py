@@ -73,3 +73,17 @@ def test_noise_grows_with_the_slope_of_the_response(light, expected):
     gamma = Camera(640, 480, 600.0, (319.5, 239.5), 1.4, 0.03, response=Response.GAMMA)
     # Light goes as the 2.2th power of the value, and its slope as the 1.2th.
     assert noise_gain(luminance, 180.0, gamma) == pytest.approx(expected, rel=0.02)
+
+
+def test_rows_levelled_with_one_extinction_become_those_with_another():
+    """Over a sky that brightens upward; a picture's contrast to its airlight is the same either way."""
+    rows = np.arange(CAMERA.height, dtype=float)[:, None]
+    above = np.maximum(CAMERA.horizon_row - rows, 0.0) / CAMERA.focal_length
+    light = np.where(rows < CAMERA.horizon_row + 1, 120.0 * (1.0 + 2.0 * above), 60.0)
+    image = np.rint(light + np.random.default_rng(0).normal(0.0, 1.0, (CAMERA.height, CAMERA.width))).astype(np.uint8)
+    thin, dense = (daytime_crop(image, CAMERA, 30.0, 0.002, extinction) for extinction in (0.01, 0.1))
+    change = thin.levelled.change(0.1)
+    assert np.abs(change - 1.0).max() > 0.01
+    told = thin.luminance / thin.sky.luminance * change[:, None]
+    assert told == pytest.approx(dense.luminance / dense.sky.luminance, rel=0.01)
+    assert thin.levelled.change(0.01) == pytest.approx(np.ones(change.size))

@@ -35,6 +35,7 @@ from fogsim.values import Estimate
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "airlight.md"
 ALBEDOS = (0.05, 0.1, 0.2, 0.4, 0.8)
+ALL_ALBEDOS = f"{ALBEDOS[0]:g} … {ALBEDOS[-1]:g}"
 VISIBILITIES = (50.0, 100.0, 150.0, 200.0, 300.0)
 HEIGHTS = (1.3, 2.5)
 METHODS = (EVEN_AIRLIGHT, "joint_road", *CHASE_METHODS)
@@ -71,14 +72,18 @@ def measure(pool: int, drives: int, droplets: tuple[str, ...]) -> Found:
 
 def records(found: Found) -> list[dict[str, Any]]:
     """A record for each method, fog and albedo, over all visibilities."""
-    groups: dict[tuple[str, str, float | None], list[tuple[Estimate, float]]] = {}
+    groups: dict[tuple[str, str, str | None], list[tuple[Estimate, float]]] = {}
     for (case, method), estimates in found.items():
         fog = "koschmieder" if case.albedo is None else f"photons, {case.droplets.replace('_', ' ')}"
-        groups.setdefault((method, fog, case.albedo), []).extend((one, case.visibility) for one in estimates)
-    return [record(*key, told) for key, told in groups.items()]
+        told = [(one, case.visibility) for one in estimates]
+        groups.setdefault((method, fog, None if case.albedo is None else f"{case.albedo:g}"), []).extend(told)
+        if case.albedo is not None:
+            groups.setdefault((method, fog, ALL_ALBEDOS), []).extend(told)
+    # Over all albedos after each by itself.
+    return [record(*key, groups[key]) for key in sorted(groups, key=lambda key: key[2] == ALL_ALBEDOS)]
 
 
-def record(method: str, fog: str, albedo: float | None, estimates: list[tuple[Estimate, float]]) -> dict[str, Any]:
+def record(method: str, fog: str, albedo: str | None, estimates: list[tuple[Estimate, float]]) -> dict[str, Any]:
     """Errors and intervals of a group."""
     told = [(one, truth) for one, truth in estimates if one.valid and one.extinction > 0.0]
     off = 100.0 * np.array([one.visibility / truth - 1.0 for one, truth in told])
@@ -98,13 +103,13 @@ def record(method: str, fog: str, albedo: float | None, estimates: list[tuple[Es
 
 def write_docs(rows: list[dict[str, Any]]) -> None:
     """Put the table into the page."""
-    fogs = list(dict.fromkeys((row["fog"], row["ground_albedo"]) for row in rows))
+    fogs = sorted(dict.fromkeys((row["fog"], row["ground_albedo"]) for row in rows), key=lambda fog: fog[0])
     table = []
     for fog, albedo in fogs:
         told = {row["method"]: row for row in rows if (row["fog"], row["ground_albedo"]) == (fog, albedo)}
         cells = [told[method] for method in METHODS]
         texts = (f"{c['median_pct']}/{c['p95_pct']} ({c['held']}; {c['told']})" if c["told"] else "—" for c in cells)
-        table.append((fog, "" if albedo is None else f"{albedo:g}", *texts))
+        table.append((fog, albedo or "", *texts))
     text = filled(PAGE.read_text(encoding="utf-8"), "mended", ("fog", "albedo", *METHODS), table)
     PAGE.write_text(text, encoding="utf-8")
 

@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import ks_2samp, norm
 
-from fogsim.loop import AdvisedDriving, ClosedLoop
+from fogsim.advised_driving import AdvisedDriving
+from fogsim.loop import ClosedLoop
 from fogsim.units import visibility_from_extinction
 from fogsim.values import Command, Estimate
 from fogsim_envs.task.sampling import EpisodeChoice, EpisodeSource

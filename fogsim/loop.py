@@ -1,46 +1,41 @@
 """The closed loop: traffic → scene → render → atmosphere → camera → estimators → fusion → advice → traffic."""
 
 import dataclasses
-import math
 import warnings
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator
 from pathlib import Path
 from types import TracebackType
 from typing import Protocol, Self
 
-from fogsim.advice import Adviser, VehicleAdviser
+from fogsim.advised_driving import AdvisedDriving
 from fogsim.atmosphere import FogNow
 from fogsim.ego.equipment import EgoEquipment
 from fogsim.ego.view_rendering import Surrounding
 from fogsim.errors import SimulationError, UnplayedWarning
-from fogsim.lighting import LightingPolicy, VehicleLightingPolicy
+from fogsim.fleet import EquippedFleet, camera_messages
 from fogsim.randomness import spawn_streams
-from fogsim.road_advice import RoadAdvice, stretch_advices
 from fogsim.scenario import Scenario, build
-from fogsim.scenario.drivers import stretch_advice
-from fogsim.scenario.road_sections import DISPLAYS
-from fogsim.scenario.schema import InformedMethod
 from fogsim.timeline import Timeline
 from fogsim.traffic import AnyTraffic, FogAccess, Traffic, libsumo_traffic
 from fogsim.values import (
     Begun,
-    Belief,
     Command,
     Ending,
     FogField,
-    LampChoice,
-    RoadSection,
-    SpeedAdvice,
     Step,
     TrafficSnapshot,
     TrafficStep,
 )
-from fogsim.values.belief import certain_belief
-from fogsim.values.result_checks import checked_advice, checked_command, checked_lamp_choice, checked_lamps
+from fogsim.values.result_checks import checked_command
 
 
 def run(
-    scenario: Scenario, seed: int = 0, traffic: Traffic | None = None, *, sumo_outputs: Path | None = None
+    scenario: Scenario,
+    seed: int = 0,
+    traffic: Traffic | None = None,
+    *,
+    sumo_outputs: Path | None = None,
+    camera_processes: int = 0,
 ) -> Generator[Step, None, None]:
     """Run a scenario with its own advice and lighting policy.
 
@@ -55,6 +50,9 @@ def run(
     sumo_outputs : Path or None
         Folder of the files that SUMO in this process writes where its files or options ask for outputs; None to keep
         none of them. Those of an earlier run with the same names are replaced.
+    camera_processes : int
+        Processes that draw for equipped vehicles other than the ego (``traffic.equipped``); 0 for this one. The steps
+        are the same with any number.
 
     Yields
     ------
@@ -75,7 +73,7 @@ def run(
         either; `Step.unplayed` of the last step has all that was not played.
     """
     policy = AdvisedDriving(scenario)
-    with ClosedLoop(scenario, traffic, sumo_outputs) as loop:
+    with ClosedLoop(scenario, traffic, sumo_outputs, camera_processes) as loop:
         step = loop.start(seed)
         yield step
         while step.ending is None:
@@ -103,101 +101,6 @@ def warn_of_unplayed(scenario: Scenario, last: TrafficStep) -> None:
     came_to_end = last.ending in (Ending.ARRIVED, Ending.LEFT_NETWORK, Ending.NOBODY_LEFT)
     if last.unplayed and (came_to_end or last.unplayed.is_final):
         warnings.warn(f"{scenario.name}: not played: {last.unplayed}", UnplayedWarning, stacklevel=3)
-
-
-class AdvisedDriving:
-    """The scenario's own policy: its adviser and its lighting rules, asked once a decision period.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
-
-    def __init__(self, scenario: Scenario) -> None:
-        self._scenario = scenario
-        self._ask_adviser = _questions_to(build.adviser(scenario))
-        self._ask_lighting = _lighting_questions(build.lighting_policy(scenario), scenario.lighting.method)
-        self._frames = build.periods(scenario).decision_frames
-        self._road = RoadAdvice(scenario) if scenario.drivers.advised in DISPLAYS else None
-
-    def decide(self, step: Step, previous: Command | None = None) -> Command:
-        """Command for the next camera period; the one before between decisions.
-
-        Parameters
-        ----------
-        step : Step
-            What was finished last.
-        previous : Command or None
-            What this policy has asked for before; None for what was in force.
-        """
-        previous = step.command if previous is None else previous
-        if step.index % self._frames:
-            return previous
-        lit = known_fog(step, self._scenario.lighting)
-        chosen = self._ask_lighting(step, lit, LampChoice(previous.lamps, previous.lamp_wish))
-        if self._road is not None:
-            advice, stretches = self._road.advise(step)
-            return Command(advice=advice, lamps=chosen.lamps, lamp_wish=chosen.wish, stretches=stretches)
-        known = known_fog(step, self._scenario.advice)
-        advice = checked_advice(self._scenario.advice.method, self._ask_adviser(step, known, previous.advice))
-        return spread_advice(Command(advice=advice, lamps=chosen.lamps, lamp_wish=chosen.wish), self._scenario)
-
-
-def _questions_to(adviser: Adviser | VehicleAdviser) -> Callable[[Step, Belief, SpeedAdvice], SpeedAdvice]:
-    """A function that asks an adviser what it says after a step, by what is known of the fog, after what it said."""
-    if isinstance(adviser, VehicleAdviser):
-        return lambda step, known, previous: adviser.advise_vehicle(
-            known, step.observation, step.speed_limit, step.time, previous
-        )
-    return lambda step, known, previous: adviser.advise(known, step.speed_limit, step.time, previous)
-
-
-def _lighting_questions(
-    policy: LightingPolicy | VehicleLightingPolicy, name: str
-) -> Callable[[Step, Belief, LampChoice], LampChoice]:
-    """A function that asks a lighting policy likewise."""
-    if isinstance(policy, VehicleLightingPolicy):
-        return lambda step, known, previous: checked_lamp_choice(
-            name, policy.choose_lamps(known, step.observation, step.time, previous)
-        )
-    return lambda _, known, previous: LampChoice(checked_lamps(name, policy.lamps(known, previous.lamps)))
-
-
-def known_fog(step: Step, method: InformedMethod) -> Belief:
-    """What a method goes by: what the ego believes, or the truth, as a visibility meter at the road has it.
-
-    Parameters
-    ----------
-    step : Step
-        What was finished last.
-    method : InformedMethod
-        The method of the scenario.
-    """
-    return step.belief if method.informed_by == "belief" else certain_belief(step.truth.extinction_ahead)
-
-
-def spread_advice(command: Command, scenario: Scenario, sections: Sequence[RoadSection] = ()) -> Command:
-    """Let others hear the ego's advice too, if the scenario says so.
-
-    Parameters
-    ----------
-    command : Command
-        With the ego's advice.
-    scenario : Scenario
-        Its ``drivers.advised`` says whom the advice goes to.
-    sections : sequence of RoadSection
-        Sections of the route that are advised each by itself, as `Truth.sections` has them: all are told the same.
-    """
-    if scenario.drivers.advised == "ego" or not math.isfinite(command.advice.speed):
-        return command
-    if scenario.drivers.advised == "all":
-        return dataclasses.replace(command, advice_reach=scenario.traffic.reading_radius_m)
-    if scenario.drivers.advised in DISPLAYS:
-        stretches, speeds = [section.stretch for section in sections], [command.advice.speed] * len(sections)
-        told = stretch_advices(stretches, speeds, DISPLAYS[scenario.drivers.advised])
-        return dataclasses.replace(command, stretches=told)
-    return dataclasses.replace(command, stretches=(stretch_advice(scenario, command.advice.speed),))
 
 
 class EntersFog(Protocol):
@@ -309,6 +212,8 @@ class ClosedLoop:
         The traffic simulation; None for SUMO in this process, as the scenario describes it.
     sumo_outputs : Path or None
         As of `run`.
+    camera_processes : int
+        As of `run`.
 
     Raises
     ------
@@ -316,13 +221,20 @@ class ClosedLoop:
         If the scenario has no ego; see `run_traffic`.
     """
 
-    def __init__(self, scenario: Scenario, traffic: Traffic | None = None, sumo_outputs: Path | None = None) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        traffic: Traffic | None = None,
+        sumo_outputs: Path | None = None,
+        camera_processes: int = 0,
+    ) -> None:
         build.check_ego(scenario, "the closed loop")
         self._scenario = scenario
         self._periods = build.periods(scenario)
         self._traffic = traffic or libsumo_traffic(build.traffic_setup(scenario), sumo_outputs)
         self._replays = traffic is None
         self._equipment = EgoEquipment(scenario)
+        self._fleet = EquippedFleet(scenario, camera_processes)
         self._drivers_fog = DriversFog()
         self._timeline = Timeline(scenario)
         self._fog: FogField | None = None
@@ -359,6 +271,7 @@ class ClosedLoop:
                 # The ego's way was not known before. Drivers must have had the fog about them while the road filled.
                 self._traffic.start(streams.traffic_seed)
                 snapshot = self._observe_ego()
+        self._fleet.start_run(seed, self._traffic.network)
         self._step = self._with_unplayed(self._with_ending(self._complete_step(0, snapshot, Command())))
         return self._step
 
@@ -403,7 +316,8 @@ class ClosedLoop:
             # In clear air nobody else has chosen a speed so far.
             self._drivers_fog.enter(self._fog, self._traffic)
         begun = self._begin_what_is_due(self._step)
-        advance_traffic(self._traffic, self._drivers_fog, self._periods, self._step.index, command)
+        for_all = self._fleet.advised(command, self._step.equipped)
+        advance_traffic(self._traffic, self._drivers_fog, self._periods, self._step.index, for_all)
         snapshot, index = self._traffic.observe(), self._step.index + 1
         if snapshot is None:
             time = self._periods.time(index)
@@ -418,7 +332,9 @@ class ClosedLoop:
         """Let begin what the timeline asks for after a step."""
         due = self._timeline.due(step)
         refused = self._traffic.begin(due.actions.traffic) if due.actions.traffic else ()
-        fog = self._equipment.begin(due.actions, step.time, self._periods.time(step.index + 1))
+        first_time = self._periods.time(step.index + 1)
+        fog = self._equipment.begin(due.actions, step.time, first_time)
+        self._fleet.begin(due.actions, step.time, first_time)
         if due.actions.fog:
             self._drivers_fog.change(fog)
         return self._timeline.begun(due, refused)
@@ -448,8 +364,12 @@ class ClosedLoop:
         return dataclasses.replace(step, unplayed=self._traffic.unplayed() + self._timeline.unplayed(step))
 
     def _complete_step(self, index: int, snapshot: TrafficSnapshot, command: Command) -> Step:
-        time = self._periods.time(index)
-        return self._equipment.complete_step(index, time, snapshot, command, self._ending(index, snapshot))
+        time, ending = self._periods.time(index), self._ending(index, snapshot)
+        sent = () if self._step is None else camera_messages(self._step)
+        self._fleet.ask(index, time, snapshot, sent)
+        step = self._equipment.complete_step(index, time, snapshot, command, ending, sent)
+        equipped = self._fleet.answer()
+        return dataclasses.replace(step, equipped=equipped) if equipped else step
 
     def _ending(self, index: int, snapshot: TrafficSnapshot) -> Ending | None:
         ego = snapshot.state.ids[snapshot.ego]
@@ -463,6 +383,7 @@ class ClosedLoop:
         """End the simulation and free the renderer; closing twice is allowed."""
         self._traffic.close()
         self._equipment.close()
+        self._fleet.close()
         self._step = None
 
     def __enter__(self) -> Self:

@@ -8,9 +8,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from fogsim.advised_driving import AdvisedDriving
 from fogsim.ego.equipment import EgoEquipment
 from fogsim.errors import InputError, SimulationError, UnplayedWarning
-from fogsim.loop import AdvisedDriving, DriversFog
+from fogsim.loop import DriversFog
 from fogsim.randomness import spawn_streams
 from fogsim.scenario import Scenario, attached_scenario, build, override
 from fogsim.scenario.loading import clock_settings
@@ -151,6 +152,10 @@ class AttachedSession:
     """
 
     def __init__(self, scenario: Scenario, traffic: AttachedTraffic, drivers: bool, seed: int) -> None:
+        if scenario.traffic.has_equipped:
+            raise InputError(
+                "attach: traffic.equipped and a list of egos are for simulations that FogSim runs; attach to one ego"
+            )
         self._name = scenario.name
         # A scenario for another ego gives fog and camera; whom else it names drives in another simulation.
         self._tells_unplayed = scenario.traffic.ego == traffic.ego

@@ -28,20 +28,23 @@ class Streams:
     reports: np.random.Generator
 
 
-def spawn_streams(seed: int) -> Streams:
+def spawn_streams(seed: int, vehicle: str = "") -> Streams:
     """Spawn the named streams of one run from its seed.
 
     Parameters
     ----------
     seed : int
         Any non-negative integer; the same seed gives the same run, bit for bit.
+    vehicle : str
+        Id of an equipped vehicle that has streams of its own; empty for the ego.
 
     Raises
     ------
     ValueError
         If the seed is negative.
     """
-    traffic, fog, camera, sensors, driver, faults, gps, reports = np.random.SeedSequence(seed).spawn(8)
+    root = np.random.SeedSequence([seed, *vehicle.encode()] if vehicle else seed)
+    traffic, fog, camera, sensors, driver, faults, gps, reports = root.spawn(8)
     return Streams(
         traffic_seed=int(traffic.generate_state(1, np.uint32)[0] >> 1),
         fog=np.random.default_rng(fog),

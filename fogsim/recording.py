@@ -76,6 +76,7 @@ def record_run(
     recorders: Iterable[str] = USUAL_RECORDERS,
     command_line: Sequence[str] = (),
     watch: Callable[[Step], None] = lambda _: None,
+    camera_processes: int = 0,
 ) -> RecordedRun:
     """Run a scenario and write its results into a directory.
 
@@ -109,6 +110,8 @@ def record_run(
     watch : callable
         Called with each finished `Step` after all recorders have taken it, for a progress bar. What it raises ends the
         run as any other error does, KeyboardInterrupt as Ctrl-C.
+    camera_processes : int
+        As of `fogsim.run`.
 
     Returns
     -------
@@ -144,7 +147,7 @@ def record_run(
     status "failed" with the error's message.
     """
     of_ego = _Recorded(
-        lambda folder: run(scenario, seed, sumo_outputs=folder),
+        lambda folder: run(scenario, seed, sumo_outputs=folder, camera_processes=camera_processes),
         RunMetrics(build.safety_standard(scenario)),
         RECORDERS,
         watch,

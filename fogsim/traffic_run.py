@@ -10,10 +10,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.advised_driving import spread_advice
 from fogsim.atmosphere import extinction, field_at, with_change
 from fogsim.ego.road_meters import RoadMeters
 from fogsim.errors import InputError, SimulationError, shown, suggest
-from fogsim.loop import DriversFog, advance_traffic, spread_advice, warn_of_unplayed
+from fogsim.loop import DriversFog, advance_traffic, warn_of_unplayed
 from fogsim.randomness import spawn_streams
 from fogsim.road_advice import RoadAdvice
 from fogsim.scenario import Scenario, build

@@ -14,8 +14,9 @@ import pytest
 from early_motorway import EARLY, ROUTES
 
 import fogsim
+from fogsim.advised_driving import spread_advice
 from fogsim.errors import SimulationError
-from fogsim.loop import ClosedLoop, DriversFog, spread_advice
+from fogsim.loop import ClosedLoop, DriversFog
 from fogsim.scenario import Scenario
 from fogsim.traffic.sumo_traffic import SumoTraffic
 from fogsim.values import Command, Display, Ending, FogChange, FogField, Lamp, SpeedAdvice, Step, Stretch, StretchAdvice

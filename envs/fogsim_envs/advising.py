@@ -8,8 +8,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from fogsim.advised_driving import spread_advice
 from fogsim.errors import InputError
-from fogsim.loop import spread_advice
 from fogsim.scenario import Scenario, build
 from fogsim.values import Ending, Step
 from fogsim_envs.actions import checked_action

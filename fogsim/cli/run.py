@@ -2,7 +2,8 @@
 
 import sys
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,6 +24,7 @@ from fogsim.cli.scenario_options import (
 from fogsim.errors import InputError, UnplayedWarning
 
 if TYPE_CHECKING:
+    from fogsim.recording import RecordedRun
     from fogsim.scenario import Scenario
 
 SHOWN = {
@@ -83,6 +85,12 @@ def run_command(
     osi: Annotated[
         bool, typer.Option("--osi", help="Write ground_truth.osi, a trace of ASAM OSI (needs fogsim[osi]).")
     ] = False,
+    camera_processes: Annotated[
+        int | None,
+        typer.Option(
+            min=0, help="Processes that draw for equipped vehicles beside the ego. [one less than processors]"
+        ),
+    ] = None,
 ) -> None:
     """Run a scenario and write manifest.json, steps.parquet, metrics.json, video.mp4 and report.html."""
     from fogsim.recording import record_run, record_traffic
@@ -97,7 +105,9 @@ def run_command(
         "openscenario": xosc,
         "osi": osi,
     }
-    record = record_run if loaded.traffic.has_ego else record_traffic
+    record: Callable[..., RecordedRun] = record_traffic
+    if loaded.traffic.has_ego:
+        record = partial(record_run, camera_processes=_camera_processes(loaded, camera_processes))
     directory = out or Path("runs", f"{loaded.name}-{of_file.folder_name}")
     with warnings.catch_warnings(), SimulationProgress(stderr, loaded.duration_s) as progress:
         # The summary names all of it.
@@ -112,8 +122,8 @@ def run_command(
             watch=progress.show,
         )
     _print_summary(result.summary.values, SHOWN if loaded.traffic.has_ego else SHOWN_OF_TRAFFIC)
-    partial = "the results are partial and say so" if result.files else "before its first step; nothing was written"
-    ended = result.ending.value if result.ending else f"{result.status.value}; {partial}"
+    written = "the results are partial and say so" if result.files else "before its first step; nothing was written"
+    ended = result.ending.value if result.ending else f"{result.status.value}; {written}"
     stdout.print(f"\nThe run ended: [bold]{ended}[/].")
     for line in result.unplayed.lines:
         stdout.print(f"[yellow]not played:[/] {escape(line)}", soft_wrap=True)
@@ -122,6 +132,15 @@ def run_command(
         stdout.print(f"  {escape(result.directory / name)}", soft_wrap=True)
     if result.ending is None:
         raise typer.Exit(INTERRUPTED)
+
+
+def _camera_processes(scenario: "Scenario", wanted: int | None) -> int:
+    """In how many processes cameras of other equipped vehicles are drawn, where there are any."""
+    if not scenario.traffic.has_equipped:
+        return 0
+    from fogsim.jit import processors
+
+    return processors() - 1 if wanted is None else wanted
 
 
 def _filmed(scenario: "Scenario", wanted: bool | None) -> bool:

@@ -66,7 +66,8 @@ def view_command(
 
 def _surrounding(scenario: "Scenario", at: float, seed: int) -> "Surrounding":
     """Run a scenario with its own policy to an instant [s]."""
-    from fogsim.loop import AdvisedDriving, ClosedLoop
+    from fogsim.advised_driving import AdvisedDriving
+    from fogsim.loop import ClosedLoop
     from fogsim.scenario.build import check_ego
 
     check_ego(scenario, "fogsim view")

@@ -7,6 +7,7 @@ from collections.abc import Callable, Generator, Iterator
 from importlib.metadata import version
 from pathlib import Path
 
+from fogsim.advised_driving import AdvisedDriving
 from fogsim.dataset.annotations import coco, frame_record, object_records
 from fogsim.dataset.directory import DatasetDirectory
 from fogsim.dataset.encoding import DEPTH_UNIT, TRANSMISSION_UNIT, encoded_depth, encoded_transmission
@@ -14,7 +15,7 @@ from fogsim.dataset.ground_truth import SemanticClass, depth, instance_mask, sem
 from fogsim.dataset.inputs import identity
 from fogsim.errors import InputError
 from fogsim.interruption import Interruption
-from fogsim.loop import AdvisedDriving, ClosedLoop
+from fogsim.loop import ClosedLoop
 from fogsim.scenario import Scenario, build
 from fogsim.values import Ending, Step
 

@@ -34,6 +34,7 @@ from fogsim.values import (
     Estimate,
     Fault,
     FogField,
+    FogReport,
     Frame,
     Observation,
     RoadNetwork,
@@ -231,7 +232,13 @@ class EgoEquipment:
         self._schedule.begin(ordered, time)
 
     def complete_step(
-        self, index: int, time: float, snapshot: TrafficSnapshot, command: Command, ending: Ending | None
+        self,
+        index: int,
+        time: float,
+        snapshot: TrafficSnapshot,
+        command: Command,
+        ending: Ending | None,
+        sent: Sequence[tuple[str, FogReport]] = (),
     ) -> Step:
         """See, measure, estimate and believe: everything between the traffic and the next decision.
 
@@ -247,6 +254,8 @@ class EgoEquipment:
             What was in force until now.
         ending : Ending or None
             Why the run is over.
+        sent : sequence of (str, FogReport)
+            Ids of equipped vehicles, and what they have seen in their last pictures.
 
         Raises
         ------
@@ -285,7 +294,7 @@ class EgoEquipment:
             camera_setback=self._setback,
             lamps=ALL_LAMPS & int(state.lamps[ego]),
             light=self._light_sensing.measure(state, ego, fog, light),
-            reports=reporters.heard(time, state, ego, fog),
+            reports=reporters.heard(time, state, ego, fog, sent),
         )
         estimates = self._estimate(frame, observation, time)
         believed = fuse(self._fusion, estimates, time, place, observation.reports)

@@ -2,15 +2,21 @@
 
 import math
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import extinction
+from fogsim.ego.route_places import RoutePlaces
 from fogsim.scenario import Scenario
-from fogsim.scenario.report_schema import ReportsFrom, RoadsideReports, VehicleReports
-from fogsim.scenario.road_sections import stations
+from fogsim.scenario.report_schema import (
+    CameraReports,
+    MeasuredReports,
+    ReportsFrom,
+    RoadsideReports,
+    VehicleReports,
+)
 from fogsim.units import extinction_from_visibility
 from fogsim.values import FogField, FogReport, TrafficState
 
@@ -18,12 +24,6 @@ Floats = NDArray[np.float64]
 
 METER_HEIGHT = 2.0
 """Height of a visibility sensor above the road [m]."""
-
-BESIDE = 15.0
-"""How far from the line of the ego's route a vehicle is on its road [m]."""
-
-SAME_WAY = 0.5
-"""Least cosine of the angle between two vehicles' headings for them to go the same way [-]."""
 
 WRONG = extinction_from_visibility(20.0), extinction_from_visibility(5000.0)
 """Extinctions between which a wrong measurement is any [1/m]."""
@@ -43,7 +43,8 @@ class FogReports:
     def __init__(self, scenario: Scenario, route: Floats) -> None:
         section = scenario.sensors.reports
         self._roadside, self._vehicles = section.roadside, section.vehicles
-        self._route, self._stations = route, stations(route)
+        self._cameras = section.cameras
+        self._route, self._places = route, RoutePlaces(route)
         self.reset(np.random.default_rng(0))
 
     def reset(self, rng: np.random.Generator) -> None:
@@ -59,7 +60,9 @@ class FogReports:
         self._under_way: list[tuple[float, FogReport]] = []
         self._told: dict[str, int] = {}
 
-    def heard(self, time: float, state: TrafficState, ego: int, fog: FogField) -> tuple[FogReport, ...]:
+    def heard(
+        self, time: float, state: TrafficState, ego: int, fog: FogField, sent: Iterable[tuple[str, FogReport]] = ()
+    ) -> tuple[FogReport, ...]:
         """Let all measure that are to, and tell what has come in by now.
 
         Parameters
@@ -72,7 +75,11 @@ class FogReports:
             Row of the one that listens.
         fog : FogField
             The fog now.
+        sent : iterable of (str, FogReport)
+            Ids of equipped vehicles, and what they have seen in their last pictures.
         """
+        if self._cameras is not None:
+            self._take_from_cameras(self._cameras, sent, state, ego)
         if self._roadside is not None:
             self._measure_roadside(self._roadside, time, fog)
         if self._vehicles is not None:
@@ -82,11 +89,11 @@ class FogReports:
         return arrived
 
     def _measure_roadside(self, sensors: RoadsideReports, time: float, fog: FogField) -> None:
-        places = np.arange(sensors.first_m, self._stations[-1], sensors.every_m)
+        places = np.arange(sensors.first_m, self._places.stations[-1], sensors.every_m)
         due = [i for i in range(len(places)) if self._is_due(f"sensor {i}", sensors.period_s, time)]
         if not due:
             return
-        points = np.stack([np.interp(places[due], self._stations, axis) for axis in self._route.T], axis=1)
+        points = np.stack([np.interp(places[due], self._places.stations, axis) for axis in self._route.T], axis=1)
         measured = extinction(fog, points + np.array([0.0, 0.0, METER_HEIGHT]))
         for i, k in zip(due, measured.tolist(), strict=True):
             self._send(f"sensor {i}", float(places[i]), k, sensors, time)
@@ -102,14 +109,20 @@ class FogReports:
 
     def _senders(self, radio: VehicleReports, state: TrafficState, ego: int) -> Iterator[tuple[int, float]]:
         """Rows of equipped vehicles that are in range and go the ego's way on its road, with their places on it [m]."""
-        apart = np.hypot(*(state.position[:, :2] - state.position[ego, :2]).T)
-        along = np.cos(state.heading - state.heading[ego])
-        for row in np.flatnonzero((apart <= radio.range_m) & (along >= SAME_WAY)).tolist():
-            if row == ego or not self._is_equipped(state.ids[row], radio.equipped):
-                continue
-            place, aside = self._on_route(state.position[row])
-            if aside <= BESIDE:
-                yield row, place
+        along, _, on_way = self._places.of(state)
+        for row in np.flatnonzero(on_way & (_apart(state, ego) <= radio.range_m)).tolist():
+            if row != ego and self._is_equipped(state.ids[row], radio.equipped):
+                yield row, float(along[row])
+
+    def _take_from_cameras(
+        self, radio: CameraReports, sent: Iterable[tuple[str, FogReport]], state: TrafficState, ego: int
+    ) -> None:
+        """Let what others have seen be on its way to the ego, as far as it is in range of them."""
+        apart = dict(zip(state.ids, _apart(state, ego).tolist(), strict=True))
+        for vehicle, report in sent:
+            in_range = vehicle != state.ids[ego] and apart.get(vehicle, math.inf) <= radio.range_m
+            if in_range and self._is_due(report.source, radio.period_s, report.time):
+                self._let_travel(report, radio)
 
     def _is_equipped(self, name: str, share: float) -> bool:
         """Whether a vehicle is, which in one run it is always or never."""
@@ -124,27 +137,18 @@ class FogReports:
         self._told[name] = number
         return True
 
-    def _send(self, name: str, place: float, k: float, sender: ReportsFrom, time: float) -> None:
-        lost, wrong, noise, any_k = (
-            self._rng.random(),
-            self._rng.random(),
-            self._rng.standard_normal(),
-            self._rng.random(),
-        )
-        if lost < sender.loss:
-            return
+    def _send(self, name: str, place: float, k: float, sender: MeasuredReports, time: float) -> None:
+        wrong, noise, any_k = self._rng.random(), self._rng.standard_normal(), self._rng.random()
         told = k * math.exp(sender.deviation * noise)
         if wrong < sender.wrong:
             told = WRONG[0] * (WRONG[1] / WRONG[0]) ** any_k
-        report = FogReport(name, self._told[name], place, time, told, sender.deviation)
-        self._under_way.append((time + sender.delay_s, report))
+        self._let_travel(FogReport(name, self._told[name], place, time, told, sender.deviation), sender)
 
-    def _on_route(self, position: Floats) -> tuple[float, float]:
-        """Where on the route a position is, and how far from it [m]."""
-        starts, ways = self._route[:-1, :2], np.diff(self._route[:, :2], axis=0)
-        squares = np.maximum((ways**2).sum(axis=1), 1e-12)
-        shares = np.clip(((position[:2] - starts) * ways).sum(axis=1) / squares, 0.0, 1.0)
-        apart = np.hypot(*(starts + shares[:, None] * ways - position[:2]).T)
-        nearest = int(apart.argmin())
-        length = self._stations[nearest + 1] - self._stations[nearest]
-        return float(self._stations[nearest] + shares[nearest] * length), float(apart[nearest])
+    def _let_travel(self, report: FogReport, sender: ReportsFrom) -> None:
+        if self._rng.random() >= sender.loss:
+            self._under_way.append((report.time + sender.delay_s, report))
+
+
+def _apart(state: TrafficState, ego: int) -> Floats:
+    """How far vehicles are from the ego [m]."""
+    return np.asarray(np.hypot(*(state.position[:, :2] - state.position[ego, :2]).T), np.float64)

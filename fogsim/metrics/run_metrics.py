@@ -6,9 +6,11 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from fogsim.errors import SimulationError
+from fogsim.metrics.belief_ahead import BeliefAheadError, DenseFogKnown
 from fogsim.metrics.cross_sections import TrafficThroughput
 from fogsim.metrics.crossing import TrafficEncroachment
-from fogsim.metrics.estimation import BeliefAheadError, BeliefError, EstimatorErrors
+from fogsim.metrics.equipped import EquippedBelief
+from fogsim.metrics.estimation import BeliefError, EstimatorErrors
 from fogsim.metrics.lighting import Lighting
 from fogsim.metrics.metric import JsonValue, Metric, Sample
 from fogsim.metrics.motion import Comfort, Compliance, Motion
@@ -44,6 +46,8 @@ METRICS: Registry[MetricFactory] = Registry(
         "lighting": lambda _: Lighting(),
         "belief": lambda _: BeliefError(),
         "belief_ahead": lambda _: BeliefAheadError(),
+        "dense_fog_known": lambda _: DenseFogKnown(),
+        "equipped": lambda _: EquippedBelief(),
         "estimators": lambda _: EstimatorErrors(),
         "traffic_collisions": lambda _: TrafficCollisions(),
         "traffic_conflicts": lambda standard: TrafficConflicts(standard.time_to_collision),

@@ -17,7 +17,7 @@ from fogsim.recorders.protocol import Derived
 from fogsim.recorders.run_directory import LOG_SUFFIX
 from fogsim.recorders.table import LOG_PERIOD
 from fogsim.units import visibility_from_extinction
-from fogsim.values import TrafficStep
+from fogsim.values import Step, TrafficStep
 from fogsim.values.traffic import with_persons
 
 MOST_ROWS_HELD = 50_000
@@ -43,9 +43,18 @@ TRAJECTORY_COLUMNS: Mapping[str, tuple[Any, str]] = {
         pa.float64(),
         "true meteorological visibility at the driver's eyes [m]; null for clear air, pedestrians",
     ),
+    "believed_visibility": (
+        pa.float64(),
+        "what the ego and other equipped vehicles believe, median [m]; null for others",
+    ),
+    "believed_visibility_low": (pa.float64(), "lower end of the 90 % interval of that [m]"),
+    "believed_visibility_high": (pa.float64(), "upper end of it [m]"),
+    "advised_speed": (pa.float64(), "lowest speed in force that was heard advised [m/s]; null for none"),
 }
 """Columns of ``trajectories.parquet``: their types and meanings, named as in SUMO's fcd-output."""
 
+
+_BELIEVED = ("believed_visibility", "believed_visibility_low", "believed_visibility_high")
 
 _AnyStep = TypeVar("_AnyStep", bound=TrafficStep)
 
@@ -192,7 +201,11 @@ def _batch(steps: list[TrafficStep], schema: Any) -> Any:
         "vehicle_slope": np.degrees(of_all("grade")),
         "vehicle_acceleration": of_all("acceleration"),
         "visibility": [visibility for step in steps for visibility in _visibilities(step)],
+        "advised_speed": [speed for step in steps for speed in _advised_speeds(step)],
     }
+    believed = [quantiles for step in steps for quantiles in _believed_visibilities(step)]
+    for name, values in zip(_BELIEVED, zip(*believed, strict=True), strict=True):
+        columns[name] = list(values)
     arrays = [pa.array(columns[field.name], type=field.type, from_pandas=True) for field in schema]
     return pa.RecordBatch.from_arrays(arrays, schema=schema)
 
@@ -204,6 +217,24 @@ def _visibilities(step: TrafficStep) -> list[float | None]:
     if extinctions is None:
         return [*[None] * len(step.traffic.ids), *persons]
     return [visibility_from_extinction(k) if k > 0.0 else None for k in extinctions.tolist()] + persons
+
+
+def _believed_visibilities(step: TrafficStep) -> list[tuple[float | None, ...]]:
+    """Visibility that each vehicle believes, and its 90 % interval [m]; None for who has no camera."""
+    beliefs = {}
+    if isinstance(step, Step):
+        beliefs = {one.vehicle_id: one.belief for one in step.equipped} | {step.traffic.ids[step.ego]: step.belief}
+    nothing: tuple[float | None, ...] = (None,) * len(_BELIEVED)
+    told = [
+        beliefs[one].visibility_quantiles((0.5, 0.05, 0.95)) if one in beliefs else nothing for one in step.traffic.ids
+    ]
+    return told + [nothing] * len(step.traffic.persons.ids)
+
+
+def _advised_speeds(step: TrafficStep) -> list[float | None]:
+    """What each vehicle has heard advised [m/s]; None for who has heard nothing, and for persons."""
+    heard = step.traffic.advised_speed.tolist() or [math.inf] * len(step.traffic.ids)
+    return [speed if speed < math.inf else None for speed in heard] + [None] * len(step.traffic.persons.ids)
 
 
 def write_trajectory_table(path: Path, log: Path, complete: bool) -> None:

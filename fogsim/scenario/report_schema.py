@@ -10,13 +10,7 @@ HALF_A_MILE = 804.672
 
 
 class ReportsFrom(Section):
-    """Whoever measures the fog and tells others."""
-
-    deviation: Annotated[Number, Field(gt=0, le=2)] = 0.1
-    """Standard deviation of a measurement of k, relative to it; a forward-scatter sensor has some 10 %."""
-
-    wrong: Share = 0.0
-    """Share of measurements that are of any visibility between 20 m and 5 km: droplets on the lens, spray, insects."""
+    """Whoever tells others of the fog."""
 
     delay_s: Time = 0.5
     """Time from a measurement to its arrival."""
@@ -25,7 +19,17 @@ class ReportsFrom(Section):
     """Share of reports that do not arrive."""
 
 
-class RoadsideReports(ReportsFrom):
+class MeasuredReports(ReportsFrom):
+    """Whoever measures the fog where they are and tells others."""
+
+    deviation: Annotated[Number, Field(gt=0, le=2)] = 0.1
+    """Standard deviation of a measurement of k, relative to it; a forward-scatter sensor has some 10 %."""
+
+    wrong: Share = 0.0
+    """Share of measurements that are of any visibility between 20 m and 5 km: droplets on the lens, spray, insects."""
+
+
+class RoadsideReports(MeasuredReports):
     """Visibility sensors beside the ego's route, as on California's Highway 99."""
 
     every_m: Length = HALF_A_MILE
@@ -41,11 +45,24 @@ class RoadsideReports(ReportsFrom):
     """Time from a measurement to its arrival; an operator who must confirm it takes minutes."""
 
 
-class VehicleReports(ReportsFrom):
+class VehicleReports(MeasuredReports):
     """Vehicles that measure the fog where they are, as by a camera of their own, and tell those behind by radio."""
 
     equipped: Share = 0.05
     """Share of the vehicles that do."""
+
+    range_m: Length = 500.0
+    """Distance over which they are heard."""
+
+    period_s: Period = 1.0
+    """Time between two reports of one vehicle."""
+
+    loss: Share = 0.1
+    """Share of reports that do not arrive."""
+
+
+class CameraReports(ReportsFrom):
+    """Equipped vehicles (`traffic.equipped`), which tell those behind by radio what their own cameras see."""
 
     range_m: Length = 500.0
     """Distance over which they are heard."""
@@ -64,4 +81,7 @@ class Reports(Section):
     """Sensors beside the road."""
 
     vehicles: VehicleReports | None = None
-    """Other vehicles on its road."""
+    """Other vehicles on its road, whose measurement is the truth with noise."""
+
+    cameras: CameraReports | None = None
+    """Other vehicles on its road with a camera of their own; what they tell is what their estimators say."""

@@ -122,6 +122,7 @@ def _named_vehicles(scenario: Scenario) -> Iterator[tuple[KeyPath, str]]:
     traffic = scenario.traffic
     if traffic.has_ego:
         yield ("traffic", "ego"), traffic.ego
+    yield from ((("traffic", "equipped_vehicles", i), one) for i, one in enumerate(traffic.equipped_vehicles))
     yield from ((("traffic", "keep_lane", i), vehicle) for i, vehicle in enumerate(traffic.keep_lane))
     yield from ((("traffic", "events", i, "vehicle"), event.vehicle) for i, event in enumerate(traffic.events))
 

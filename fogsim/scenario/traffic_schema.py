@@ -148,6 +148,13 @@ class Traffic(Section):
     ego: Id = "ego"
     """Id of the ego vehicle in the route files; `none` for traffic alone, without camera and estimators."""
 
+    equipped: Share = 0.0
+    """Share of the other vehicles that have a camera, estimators, a belief and lighting policy like the ego's, and are
+    advised like it, as long as they are read and on its way."""
+
+    equipped_vehicles: tuple[Id, ...] = ()
+    """Ids of vehicles that have them in any case; `ego: [a, b, c]` writes b and c here."""
+
     along: tuple[Id, ...] = ()
     """With `ego: none`: edges, as they are driven one after the other, along which places count, not its route. On a
     road by template it is `same_way`, the whole way, if not written."""
@@ -185,11 +192,34 @@ class Traffic(Section):
         """Whether there is an ego."""
         return self.ego != NO_EGO
 
+    @property
+    def has_equipped(self) -> bool:
+        """Whether other vehicles than the ego have a camera."""
+        return self.equipped > 0.0 or bool(self.equipped_vehicles)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _several_egos(cls, value: object) -> object:
+        if not isinstance(value, dict) or not isinstance(value.get("ego"), list | tuple):
+            return value
+        if value.get("equipped_vehicles"):
+            raise ValueError("equipped_vehicles: written with a list of egos; write them all under one of the two keys")
+        if not value["ego"]:
+            raise ValueError("ego: an empty list; write the ego's id, several of them, or none")
+        first, *others = value["ego"]
+        return {**value, "ego": first, "equipped_vehicles": others}
+
     @model_validator(mode="after")
     def _keys_without_ego(self) -> Self:
         for key in ("along", "warm_up_s"):
             if self.has_ego and getattr(self, key):
                 raise ValueError(f"{key}: goes with ego: none, and the ego is {self.ego!r}")
+        for key in ("equipped", "equipped_vehicles"):
+            if not self.has_ego and getattr(self, key):
+                raise ValueError(f"{key}: goes with an ego, about which they are read, and ego is none")
+        named = (self.ego, *self.equipped_vehicles)
+        if len({*named}) < len(named):
+            raise ValueError(f"equipped_vehicles: {', '.join(named)}: one of them, or the ego, is named twice")
         return self
 
     @model_validator(mode="after")

@@ -38,6 +38,7 @@ from fogsim.traffic.sumo_street.person_reader import PersonReader
 from fogsim.traffic.sumo_street.signal_reader import SignalReader
 from fogsim.values import (
     Command,
+    Lamp,
     NetworkSnapshot,
     RoadNetwork,
     SignMap,
@@ -145,7 +146,7 @@ class SumoTraffic:
             lane_changes=changes,
             speeds=speeds,
             driving=EgoDriving(api, setup.ego, setup.step_length),
-            lamps=ToldLamps(api, setup.ego),
+            lamps=ToldLamps(api),
             lanes=LaneKeeping(api, setup.keep_lane, roster, session),
             collisions=CollisionLog(),
             script=script,
@@ -296,7 +297,7 @@ class SumoTraffic:
         if run.driving.apply(command.control, run.roster.present) and self._setup.ego is not None:
             orders.pop(self._setup.ego, None)
         run.speeds.apply(orders)
-        run.lamps.tell(command.lamps, run.roster.present)
+        run.lamps.tell(self._told_lamps(), run.roster.present)
         run.actions.play(self._elapsed(run), run.roster.present)
         self._update_drivers(run, command)
 
@@ -335,7 +336,7 @@ class SumoTraffic:
 
     def _update_drivers(self, run: _Run, command: Command) -> None:
         if run.perception is not None:
-            run.perception.update(self._setup.ego, self._command.lamps, run.script.lamps)
+            run.perception.update(self._told_lamps(), run.script.lamps)
         if run.drivers is not None:
             run.drivers.update(command)
 
@@ -362,7 +363,7 @@ class SumoTraffic:
         new, self._mark = run.roster.entered_since(self._mark)
         # Another vehicle may have come under the ego's name.
         self._route = RoutePosition(run.api, ego) if self._route is None or ego in new else self._route
-        state = run.reader.state(self._command.lamps, self._heard(run))
+        state = run.reader.state(self._command.lamps, self._heard(run), self._command.lamps_of)
         row = state.ids.index(ego)
         route_position, route_length = self._route.update(state.position[row])
         state = run.script.lamps.shown(run.lane_changes.smoothed(state), self._elapsed(run))
@@ -409,6 +410,11 @@ class SumoTraffic:
         heard = {} if run.drivers is None else run.drivers.heard
         ego, own = self._setup.ego, self._command.advice.speed
         return heard if ego is None or math.isinf(own) else {**heard, ego: own}
+
+    def _told_lamps(self) -> Mapping[str, Lamp]:
+        """Lamps that the command lights."""
+        own = {} if self._setup.ego is None else {self._setup.ego: self._command.lamps}
+        return {**self._command.lamps_of, **own}
 
     def unplayed(self) -> Unplayed:
         """What of the script has not been played; see `Traffic.unplayed`."""

@@ -12,6 +12,7 @@ from fogsim.values.command import (
     Stretch,
     StretchAdvice,
 )
+from fogsim.values.equipped import EquippedVehicle
 from fogsim.values.estimate import DenserFog, Estimate, FogCategory, OpticalDepths, SignLook, fog_category
 from fogsim.values.fault import Fault, RunningFault
 from fogsim.values.fog import FogBank, FogChange, FogField, FogPatches, FogShelter
@@ -61,6 +62,7 @@ __all__ = [
     "Display",
     "EgoControl",
     "Ending",
+    "EquippedVehicle",
     "Estimate",
     "Fault",
     "FogBank",

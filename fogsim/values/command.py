@@ -136,6 +136,8 @@ class Command:
         Lamps that the ego vehicle is to light; dipped head lamps until somebody decides.
     advised_speeds : mapping from vehicle id to float
         Advice to other vehicles [m/s].
+    lamps_of : mapping from vehicle id to Lamp
+        Lamps that other vehicles are to light, in place of the dipped ones that all have.
     advice_reach : float
         Distance from the ego within which all others hear the ego's advice too, from vehicle to vehicle, and whoever
         comes there [m]; 0 for nobody.
@@ -150,6 +152,7 @@ class Command:
     advice: SpeedAdvice = field(default_factory=SpeedAdvice)
     lamps: Lamp = Lamp.POSITION | Lamp.LOW_BEAM
     advised_speeds: Mapping[str, float] = field(default_factory=dict)
+    lamps_of: Mapping[str, Lamp] = field(default_factory=dict)
     advice_reach: float = 0.0
     stretches: tuple[StretchAdvice, ...] = ()
     control: EgoControl | None = None

@@ -203,6 +203,8 @@ def checked_command(value: object) -> Command:
     _of_type("the command's advice", command.advice, SpeedAdvice)
     _of_type("the command's lamps", command.lamps, Lamp)
     _check_speed("the command", "advice.speed", command.advice.speed)
+    for vehicle, lit in command.lamps_of.items():
+        _of_type(f"the command's lamps_of[{vehicle!r}]", lit, Lamp)
     for vehicle, speed in command.advised_speeds.items():
         _check_speed("the command", f"advised_speeds[{vehicle!r}]", speed)
     if not (_is_number(command.advice_reach) and command.advice_reach >= 0.0):

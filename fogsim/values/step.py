@@ -12,6 +12,7 @@ from fogsim.units import visibility_from_extinction
 from fogsim.values.belief import Belief, FogProfile
 from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.command import Command, Stretch
+from fogsim.values.equipped import EquippedVehicle
 from fogsim.values.estimate import Estimate
 from fogsim.values.fault import Fault
 from fogsim.values.fog import FogField
@@ -202,6 +203,8 @@ class Step(TrafficStep):
         What is believed after this step.
     reading_radius : float
         Distance from the ego up to which vehicles are in `traffic` [m].
+    equipped : tuple of EquippedVehicle
+        Other vehicles with a camera of their own, as far as they are in `traffic` and on the ego's way.
     """
 
     ego: int
@@ -214,3 +217,4 @@ class Step(TrafficStep):
     belief: Belief
     reading_radius: float = math.inf
     signal_ahead: SignalAhead | None = None
+    equipped: tuple[EquippedVehicle, ...] = ()

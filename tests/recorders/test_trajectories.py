@@ -11,8 +11,8 @@ import pytest
 from fogsim.recorders import TrajectoryRecorder, recover_run, trajectories, with_trajectories
 from fogsim.recorders.run_directory import TRAJECTORY_LOG
 from fogsim.recorders.trajectories import TRAJECTORY_COLUMNS
-from fogsim.values import PersonState, Step
-from tests.recorders.synthetic import drive
+from fogsim.values import EquippedVehicle, Lamp, PersonState, SpeedAdvice, Step
+from tests.recorders.synthetic import belief, drive
 
 STEPS = 12
 
@@ -51,6 +51,21 @@ def test_the_fog_at_each_vehicle_is_told_as_visibility(tmp_path: Path) -> None:
     truth = dataclasses.replace(step.truth, vehicle_extinctions=np.array([math.log(20.0) / 50.0, 0.0]))
     list(with_trajectories([unknown, dataclasses.replace(step, truth=truth)], path))
     assert [row["visibility"] for row in rows(path)] == [None, None, pytest.approx(50.0), None]
+
+
+def test_what_equipped_vehicles_believe_and_are_advised_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "trajectories.parquet"
+    step = dataclasses.replace(next(iter(drive(1))), belief=belief(80.0, 0.1))
+    other = next(one for row, one in enumerate(step.traffic.ids) if row != step.ego)
+    seen = EquippedVehicle(other, 0.0, 0.03, 0.03, (), belief(120.0, 0.1), SpeedAdvice(), Lamp.NONE)
+    heard = np.where(np.array(step.traffic.ids) == other, 20.0, np.inf)
+    traffic = dataclasses.replace(step.traffic, advised_speed=heard)
+    list(with_trajectories([dataclasses.replace(step, traffic=traffic, equipped=(seen,))], path))
+    of = {row["vehicle_id"]: row for row in rows(path)}
+    assert of[other]["believed_visibility"] == pytest.approx(120.0, rel=0.02)
+    assert of[other]["believed_visibility_low"] < 120.0 < of[other]["believed_visibility_high"]  # type: ignore[operator]
+    assert of["ego"]["believed_visibility"] == pytest.approx(80.0, rel=0.02)
+    assert [of[other]["advised_speed"], of["ego"]["advised_speed"]] == [20.0, None]
 
 
 def test_persons_on_foot_are_rows_too(tmp_path: Path) -> None:

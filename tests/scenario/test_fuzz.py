@@ -22,11 +22,12 @@ from hypothesis import strategies as st
 from pydantic import BaseModel
 
 from fogsim.advice import ADVISERS
+from fogsim.advised_driving import AdvisedDriving
 from fogsim.errors import InputError, SimulationError
 from fogsim.estimators import ESTIMATORS
 from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
-from fogsim.loop import AdvisedDriving, ClosedLoop
+from fogsim.loop import ClosedLoop
 from fogsim.parameters import Range, accepted_parameters
 from fogsim.scenario import Scenario, load_scenario
 from fogsim.scenario.section import GIVEN_BY_THE_LOOP, Method

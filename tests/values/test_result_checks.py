@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 
+from fogsim.advised_driving import AdvisedDriving
 from fogsim.errors import InputError
 from fogsim.fusion import make as make_fusion
-from fogsim.loop import AdvisedDriving
 from fogsim.metrics import METRICS, RunMetrics
 from fogsim.scenario import load_scenario
 from fogsim.values import Command, Display, Estimate, Lamp, LampChoice, SpeedAdvice, Stretch, StretchAdvice

@@ -9,9 +9,9 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from fogsim.advised_driving import AdvisedDriving, spread_advice
 from fogsim.ego.view_rendering import prepare_lamplight
 from fogsim.errors import InputError, UnknownNameError
-from fogsim.loop import AdvisedDriving, spread_advice
 from fogsim.scenario import Scenario, build
 from fogsim.values import Command, Ending, Step
 from fogsim_envs.actions import checked_action

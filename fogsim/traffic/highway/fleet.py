@@ -1,5 +1,6 @@
 """Names and looks of highway-env's vehicles, which have neither ids nor lamps."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from fogsim.traffic.appearance import OTHERS_LAMPS, SUMO_DEFAULT_COLOUR, paint
@@ -30,6 +31,7 @@ class Fleet:
         self.environment = environment
         self.ego = ego
         self.ego_lamps = Command().lamps
+        self.lamps_of: Mapping[str, Lamp] = {}
         self.dark: frozenset[str] = frozenset()
         # Vehicles are equal only to themselves, so they serve as keys.
         self._names: dict[Any, str] = {ego: EGO}
@@ -89,7 +91,7 @@ class Fleet:
         """
         if not hasattr(vehicle, "action") or self.name(vehicle) in self.dark:
             return Lamp.NONE
-        steady = self.ego_lamps if vehicle is self.ego else OTHERS_LAMPS
+        steady = self.ego_lamps if vehicle is self.ego else self.lamps_of.get(self.name(vehicle), OTHERS_LAMPS)
         return steady | Lamp.STOP if acceleration(vehicle) < -BRAKING else steady
 
 

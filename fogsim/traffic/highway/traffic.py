@@ -193,7 +193,7 @@ class HighwayTraffic:
             Advised speeds and lamps.
         """
         fleet, control = self._running()
-        fleet.ego_lamps = command.lamps
+        fleet.ego_lamps, fleet.lamps_of = command.lamps, command.lamps_of
         control.command = command
         fleet.environment.road.act()
         hold_at_standstill(fleet)

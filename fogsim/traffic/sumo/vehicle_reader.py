@@ -191,7 +191,12 @@ class VehicleReader:
         self._constants: _Constants | None = None
         self._signals: tuple[Sequence[int], NDArray[np.int32]] = ([], np.zeros(0, dtype=np.int32))
 
-    def state(self, ego_lamps: Lamp, heard: Mapping[str, float] | None = None) -> TrafficState:
+    def state(
+        self,
+        ego_lamps: Lamp,
+        heard: Mapping[str, float] | None = None,
+        lamps_of: Mapping[str, Lamp] | None = None,
+    ) -> TrafficState:
         """Vehicles near the ego.
 
         Parameters
@@ -200,6 +205,8 @@ class VehicleReader:
             Lamps of the command; the ego lights its stop lamps itself.
         heard : mapping from vehicle id to float or None
             What drivers have heard advised [m/s]; None if nobody has heard anything.
+        lamps_of : mapping from vehicle id to Lamp or None
+            Lamps of the command of others, likewise; None for nobody's.
         """
         self._roster.update()
         new, self._mark = self._roster.entered_since(self._mark)
@@ -208,8 +215,10 @@ class VehicleReader:
         constants = self._constants_of(now.ids)
         ego = constants.ego
         lamps = self._lamps(now.signals)
-        if ego is not None:
-            lamps[ego] = int(ego_lamps) | (int(lamps[ego]) & int(Lamp.STOP))
+        told = [] if ego is None else [(ego, ego_lamps)]
+        told += [(now.ids.index(other), lit) for other, lit in (lamps_of or {}).items() if other in now.ids]
+        for row, lit in told:
+            lamps[row] = int(lit) | (int(lamps[row]) & int(Lamp.STOP))
         return TrafficState(
             time=self._roster.time,
             ids=now.ids,

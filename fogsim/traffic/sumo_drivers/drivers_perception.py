@@ -1,6 +1,6 @@
 """All that SUMO's drivers perceive only as far as it can be seen, through fog and past what stands beside roads."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -49,19 +49,17 @@ class DriversPerception:
     def __init__(self, parts: Sequence[PerceivedPart]) -> None:
         self._parts = tuple(parts)
 
-    def update(self, ego: str | None, ego_lamps: Lamp, lamps: Lamps) -> None:
+    def update(self, told: Mapping[str, Lamp], lamps: Lamps) -> None:
         """Tell SUMO's drivers, before a step, what they do not see.
 
         Parameters
         ----------
-        ego : str or None
-            Id of the ego, whose lamps are not SUMO's, if there is one.
-        ego_lamps : Lamp
-            Its lit lamps.
+        told : mapping from vehicle id to Lamp
+            Lit lamps of the ego and of other equipped vehicles, whose lamps are not SUMO's.
         lamps : Lamps
             Lamps that are switched by hand or have failed.
         """
-        own_lamps: OwnLamps = {} if ego is None else {ego: int(ego_lamps)}
+        own_lamps: OwnLamps = {vehicle: int(lit) for vehicle, lit in told.items()}
         own_lamps.update((v, lamps.switched(v, own_lamps.get(v, int(OTHERS_LAMPS)))) for v in lamps.vehicles)
         for part in self._parts:
             part.update(own_lamps)

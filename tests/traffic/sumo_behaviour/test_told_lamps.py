@@ -1,5 +1,6 @@
 """The ego's lamps as SUMO is told them."""
 
+from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,7 +14,7 @@ from fogsim.values import Lamp
 def test_lamps_are_told_when_they_change_and_the_ego_is_there() -> None:
     told: list[tuple[str, ...]] = []
     api: Any = SimpleNamespace(vehicle=SimpleNamespace(setParameter=lambda *what: told.append(what)))
-    lamps = ToldLamps(api, "ego")
+    lamps = ToldLamps(api)
     for lit, present in (
         (Lamp.LOW_BEAM, {"other"}),
         (Lamp.LOW_BEAM, {"ego"}),
@@ -21,7 +22,7 @@ def test_lamps_are_told_when_they_change_and_the_ego_is_there() -> None:
         (Lamp.LOW_BEAM | Lamp.FRONT_FOG, {"ego", "other"}),
         (Lamp.NONE, {"ego"}),
     ):
-        lamps.tell(lit, present)
+        lamps.tell({"ego": lit, "gone": Lamp.NONE}, present)
     assert [what[2] for what in told] == ["low_beam", "low_beam+front_fog", ""]
     assert {what[:2] for what in told} == {("ego", "fogsim-lamps")}
 
@@ -30,7 +31,7 @@ def test_sumo_itself_has_them(monkeypatch: pytest.MonkeyPatch) -> None:
     found = []
     tell = ToldLamps.tell
 
-    def spied(self: ToldLamps, lamps: Lamp, present: set[str]) -> None:
+    def spied(self: ToldLamps, lamps: Mapping[str, Lamp], present: set[str]) -> None:
         tell(self, lamps, present)
         found.append(self._api.vehicle.getParameter("ego", "fogsim-lamps"))
 

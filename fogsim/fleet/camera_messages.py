@@ -1,0 +1,36 @@
+"""What vehicles with cameras tell others of the fog."""
+
+from fogsim.values import Estimate, FogReport, Step
+
+SURE = 0.5
+"""Relative deviation beyond which an extinction is not told [-]."""
+
+REACH = 300.0
+"""Most of the way ahead in whose middle what a camera has seen counts [m]."""
+
+
+def camera_messages(step: Step) -> tuple[tuple[str, FogReport], ...]:
+    """What the ego and the other equipped vehicles see in their pictures, with their ids.
+
+    What is told is the surest estimate of one picture and not what is believed: whoever believes what others tell, and
+    tells it on, would hear it come back as if it were news. It counts for the middle of the road that it was seen on.
+
+    Parameters
+    ----------
+    step : Step
+        What was finished last.
+    """
+    seen = [(step.traffic.ids[step.ego], step.route_position, step.estimates)]
+    seen += [(one.vehicle_id, one.place, one.estimates) for one in step.equipped]
+    told = ((vehicle, _report(vehicle, place, estimates, step)) for vehicle, place, estimates in seen)
+    return tuple((vehicle, report) for vehicle, report in told if report is not None)
+
+
+def _report(vehicle: str, place: float, estimates: tuple[Estimate, ...], step: Step) -> FogReport | None:
+    valid = [one for one in estimates if one.valid and one.standard_deviation < SURE * one.extinction]
+    if not valid:
+        return None
+    surest = min(valid, key=lambda one: one.standard_deviation / one.extinction)
+    ahead = 0.5 * min(surest.reach, REACH)
+    deviation = surest.standard_deviation / surest.extinction
+    return FogReport(f"camera of {vehicle}", step.index, place + ahead, step.time, surest.extinction, deviation)

@@ -1,0 +1,50 @@
+"""What other equipped vehicles than the ego believe."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from fogsim.metrics.estimation import FOG_LIMIT, quantile, relative_error
+from fogsim.metrics.metric import JsonValue, Sample, share
+from fogsim.units import visibility_from_extinction
+
+
+@dataclass(slots=True)
+class EquippedBelief:
+    """How right the beliefs of all other equipped vehicles were, where the fog ahead of them is below 1000 m."""
+
+    meanings: ClassVar[Mapping[str, str]] = {
+        "equipped_vehicles_mean": "equipped vehicles beside the ego that were read and on its way, mean over steps",
+        "equipped_belief_median_error_percent": "median error of the visibility that they believed, where it is below "
+        "1000 m ahead of them",
+        "equipped_belief_coverage_share": "share of those beliefs whose 90 % interval held the true visibility",
+    }
+    _steps: int = 0
+    _vehicles: int = 0
+    _held: int = 0
+    _errors: list[float] = field(default_factory=list)
+
+    def update(self, sample: Sample) -> None:
+        """Take in one step.
+
+        Parameters
+        ----------
+        sample : Sample
+            The step, and what is derived from it.
+        """
+        self._steps += 1
+        self._vehicles += len(sample.step.equipped)
+        for one in sample.step.equipped:
+            truth = visibility_from_extinction(one.extinction_ahead)
+            if truth < FOG_LIMIT:
+                low, middle, high = one.belief.visibility_quantiles((0.05, 0.5, 0.95))
+                self._errors.append(relative_error(middle, truth))
+                self._held += low <= truth <= high
+
+    def result(self) -> dict[str, JsonValue]:
+        """Say how many, error and coverage."""
+        return {
+            "equipped_vehicles_mean": self._vehicles / self._steps if self._steps else None,
+            "equipped_belief_median_error_percent": quantile(self._errors, 0.5),
+            "equipped_belief_coverage_share": share(self._held, len(self._errors)),
+        }

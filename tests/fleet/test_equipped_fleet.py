@@ -1,0 +1,168 @@
+"""Other vehicles with cameras: in which process they are drawn changes nothing, and what they believe has effects."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+import fogsim
+from fogsim.ego.route_places import RoutePlaces
+from fogsim.errors import InputError, SimulationError
+from fogsim.fleet import EquippedFleet, camera_messages
+from fogsim.fleet.equipped_fleet import _leader
+from fogsim.loop import ClosedLoop
+from fogsim.scenario import Scenario
+from fogsim.values import Command, Estimate, Lamp, Step
+
+SMALL = ("camera.width=160", "camera.height=120", "duration_s=2", "clocks.camera_period_s=0.5")
+DENSE = "fog.visibility_m=60"
+
+
+def small(*overrides: str) -> Scenario:
+    return fogsim.load_scenario("motorway_fog_bank", [*SMALL, *overrides])
+
+
+def _told(estimates: tuple[Estimate, ...]) -> list[tuple[float, float, bool]]:
+    return [(one.extinction, one.standard_deviation, one.valid) for one in estimates]
+
+
+def seen_and_believed(steps: list[Step]) -> list[object]:
+    """What all see and believe in each step, bit for bit."""
+    return [
+        (
+            step.traffic.speed.tobytes(),
+            step.observation.reports,
+            step.belief.probability.tobytes(),
+            [
+                (
+                    one.vehicle_id,
+                    one.place,
+                    one.belief.probability.tobytes(),
+                    one.advice,
+                    one.lamps,
+                    _told(one.estimates),
+                )
+                for one in step.equipped
+            ],
+        )
+        for step in steps
+    ]
+
+
+@pytest.mark.timeout(300)
+def test_the_number_of_processes_changes_nothing():
+    scenario = small(DENSE, "traffic.equipped=20 %", "fusion=field_filter", "sensors.reports.cameras={range_m: 1000}")
+    found = [list(fogsim.run(scenario, 1, camera_processes=number)) for number in (0, 1, 2)]
+    assert max(len(step.equipped) for step in found[0]) >= 3
+    assert seen_and_believed(found[1]) == seen_and_believed(found[0])
+    assert seen_and_believed(found[2]) == seen_and_believed(found[0])
+    heard = {one.source for step in found[0] for one in step.observation.reports}
+    assert heard <= {f"camera of {one.vehicle_id}" for step in found[0] for one in step.equipped}
+    assert heard
+
+
+def test_each_sees_by_its_own_camera_and_is_advised_and_lit_by_its_own_belief():
+    steps = list(fogsim.run(small(DENSE, "traffic.equipped=20 %", "lighting=legal", "duration_s=6"), 1))
+    last = steps[-1]
+    assert len({one.belief.visibility_quantile(0.5) for one in last.equipped}) == len(last.equipped)
+    for one in last.equipped:
+        assert one.belief.visibility_quantile(0.5) == pytest.approx(60.0, rel=0.3)
+        assert one.extinction == pytest.approx(math.log(20.0) / 60.0, rel=1e-3)
+        assert one.advice.speed < 20.0
+        row = last.traffic.ids.index(one.vehicle_id)
+        assert Lamp.FRONT_FOG in one.lamps
+        assert Lamp.FRONT_FOG in Lamp(int(last.traffic.lamps[row]))
+        assert last.traffic.advised_speed[row] <= 20.0
+    # What the ego was asked to do is its own.
+    assert not last.command.is_for_others
+
+
+def test_nobody_is_equipped_unless_asked_and_named_ones_are():
+    assert all(not step.equipped for step in fogsim.run(small("renderer=none", "estimators=[]"), 1))
+    ids = next(iter(fogsim.run(small("renderer=none", "estimators=[]"), 1))).traffic.ids
+    same_way = [one for one in ids if one.startswith("east")][:2]
+    named = small("renderer=none", "estimators=[]", f"traffic.ego=[ego,{','.join(same_way)}]")
+    first = next(iter(fogsim.run(named, 1)))
+    assert {one.vehicle_id for one in first.equipped} <= {*same_way}
+    assert first.equipped
+
+
+def test_the_leader_of_an_equipped_vehicle_is_the_one_that_sumo_has():
+    compared = 0
+    with ClosedLoop(small("renderer=none", "estimators=[]", "duration_s=10")) as loop:
+        step = loop.start(3)
+        places = RoutePlaces(step.truth.route)
+        while step.ending is None:
+            found = _leader(step.ego, places.of(step.traffic), step.traffic)
+            if step.leader is not None and step.leader.gap < 150.0:
+                assert found is not None
+                assert found.vehicle_id == step.leader.vehicle_id
+                assert found.gap == pytest.approx(step.leader.gap, abs=1.0)
+                compared += 1
+            step = loop.advance(Command())
+    assert compared > 5
+
+
+def test_what_a_script_asks_of_fog_holds_for_those_who_come_later():
+    script = "timeline=[{when: time >= 1 s, do: {fog: {visibility: 100 m}}}]"
+    steps = list(
+        fogsim.run(small("fog.visibility_m=300", "traffic.equipped=20 %", script, "renderer=none", "estimators=[]"), 1)
+    )
+    before, after = steps[1].equipped[0], steps[-1].equipped[0]
+    assert after.extinction == pytest.approx(3.0 * before.extinction, rel=0.05)
+
+
+def test_an_error_in_another_process_and_its_death_are_told(monkeypatch):
+    scenario = small("traffic.equipped=20 %", "renderer=none", "estimators=[]")
+    with ClosedLoop(scenario, camera_processes=1) as loop:
+        loop.start(1)
+        process = loop._fleet._pools[0]._process
+        process.kill()
+        process.join()
+        with pytest.raises(SimulationError, match="has died"):
+            loop.advance(Command())
+    with pytest.raises(SimulationError, match="not been started"):
+        EquippedFleet(scenario, 1)._pools[0].answer()
+
+
+def test_cameras_tell_what_one_picture_shows_and_not_what_is_believed():
+    estimates = (
+        Estimate("a", 0.03, 0.003, reach=100.0),
+        Estimate("b", 0.04, 0.001, reach=80.0),
+        Estimate.invalid("c", "no"),
+    )
+    step = next(iter(fogsim.run(small("renderer=none", "estimators=[]"), 1)))
+    ((vehicle, report),) = camera_messages(dataclasses.replace(step, estimates=estimates))
+    assert vehicle == "ego"
+    assert (report.extinction, report.relative_deviation) == (0.04, pytest.approx(0.025))
+    assert report.place == pytest.approx(step.route_position + 40.0)
+    assert camera_messages(dataclasses.replace(step, estimates=(Estimate("a", 0.03, 0.02),))) == ()
+
+
+@pytest.mark.parametrize(
+    ("written", "told"),
+    [
+        ("traffic.equipped_vehicles=[nobody]", "nobody"),
+        ("traffic.ego=[ego, ego]", "named twice"),
+        ("traffic.equipped=1.5", "equipped"),
+        ("traffic.ego=[]", "empty list"),
+    ],
+)
+def test_who_cannot_be_equipped_is_told(written, told):
+    with pytest.raises(InputError, match=told):
+        small(written)
+
+
+def test_places_along_a_route_with_a_bend():
+    route = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0], [100.0, 100.0, 0.0]])
+    step = next(iter(fogsim.run(small("renderer=none", "estimators=[]"), 1)))
+    some = {
+        "ids": ("a", "b", "c", "d"),
+        "position": np.array([[50.0, 2.0, 0.0], [98.0, 40.0, 0.0], [50.0, 3.0, 0.0], [50.0, 40.0, 0.0]]),
+        "heading": np.array([0.0, 0.5 * np.pi, np.pi, 0.0]),
+    }
+    at = RoutePlaces(route).of(dataclasses.replace(step.traffic, **some))
+    assert at.along[:2] == pytest.approx([50.0, 140.0])
+    assert at.aside[:2] == pytest.approx([2.0, 2.0])
+    assert at.on_way.tolist() == [True, True, False, False]

@@ -47,10 +47,12 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
         COLLISIONS,
     ),
     "who_tells_of_the_bank": (
+        ("equipped_vehicles_mean", "other cameras near", 1.0, 1),
+        ("dense_fog_known_before_m", "bank known before it [m]", 1.0, 0),
         ("belief_200_m_ahead_median_error_percent", "belief 200 m ahead: error [%]", 1.0, 0),
         ("belief_200_m_ahead_coverage_share", "held [%]", 100.0, 0),
-        ("belief_coverage_share", "here and now: held [%]", 100.0, 0),
         EGO,
+        OVERDRIVING,
         ("max_deceleration_mps2", "hardest braking [m/s²]", 1.0, 1),
     ),
     "lighting_policies": (

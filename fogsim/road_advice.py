@@ -3,6 +3,7 @@
 import itertools
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from fogsim.advice.harmonisation import harmonised_speeds
 from fogsim.scenario import Scenario, build
@@ -17,9 +18,10 @@ class RoadAdvice:
     """What the sections of the ego's route are advised in one run; it remembers what each was advised last.
 
     Informed by the truth, each section goes by the visibility meter on it and the speed limit of its own road, and the
-    ego hears what others hear there. Informed by the ego's belief, the ego goes by its own advice, and tells it to the
-    section on which it is; a section that it has left keeps what it told last, and one that it has not reached knows
-    nothing.
+    ego hears what others hear there. Informed by sensors, each goes likewise by what the nearest one has reported last,
+    and one of which nothing is known has no advice. Informed by the ego's belief, the ego goes by its own advice, and
+    tells it to the section on which it is; a section that it has left keeps what it told last, and one that it has not
+    reached knows nothing.
 
     Parameters
     ----------
@@ -32,6 +34,7 @@ class RoadAdvice:
         self._advice = scenario.advice
         self._display = DISPLAYS[scenario.drivers.advised]
         self._harmonisation = scenario.drivers.harmonisation
+        self._read_before = scenario.drivers.signs.reading_distance_m if self._display == Display.MESSAGE_SIGN else 0.0
         self._told: dict[Stretch, SpeedAdvice] = {}
         self._egos = SpeedAdvice()
         self._read: tuple[Stretch, float] | None = None
@@ -55,9 +58,10 @@ class RoadAdvice:
         else:
             self._ask_meters(step)
         shown = self._shown(step)
-        if self._advice.informed_by == "truth":
-            self._egos = SpeedAdvice(self._heard(here, dict(zip(sections, shown, strict=True))))
-        return self._egos, stretch_advices(sections, shown, self._display)
+        if self._advice.informed_by != "belief":
+            read = next((s for s in sections if s.start <= step.route_position + self._read_before < s.end), None)
+            self._egos = SpeedAdvice(self._heard(read, dict(zip(sections, shown, strict=True))))
+        return self._egos, self._advices(sections, shown)
 
     def advise_traffic(self, step: TrafficStep) -> tuple[StretchAdvice, ...]:
         """Advice to all on the sections that have any, by the meters, where there is no ego.
@@ -71,13 +75,23 @@ class RoadAdvice:
             self._told = {}
         self._ask_meters(step)
         sections = tuple(section.stretch for section in step.truth.sections)
-        return stretch_advices(sections, self._shown(step), self._display)
+        return self._advices(sections, self._shown(step))
+
+    def _advices(self, sections: Sequence[Stretch], speeds: Sequence[float]) -> tuple[StretchAdvice, ...]:
+        """What is heard where, which begins where a sign can be read."""
+        heard = [
+            replace(one, start=max(one.start - self._read_before, 0.0), end=one.end - self._read_before)
+            for one in sections
+        ]
+        return stretch_advices(heard, speeds, self._display)
 
     def _ask_meters(self, step: TrafficStep) -> None:
         for section in step.truth.sections:
             previous = self._told.get(section.stretch, SpeedAdvice())
-            known = certain_belief(section.extinction)
-            self._told[section.stretch] = self._ask(step, section.speed_limit, known, previous)
+            measured = section.reported if self._advice.informed_by == "sensors" else section.extinction
+            if measured is not None:
+                known = certain_belief(measured)
+                self._told[section.stretch] = self._ask(step, section.speed_limit, known, previous)
 
     def _ask(self, step: TrafficStep, limit: float, known: Belief, previous: SpeedAdvice) -> SpeedAdvice:
         return checked_advice(self._advice.method, self._adviser.advise(known, limit, step.time, previous))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fogsim.advised_driving import spread_advice
 from fogsim.atmosphere import extinction, field_at, with_change
+from fogsim.ego.fog_reports import FogReports
 from fogsim.ego.road_meters import RoadMeters
 from fogsim.errors import InputError, SimulationError, shown, suggest
 from fogsim.loop import DriversFog, advance_traffic, warn_of_unplayed
@@ -147,7 +148,7 @@ class TrafficRun:
         # A meter that stands for a whole network does not see single patches.
         self._sees_patches = bool(along)
         self._meters = _places_along(axis) + EYES
-        self._section_meters = RoadMeters(scenario, axis, limits)
+        self._section_meters, self._reporters = RoadMeters(scenario, axis, limits), FogReports(scenario, axis)
         self._drivers_fog = DriversFog()
         self._step: TrafficStep | None = None
 
@@ -174,7 +175,10 @@ class TrafficRun:
         self._drivers_fog.restart()
         if not self._drivers_fog.is_about(self._fog):
             self._drivers_fog.enter(self._fog, self._traffic)
-        self._traffic.start(spawn_streams(seed).traffic_seed)
+        streams = spawn_streams(seed)
+        self._reporters.reset(streams.reports)
+        self._section_meters.reset()
+        self._traffic.start(streams.traffic_seed)
         return self._complete_step(0, Command())
 
     def advance(self, command: Command) -> tuple[TrafficStep, float]:
@@ -243,6 +247,7 @@ class TrafficRun:
         metered = fog if self._sees_patches else dataclasses.replace(fog, patches=None)
         measured = float(extinction(metered, self._meters).max())
         seen = extinction(fog, snapshot.state.position + EYES)
+        self._section_meters.hear(self._reporters.heard_from_roadside(time, fog))
         sections = self._section_meters.measure(fog)
         return Truth(measured, measured, fog=fog, vehicle_extinctions=seen, sections=sections, route=self._route)
 

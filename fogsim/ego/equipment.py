@@ -144,6 +144,8 @@ class EgoEquipment:
         self._streams = streams
         if self._reporters is not None:
             self._reporters.reset(streams.reports)
+        if self._meters is not None:
+            self._meters.reset()
         self._light = Ramp(self._scenario.light.illuminance_lx)
         self._daylight = self._light.first
         if self._fog is None:
@@ -273,6 +275,8 @@ class EgoEquipment:
             self._daylight = light
             self._enter_fog(in_daylight(renderer.fog, light))
         pose, fog = self._pose(state, ego), field_at(renderer.fog, time)
+        reports = reporters.heard(time, state, ego, fog, sent)
+        meters.hear(reports)
         sections, known = meters.measure(fog), tuple(one.fault for one in faults)
         place = snapshot.route_position
         truth = fog_truth(fog, pose, camera, renderer.signs, state, sections, self._way, known, place)
@@ -294,7 +298,7 @@ class EgoEquipment:
             camera_setback=self._setback,
             lamps=ALL_LAMPS & int(state.lamps[ego]),
             light=self._light_sensing.measure(state, ego, fog, light),
-            reports=reporters.heard(time, state, ego, fog, sent),
+            reports=reports,
         )
         estimates = self._estimate(frame, observation, time)
         believed = fuse(self._fusion, estimates, time, place, observation.reports)

@@ -3,12 +3,14 @@
 import math
 import zlib
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import extinction
 from fogsim.ego.route_places import RoutePlaces
+from fogsim.randomness import named_generator
 from fogsim.scenario import Scenario
 from fogsim.scenario.report_schema import (
     CameraReports,
@@ -27,6 +29,21 @@ METER_HEIGHT = 2.0
 
 WRONG = extinction_from_visibility(20.0), extinction_from_visibility(5000.0)
 """Extinctions between which a wrong measurement is any [1/m]."""
+
+
+SENSOR = "sensor"
+"""What names of sensors beside the road begin with."""
+
+
+def is_of_sensor(report: FogReport) -> bool:
+    """Whether a report is of a sensor beside the road.
+
+    Parameters
+    ----------
+    report : FogReport
+        The report.
+    """
+    return report.source.startswith(SENSOR + " ")
 
 
 class FogReports:
@@ -59,6 +76,7 @@ class FogReports:
         self._draw = int(rng.integers(2**32))
         self._under_way: list[tuple[float, FogReport]] = []
         self._told: dict[str, int] = {}
+        self._has_begun = False
 
     def heard(
         self, time: float, state: TrafficState, ego: int, fog: FogField, sent: Iterable[tuple[str, FogReport]] = ()
@@ -80,23 +98,36 @@ class FogReports:
         """
         if self._cameras is not None:
             self._take_from_cameras(self._cameras, sent, state, ego)
-        if self._roadside is not None:
-            self._measure_roadside(self._roadside, time, fog)
         if self._vehicles is not None:
             self._measure_vehicles(self._vehicles, time, state, ego, fog)
+        return self.heard_from_roadside(time, fog)
+
+    def heard_from_roadside(self, time: float, fog: FogField) -> tuple[FogReport, ...]:
+        """Let sensors beside the road measure, and tell what has come in by now from anybody.
+
+        Parameters
+        ----------
+        time, fog
+            See `heard`.
+        """
+        if self._roadside is not None:
+            self._measure_roadside(self._roadside, time, fog)
         arrived = tuple(report for due, report in self._under_way if due <= time + 1e-9)
         self._under_way = [(due, report) for due, report in self._under_way if due > time + 1e-9]
         return arrived
 
     def _measure_roadside(self, sensors: RoadsideReports, time: float, fog: FogField) -> None:
         places = np.arange(sensors.first_m, self._places.stations[-1], sensors.every_m)
-        due = [i for i in range(len(places)) if self._is_due(f"sensor {i}", sensors.period_s, time)]
+        due = [i for i in range(len(places)) if self._is_due(f"{SENSOR} {i}", sensors.period_s, time)]
         if not due:
             return
+        # A run begins with what sensors have told before of the fog as it is then.
+        time = time if self._has_begun else time - sensors.delay_s
+        self._has_begun = True
         points = np.stack([np.interp(places[due], self._places.stations, axis) for axis in self._route.T], axis=1)
         measured = extinction(fog, points + np.array([0.0, 0.0, METER_HEIGHT]))
         for i, k in zip(due, measured.tolist(), strict=True):
-            self._send(f"sensor {i}", float(places[i]), k, sensors, time)
+            self._send(f"{SENSOR} {i}", float(places[i]), k, sensors, time)
 
     def _measure_vehicles(
         self, radio: VehicleReports, time: float, state: TrafficState, ego: int, fog: FogField
@@ -122,7 +153,8 @@ class FogReports:
         for vehicle, report in sent:
             in_range = vehicle != state.ids[ego] and apart.get(vehicle, math.inf) <= radio.range_m
             if in_range and self._is_due(report.source, radio.period_s, report.time):
-                self._let_travel(report, radio)
+                ahead = self._clock_error(report.source, radio.clock_deviation_s)
+                self._let_travel(replace(report, time=report.time + ahead), report.time, radio)
 
     def _is_equipped(self, name: str, share: float) -> bool:
         """Whether a vehicle is, which in one run it is always or never."""
@@ -142,11 +174,16 @@ class FogReports:
         told = k * math.exp(sender.deviation * noise)
         if wrong < sender.wrong:
             told = WRONG[0] * (WRONG[1] / WRONG[0]) ** any_k
-        self._let_travel(FogReport(name, self._told[name], place, time, told, sender.deviation), sender)
+        told_time = time + self._clock_error(name, sender.clock_deviation_s)
+        self._let_travel(FogReport(name, self._told[name], place, told_time, told, sender.deviation), time, sender)
 
-    def _let_travel(self, report: FogReport, sender: ReportsFrom) -> None:
+    def _clock_error(self, name: str, deviation: float) -> float:
+        """How far a sender's clock is ahead [s]; in one run always the same."""
+        return deviation * float(named_generator(self._draw, name).standard_normal()) if deviation else 0.0
+
+    def _let_travel(self, report: FogReport, time: float, sender: ReportsFrom) -> None:
         if self._rng.random() >= sender.loss:
-            self._under_way.append((report.time + sender.delay_s, report))
+            self._under_way.append((time + sender.delay_s, report))
 
 
 def _apart(state: TrafficState, ego: int) -> Floats:

@@ -1,14 +1,16 @@
 """Visibility meters beside the ego's route, one for each section of it that is advised by itself."""
 
 import itertools
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import extinction
+from fogsim.ego.fog_reports import is_of_sensor
 from fogsim.scenario import Scenario
 from fogsim.scenario.road_sections import meter_places, road_sections, section_limits, stations
-from fogsim.values import FogField, RoadSection
+from fogsim.values import FogField, FogReport, RoadSection
 
 
 class RoadMeters:
@@ -28,6 +30,23 @@ class RoadMeters:
         self._stretches = road_sections(scenario, float(stations(route)[-1]))
         self._places = meter_places(scenario, self._stretches, route)
         self._limits = section_limits(self._stretches, route, limits)
+        self._along = [stretch.start for stretch in self._stretches]
+        self._reported: dict[float, float] = {}
+
+    def reset(self) -> None:
+        """Begin a run, in which no sensor has reported anything."""
+        self._reported = {}
+
+    def hear(self, reports: Iterable[FogReport]) -> None:
+        """Let sensors beside the road report.
+
+        Parameters
+        ----------
+        reports : iterable of FogReport
+            What has come in, from others too.
+        """
+        # Later ones come later: all are on their way for the same time.
+        self._reported.update((one.place, one.extinction) for one in reports if is_of_sensor(one))
 
     def measure(self, fog: FogField) -> tuple[RoadSection, ...]:
         """What they measure, in the direction of travel.
@@ -39,5 +58,12 @@ class RoadMeters:
         """
         if not self._stretches:
             return ()
-        measured = extinction(fog, self._places).tolist()
-        return tuple(itertools.starmap(RoadSection, zip(self._stretches, measured, self._limits, strict=True)))
+        measured, reported = extinction(fog, self._places).tolist(), [self._nearest(at) for at in self._along]
+        sections = zip(self._stretches, measured, self._limits, reported, strict=True)
+        return tuple(itertools.starmap(RoadSection, sections))
+
+    def _nearest(self, place: float) -> float | None:
+        """What the sensor nearest to a place along the route has reported last [1/m]."""
+        if not self._reported:
+            return None
+        return self._reported[min(self._reported, key=lambda at: abs(at - place))]

@@ -32,6 +32,9 @@ STARTLED, CERTAIN, LEAST_LEAP = 3.0, 0.35, 0.3
 """By how many standard deviations, and by how much in ln k, the belief of the here and now must differ for a leap, and
 how sure it must be of ln k [-]."""
 
+CLOCKS_DISAGREE = 5.0
+"""How far in the future a report may be for it to count as one of now [s]: clocks of vehicles differ."""
+
 ANNOUNCED, ANNOUNCED_DEVIATION = 75.0, 0.6
 """Length of the denser fog that is announced [m], and the standard deviation of ln k there: a front is seen, not what
 lies behind it."""
@@ -109,8 +112,8 @@ class FieldFilter:
         place : float
             How far the vehicle has come along its way [m].
         reports : sequence of FogReport
-            What has come in since the last call; those of the future, too old ones, repeated ones and such that are no
-            numbers are left out.
+            What has come in since the last call; those of the future, beyond what clocks disagree by, too old ones,
+            repeated ones and such that are no numbers are left out.
 
         Returns
         -------
@@ -168,6 +171,7 @@ class FieldFilter:
     def _hear(self, report: FogReport, time: float, place: float) -> None:
         """Learn what somebody else has measured."""
         age, ahead, known = time - report.time, report.place - place, (report.source, report.number)
+        age = 0.0 if -CLOCKS_DISAGREE <= age < 0.0 else age
         numbers = (age, ahead, report.extinction, report.relative_deviation)
         if known in self._heard or not all(map(math.isfinite, numbers)) or not 0.0 <= age <= self._oldest_report:
             return

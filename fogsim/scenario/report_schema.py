@@ -18,6 +18,9 @@ class ReportsFrom(Section):
     loss: Share = 0.0
     """Share of reports that do not arrive."""
 
+    clock_deviation_s: Time = 0.0
+    """Standard deviation of the senders' clocks from the receiver's; in one run each is off by the same."""
+
 
 class MeasuredReports(ReportsFrom):
     """Whoever measures the fog where they are and tells others."""

@@ -41,6 +41,12 @@ class InformedMethod(Method):
     informed_by: Literal["belief", "truth"] = "belief"
 
 
+class InformedAdvice(Method):
+    """Advice, which may also go by the reports of sensors beside the road, where sections of road are advised."""
+
+    informed_by: Literal["belief", "truth", "sensors"] = "belief"
+
+
 class Clocks(Section):
     """The three clocks; each is a whole multiple of the one before."""
 
@@ -158,8 +164,9 @@ class Scenario(Section):
     fusion: Annotated[Method, method_of(FUSIONS)] = Method(method="grid_filter")
     """How estimates become a belief."""
 
-    advice: Annotated[InformedMethod, method_of(ADVISERS)] = InformedMethod(method="stopping_sight_distance")
-    """How the belief becomes a speed advice; with `informed_by: truth`, how the true visibility does."""
+    advice: Annotated[InformedAdvice, method_of(ADVISERS)] = InformedAdvice(method="stopping_sight_distance")
+    """How the belief becomes a speed advice; with `informed_by: truth`, how the true visibility does, and with
+    `sensors`, on roads by sections, what the nearest of `sensors.reports.roadside` has reported last."""
 
     lighting: Annotated[InformedMethod, method_of(LIGHTING_POLICIES)] = InformedMethod(method="fog_lamp_rules")
     """How the belief becomes lamps; with `informed_by: truth`, how the true visibility does."""
@@ -232,6 +239,20 @@ class Scenario(Section):
                 if fault.sensor == "camera":
                     raise ValueError(f"faults.{place} is of the camera, and renderer: none draws no frames")
         return value
+
+    @model_validator(mode="after")
+    def _sensors_that_inform(self) -> Self:
+        if self.advice.informed_by == "sensors":
+            if self.sensors.reports.roadside is None:
+                raise ValueError(
+                    "advice.informed_by: sensors needs sensors.reports.roadside, which is missing; {} will do"
+                )
+            if self.drivers.advised not in ("signs", "equipped", "law"):
+                raise ValueError(
+                    "advice.informed_by: sensors goes with drivers.advised: signs, equipped or law, which advise "
+                    f"sections of road, and it is {self.drivers.advised}"
+                )
+        return self
 
     @model_validator(mode="after")
     def _distinct_estimators(self) -> Self:

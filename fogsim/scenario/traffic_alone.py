@@ -65,11 +65,15 @@ def _of_camera(written: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
     if _method(written.get("advice")).get("informed_by") == "belief":
         yield (
             ("advice", "informed_by"),
-            f"belief {_NEEDS}; leave it out, or write truth: a visibility meter at the road",
+            f"belief {_NEEDS}; leave it out, or write truth, a visibility meter at the road, or sensors beside it",
         )
     sensors = written.get("sensors")
     if isinstance(sensors, dict) and sensors.get("faults"):
         yield ("sensors", "faults"), f"a fault of a sensor {_NEEDS}; leave it out"
+    reports = sensors.get("reports") if isinstance(sensors, dict) else None
+    for key in ("vehicles", "cameras"):
+        if isinstance(reports, dict) and reports.get(key):
+            yield ("sensors", "reports", key), f"who hears other vehicles {_NEEDS}; leave it out, or write roadside"
     if _method(written.get("lighting")).get("method", "low_beam") != "low_beam":
         yield ("lighting",), f"choosing lamps {_NEEDS}; leave it out, or write low_beam"
 

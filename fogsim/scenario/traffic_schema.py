@@ -329,6 +329,9 @@ class Signs(Section):
     at_m: tuple[Distance, ...] = ()
     """Their positions, in place of the first one's and the spacing."""
 
+    reading_distance_m: Annotated[Length, Field(ge=0, le=500)] = 0.0
+    """How far before a sign drivers read it, through fog too: it shines."""
+
     @model_validator(mode="after")
     def _in_order(self) -> Self:
         placed = {"from_m", "spacing_m"} & self.model_fields_set

@@ -50,11 +50,15 @@ class RoadSection:
         Extinction coefficient at the meter [1/m].
     speed_limit : float
         Speed limit where the section begins [m/s], as the map has it; ``inf`` where that is not known.
+    reported : float or None
+        Extinction coefficient that the nearest sensor beside the road has reported last [1/m]: with errors, and old;
+        None while it has reported nothing.
     """
 
     stretch: Stretch
     extinction: float
     speed_limit: float
+    reported: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

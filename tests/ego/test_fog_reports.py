@@ -60,8 +60,8 @@ def test_sensors_stand_every_half_mile_and_tell_what_is_there():
         assert one.extinction == pytest.approx(expected, rel=1e-3)
         assert one.relative_deviation == 0.0001
     by_sensor = [one.time for one in told if one.source == "sensor 0"]
-    # Each has a beat of its own, and tells at the beginning too.
-    assert by_sensor[0] == 0.0
+    # Each has a beat of its own; what it told before the run has come in when that begins.
+    assert by_sensor[0] == -1.0
     assert np.diff(by_sensor)[1:] == pytest.approx(2.0, abs=0.11)
 
 
@@ -84,7 +84,7 @@ def test_vehicles_in_range_that_go_the_same_way_on_the_same_road_tell_where_they
 
 
 def test_places_round_a_corner_are_counted_along_the_route():
-    told = heard(senders(vehicles="{equipped: 1, loss: 0}"), vehicles([(1000.0, 150.0, 0.5)], ego=(900.0, 0.0)))
+    told = heard(senders(vehicles="{equipped: 1, loss: 0}"), vehicles([(1000.0, 150.0, 1.5)], ego=(900.0, 0.0)))
     assert {round(one.place) for one in told} == {1150}
 
 

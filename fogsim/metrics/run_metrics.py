@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from fogsim.errors import SimulationError
-from fogsim.metrics.belief_ahead import BeliefAheadError, DenseFogKnown
 from fogsim.metrics.cross_sections import TrafficThroughput
 from fogsim.metrics.crossing import TrafficEncroachment
-from fogsim.metrics.equipped import EquippedBelief
-from fogsim.metrics.estimation import BeliefError, EstimatorErrors
+from fogsim.metrics.estimation import BeliefAheadError, BeliefError, DenseFogKnown, EquippedBelief, EstimatorErrors
 from fogsim.metrics.lighting import Lighting
 from fogsim.metrics.metric import JsonValue, Metric, Sample
 from fogsim.metrics.motion import Comfort, Compliance, Motion

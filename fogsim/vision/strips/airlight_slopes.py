@@ -216,9 +216,9 @@ def row_airlight(sky: Sky, camera: Camera, extinction: float = USUAL_EXTINCTION)
         np.where(angle < 0.0, -np.interp(at, table.angle, between(below)), np.interp(at, table.angle, between(above)))
         for below, above in zip(table.below, table.above, strict=True)
     ]
-    mean = chances @ shapes
-    spread = np.sqrt(chances @ (shapes - mean) ** 2)
-    higher = chances @ (darker * [above for _, above in lines])
+    mean = (chances[:, None] * shapes).sum(axis=0)
+    spread = np.sqrt((chances[:, None] * (shapes - mean) ** 2).sum(axis=0))
+    higher = (chances * darker * [above for _, above in lines]).sum()
     unsure = math.hypot(OTHER_LIGHT, sky.slope_deviation / sky.slope)
     return RowAirlight(sky.luminance / (1.0 + float(higher)), 1.0 + mean, np.hypot(spread, unsure * mean))
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from fogsim.metrics.estimation import FOG_LIMIT, quantile, relative_error
+from fogsim.metrics.estimation.errors import FOG_LIMIT, quantile, relative_error
 from fogsim.metrics.metric import JsonValue, Sample, share
 from fogsim.units import visibility_from_extinction
 

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from fogsim.metrics.estimation import FOG_LIMIT, quantile, relative_error
+from fogsim.metrics.estimation.errors import FOG_LIMIT, quantile, relative_error
 from fogsim.metrics.metric import JsonValue, Sample, share
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import Step

@@ -12,7 +12,6 @@ from fogsim.values.command import (
     Stretch,
     StretchAdvice,
 )
-from fogsim.values.equipped import EquippedVehicle
 from fogsim.values.estimate import DenserFog, Estimate, FogCategory, OpticalDepths, SignLook, fog_category
 from fogsim.values.fault import Fault, RunningFault
 from fogsim.values.fog import FogBank, FogChange, FogField, FogPatches, FogShelter
@@ -34,7 +33,7 @@ from fogsim.values.road import (
 )
 from fogsim.values.scene import Batch, Mesh, Pavement, RoadSurface, Scene, Surface
 from fogsim.values.script import Begun
-from fogsim.values.step import Ending, LampEffects, RoadSection, Step, TrafficStep, Truth
+from fogsim.values.step import Ending, EquippedVehicle, LampEffects, RoadSection, Step, TrafficStep, Truth
 from fogsim.values.traffic import (
     Collision,
     Leader,

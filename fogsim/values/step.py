@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from fogsim.units import visibility_from_extinction
 from fogsim.values.belief import Belief, FogProfile
 from fogsim.values.camera import Camera, CameraPose
-from fogsim.values.command import Command, Stretch
-from fogsim.values.equipped import EquippedVehicle
+from fogsim.values.command import Command, SpeedAdvice, Stretch
 from fogsim.values.estimate import Estimate
 from fogsim.values.fault import Fault
 from fogsim.values.fog import FogField
 from fogsim.values.image import View
+from fogsim.values.light import Lamp
 from fogsim.values.observation import Observation
 from fogsim.values.road import SignMap
 from fogsim.values.script import Begun
@@ -177,6 +177,38 @@ class TrafficStep:
     unplayed: Unplayed = NOTHING_UNPLAYED
     begun: tuple[Begun, ...] = ()
     waiting: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class EquippedVehicle:
+    """What another vehicle with a camera and estimators of its own sees, believes and does at one instant.
+
+    Attributes
+    ----------
+    vehicle_id : str
+        Its id.
+    place : float
+        How far along the ego's route its front bumper is [m].
+    extinction, extinction_ahead : float
+        The truth at its camera, and ahead of it, as of `Truth` [1/m].
+    estimates : tuple of Estimate
+        What its estimators make of its picture.
+    belief : Belief
+        What it believes.
+    advice : SpeedAdvice
+        What it is advised from now on.
+    lamps : Lamp
+        What it lights from now on.
+    """
+
+    vehicle_id: str
+    place: float
+    extinction: float
+    extinction_ahead: float
+    estimates: tuple[Estimate, ...]
+    belief: Belief
+    advice: SpeedAdvice
+    lamps: Lamp
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

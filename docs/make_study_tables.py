@@ -55,6 +55,13 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
         OVERDRIVING,
         ("max_deceleration_mps2", "hardest braking [m/s²]", 1.0, 1),
     ),
+    "belief_over_places": (
+        ("belief_median_error_percent", "error here and now [%]", 1.0, 1),
+        ("belief_coverage_share", "held [%]", 100.0, 0),
+        ("dense_fog_known_before_m", "bank known before it [m]", 1.0, 0),
+        EGO,
+        ("ego_collisions", "collisions of the ego a run", 1.0, 2),
+    ),
     "lighting_policies": (
         ("mean_own_sight_m", "own sight [m]", 1.0, 1),
         ("high_beam_time_share", "high beams [% of time]", 100.0, 0),

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,7 @@ from fogsim.scenario.sensor_schema import fault_of
 from fogsim.sensors import check_sign_ids, faulty_signs
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim.values import (
+    Belief,
     Camera,
     CameraPose,
     Command,
@@ -48,6 +50,16 @@ from fogsim.values.fault import FaultKind, Where
 from fogsim.values.light import ALL_LAMPS
 from fogsim.values.result_checks import checked_belief, checked_estimate
 from fogsim.values.script import Actions
+
+
+class _RunParts(NamedTuple):
+    """What lives as long as one run: random numbers, faults, meters, what others tell, and signs."""
+
+    streams: Streams
+    schedule: FaultSchedule
+    meters: RoadMeters
+    reporters: FogReports
+    signs: SignMap
 
 
 class EgoEquipment:
@@ -264,22 +276,27 @@ class EgoEquipment:
         SimulationError
             If `start_run` has not been called, or it is closed.
         """
-        streams, meters, schedule, network = self._streams, self._meters, self._schedule, self._network
-        reporters = self._reporters
-        if streams is None or meters is None or schedule is None or network is None or reporters is None:
-            raise SimulationError("the run has not been started, or is closed")
-        faults = schedule.at(time)
+        parts = self._run_parts()
+        faults = parts.schedule.at(time)
         renderer, state, ego = self._view_of_world(faults), snapshot.state, snapshot.ego
         camera, light = knocked(self._camera, [one.kind for one in faults]), self._light.at(time)
         if light != self._daylight:
             self._daylight = light
             self._enter_fog(in_daylight(renderer.fog, light))
         pose, fog = self._pose(state, ego), field_at(renderer.fog, time)
-        reports = reporters.heard(time, state, ego, fog, sent)
-        meters.hear(reports)
-        sections, known = meters.measure(fog), tuple(one.fault for one in faults)
-        place = snapshot.route_position
-        truth = fog_truth(fog, pose, camera, renderer.signs, state, sections, self._way, known, place)
+        reports = parts.reporters.heard(time, state, ego, fog, sent)
+        parts.meters.hear(reports)
+        truth = fog_truth(
+            fog,
+            pose,
+            camera,
+            renderer.signs,
+            state,
+            parts.meters.measure(fog),
+            self._way,
+            tuple(one.fault for one in faults),
+            snapshot.route_position,
+        )
         if light < DAY_ILLUMINANCE:
             truth = replace(truth, lamp_effects=lamp_effects(state, ego, fog, truth.extinction_ahead))
         view, radiance = exposed(
@@ -289,26 +306,24 @@ class EgoEquipment:
             ego,
             pose,
         )
-        frame = self._frame(radiance, camera, faults, streams, time)
+        frame = self._frame(radiance, camera, faults, parts.streams, time)
         observation = Observation(
             frame=frame,
             speed=float(state.speed[ego]),
-            lead=self._sensors.lead(snapshot, faults, streams),
-            signs=self._sensors.signs(snapshot, network[1], faults, streams),
+            lead=self._sensors.lead(snapshot, faults, parts.streams),
+            signs=self._sensors.signs(snapshot, parts.signs, faults, parts.streams),
             camera_setback=self._setback,
             lamps=ALL_LAMPS & int(state.lamps[ego]),
             light=self._light_sensing.measure(state, ego, fog, light),
             reports=reports,
         )
         estimates = self._estimate(frame, observation, time)
-        believed = fuse(self._fusion, estimates, time, place, observation.reports)
-        belief = checked_belief(self._scenario.fusion.method, believed)
         return Step(
             index=index,
             time=time,
             traffic=state,
             ego=ego,
-            route_position=place,
+            route_position=snapshot.route_position,
             speed_limit=snapshot.speed_limit,
             leader=snapshot.leader,
             signal_ahead=snapshot.signal_ahead,
@@ -317,11 +332,24 @@ class EgoEquipment:
             view=view,
             observation=observation,
             estimates=estimates,
-            belief=belief,
+            belief=self._believe(estimates, observation, time, snapshot.route_position),
             command=command,
             ending=ending,
             reading_radius=self._scenario.traffic.reading_radius_m,
         )
+
+    def _run_parts(self) -> "_RunParts":
+        """What lives as long as one run."""
+        found = self._streams, self._schedule, self._meters, self._reporters, self._network
+        streams, schedule, meters, reporters, network = found
+        if streams is None or schedule is None or meters is None or reporters is None or network is None:
+            raise SimulationError("the run has not been started, or is closed")
+        return _RunParts(streams, schedule, meters, reporters, network[1])
+
+    def _believe(self, estimates: tuple[Estimate, ...], observation: Observation, time: float, place: float) -> Belief:
+        """What is believed after this step."""
+        believed = fuse(self._fusion, estimates, time, place, observation.reports)
+        return checked_belief(self._scenario.fusion.method, believed)
 
     def _frame(
         self,

@@ -40,6 +40,8 @@ class PresentedAdviser(ABC):
     slowing : float
         Deceleration with which drivers slow down for denser fog ahead [m/s²], where the belief knows of places: the
         advice is what each place ahead asks for, and as much more as can be lost on the way there.
+    lead_time : float
+        Time before drivers begin to do so [s]: to hear, to react, and the time until advice is given again.
     """
 
     quantile: Annotated[float, Range(0.0, 1.0)] = 0.5
@@ -51,6 +53,7 @@ class PresentedAdviser(ABC):
     minimum: Annotated[float, Range(0.0, 100.0, "m/s")] = 0.0
     hold: Annotated[float, Range(0.0, 3600.0, "s")] = 60.0
     slowing: Annotated[float, Range(0.1, 15.0, "m/s²")] = 1.5
+    lead_time: Annotated[float, Range(0.0, 60.0, "s")] = 2.0
 
     @abstractmethod
     def speed_at(self, visibility: float) -> float:
@@ -96,7 +99,9 @@ class PresentedAdviser(ABC):
             ahead = (profile.distance > 0.0) & (profile.standard_deviation <= self.widest_belief)
             for distance in profile.distance[ahead].tolist():
                 there = self.speed_at(profile.visibility_quantile(distance, self.quantile))
-                speed = min(speed, math.sqrt(there**2 + 2.0 * self.slowing * distance))
+                # v² = v_there² + 2 a (d − v T)
+                lost = self.slowing * self.lead_time
+                speed = min(speed, math.sqrt(lost**2 + there**2 + 2.0 * self.slowing * distance) - lost)
         return self._presented(speed, limit)
 
     def _smoothed(self, visibility: float, time: float, previous: SpeedAdvice) -> float:

@@ -137,7 +137,9 @@ class FieldFilter:
             self._take_in(estimate)
         for report in reports:
             self._hear(report, time, place)
-        self._mind_leaps(now)
+        seen = [estimate.reach for estimate in estimates if estimate.valid]
+        if seen:
+            self._mind_leaps(now, max(seen))
         if now.denser is not None:
             self._expect(now.denser)
         return self._belief(now)
@@ -183,13 +185,14 @@ class FieldFilter:
         start, end = ahead - 0.5 * CELL, ahead + 0.5 * CELL
         self._field.learn(start, end, value, deviation, self._wrong_reports, self._floor)
 
-    def _mind_leaps(self, now: Belief) -> None:
-        """Doubt the field where the belief of the here and now surely differs from it."""
+    def _mind_leaps(self, now: Belief, reach: float) -> None:
+        """Doubt the field where the belief of the here and now surely differs from it, as far as that has been seen."""
         deviation = now.log_standard_deviation
         if deviation > CERTAIN:
             return
         value = float((now.probability * now.log_extinction).sum())
-        sight = self._sight(math.exp(value))
+        # A bank beyond what was seen, of which others have told, is no contradiction.
+        sight = min(self._sight(math.exp(value)), reach)
         believed, variance = self._field.mean_extinction(0.0, sight)
         apart = abs(value - believed)
         if apart > max(STARTLED * math.sqrt(variance + deviation**2), LEAST_LEAP):

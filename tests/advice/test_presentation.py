@@ -99,10 +99,18 @@ def test_a_bank_ahead_is_slowed_down_for_no_earlier_than_need_be() -> None:
     speeds_on_the_way = []
     for ahead in (400.0, 200.0, 100.0, 0.0):
         belief = believed({-100.0: 2000.0, ahead - 1e-3: 2000.0, ahead: 60.0, 1000.0: 60.0})
-        speeds_on_the_way.append(advised(belief, quantile=0.5, slowing=1.5))
+        speeds_on_the_way.append(advised(belief, quantile=0.5, slowing=1.5, lead_time=0.0))
         expected = math.sqrt(in_bank**2 + 2.0 * 1.5 * ahead)
         assert speeds_on_the_way[-1] == pytest.approx(math.inf if expected >= LIMIT else expected, abs=0.05)
     assert speeds_on_the_way == sorted(speeds_on_the_way, reverse=True)
+
+
+def test_advice_comes_early_enough_for_drivers_who_begin_later() -> None:
+    for ahead in (50.0, 150.0, 250.0):
+        belief = believed({-100.0: 2000.0, ahead - 1e-3: 2000.0, ahead: 60.0, 1000.0: 60.0})
+        early = advised(belief, quantile=0.5, slowing=1.5, lead_time=2.0)
+        left = ahead - 2.0 * early
+        assert early**2 == pytest.approx(safe_speed(60.0, 2.5, 3.4) ** 2 + 2.0 * 1.5 * left, rel=0.01)
 
 
 def test_places_of_which_too_little_is_known_do_not_count() -> None:

@@ -1,5 +1,6 @@
 """Belief over space from estimates, announcements and reports."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -94,7 +95,7 @@ def test_a_report_from_ahead_is_believed_where_it_was_measured():
 @pytest.mark.parametrize(
     "bad",
     [
-        report(350.0, 80.0, time=5.0),
+        report(350.0, 80.0, time=50.0),
         report(350.0, 80.0, time=-1000.0),
         report(350.0, math.nan),
         report(math.inf, 80.0),
@@ -108,6 +109,22 @@ def test_reports_that_cannot_be_change_nothing(bad):
     plain = driven(make("field_filter"), [seen(800.0, 0.1)], 1.0)
     told = driven(make("field_filter"), [seen(800.0, 0.1)], 1.0, reports=[bad])
     np.testing.assert_array_equal(told.profile.log_extinction, plain.profile.log_extinction)
+
+
+def test_clocks_may_disagree_by_some_seconds():
+    now = driven(make("field_filter"), [seen(800.0, 0.1)], 1.0, reports=[report(350.0, 80.0, time=1.0)])
+    ahead = driven(make("field_filter"), [seen(800.0, 0.1)], 1.0, reports=[report(350.0, 80.0, time=4.0)])
+    np.testing.assert_array_equal(ahead.profile.log_extinction, now.profile.log_extinction)
+
+
+def test_a_bank_beyond_what_is_seen_is_no_contradiction_to_clear_air_here():
+    """Of it others tell; the camera sees 190 m, in which the air is clear."""
+    fusion, clear = make("field_filter"), dataclasses.replace(seen(2000.0, 0.2), reach=190.0)
+    for number in range(40):
+        reports = [FogReport(f"at {at}", number, at, 0.5 * number, 0.05, 0.1) for at in (260.0, 310.0)]
+        told = fusion.update_at([clear], 0.5 * number, 0.0, reports)
+    assert told.profile.visibility_quantile(300.0, 0.5) == pytest.approx(60.0, rel=0.2)
+    assert told.profile.visibility_quantile(50.0, 0.5) > 1000.0
 
 
 def test_a_report_that_comes_twice_counts_once():

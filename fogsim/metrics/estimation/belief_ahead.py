@@ -20,6 +20,9 @@ DENSE_FOG = 150.0
 KNOWN_FOG = 300.0
 """Believed visibility below which dense fog is known [m]."""
 
+BEHIND_EDGE = 50.0
+"""How far behind the place where dense fog begins the belief is asked for [m]: edges are not known to the metre."""
+
 INTO_FOG = 300.0
 """How far into dense fog it is still asked when it was known [m]."""
 
@@ -74,9 +77,9 @@ class DenseFogKnown:
     """How far before dense fog it was known, and known from then on."""
 
     meanings: ClassVar[Mapping[str, str]] = {
-        "dense_fog_known_before_m": "way before fog of less than 150 m from which on the belief about the place where "
-        "it begins was below 300 m in the median; negative if it was known only behind that place; median of such "
-        "places, and none if the run has none or ends 300 m behind it or earlier",
+        "dense_fog_known_before_m": "way before fog of less than 150 m from which on the belief about the place 50 m "
+        "behind its beginning was below 300 m in the median; negative if it was known only behind that beginning; "
+        "median over such fogs, and none if the run has none or ends 300 m behind it or earlier",
     }
     _begins: float | None = None
     _known: float | None = None
@@ -104,7 +107,7 @@ class DenseFogKnown:
         believed = (
             step.belief.visibility_quantile(0.5)
             if profile is None
-            else profile.visibility_quantile(max(ahead, 0.0), 0.5)
+            else profile.visibility_quantile(max(ahead + BEHIND_EDGE, 0.0), 0.5)
         )
         if believed >= KNOWN_FOG:
             self._known = None

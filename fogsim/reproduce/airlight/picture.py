@@ -57,11 +57,11 @@ def _draw_airlight(axes: Axes) -> None:
     up = np.concatenate((-np.geomspace(15.0, 0.5, 40), [0.0], np.geomspace(0.5, 30.0, 40)))
     for albedo, colour in _COLOURS.items():
         over = Condition("", albedo)
-        axes.plot(up, [airlight(over, one) for one in up.tolist()], colour, label=f"land of albedo {albedo:g}")
-    axes.axhline(AIRLIGHT_SHARE, color="0.5", ls="--", label="Koschmieder, over land of albedo 0.1")
+        axes.plot(up, [airlight(over, one) for one in up.tolist()], colour, label=f"ρ {albedo:g}")
+    axes.axhline(AIRLIGHT_SHARE, color="0.5", ls="--", label="Koschmieder, ρ 0.1")
     axes.axvline(0.0, color="0.8", lw=1)
     axes.set(xlabel="elevation [°]", ylabel="airlight / (1 − T), over E/π", title="Airlight up to road or sky")
-    axes.legend(fontsize=8)
+    axes.legend(fontsize=7, loc="lower right")
 
 
 def _draw_road(axes: Axes) -> None:

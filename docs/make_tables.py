@@ -35,7 +35,7 @@ from fogsim.recorders.table_columns import Column, table_columns, traffic_table_
 from fogsim.recorders.trajectories import TRAJECTORY_COLUMNS
 from fogsim.scenario.schema import Scenario
 from fogsim.scenario.section import GIVEN_BY_THE_LOOP, Method
-from fogsim.scenario.sensor_schema import FaultSection
+from fogsim.scenario.sensors.faults import FaultSection
 from fogsim.scenario.timeline import TimelineEntry
 from fogsim.scene import SIGN_KINDS
 from fogsim.traffic import COMPLIANCES, FOLLOWING_MODELS, SPEED_CHOICES

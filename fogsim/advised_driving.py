@@ -10,7 +10,7 @@ from fogsim.road_advice import RoadAdvice, stretch_advices
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.drivers import stretch_advice
 from fogsim.scenario.road_sections import DISPLAYS
-from fogsim.scenario.schema import InformedAdvice, InformedMethod
+from fogsim.scenario.schema import InformedMethod
 from fogsim.values import Belief, Command, LampChoice, RoadSection, SpeedAdvice, Step
 from fogsim.values.belief import certain_belief
 from fogsim.values.result_checks import checked_advice, checked_lamp_choice, checked_lamps
@@ -75,14 +75,14 @@ def _lighting_questions(
     return lambda _, known, previous: LampChoice(checked_lamps(name, policy.lamps(known, previous.lamps)))
 
 
-def known_fog(step: Step, method: InformedMethod | InformedAdvice) -> Belief:
+def known_fog(step: Step, method: InformedMethod) -> Belief:
     """What a method goes by: what the ego believes, or the truth, as a visibility meter at the road has it.
 
     Parameters
     ----------
     step : Step
         What was finished last.
-    method : InformedMethod or InformedAdvice
+    method : InformedMethod
         The method of the scenario.
     """
     return step.belief if method.informed_by == "belief" else certain_belief(step.truth.extinction_ahead)

@@ -26,7 +26,7 @@ from fogsim.scenario.roads.schema import DemandSection as Demand
 from fogsim.scenario.roads.schema import Road
 from fogsim.scenario.schema import Clocks, InformedMethod, Light
 from fogsim.scenario.section import Method
-from fogsim.scenario.sensor_schema import (
+from fogsim.scenario.sensors.faults import (
     CameraBlackout,
     CameraCalibration,
     CameraDirtyLens,
@@ -38,14 +38,14 @@ from fogsim.scenario.sensor_schema import (
     GpsHeadingBias,
     GpsOutage,
     GpsPositionBias,
-    Sensors,
 )
-from fogsim.scenario.sensor_schema import LeadBiasSection as LeadBias
-from fogsim.scenario.sensor_schema import LeadDropoutSection as LeadDropout
-from fogsim.scenario.sensor_schema import LeadNarrowViewSection as LeadNarrowView
-from fogsim.scenario.sensor_schema import LeadNoiseSection as LeadNoise
-from fogsim.scenario.sensor_schema import SignsMissingSection as SignsMissing
-from fogsim.scenario.sensor_schema import SignsMovedSection as SignsMoved
+from fogsim.scenario.sensors.faults import LeadBiasSection as LeadBias
+from fogsim.scenario.sensors.faults import LeadDropoutSection as LeadDropout
+from fogsim.scenario.sensors.faults import LeadNarrowViewSection as LeadNarrowView
+from fogsim.scenario.sensors.faults import LeadNoiseSection as LeadNoise
+from fogsim.scenario.sensors.faults import SignsMissingSection as SignsMissing
+from fogsim.scenario.sensors.faults import SignsMovedSection as SignsMoved
+from fogsim.scenario.sensors.schema import Sensors
 from fogsim.scenario.timeline.lamps import LampActions, LampSides, StopLampSides
 from fogsim.scenario.timeline.schema import (
     BrakeAction,

@@ -24,7 +24,7 @@ from fogsim.fusion import fuse
 from fogsim.randomness import Streams
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.schema import NO_RENDERER
-from fogsim.scenario.sensor_schema import fault_of
+from fogsim.scenario.sensors.faults import fault_of
 from fogsim.sensors import check_sign_ids, faulty_signs
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim.values import (

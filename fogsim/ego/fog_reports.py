@@ -12,7 +12,7 @@ from fogsim.atmosphere import extinction
 from fogsim.ego.route_places import RoutePlaces
 from fogsim.randomness import named_generator
 from fogsim.scenario import Scenario
-from fogsim.scenario.report_schema import (
+from fogsim.scenario.sensors.reports import (
     CameraReports,
     MeasuredReports,
     ReportsFrom,

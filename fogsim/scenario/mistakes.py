@@ -10,7 +10,7 @@ from fogsim.errors import nearest, shown, suggest
 from fogsim.scenario.document import Document
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.section import MISTAKE
-from fogsim.scenario.sensor_schema import AnyFault
+from fogsim.scenario.sensors.faults import AnyFault
 from fogsim.scenario.traffic_schema import AnyEvent
 
 MOST_TOLD = 50

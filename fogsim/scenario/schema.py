@@ -23,7 +23,7 @@ from fogsim.scenario.expect.schema import Expectations
 from fogsim.scenario.fog import Fog
 from fogsim.scenario.roads.schema import Actors, DemandSection, Road, check_roads
 from fogsim.scenario.section import Flag, Method, Number, Period, Section, Seed, Text, method_of
-from fogsim.scenario.sensor_schema import Sensors
+from fogsim.scenario.sensors.schema import Sensors
 from fogsim.scenario.timeline import Timeline, check_timeline
 from fogsim.scenario.timeline.checks import PHOTONS_BY_DAY
 from fogsim.scenario.traffic_alone import without_ego
@@ -36,13 +36,10 @@ NO_RENDERER = "none"
 
 
 class InformedMethod(Method):
-    """A method that goes by the fog, known from the ego's belief or, as of a meter beside the road, in truth."""
+    """A method that goes by the fog, known from the ego's belief or, as of a meter beside the road, in truth.
 
-    informed_by: Literal["belief", "truth"] = "belief"
-
-
-class InformedAdvice(Method):
-    """Advice, which may also go by the reports of sensors beside the road, where sections of road are advised."""
+    Advice may also go by the reports of sensors beside the road, where sections of road are advised.
+    """
 
     informed_by: Literal["belief", "truth", "sensors"] = "belief"
 
@@ -164,7 +161,7 @@ class Scenario(Section):
     fusion: Annotated[Method, method_of(FUSIONS)] = Method(method="grid_filter")
     """How estimates become a belief."""
 
-    advice: Annotated[InformedAdvice, method_of(ADVISERS)] = InformedAdvice(method="stopping_sight_distance")
+    advice: Annotated[InformedMethod, method_of(ADVISERS)] = InformedMethod(method="stopping_sight_distance")
     """How the belief becomes a speed advice; with `informed_by: truth`, how the true visibility does, and with
     `sensors`, on roads by sections, what the nearest of `sensors.reports.roadside` has reported last."""
 
@@ -242,6 +239,8 @@ class Scenario(Section):
 
     @model_validator(mode="after")
     def _sensors_that_inform(self) -> Self:
+        if self.lighting.informed_by == "sensors":
+            raise ValueError("lighting.informed_by: sensors beside the road choose no lamps; write belief or truth")
         if self.advice.informed_by == "sensors":
             if self.sensors.reports.roadside is None:
                 raise ValueError(

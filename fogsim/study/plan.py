@@ -16,7 +16,7 @@ from fogsim.errors import InputError, suggest
 from fogsim.scenario import Scenario, build, load_scenario, override, resolved, scenario_from_config
 from fogsim.scenario.document import Document, read_document
 from fogsim.scenario.mistakes import mistake_lines
-from fogsim.scenario.schema import NO_RENDERER, InformedAdvice, InformedMethod
+from fogsim.scenario.schema import NO_RENDERER
 from fogsim.scenario.section import Id, Section, Seed, Share, Text
 from fogsim.scenario.traffic_alone import NO_EGO
 from fogsim.study.main_metrics import unknown_metrics
@@ -293,5 +293,5 @@ def needs_camera(scenario: Scenario) -> bool:
         The scenario.
     """
     deaf = scenario.advice.method in ("none", "fixed_speed"), scenario.lighting.method == "low_beam"
-    methods: tuple[InformedAdvice | InformedMethod, ...] = (scenario.advice, scenario.lighting)
+    methods = (scenario.advice, scenario.lighting)
     return any(m.informed_by == "belief" and not d for m, d in zip(methods, deaf, strict=True))

@@ -5,7 +5,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Protocol
 
-from fogsim.scenario.sensor_schema import fault_of
+from fogsim.scenario.sensors.faults import fault_of
 from fogsim.scenario.timeline.lamps import lamp_switches
 from fogsim.scenario.timeline.schema import (
     DepartAction,

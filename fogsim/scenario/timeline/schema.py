@@ -33,7 +33,7 @@ from fogsim.scenario.section import (
     Visibility,
     Whole,
 )
-from fogsim.scenario.sensor_schema import AnyFault
+from fogsim.scenario.sensors.faults import AnyFault
 from fogsim.scenario.timeline.lamps import LampActions
 from fogsim.traffic.templates import VEHICLE_KINDS
 from fogsim.values.script import Shape

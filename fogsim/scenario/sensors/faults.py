@@ -1,12 +1,11 @@
-"""The block of a scenario file about the ego's sensors beside the camera, and about the faults of all of them."""
+"""The keys of a scenario file about what is wrong with the ego's sensors, the camera among them, and when."""
 
 import math
 from typing import Annotated, Literal
 
 from pydantic import Field
 
-from fogsim.scenario.report_schema import Reports
-from fogsim.scenario.section import Distance, Id, Length, Number, Period, Place, Section, Share, Time
+from fogsim.scenario.section import Id, Number, Period, Place, Section, Share, Time
 from fogsim.values.fault import (
     Blackout,
     DirtyLens,
@@ -39,45 +38,6 @@ SmallAngle = Annotated[Number, Field(ge=-10, le=10)]
 
 Speed = Annotated[Number, Field(ge=-140, le=140)]
 """A speed, or a difference of speeds [m/s]."""
-
-
-class Lead(Section):
-    """The radar that tracks the vehicle ahead."""
-
-    reach_m: Length = 200.0
-    """Distance up to which it tracks a vehicle."""
-
-    distance_deviation_m: Annotated[Distance, Field(le=1000)] = 0.25
-    """Standard deviation of its distance."""
-
-    speed_deviation_mps: Annotated[Number, Field(ge=0, le=140)] = 0.1
-    """Standard deviation of its relative speed."""
-
-    field_of_view_deg: Annotated[Number, Field(ge=0.1, le=360)] = 360.0
-    """Full horizontal angle within which it tracks a vehicle; long-range radars have about 10 to 20."""
-
-
-class GpsSection(Section):
-    """Satellite positioning, by which the map tells of signs ahead."""
-
-    position_deviation_m: Annotated[Distance, Field(le=1000)] = 0.0
-    """Standard deviation of the position, east and north."""
-
-    heading_deviation_deg: Annotated[Number, Field(ge=0, le=180)] = 0.0
-    """Standard deviation of the heading."""
-
-
-class LightSensorSection(Section):
-    """The light sensor behind the windscreen: the light of the sky, and by night whether others' lamps are ahead."""
-
-    reach_m: Length = 400.0
-    """Distance up to which it finds dipped head lamps in clear air; brighter ones farther, in fog all less far."""
-
-    tail_reach_m: Length = 100.0
-    """The same of tail lamps."""
-
-    field_of_view_deg: Annotated[Number, Field(ge=0.1, le=180)] = 40.0
-    """Full horizontal angle within which it looks for lamps."""
 
 
 class FaultSection(Section):
@@ -428,28 +388,6 @@ AnyFault = Annotated[
     Field(discriminator="fault"),
 ]
 """Any fault of any sensor, known by its name."""
-
-
-class Sensors(Section):
-    """Sensors beside the camera."""
-
-    lead: Lead = Lead()
-    """The radar."""
-
-    gps: GpsSection = GpsSection()
-    """Satellite positioning."""
-
-    light: LightSensorSection = LightSensorSection()
-    """The light sensor, by which lighting policies go."""
-
-    sign_reach_m: Length = 250.0
-    """Distance up to which the map tells of signs ahead."""
-
-    reports: Reports = Reports()
-    """What others tell of the fog where they are."""
-
-    faults: tuple[AnyFault, ...] = ()
-    """What is wrong with sensors, the camera among them, and when."""
 
 
 def fault_of(written: AnyFault) -> Fault:

@@ -1,0 +1,70 @@
+"""The block of a scenario file about the ego's sensors beside the camera, and about the faults of all of them."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from fogsim.scenario.section import Distance, Length, Number, Section
+from fogsim.scenario.sensors.faults import AnyFault
+from fogsim.scenario.sensors.reports import Reports
+
+
+class Lead(Section):
+    """The radar that tracks the vehicle ahead."""
+
+    reach_m: Length = 200.0
+    """Distance up to which it tracks a vehicle."""
+
+    distance_deviation_m: Annotated[Distance, Field(le=1000)] = 0.25
+    """Standard deviation of its distance."""
+
+    speed_deviation_mps: Annotated[Number, Field(ge=0, le=140)] = 0.1
+    """Standard deviation of its relative speed."""
+
+    field_of_view_deg: Annotated[Number, Field(ge=0.1, le=360)] = 360.0
+    """Full horizontal angle within which it tracks a vehicle; long-range radars have about 10 to 20."""
+
+
+class GpsSection(Section):
+    """Satellite positioning, by which the map tells of signs ahead."""
+
+    position_deviation_m: Annotated[Distance, Field(le=1000)] = 0.0
+    """Standard deviation of the position, east and north."""
+
+    heading_deviation_deg: Annotated[Number, Field(ge=0, le=180)] = 0.0
+    """Standard deviation of the heading."""
+
+
+class LightSensorSection(Section):
+    """The light sensor behind the windscreen: the light of the sky, and by night whether others' lamps are ahead."""
+
+    reach_m: Length = 400.0
+    """Distance up to which it finds dipped head lamps in clear air; brighter ones farther, in fog all less far."""
+
+    tail_reach_m: Length = 100.0
+    """The same of tail lamps."""
+
+    field_of_view_deg: Annotated[Number, Field(ge=0.1, le=180)] = 40.0
+    """Full horizontal angle within which it looks for lamps."""
+
+
+class Sensors(Section):
+    """Sensors beside the camera."""
+
+    lead: Lead = Lead()
+    """The radar."""
+
+    gps: GpsSection = GpsSection()
+    """Satellite positioning."""
+
+    light: LightSensorSection = LightSensorSection()
+    """The light sensor, by which lighting policies go."""
+
+    sign_reach_m: Length = 250.0
+    """Distance up to which the map tells of signs ahead."""
+
+    reports: Reports = Reports()
+    """What others tell of the fog where they are."""
+
+    faults: tuple[AnyFault, ...] = ()
+    """What is wrong with sensors, the camera among them, and when."""

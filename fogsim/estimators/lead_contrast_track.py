@@ -202,9 +202,12 @@ class ContrastTrack(TrackedVehicle[RearDetection]):
         """
         if self.reference is None or all(_is_near(one.levelled, extinction) for one in self.detections):
             return
-        number = next(i for i, one in enumerate(self.detections) if self._is_reference(one))
-        self.detections = [_relevelled(one, extinction) for one in self.detections]
-        self._compare_all(self.detections[number])
+        # The reference itself may have given way among the detections to a later picture from its range.
+        reference = _relevelled(self.reference, extinction)
+        self.detections = [
+            reference if self._is_reference(one) else _relevelled(one, extinction) for one in self.detections
+        ]
+        self._compare_all(reference)
 
     def _keep_new(self, detection: RearDetection) -> None:
         """Keep a detection from a new range; one from a known range tells whether fog has changed, or replaces it."""

@@ -81,7 +81,7 @@ class FieldFilter:
         relative_floor: Annotated[float, Range(1e-4, 10.0)] = 0.1,
         outlier_share: Annotated[float, Range(1e-12, 0.999)] = 0.07,
         wrong_reports: Annotated[float, Range(1e-12, 0.999)] = 0.2,
-        correlation_time: Annotated[float, Range(1e-3, 1e6, "s")] = 1.5,
+        correlation_time: Annotated[float, Range(1e-3, 1e6, "s")] = 2.0,
         oldest_report: Annotated[float, Range(0.0, 1e6, "s")] = 600.0,
     ) -> None:
         self._here = GridFilter(outlier_share=outlier_share)

@@ -152,6 +152,22 @@ def test_airlight_that_darkens_toward_the_road_is_reckoned_with_the_extinction_t
     assert abs(np.median(errors)) < 15
 
 
+def test_pictures_are_levelled_anew_although_the_reference_is_not_among_them():
+    light, ranges = DARK_LAND[30.0], np.linspace(12.0, 26.0, 15).tolist()
+    observations = list(drive(30.0, away(ranges), light=light, gains=[0.55] * len(ranges), noise=0.1))
+    estimator = make("lead_contrast", CAMERA)
+    for observation in observations[:12]:
+        estimator.update(observation)
+    track = estimator._track
+    track.detections = [one for one in track.detections if one.picture is not track.reference.picture]
+    before = [one.contrast.ratio for one in track.detections]
+    track.relevel(0.5)
+    assert track.reference.levelled.extinction == 0.5
+    assert {one.levelled.extinction for one in track.detections} == {0.5}
+    assert [one.contrast.ratio for one in track.detections] != before
+    assert estimator.update(observations[12]).method == "lead_contrast"
+
+
 @pytest.mark.parametrize("name", sorted(CAMERAS))
 def test_other_cameras(name):
     camera = CAMERAS[name]

@@ -204,8 +204,7 @@ def _batch(steps: list[TrafficStep], schema: Any) -> Any:
         "advised_speed": [speed for step in steps for speed in _advised_speeds(step)],
     }
     believed = [quantiles for step in steps for quantiles in _believed_visibilities(step)]
-    for name, values in zip(_BELIEVED, zip(*believed, strict=True), strict=True):
-        columns[name] = list(values)
+    columns |= {name: [quantiles[i] for quantiles in believed] for i, name in enumerate(_BELIEVED)}
     arrays = [pa.array(columns[field.name], type=field.type, from_pandas=True) for field in schema]
     return pa.RecordBatch.from_arrays(arrays, schema=schema)
 

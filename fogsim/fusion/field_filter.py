@@ -1,29 +1,22 @@
 """Belief over space: what is known of the fog at places along the way, from estimates, announcements and reports."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Annotated
 
-import numpy as np
-
 from fogsim.errors import InputError
+from fogsim.fusion.curve_stretches import curve_stretches
 from fogsim.fusion.grid_filter import GridFilter
 from fogsim.fusion.route_field import AHEAD, CELL, RouteField
 from fogsim.fusion.route_field_kernels import shares_in_cells
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.belief import Belief
-from fogsim.values.estimate import DenserFog, Estimate, OpticalDepths
+from fogsim.values.estimate import DenserFog, Estimate
 from fogsim.values.observation import FogReport
 
 FARTHEST = CELL * AHEAD
 """How far ahead an estimate is taken to speak [m]."""
-
-CUTS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
-"""Optical depths between which a curve of them tells of stretches of their own [-]."""
-
-SHORTEST, SHARED, GRAIN = 15.0, 0.8, 0.02
-"""Shortest such stretch [m], correlation of a curve's errors at its ends, and least deviation of its depth [-]."""
 
 CLEAR, UNSURE = 4e-4, 0.7
 """Extinction [1/m] and relative deviation [-] from which on an estimate only says that there is little fog."""
@@ -162,7 +155,7 @@ class FieldFilter:
         if estimate.optical_depths is None:
             self._learn(0.0, min(estimate.reach, self._sight(k)), math.log(k), relative)
             return
-        for start, end, value, deviation in _stretches(estimate.optical_depths):
+        for start, end, value, deviation in curve_stretches(estimate.optical_depths, FARTHEST).tolist():
             self._learn(start, end, value, max(deviation, 0.5 * relative))
 
     def _learn(self, start: float, end: float, value: float, deviation: float) -> None:
@@ -187,10 +180,9 @@ class FieldFilter:
 
     def _mind_leaps(self, now: Belief, reach: float) -> None:
         """Doubt the field where the belief of the here and now surely differs from it, as far as that has been seen."""
-        deviation = now.log_standard_deviation
+        value, deviation = now.log_moments()
         if deviation > CERTAIN:
             return
-        value = float((now.probability * now.log_extinction).sum())
         # A bank beyond what was seen, of which others have told, is no contradiction.
         sight = min(self._sight(math.exp(value)), reach)
         believed, variance = self._field.mean_extinction(0.0, sight)
@@ -216,22 +208,3 @@ class FieldFilter:
     def _sight(extinction: float) -> float:
         """Meteorological visibility, as far as the field goes [m]."""
         return min(OPTICAL_DEPTH_AT_VISIBILITY / extinction, FARTHEST)
-
-
-def _stretches(curve: OpticalDepths) -> Iterator[tuple[float, float, float, float]]:
-    """Stretches of which a curve tells: start and end [m], ln of the mean extinction, and its standard deviation."""
-    distance, depth, deviation = map(np.array, (curve.distance, curve.depth, curve.standard_deviation))
-    ends = [float(np.interp(cut, depth, distance)) for cut in CUTS if cut < depth[-1]]
-    if depth[-1] < CUTS[-1]:
-        ends.append(float(distance[-1]))
-    start, reached, unsure = 0.0, 0.0, 0.0
-    for end in ends:
-        if end - start < SHORTEST:
-            continue
-        total, spread = (float(np.interp(end, distance, values)) for values in (depth, deviation))
-        more = max(total - reached, 1e-4)
-        apart = math.sqrt(max(spread**2 + unsure**2 - 2.0 * SHARED * spread * unsure, 0.0))
-        yield start, min(end, FARTHEST), math.log(more / (end - start)), math.hypot(apart, GRAIN) / more
-        start, reached, unsure = end, total, spread
-        if start >= FARTHEST:
-            return

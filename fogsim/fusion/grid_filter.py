@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fogsim.errors import InputError
 from fogsim.fusion.announcements import Announcements
+from fogsim.jit import kernel
 from fogsim.linear_algebra import convolution
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY, extinction_from_visibility
@@ -151,12 +152,7 @@ class GridFilter:
 
     def _diffused(self, elapsed: float) -> Floats:
         """Spread the probability over what may have happened in between, folding back at both ends of the grid."""
-        spread = convolution(self._probability, self._step(elapsed))
-        inside = spread[CELLS - 1 : 2 * CELLS - 1].copy()
-        inside[: CELLS - 1] += spread[CELLS - 2 :: -1]
-        inside[1:] += spread[: 2 * CELLS - 2 : -1]
-        inside /= inside.sum()
-        return inside
+        return _folded(convolution(self._probability, self._step(elapsed)))
 
     def _step(self, elapsed: float) -> Floats:
         """Distribution over offsets in cells after some time; clocks round it to one of few numbers."""
@@ -193,11 +189,7 @@ class GridFilter:
         seen = estimate.reach * measured / OPTICAL_DEPTH_AT_VISIBILITY if measured > 0.0 else 1.0
         unseen = self._unseen_deviation * max(0.0, 1.0 - seen) * measured
         deviation = math.hypot(min(max(estimate.standard_deviation, 0.0), 10.0), floor, unseen)
-        exponent = -0.5 * ((measured - self._extinction) / deviation) ** 2
-        density = np.exp(exponent) / (math.sqrt(2.0 * math.pi) * deviation)
-        # An outlier is any ln k on the grid: 1 / (k LOG_RANGE) in k, and no more than that at k̂ = 0.
-        outlier = 1.0 / (LOG_RANGE * max(measured, deviation))
-        return np.asarray(np.log1p((1.0 - self._outlier_share) / self._outlier_share * density / outlier))
+        return _log_likelihoods(self._extinction, measured, deviation, self._outlier_share)
 
     def _log_likelihood_within(self, bounds: ExtinctionBounds) -> Floats:
         """Logarithm of the likelihood of each cell by bounds of k, at most 0."""
@@ -215,3 +207,28 @@ class GridFilter:
 def _normal_share(deviations: Floats) -> Floats:
     """Share of a normal distribution below so many standard deviations [-]."""
     return np.array([0.5 * math.erfc(-x / math.sqrt(2.0)) for x in deviations.tolist()])
+
+
+@kernel
+def _folded(spread: Floats) -> Floats:
+    """Probabilities of the cells of a grid by those of as many more on either side."""
+    count = (len(spread) + 2) // 3
+    inside, total = spread[count - 1 : 2 * count - 1].copy(), 0.0
+    for i in range(count - 1):
+        inside[i] += spread[count - 2 - i]
+        inside[count - 1 - i] += spread[2 * count - 1 + i]
+    for i in range(count):
+        total += inside[i]
+    return inside / total
+
+
+@kernel
+def _log_likelihoods(extinction: Floats, measured: float, deviation: float, outlier_share: float) -> Floats:
+    """Logarithm of the likelihood of each extinction by a measured one, relative to that of an outlier."""
+    # An outlier is any ln k on the grid: 1 / (k LOG_RANGE) in k, and no more than that at k̂ = 0.
+    outlier = 1.0 / (LOG_RANGE * max(measured, deviation))
+    share = (1.0 - outlier_share) / outlier_share / (math.sqrt(2.0 * math.pi) * deviation * outlier)
+    out = np.empty(len(extinction))
+    for i in range(len(extinction)):
+        out[i] = math.log1p(share * math.exp(-0.5 * ((measured - extinction[i]) / deviation) ** 2))
+    return out

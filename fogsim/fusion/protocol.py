@@ -1,7 +1,8 @@
 """What every fusion is to the loop."""
 
+import functools
 from collections.abc import Sequence
-from typing import Protocol, runtime_checkable
+from typing import Protocol, cast, runtime_checkable
 
 from fogsim.values.belief import Belief
 from fogsim.values.estimate import Estimate
@@ -81,6 +82,11 @@ def fuse(
     estimates, time, place, reports
         As of `LocatedFusion.update_at`.
     """
-    if isinstance(fusion, LocatedFusion):
-        return fusion.update_at(estimates, time, place, reports)
-    return fusion.update(estimates, time)
+    if _knows_places(type(fusion)):
+        return cast("LocatedFusion", fusion).update_at(estimates, time, place, reports)
+    return cast("Fusion", fusion).update(estimates, time)
+
+
+@functools.cache
+def _knows_places(kind: type) -> bool:
+    return issubclass(kind, LocatedFusion)

@@ -17,20 +17,14 @@ CELL, BEHIND, AHEAD = 25.0, 12, 40
 
 COUNT = BEHIND + AHEAD + 1
 
-LOG_RANGE = 7.0
-"""ln k that a wrong measurement may have any of [-]."""
-
 LEVEL, LEVEL_DEVIATION = math.log(extinction_from_visibility(750.0)), 1.2
 """Mean and standard deviation of a whole road's ln k before anything is known of it."""
 
 GRAIN, GRAIN_LENGTH = 0.4, 50.0
 """Standard deviation of what else varies, from place to place [-], and the length over which it does [m]."""
 
-SAMPLES = 64
+SAMPLES = 48
 """Pairs of samples from which the visibility ahead is told."""
-
-WEIGHED = 41
-"""Values over which a likelihood is weighed."""
 
 
 class RouteField:
@@ -62,8 +56,7 @@ class RouteField:
         self._next = matrix_product(inverse_of(np.ascontiguousarray(self._beforehand)), beforehand[:-1, -1])
         self._rest = float(beforehand[-1, -1] - matrix_product(self._next, beforehand[:-1, -1]))
         # The same in every run: what is told of a distribution is not to go by chance.
-        half = np.random.default_rng(0).standard_normal((SAMPLES, AHEAD + 1))
-        self._normals = np.concatenate([half, -half])
+        self._normals = np.ascontiguousarray(np.random.default_rng(0).standard_normal((SAMPLES, AHEAD + 1)).T)
         self.reset()
 
     def reset(self) -> None:
@@ -125,11 +118,13 @@ class RouteField:
 
     def _linearised(self, start: float, end: float) -> tuple[float, Floats, float]:
         """Logarithm of the mean extinction over a stretch: mean, covariance with all cells, and variance."""
-        weights = route_field_kernels.stretch_weights(COUNT, CELL, self._rear(), start, end)
-        return route_field_kernels.linearised(self._mean, self._covariance, weights)
+        return route_field_kernels.linearised(self._mean, self._covariance, self._weights(start, end))
 
-    def learn(self, start: float, end: float, value: float, deviation: float, wrong: float, floor: float) -> None:
-        """Take in a measurement of the mean extinction over a stretch.
+    def _weights(self, start: float, end: float) -> Floats:
+        return route_field_kernels.stretch_weights(COUNT, CELL, self._rear(), start, end)
+
+    def learn(self, start: float, end: float, value: float, deviation: float, wrong: float, floor: float) -> float:
+        """Take in a measurement of the mean extinction over a stretch, and tell how likely it is a right one [-].
 
         Parameters
         ----------
@@ -142,15 +137,8 @@ class RouteField:
         floor : float
             Standard deviation that no number of measurements brings below [-]: their errors are alike.
         """
-        before, shared, variance = self._linearised(start, end)
-        total, apart = variance + max(deviation, floor) ** 2, value - before
-        if variance <= floor**2 and apart**2 < 4.0 * total:
-            return
-        density = (1.0 - wrong) * math.exp(-0.5 * apart**2 / total) / math.sqrt(2.0 * math.pi * total)
-        right = density / (density + wrong / LOG_RANGE)
-        gain = variance / total
-        narrowed = right * gain * variance - right * (1.0 - right) * (gain * apart) ** 2
-        self._condition(shared, variance, right * gain * apart, narrowed)
+        weights = self._weights(start, end)
+        return route_field_kernels.learn(self._mean, self._covariance, weights, value, deviation, wrong, floor)
 
     def learn_at_most(self, end: float, value: float, softness: float) -> None:
         """Take in that the mean extinction from the vehicle on is likely no more than a value.
@@ -165,12 +153,7 @@ class RouteField:
         before, shared, variance = self._linearised(0.0, end)
         if variance <= 0.0:
             return
-        at = before + math.sqrt(variance) * np.linspace(-4.0, 4.0, WEIGHED)
-        below = np.array([0.5 * math.erfc((one - value) / (math.sqrt(2.0) * softness)) for one in at.tolist()])
-        weights = np.exp(-0.5 * (at - before) ** 2 / variance) * (below + 1e-12)
-        weights /= weights.sum()
-        moved = float((weights * at).sum()) - before
-        left = float((weights * (at - before - moved) ** 2).sum())
+        moved, left = route_field_kernels.moments_at_most(before, variance, value, softness)
         self._condition(shared, variance, moved, variance - left)
 
     def _condition(self, shared: Floats, variance: float, moved: float, narrowed: float) -> None:
@@ -179,17 +162,16 @@ class RouteField:
     def sighted_extinctions(self) -> Floats:
         """(samples,) float64, ascending: ln of the mean extinction up to where 95 % of the light is lost."""
         ahead, ends = slice(BEHIND, None), np.asarray(self._rear() + CELL * np.arange(BEHIND + 1, COUNT + 1))
-        lower = route_field_kernels.factor(np.ascontiguousarray(self._covariance[ahead, ahead]))
         found = route_field_kernels.sighted_extinctions(
-            self._mean[ahead], lower, self._normals, ends, OPTICAL_DEPTH_AT_VISIBILITY
+            self._mean[ahead], self._covariance[ahead, ahead], self._normals, ends, OPTICAL_DEPTH_AT_VISIBILITY
         )
-        return np.sort(found)
+        found.sort()
+        return found
 
     def profile(self) -> FogProfile:
         """What is believed at the middle of each cell."""
-        deviation = np.sqrt(np.maximum(np.diagonal(self._covariance), 0.0))
-        middles = np.asarray(self._rear() + CELL * (np.arange(COUNT) + 0.5))
-        return FogProfile(middles, self._mean.copy(), np.asarray(deviation))
+        middles, deviation = route_field_kernels.marginals(self._covariance, self._rear(), CELL)
+        return FogProfile(middles, self._mean.copy(), deviation)
 
     def _rear(self) -> float:
         """Where the hindmost cell begins, ahead of the vehicle [m]."""

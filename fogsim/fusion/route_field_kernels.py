@@ -6,12 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
-from fogsim.linear_algebra import times
 
 Floats = NDArray[np.float64]
 
 LEAST_EXTINCTION, MOST_EXTINCTION = 1e-4, 0.5
 """Range of the extinctions that are reckoned with [1/m]."""
+
+LOG_RANGE = 7.0
+"""ln k that a wrong measurement may have any of [-]."""
+
+WEIGHED = 41
+"""Values over which a likelihood is weighed."""
 
 
 @kernel
@@ -63,14 +68,36 @@ def spread_with(covariance: Floats, gradient: Floats) -> tuple[Floats, float]:
     Parameters
     ----------
     covariance : (n, n) float64
-        Of the cells.
+        Of the cells; symmetric.
     gradient : (n,) float64
         The function.
     """
-    shared, variance = times(covariance, gradient), 0.0
+    shared, variance = np.zeros(gradient.size), 0.0
+    for j in range(gradient.size):
+        if gradient[j] != 0.0:
+            for i in range(gradient.size):
+                shared[i] += gradient[j] * covariance[j, i]
     for i in range(gradient.size):
         variance += gradient[i] * shared[i]
     return shared, max(variance, 0.0)
+
+
+@kernel
+def marginals(covariance: Floats, rear: float, cell: float) -> tuple[Floats, Floats]:
+    """Where the middle of each cell is ahead of the vehicle [m], and the standard deviation of its ln k [-].
+
+    Parameters
+    ----------
+    covariance : (n, n) float64
+        Of the cells.
+    rear, cell : float
+        Where the hindmost begins ahead of the vehicle, and the length of one [m].
+    """
+    middles, deviations = np.empty(len(covariance)), np.empty(len(covariance))
+    for i in range(len(covariance)):
+        middles[i] = rear + cell * (i + 0.5)
+        deviations[i] = math.sqrt(max(covariance[i, i], 0.0))
+    return middles, deviations
 
 
 @kernel
@@ -117,6 +144,43 @@ def linearised(mean: Floats, covariance: Floats, weights: Floats) -> tuple[float
     for i in range(mean.size):
         differing += gradient[i] * covariance[i, i]
     return value + 0.5 * max(differing, 0.0), shared, variance
+
+
+@kernel
+def learn(
+    mean: Floats,
+    covariance: Floats,
+    weights: Floats,
+    value: float,
+    deviation: float,
+    wrong: float,
+    floor: float,
+) -> float:
+    """Take in a measurement of the mean extinction over a stretch, in place, and tell how likely it is a right one.
+
+    Parameters
+    ----------
+    mean, covariance : (n,) and (n, n) float64
+        Of the cells; written to.
+    weights : (n,) float64
+        Share of the stretch that lies in each.
+    value, deviation : float
+        Logarithm of the mean extinction, and its standard deviation [ln 1/m, -].
+    wrong : float
+        How likely a measurement says nothing, beforehand [-].
+    floor : float
+        Standard deviation that no number of measurements brings below [-]: their errors are alike.
+    """
+    before, shared, variance = linearised(mean, covariance, weights)
+    total, apart = variance + max(deviation, floor) ** 2, value - before
+    if variance <= floor**2 and apart**2 < 4.0 * total:
+        return 1.0
+    density = (1.0 - wrong) * math.exp(-0.5 * apart**2 / total) / math.sqrt(2.0 * math.pi * total)
+    right = density / (density + wrong / LOG_RANGE)
+    gain = variance / total
+    narrowed = right * gain * variance - right * (1.0 - right) * (gain * apart) ** 2
+    condition(mean, covariance, shared / variance, right * gain * apart, narrowed)
+    return right
 
 
 @kernel
@@ -178,59 +242,91 @@ def roll(mean: Floats, covariance: Floats, weights: Floats, level: float, rest: 
 
 
 @kernel
-def factor(covariance: Floats) -> Floats:
-    """Lower triangular matrix whose square is a covariance (Cholesky); what rounding makes negative counts as 0.
+def extend_factor(covariance: Floats, upper: Floats, row: int) -> None:
+    """Next column of the upper triangular matrix U with UᵀU a covariance (Cholesky), in place.
+
+    What rounding makes negative counts as 0.
 
     Parameters
     ----------
     covariance : (n, n) float64
         Positive semidefinite.
+    upper : (n, n) float64
+        U up to that column; written to.
+    row : int
+        Which column, and row of the covariance.
     """
-    count = len(covariance)
-    lower = np.zeros((count, count))
-    for j in range(count):
-        square = covariance[j, j]
-        for k in range(j):
-            square -= lower[j, k] ** 2
-        diagonal = math.sqrt(max(square, 1e-12))
-        lower[j, j] = diagonal
-        for i in range(j + 1, count):
-            value = covariance[i, j]
-            for k in range(j):
-                value -= lower[i, k] * lower[j, k]
-            lower[i, j] = value / diagonal
-    return lower
+    left = covariance[row].copy()
+    for j in range(row):
+        share = left[j] / upper[j, j]
+        upper[j, row] = share
+        for k in range(j + 1, row + 1):
+            left[k] -= share * upper[j, k]
+    upper[row, row] = math.sqrt(max(left[row], 1e-12))
 
 
 @kernel
-def sighted_extinctions(mean: Floats, lower: Floats, normals: Floats, ends: Floats, depth: float) -> Floats:
+def sighted_extinctions(mean: Floats, covariance: Floats, normals: Floats, ends: Floats, depth: float) -> Floats:
     """Samples of the mean extinction from the vehicle to where a depth is reached, as logarithms.
 
     Parameters
     ----------
     mean : (n,) float64
         ln k of the cells ahead.
-    lower : (n, n) float64
-        Triangular factor of their covariance.
-    normals : (samples, n) float64
-        Standard normal numbers.
+    covariance : (n, n) float64
+        Theirs.
+    normals : (n, pairs) float64
+        Standard normal numbers; the second sample of each pair has them with the other sign.
     ends : (n,) float64
         Where each cell ends ahead of the vehicle [m].
     depth : float
         The optical depth [-].
     """
-    out = np.empty(len(normals))
-    for sample in range(len(normals)):
-        reached, start, found = 0.0, 0.0, -1.0
-        for i in range(mean.size):
-            value = mean[i]
-            for j in range(i + 1):
-                value += lower[i, j] * normals[sample, j]
+    pairs = normals.shape[1]
+    reached, found, apart = np.zeros(2 * pairs), np.zeros(2 * pairs), np.empty(pairs)
+    start, waiting, upper = 0.0, 2 * pairs, np.empty_like(covariance)
+    for i in range(mean.size):
+        extend_factor(covariance, upper, i)
+        apart[:] = 0.0
+        for j in range(i + 1):
+            for pair in range(pairs):
+                apart[pair] += upper[j, i] * normals[j, pair]
+        for sample in range(2 * pairs):
+            if found[sample] > 0.0:
+                continue
+            value = mean[i] + (apart[sample] if sample < pairs else -apart[sample - pairs])
             k = min(max(math.exp(value), LEAST_EXTINCTION), MOST_EXTINCTION)
-            if reached + k * (ends[i] - start) >= depth:
-                found = depth / (start + (depth - reached) / k)
-                break
-            reached += k * (ends[i] - start)
-            start = ends[i]
-        out[sample] = math.log(found if found > 0.0 else reached / start)
-    return out
+            more = k * (ends[i] - start)
+            if reached[sample] + more >= depth:
+                found[sample] = depth / (start + (depth - reached[sample]) / k)
+                waiting -= 1
+            reached[sample] += more
+        start = ends[i]
+        if waiting == 0:
+            break
+    for sample in range(2 * pairs):
+        found[sample] = math.log(found[sample] if found[sample] > 0.0 else reached[sample] / start)
+    return found
+
+
+@kernel
+def moments_at_most(before: float, variance: float, value: float, softness: float) -> tuple[float, float]:
+    """By how much a normal distribution's mean moves when it is likely below a value, and the variance that it keeps.
+
+    Parameters
+    ----------
+    before, variance : float
+        Of the distribution.
+    value, softness : float
+        The most, and the standard deviation of that.
+    """
+    total = first = second = 0.0
+    for i in range(WEIGHED):
+        apart = math.sqrt(variance) * (8.0 * i / (WEIGHED - 1) - 4.0)
+        below = 0.5 * math.erfc((before + apart - value) / (math.sqrt(2.0) * softness))
+        weight = math.exp(-0.5 * apart**2 / variance) * (below + 1e-12)
+        total += weight
+        first += weight * apart
+        second += weight * apart**2
+    moved = first / total
+    return moved, second / total - moved**2

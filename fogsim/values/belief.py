@@ -111,8 +111,22 @@ class Belief:
     @property
     def log_standard_deviation(self) -> float:
         """Standard deviation of ln k [-]."""
-        mean = float((self.probability * self.log_extinction).sum())
-        return math.sqrt((self.probability * (self.log_extinction - mean) ** 2).sum())
+        return self.log_moments()[1]
+
+    def log_moments(self) -> tuple[float, float]:
+        """Mean and standard deviation of ln k [ln 1/m, -]."""
+        return _moments(np.array(self.log_extinction, float), np.array(self.probability, float))
+
+
+@kernel
+def _moments(values: NDArray[np.float64], probability: NDArray[np.float64]) -> tuple[float, float]:
+    """Mean and standard deviation of values with their probabilities."""
+    mean = variance = 0.0
+    for i in range(len(values)):
+        mean += probability[i] * values[i]
+    for i in range(len(values)):
+        variance += probability[i] * (values[i] - mean) ** 2
+    return mean, math.sqrt(variance)
 
 
 @kernel

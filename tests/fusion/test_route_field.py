@@ -127,12 +127,15 @@ def test_cholesky_and_samples_agree_with_numpy():
     rng = np.random.default_rng(1)
     half = rng.normal(size=(6, 6))
     covariance = half @ half.T + 0.1 * np.eye(6)
-    lower = route_field_kernels.factor(covariance)
+    upper = np.zeros((6, 6))
+    for row in range(6):
+        route_field_kernels.extend_factor(covariance, upper, row)
+    lower = upper.T
     assert lower == pytest.approx(np.linalg.cholesky(covariance), abs=1e-9)
     normals, ends = rng.normal(size=(50, 6)), 30.0 * np.arange(1, 7)
     mean, small = np.full(6, math.log(0.03)), 0.05 * lower
-    found = route_field_kernels.sighted_extinctions(mean, small, normals, ends, 3.0)
-    for one, normal in zip(found, normals, strict=True):
+    found = route_field_kernels.sighted_extinctions(mean, small @ small.T, np.ascontiguousarray(normals.T), ends, 3.0)
+    for one, normal in zip(found, [*normals, *-normals], strict=True):
         k = np.exp(mean + small @ normal)
         depth = np.interp(np.linspace(0.0, 180.0, 18_001), [0.0, *ends], [0.0, *np.cumsum(30.0 * k)])
         sight = np.linspace(0.0, 180.0, 18_001)[np.searchsorted(depth, 3.0)] if depth[-1] >= 3.0 else None

@@ -7,7 +7,8 @@ kind of drive and fusion:
 ``ahead``    error of the median visibility, |V_believed − V_true| / V_true, against the mean extinction from the camera
              to where 95 % of the light is lost, and how often the 90 % interval held it, where that visibility is
              below 1 km
-``entered``  the same in the 5 s after the ego has come 60 m into a bank (median)
+``here``     the same of the fog at the vehicle's own place, by fusions that tell of places
+``entered``  ``ahead`` in the 5 s after the ego has come 60 m into a bank (median)
 ``at D m``   error (median) and share held of the visibility at a place D m ahead, likewise, by fusions that tell
 
 ``reported`` gives the field filter what a vehicle 300 m ahead measures (deviation 10 %, every second, a second late).
@@ -79,6 +80,7 @@ class Found:
 
     errors: list[float] = field(default_factory=list)
     held: list[bool] = field(default_factory=list)
+    here: list[tuple[float, bool]] = field(default_factory=list)
     entered: list[float] = field(default_factory=list)
     places: dict[float, list[tuple[float, bool]]] = field(default_factory=dict)
     spent: list[float] = field(default_factory=list)
@@ -137,12 +139,13 @@ def judge(seen: Seen, belief: Belief, found: Found) -> None:
         found.held.append(low <= true <= high)
     if belief.profile is None:
         return
-    for place in PLACES:
+    for place in (0.0, *PLACES):
         true, _ = seen.profile.at(place)
         if true > math.log(FOG):
             value, deviation = belief.profile.at(place)
+            told = found.places.setdefault(place, []) if place > 0.0 else found.here
             error = 100.0 * abs(math.expm1(true - value))
-            found.places.setdefault(place, []).append((error, abs(value - true) <= NORMAL_90_PERCENT * deviation))
+            told.append((error, abs(value - true) <= NORMAL_90_PERCENT * deviation))
 
 
 def follow(name: str, seen: list[Seen], found: Found, seed: int) -> None:
@@ -164,12 +167,29 @@ def follow(name: str, seen: list[Seen], found: Found, seed: int) -> None:
                 found.entered.append(found.errors[-1])
 
 
+def together(found: dict[tuple[str, str], Found]) -> dict[tuple[str, str], Found]:
+    """What was found, and for each fusion that of all kinds of drives together."""
+    out = dict(found)
+    for name in FUSIONS:
+        every = out["all", name] = Found()
+        for one in (one for (_, fusion), one in found.items() if fusion == name):
+            for part in ("errors", "held", "here", "entered", "spent"):
+                getattr(every, part).extend(getattr(one, part))
+            for place, told in one.places.items():
+                every.places.setdefault(place, []).extend(told)
+    return out
+
+
 def records(found: dict[tuple[str, str], Found], pool: int) -> Iterator[Row]:
     """A record for each kind of drive and fusion."""
-    for (kind, name), one in found.items():
+    for (kind, name), one in together(found).items():
         row: Row = {"pool": pool, "drive": kind, "fusion": name, "steps": len(one.spent)}
         row |= {"median_pct": float(np.median(one.errors)), "p95_pct": float(np.quantile(one.errors, 0.95))}
         row |= {"coverage": float(np.mean(one.held)), "ms": float(np.median(one.spent))}
+        if one.here:
+            errors, held = zip(*one.here, strict=True)
+            row |= {"here_pct": float(np.median(errors)), "here_p95_pct": float(np.quantile(errors, 0.95))}
+            row["here_coverage"] = float(np.mean(held))
         if kind == "bank":
             row["entered_pct"] = float(np.median(one.entered))
         for place, told in sorted(one.places.items()):
@@ -181,15 +201,21 @@ def records(found: dict[tuple[str, str], Found], pool: int) -> Iterator[Row]:
 def table(rows: list[Row]) -> Iterator[str]:
     """Lines of the table."""
     places = [f"{place:.0f}" for place in PLACES]
-    yield f"| drive | fusion | ahead, median / p95 % (held) | entered, % | {' | '.join(f'at {p} m' for p in places)} |"
-    yield f"|---|---|---|---|{'---|' * len(places)}"
+    told = "median / p95 % (held)"
+    yield f"| drive | fusion | ahead, {told} | here, {told} | entered, % | {' | '.join(f'at {p} m' for p in places)} |"
+    yield f"|---|---|---|---|---|{'---|' * len(places)}"
     for row in rows:
         ahead = f"{row['median_pct']:.1f} / {row['p95_pct']:.0f} ({row['coverage']:.2f})"
+        here = (
+            f"{row['here_pct']:.1f} / {row['here_p95_pct']:.0f} ({row['here_coverage']:.2f})"
+            if "here_pct" in row
+            else ""
+        )
         entered = f"{row['entered_pct']:.0f}" if "entered_pct" in row else ""
         there = (
             f"{row[f'at_{p}_pct']:.0f} ({row[f'at_{p}_coverage']:.2f})" if f"at_{p}_pct" in row else "" for p in places
         )
-        yield f"| {row['drive']} | {row['fusion']} | {ahead} | {entered} | {' | '.join(there)} |"
+        yield f"| {row['drive']} | {row['fusion']} | {ahead} | {here} | {entered} | {' | '.join(there)} |"
 
 
 def write_docs(rows: list[Row]) -> None:

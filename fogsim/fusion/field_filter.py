@@ -12,7 +12,7 @@ from fogsim.fusion.route_field_kernels import shares_in_cells
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.belief import Belief
-from fogsim.values.estimate import DenserFog, Estimate
+from fogsim.values.estimate import NORMAL_90_PERCENT, DenserFog, Estimate
 from fogsim.values.observation import FogReport
 
 FARTHEST = CELL * AHEAD
@@ -27,6 +27,9 @@ how sure it must be of ln k [-]."""
 
 CLOCKS_DISAGREE = 5.0
 """How far in the future a report may be for it to count as one of now [s]: clocks of vehicles differ."""
+
+SAME_PLACE, BESIDE, SAME_FOG = 5.0, 100.0, 0.3
+"""Distances between which a report beside a doubted one confirms it [m], and by how much the fog may differ [-]."""
 
 ANNOUNCED, ANNOUNCED_DEVIATION = 75.0, 0.6
 """Length of the denser fog that is announced [m], and the standard deviation of ln k there: a front is seen, not what
@@ -89,7 +92,9 @@ class FieldFilter:
         self._field.reset()
         self._time: float | None = None
         self._share = 1.0
+        self._place = 0.0
         self._heard: set[tuple[str, int]] = set()
+        self._doubted: tuple[float, float, float] | None = None
 
     def update_at(
         self, estimates: Sequence[Estimate], time: float, place: float, reports: Sequence[FogReport] = ()
@@ -125,6 +130,7 @@ class FieldFilter:
             self._share = min(1.0, (time - self._time) / self._correlation_time)
             self._field.elapse(time - self._time)
         self._time = time
+        self._place = place
         self._field.move_to(place)
         for estimate in estimates:
             self._take_in(estimate)
@@ -175,8 +181,28 @@ class FieldFilter:
         self._heard.add(known)
         value = math.log(max(report.extinction, CLEAR))
         deviation = math.hypot(max(report.relative_deviation, self._floor), math.sqrt(self._field.variance_of_age(age)))
-        start, end = ahead - 0.5 * CELL, ahead + 0.5 * CELL
-        self._field.learn(start, end, value, deviation, self._wrong_reports, self._floor)
+        self._learn_report(report.place, value, deviation)
+
+    def _learn_report(self, at: float, value: float, deviation: float) -> None:
+        """Learn a report; two side by side that tell of the same fog, which was doubted, are the edge of a bank."""
+        wrong, doubted = self._wrong_reports, self._doubted
+        if doubted is not None and self._confirms(doubted, at, value, deviation):
+            # Two that are both wrong would hardly agree.
+            wrong *= wrong
+            self._field.leap(min(doubted[0], at) - self._place)
+            self._field.learn(*self._cell_at(doubted[0]), *doubted[1:], wrong, self._floor)
+            self._doubted = None
+        if self._field.learn(*self._cell_at(at), value, deviation, wrong, self._floor) < 0.5:
+            self._doubted = at, value, deviation
+
+    @staticmethod
+    def _confirms(doubted: tuple[float, float, float], at: float, value: float, deviation: float) -> bool:
+        apart = SAME_FOG + NORMAL_90_PERCENT * math.hypot(deviation, doubted[2])
+        return SAME_PLACE < abs(doubted[0] - at) < BESIDE and abs(doubted[1] - value) < apart
+
+    def _cell_at(self, place: float) -> tuple[float, float]:
+        """Ends of a stretch as long as a cell about a place of the way, ahead of the vehicle [m]."""
+        return place - self._place - 0.5 * CELL, place - self._place + 0.5 * CELL
 
     def _mind_leaps(self, now: Belief, reach: float) -> None:
         """Doubt the field where the belief of the here and now surely differs from it, as far as that has been seen."""

@@ -100,10 +100,17 @@ class RouteField:
         """
         return 2.0 * self._deviation**2 * -math.expm1(-max(age, 0.0) / self._steadiness)
 
-    def leap(self) -> None:
-        """Doubt what was believed of where the vehicle is and ahead: the edge of a bank has been driven through."""
-        here = np.arange(COUNT) >= BEHIND
-        self._covariance += self._beforehand * here[:, None] * here
+    def leap(self, distance: float = 0.0) -> None:
+        """Doubt what was believed of a place and of all that lies beyond it: there the edge of a bank is.
+
+        Parameters
+        ----------
+        distance : float
+            How far ahead of the vehicle [m].
+        """
+        first = math.floor((distance - self._rear()) / CELL)
+        beyond = np.arange(COUNT) >= first
+        self._covariance += self._beforehand * beyond[:, None] * beyond
 
     def mean_extinction(self, start: float, end: float) -> tuple[float, float]:
         """Mean and variance of the logarithm of the mean extinction over a stretch [ln 1/m, -].

@@ -127,6 +127,19 @@ def test_a_bank_beyond_what_is_seen_is_no_contradiction_to_clear_air_here():
     assert told.profile.visibility_quantile(50.0, 0.5) > 1000.0
 
 
+def test_two_reports_side_by_side_that_tell_of_the_same_bank_are_believed_where_one_is_doubted():
+    clear = [FogReport(f"at {at}", 0, at, 0.0, 0.0015, 0.1) for at in (300.0, 325.0, 350.0, 375.0)]
+
+    def told(*banks: FogReport) -> float:
+        return make("field_filter").update_at([], 0.0, 0.0, [*clear, *banks]).profile.visibility_quantile(430.0, 0.5)
+
+    first, second = (FogReport("ahead", number, 400.0 + 30.0 * number, 0.0, 0.05, 0.1) for number in (1, 2))
+    assert told(first) > 300.0
+    assert told(second) > 300.0
+    assert told(first, second) < 200.0
+    assert told(first, dataclasses.replace(second, extinction=0.6)) > 300.0
+
+
 def test_a_report_that_comes_twice_counts_once():
     once = driven(make("field_filter"), [], 1.0, reports=[report(350.0, 80.0)])
     twice = driven(make("field_filter"), [], 1.0, reports=[report(350.0, 80.0)] * 3)

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from fogsim.values import LeadMeasurement as LeadMeasurement
     from fogsim.values import LightMeasurement as LightMeasurement
     from fogsim.values import Observation as Observation
+    from fogsim.values import SecondView as SecondView
     from fogsim.values import SignSighting as SignSighting
     from fogsim.values import SpeedAdvice as SpeedAdvice
     from fogsim.values import Step as Step
@@ -54,6 +55,7 @@ _VALUES = (
     "LeadMeasurement",
     "LightMeasurement",
     "Observation",
+    "SecondView",
     "SignSighting",
     "SpeedAdvice",
     "Step",
@@ -96,6 +98,7 @@ __all__ = [
     "MissingDependencyError",
     "Observation",
     "Scenario",
+    "SecondView",
     "SignSighting",
     "SimulationError",
     "SpeedAdvice",

@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import field_at, with_change
-from fogsim.camera import Delivered, FaultyLens, FrameDelivery, knocked, mounted_pose, unexposed
+from fogsim.camera import Delivered, FaultyLens, FrameDelivery, Pixels, knocked, mounted_pose, unexposed
 from fogsim.ego.daylight import Ramp, in_daylight
 from fogsim.ego.fog_reports import FogReports
 from fogsim.ego.fog_truth import KnownWay, carriageways, fog_truth
@@ -16,6 +16,7 @@ from fogsim.ego.frame_watch import FrameWatch, LeadHistory
 from fogsim.ego.light_sensing import LightSensing, lamp_effects
 from fogsim.ego.measurements import EgoSensors
 from fogsim.ego.road_meters import RoadMeters
+from fogsim.ego.second_camera import SecondCamera
 from fogsim.ego.sensor_faults import FaultSchedule
 from fogsim.ego.shutter import Shutter, exposed
 from fogsim.ego.view_rendering import EgoView, NoView, Surrounding, ViewRenderer
@@ -41,6 +42,7 @@ from fogsim.values import (
     Observation,
     RoadNetwork,
     RunningFault,
+    SecondView,
     SignMap,
     Step,
     TrafficSnapshot,
@@ -74,6 +76,7 @@ class EgoEquipment:
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
         self._camera_sensor = build.camera_sensor(scenario)
+        self._second = SecondCamera(scenario) if scenario.camera.stereo is not None else None
         self._body_pitch = build.body_pitch(scenario)
         blur = scenario.camera.motion_blur
         self._shutter = Shutter(blur.open_time_s, blur.instants, blur.follows_exposure)
@@ -148,7 +151,10 @@ class EgoEquipment:
             estimator.reset()
         self._fusion.reset()
         self._camera_sensor.reset()
+        if self._second is not None:
+            self._second.reset(streams.camera.spawn(1)[0])
         self._body_pitch.reset()
+        self._sensors.reset(streams)
         self._glass.reset()
         self._delivery.reset()
         self._watch.reset()
@@ -299,6 +305,7 @@ class EgoEquipment:
         )
         if light < DAY_ILLUMINANCE:
             truth = replace(truth, lamp_effects=lamp_effects(state, ego, fog, truth.extinction_ahead))
+        second = self._second_image(renderer, snapshot, pose, time, light)
         view, radiance = exposed(
             lambda traffic, place: renderer.render(traffic, ego, place, time, camera, light),
             self._shutter.at(self._camera_sensor.share_of_longest_exposure),
@@ -306,7 +313,7 @@ class EgoEquipment:
             ego,
             pose,
         )
-        frame = self._frame(radiance, camera, faults, parts.streams, time)
+        frame, right = self._frame(radiance, second, camera, faults, parts.streams, time)
         observation = Observation(
             frame=frame,
             speed=float(state.speed[ego]),
@@ -316,6 +323,8 @@ class EgoEquipment:
             lamps=ALL_LAMPS & int(state.lamps[ego]),
             light=self._light_sensing.measure(state, ego, fog, light),
             reports=reports,
+            right=right,
+            scattering=self._sensors.scattering(snapshot, fog, time, faults),
         )
         estimates = self._estimate(frame, observation, time)
         return Step(
@@ -351,19 +360,43 @@ class EgoEquipment:
         believed = fuse(self._fusion, estimates, time, place, observation.reports)
         return checked_belief(self._scenario.fusion.method, believed)
 
+    def _second_image(
+        self, renderer: EgoView, snapshot: TrafficSnapshot, pose: CameraPose, time: float, light: float
+    ) -> Pixels | None:
+        """What the second camera takes, drawn first: arrays of the picture that is drawn last are kept."""
+        if self._second is None:
+            return None
+        state, ego = snapshot.state, snapshot.ego
+        taken = self._second.take(
+            lambda traffic, place, camera: renderer.render(traffic, ego, place, time, camera, light),
+            self._shutter,
+            state,
+            ego,
+            pose,
+            self._camera,
+        )
+        return self._unexposed if taken is None else taken
+
     def _frame(
         self,
         radiance: NDArray[np.float32] | None,
+        second: Pixels | None,
         camera: Camera,
         faults: Sequence[RunningFault],
         streams: Streams,
         time: float,
-    ) -> Frame:
-        """What the camera delivers of the light that falls on its glass; None where nothing is drawn."""
+    ) -> tuple[Frame, SecondView | None]:
+        """What the cameras deliver of the light that falls on the first one's glass; None where nothing is drawn."""
         image = self._unexposed
         if radiance is not None:
             image = self._camera_sensor.take(self._glass.look_through(radiance, camera, faults), streams.camera)
-        return Frame(*self._delivery.deliver(Delivered(time, image), faults), self._assumed_camera)
+        if self._second is None or second is None:
+            return Frame(*self._delivery.deliver(Delivered(time, image), faults), self._assumed_camera), None
+        # Both pictures go one way, and are late, lost or frozen together.
+        pair = cast("Pixels", np.concatenate((image, second), axis=1))
+        when, both = self._delivery.deliver(Delivered(time, pair), faults)
+        left, right = (np.ascontiguousarray(half) for half in np.split(both, 2, axis=1))
+        return Frame(when, left, self._assumed_camera), SecondView(right, self._second.told_baseline)
 
     def surrounding(self, state: TrafficState, ego: int, pose: CameraPose) -> Surrounding:
         """Tell what is around the camera.

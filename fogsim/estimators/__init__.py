@@ -13,7 +13,10 @@ from fogsim.estimators.night.gallen2014 import Gallen2014, Gallen2014Halo
 from fogsim.estimators.night.gallen2014_veil import Gallen2014Veil
 from fogsim.estimators.night.night_glow import NightGlow
 from fogsim.estimators.night.night_road import NightRoad
+from fogsim.estimators.other_sensors.gabb2014 import Gabb2014
+from fogsim.estimators.other_sensors.hautiere2006_stereo import Hautiere2006Stereo
 from fogsim.estimators.protocol import Estimator
+from fogsim.estimators.other_sensors.scatterometer import Scatterometer
 from fogsim.estimators.signs.belaroussi2015 import Belaroussi2015
 from fogsim.estimators.signs.sign_contrast import SignContrast
 from fogsim.estimators.zhu2015 import Zhu2015
@@ -35,8 +38,11 @@ ESTIMATORS: Registry[Callable[..., Estimator]] = Registry(
         "gallen2014_veil": Gallen2014Veil,
         "night_road": NightRoad,
         "night_glow": NightGlow,
+        "hautiere2006_stereo": Hautiere2006Stereo,
         "gallen2014": Gallen2014,
         "gallen2014_halo": Gallen2014Halo,
+        "gabb2014": Gabb2014,
+        "scatterometer": Scatterometer,
     },
     group="fogsim.estimators",
     methods=("update", "reset"),

@@ -15,12 +15,14 @@ from fogsim.vision.light.daylight import lit_by_lamps
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.lines.horizon import (
+    MIN_ROWS,
     PITCH_DEVIATION,
     Horizon,
     PitchDeviation,
     calibrated_horizon,
     levelled,
     weighted_mean,
+    why_no_road,
 )
 from fogsim.vision.lines.road_course import RoadCourse, road_course, unseen_course
 from fogsim.vision.lines.road_lines import seen_lines, vanishing_point_of
@@ -44,9 +46,6 @@ from fogsim.vision.strips.strip_geometry import StripGeometry, strip_geometry
 from fogsim.vision.uneven.airlight_edge import airlight_edge
 from fogsim.vision.uneven.hidden_course import HiddenCourse
 from fogsim.vision.uneven.uneven_fit import UnevenFit, even_fog, fit_uneven
-
-MIN_COLS, MIN_ROWS = 32, 16
-"""A road narrower than this, or lower below its horizon, shows no curve [px]."""
 
 MIN_AIRLIGHT = 6.0
 """Sky darker than this is no day [linear grey levels]."""
@@ -152,7 +151,7 @@ class JointRoad:
     ) -> None:
         self._camera, self._check, self._even_airlight = camera, ObservationCheck(camera), even_airlight
         self._horizon = calibrated_horizon(camera, pitch_deviation)
-        self._impossible = _impossible(camera)
+        self._impossible = why_no_road(camera)
         self._straight = strip_geometry(camera, max(1.0, self._horizon.standard_deviation))
         self._geometry, self._shaded = self._straight, 0.0
         self._earlier: deque[tuple[StripCurves, Sky]] = deque(maxlen=int(frames) - 1)
@@ -361,17 +360,6 @@ class JointRoad:
             optical_depths=_optical_depths(uneven, unevenness),
             denser=None if front is None else DenserFog(*front),
         )
-
-
-def _impossible(camera: Camera) -> str:
-    """Say why a camera can never show a foggy road; empty if it can."""
-    if abs(camera.roll) > math.pi / 4:
-        return "the camera lies on its side or is upside-down"
-    if not 4.0 <= camera.horizon_row <= camera.height - 1:
-        return f"the horizon (row {camera.horizon_row:.1f}) is outside the image"
-    if camera.height - 1 - camera.horizon_row < MIN_ROWS or camera.width < MIN_COLS:
-        return "the image is too small to show a curve"
-    return ""
 
 
 def _too_little_seen(uneven: UnevenFit, told: float) -> str:

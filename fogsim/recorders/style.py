@@ -54,6 +54,9 @@ _NAMED = (
     "night_glow",
     "gallen2014",
     "gallen2014_halo",
+    "hautiere2006_stereo",
+    "gabb2014",
+    "scatterometer",
 )
 """Methods that the first colours belong to, whichever others stand beside them."""
 
@@ -72,13 +75,18 @@ ON_DARK: tuple[Colour, ...] = (
     (255, 237, 204),
     (189, 159, 123),
     (0, 105, 182),
+    (75, 90, 90),
+    (165, 0, 135),
+    (240, 120, 75),
+    (90, 0, 255),
     (180, 195, 0),
     (90, 255, 120),
 )
 """Colours as far apart as sixteen can be on a dark ground, the first ones farthest from the panel's belief and truth.
 
 The least colour difference of any two (CIE 1976, ΔE of L*a*b*) is 18 for normal sight and for any of the three
-dichromacies as Machado et al. 2009 simulate them; found by search over a grid of all colours of L* 43 … 95.
+dichromacies as Machado et al. 2009 simulate them; found by search over a grid of all colours of L* 43 … 95. Four that
+came later, before the last two, are those of L* 36 and more that lie farthest from the others, at least 13.
 """
 
 ON_LIGHT: tuple[Colour, ...] = (
@@ -96,10 +104,14 @@ ON_LIGHT: tuple[Colour, ...] = (
     (0, 180, 255),
     (60, 15, 60),
     (0, 0, 240),
+    (105, 30, 195),
+    (45, 0, 90),
+    (105, 75, 60),
+    (135, 180, 225),
     (240, 45, 0),
     (0, 150, 30),
 )
-"""The same on a white ground, ΔE 18 or more.
+"""The same on a white ground, ΔE 18 or more, of those that came later 13.
 
 Named methods keep their colour where it is dark enough and far from the report's belief and truth.
 """

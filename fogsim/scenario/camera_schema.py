@@ -91,6 +91,25 @@ class BodySection(Section):
     """Lag with which the body follows."""
 
 
+class StereoSection(Section):
+    """A second camera like the first, to the right of it, and what the calibration of the pair has missed."""
+
+    baseline_m: Annotated[Number, Field(ge=0.01, le=10)] = 0.5
+    """Distance between the optical centres."""
+
+    baseline_error_percent: Number = Field(default=0.0, ge=-50, le=50)
+    """Told over true baseline, minus 1."""
+
+    yaw_error_deg: Number = Field(default=0.0, ge=-2, le=2)
+    """How far its axis truly turns to the left of the first one's, where the calibration has them parallel."""
+
+    pitch_error_deg: Number = Field(default=0.0, ge=-2, le=2)
+    """The same downward."""
+
+    roll_error_deg: Number = Field(default=0.0, ge=-2, le=2)
+    """The same about the axis."""
+
+
 class CameraSection(Section):
     """The ego's camera."""
 
@@ -165,6 +184,9 @@ class CameraSection(Section):
 
     told: CalibrationErrors = CalibrationErrors()
     """Errors of the calibration that the estimators assume."""
+
+    stereo: StereoSection | None = None
+    """A second camera beside it; `{}` for one half a metre to the right. Each picture is drawn twice then."""
 
     @property
     def automatic(self) -> bool:

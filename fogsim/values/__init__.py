@@ -17,7 +17,14 @@ from fogsim.values.fault import Fault, RunningFault
 from fogsim.values.fog import FogBank, FogChange, FogField, FogPatches, FogShelter
 from fogsim.values.image import Frame, View
 from fogsim.values.light import Beam, HeadLamp, Lamp, LampLobes, Lights, LightSources, SignalLight, StreetLighting
-from fogsim.values.observation import FogReport, LeadMeasurement, LightMeasurement, Observation, SignSighting
+from fogsim.values.observation import (
+    FogReport,
+    LeadMeasurement,
+    LightMeasurement,
+    Observation,
+    SecondView,
+    SignSighting,
+)
 from fogsim.values.road import (
     Lane,
     LaneEnd,
@@ -102,6 +109,7 @@ __all__ = [
     "RoadSurface",
     "RunningFault",
     "Scene",
+    "SecondView",
     "Sign",
     "SignLook",
     "SignMap",

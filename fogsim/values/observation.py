@@ -117,6 +117,22 @@ class FogReport:
 
 
 @dataclass(frozen=True, slots=True)
+class SecondView:
+    """The picture of a second camera to the right of the first, as its calibration has it: alike and parallel.
+
+    Attributes
+    ----------
+    image : (rows, cols, 3) or (rows, cols) uint8, or uint16 of a camera of 10 or 12 bits
+        Its pixels, of the same instant and camera model as the first one's; rows of both show the same things.
+    baseline : float
+        Told distance between the optical centres [m].
+    """
+
+    image: NDArray[np.uint8] | NDArray[np.uint16]
+    baseline: float
+
+
+@dataclass(frozen=True, slots=True)
 class Observation:
     """What one vehicle has at one instant.
 
@@ -138,6 +154,10 @@ class Observation:
         What the light sensor tells; None without one.
     reports : tuple of FogReport
         What others have told of the fog since the instant before.
+    right : SecondView or None
+        What the second camera of a stereo rig shows; None without one.
+    scattering : float or None
+        What a forward-scatter sensor on board tells of the extinction coefficient at its place [1/m]; None without one.
     """
 
     frame: Frame | NDArray[np.uint8] | NDArray[np.uint16]
@@ -148,6 +168,8 @@ class Observation:
     lamps: Lamp | None = None
     light: LightMeasurement | None = None
     reports: tuple[FogReport, ...] = ()
+    right: SecondView | None = None
+    scattering: float | None = None
 
     @property
     def image(self) -> NDArray[np.uint8] | NDArray[np.uint16]:

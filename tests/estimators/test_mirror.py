@@ -23,7 +23,10 @@ from fogsim.values import Camera, Estimate, Frame, LeadMeasurement, Observation,
 OF_SIGNS = {"belaroussi2015", "sign_contrast"}
 """They need a map, which these pictures do not have."""
 
-METHODS = sorted(set(ESTIMATORS) - OF_SIGNS - set(NIGHT_METHODS))
+ONE_SIDED = {"hautiere2006_stereo"}
+"""Its second camera is to the right of the first: mirrored, that is another rig."""
+
+METHODS = sorted(set(ESTIMATORS) - OF_SIGNS - ONE_SIDED - set(NIGHT_METHODS))
 RANGES = (14.0, 18.0, 22.0, 26.0, 30.0, 35.0, 40.0)
 
 

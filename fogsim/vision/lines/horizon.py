@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from fogsim.parameters import Range
 from fogsim.values.camera import Camera
 
+MIN_COLS, MIN_ROWS = 32, 16
+"""A road narrower than this, or lower below its horizon, shows no curve [px]."""
+
 PITCH_DEVIATION = math.radians(0.1)
 """Standard deviation of a vehicle's pitch about its calibration [rad]: load, suspension, uneven road."""
 
@@ -96,3 +99,20 @@ def levelled(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera) -> N
     size = (camera.width, camera.height)
     level: NDArray[Any] = cv2.warpAffine(image, turn, size, borderMode=cv2.BORDER_REPLICATE)
     return level
+
+
+def why_no_road(camera: Camera) -> str:
+    """Say why a camera can never show a foggy road before a sky; empty if it can.
+
+    Parameters
+    ----------
+    camera : Camera
+        The assumed calibration.
+    """
+    if abs(camera.roll) > math.pi / 4:
+        return "the camera lies on its side or is upside-down"
+    if not 4.0 <= camera.horizon_row <= camera.height - 1:
+        return f"the horizon (row {camera.horizon_row:.1f}) is outside the image"
+    if camera.height - 1 - camera.horizon_row < MIN_ROWS or camera.width < MIN_COLS:
+        return "the image is too small to show a curve"
+    return ""

@@ -13,9 +13,9 @@ class Streams:
     ----------
     traffic_seed : int
         Seed handed to the traffic simulation, in 0 … 2³¹ − 1.
-    fog, camera, sensors, driver, faults, gps, reports : numpy.random.Generator
+    fog, camera, sensors, driver, faults, gps, reports, scatterometer : numpy.random.Generator
         Generators for fog fields, camera noise, the vehicle's other sensors, drivers, faults of sensors, satellite
-        positioning, and what others report of the fog.
+        positioning, what others report of the fog, and the scatterometer on board.
     """
 
     traffic_seed: int
@@ -26,6 +26,7 @@ class Streams:
     faults: np.random.Generator
     gps: np.random.Generator
     reports: np.random.Generator
+    scatterometer: np.random.Generator
 
 
 def spawn_streams(seed: int, vehicle: str = "") -> Streams:
@@ -44,7 +45,7 @@ def spawn_streams(seed: int, vehicle: str = "") -> Streams:
         If the seed is negative.
     """
     root = np.random.SeedSequence([seed, *vehicle.encode()] if vehicle else seed)
-    traffic, fog, camera, sensors, driver, faults, gps, reports = root.spawn(8)
+    traffic, fog, camera, sensors, driver, faults, gps, reports, scatterometer = root.spawn(9)
     return Streams(
         traffic_seed=int(traffic.generate_state(1, np.uint32)[0] >> 1),
         fog=np.random.default_rng(fog),
@@ -54,6 +55,7 @@ def spawn_streams(seed: int, vehicle: str = "") -> Streams:
         faults=np.random.default_rng(faults),
         gps=np.random.default_rng(gps),
         reports=np.random.default_rng(reports),
+        scatterometer=np.random.default_rng(scatterometer),
     )
 
 

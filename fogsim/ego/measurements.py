@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.atmosphere import extinction
 from fogsim.randomness import Streams
 from fogsim.scenario import Scenario, build
 from fogsim.sensors import (
@@ -14,20 +15,24 @@ from fogsim.sensors import (
     faulty_fix,
     faulty_lead,
     faulty_lead_sensor,
+    faulty_scattering,
     faulty_signs,
     measure_fix,
     measure_lead,
     signs_ahead,
 )
 from fogsim.sensors.radar_shadow import HEIGHT
-from fogsim.values import LeadMeasurement, RunningFault, SignMap, SignSighting, Structure, TrafficSnapshot
+from fogsim.values import FogField, LeadMeasurement, RunningFault, SignMap, SignSighting, Structure, TrafficSnapshot
 from fogsim.values.fault import Where
 
 Faults = Sequence[RunningFault]
 
+BUMPER_HEIGHT = 0.6
+"""Height of the scatterometer above the road, at the front bumper [m]."""
+
 
 class EgoSensors:
-    """Radar, satellite positioning and sign map of an ego.
+    """Radar, satellite positioning, sign map and scatterometer of an ego.
 
     Parameters
     ----------
@@ -38,7 +43,19 @@ class EgoSensors:
     def __init__(self, scenario: Scenario) -> None:
         self._radar, self._gps = build.lead_sensor(scenario), build.gps(scenario)
         self._sign_reach = scenario.sensors.sign_reach_m
+        self._scatterometer = build.scatterometer(scenario)
         self._shadow = RadarShadow(())
+
+    def reset(self, streams: Streams) -> None:
+        """Begin a run.
+
+        Parameters
+        ----------
+        streams : Streams
+            Random numbers of the run.
+        """
+        if self._scatterometer is not None:
+            self._scatterometer.reset(streams.scatterometer)
 
     def enter_road(self, structures: Sequence[Structure]) -> None:
         """Let the radar reach only what is not behind these.
@@ -98,6 +115,25 @@ class EgoSensors:
         known = faulty_signs(known, (fault.kind for fault in faults), Where.MAP)
         grade = float(state.grade[ego])
         return signs_ahead(known, measured.position, measured.heading, self._sign_reach, grade=grade)
+
+    def scattering(self, snapshot: TrafficSnapshot, fog: FogField, time: float, faults: Faults) -> float | None:
+        """What the scatterometer tells of the extinction coefficient at the front bumper [1/m]; None without one.
+
+        Parameters
+        ----------
+        snapshot : TrafficSnapshot
+            The traffic now.
+        fog : FogField
+            The fog now.
+        time : float
+            Time since the run began [s].
+        faults : sequence of RunningFault
+            What is wrong now.
+        """
+        if self._scatterometer is None:
+            return None
+        place = snapshot.state.position[snapshot.ego] + np.array([0.0, 0.0, BUMPER_HEIGHT])
+        return faulty_scattering(self._scatterometer.measure(float(extinction(fog, place)), time), faults)
 
 
 def _rear(snapshot: TrafficSnapshot) -> NDArray[np.float64] | None:

@@ -26,6 +26,7 @@ from fogsim.scenario.parts.sensors import (
     camera_sensor,
     gps,
     lead_sensor,
+    scatterometer,
     sensor,
 )
 from fogsim.scenario.parts.traffic import traffic_setup
@@ -55,6 +56,7 @@ __all__ = [
     "periods",
     "road_adviser",
     "safety_standard",
+    "scatterometer",
     "sensor",
     "traffic_setup",
 ]

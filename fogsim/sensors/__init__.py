@@ -1,9 +1,17 @@
 """What a vehicle measures beside its camera."""
 
-from fogsim.sensors.faults import check_sign_ids, faulty_fix, faulty_lead, faulty_lead_sensor, faulty_signs
+from fogsim.sensors.faults import (
+    check_sign_ids,
+    faulty_fix,
+    faulty_lead,
+    faulty_lead_sensor,
+    faulty_scattering,
+    faulty_signs,
+)
 from fogsim.sensors.gps import Fix, Gps, measure_fix
 from fogsim.sensors.lead import LeadSensor, measure_lead
 from fogsim.sensors.radar_shadow import RadarShadow
+from fogsim.sensors.scatterometer import Scatterometer
 from fogsim.sensors.signs import signs_ahead
 
 __all__ = [
@@ -11,10 +19,12 @@ __all__ = [
     "Gps",
     "LeadSensor",
     "RadarShadow",
+    "Scatterometer",
     "check_sign_ids",
     "faulty_fix",
     "faulty_lead",
     "faulty_lead_sensor",
+    "faulty_scattering",
     "faulty_signs",
     "measure_fix",
     "measure_lead",

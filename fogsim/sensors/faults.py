@@ -1,4 +1,4 @@
-"""What faults do to radar, satellite positioning and signs."""
+"""What faults do to radar, satellite positioning, signs and scatterometer."""
 
 import dataclasses
 import math
@@ -12,11 +12,13 @@ from fogsim.sensors.lead import LeadSensor
 from fogsim.values import LeadMeasurement, RunningFault, Sign, SignMap
 from fogsim.values.fault import (
     FaultKind,
+    Fouled,
     HeadingBias,
     LeadBias,
     LeadDropout,
     LeadNarrowView,
     LeadNoise,
+    NoSignal,
     Outage,
     PositionBias,
     SignsMissing,
@@ -97,6 +99,25 @@ def faulty_fix(fix: Fix, faults: Iterable[RunningFault]) -> Fix | None:
             case Outage():
                 return None
     return fix
+
+
+def faulty_scattering(measured: float, faults: Iterable[RunningFault]) -> float | None:
+    """What a scatterometer with faults tells of the extinction coefficient [1/m]; None if nothing.
+
+    Parameters
+    ----------
+    measured : float
+        What it tells without them [1/m].
+    faults : iterable of RunningFault
+        What is wrong now, with whatever sensor.
+    """
+    for fault in faults:
+        match fault.kind:
+            case Fouled(factor):
+                measured *= factor
+            case NoSignal():
+                return None
+    return measured
 
 
 def faulty_signs(signs: SignMap, kinds: Iterable[FaultKind], where: Where) -> SignMap:

@@ -310,11 +310,35 @@ class SignsMoved:
     up: float = 0.0
 
 
+@dataclass(frozen=True, slots=True)
+class Fouled:
+    """A scatterometer with dirt or water on its windows, or an insect in its beam.
+
+    Attributes
+    ----------
+    factor : float
+        What it tells over what it should [-]: below 1 by windows that let less light through, above by what scatters.
+    """
+
+    sensor: ClassVar[str] = "scatterometer"
+    name: ClassVar[str] = "fouled"
+    factor: float = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class NoSignal:
+    """A scatterometer that tells nothing."""
+
+    sensor: ClassVar[str] = "scatterometer"
+    name: ClassVar[str] = "no_signal"
+
+
 CameraFault = Blackout | FrozenFrame | DroppedFrames | Latency | Miscalibration | DirtyLens | WetLens | Glare
 LeadFault = LeadDropout | LeadBias | LeadNoise | LeadNarrowView
 GpsFault = PositionBias | HeadingBias | Outage
 SignFault = SignsMissing | SignsMoved
-FaultKind = CameraFault | LeadFault | GpsFault | SignFault
+ScatterometerFault = Fouled | NoSignal
+FaultKind = CameraFault | LeadFault | GpsFault | SignFault | ScatterometerFault
 """What can be wrong with a sensor."""
 
 

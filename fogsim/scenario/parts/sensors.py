@@ -6,7 +6,7 @@ import math
 from fogsim.atmosphere import airlight_from_illuminance
 from fogsim.camera import USUAL_MOUNTS, AutoExposure, BodyPitch, CameraMount, CameraSensor, Metering, Sensor, Suspension
 from fogsim.scenario.schema import Scenario
-from fogsim.sensors import Gps, LeadSensor
+from fogsim.sensors import Gps, LeadSensor, Scatterometer
 from fogsim.values import Camera
 
 AIRLIGHT_EXPOSURE = 0.6
@@ -172,3 +172,17 @@ def gps(scenario: Scenario) -> Gps:
     """
     section = scenario.sensors.gps
     return Gps(section.position_deviation_m, math.radians(section.heading_deviation_deg))
+
+
+def scatterometer(scenario: Scenario) -> Scatterometer | None:
+    """The ego's forward-scatter visibility sensor, if it has one.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    section = scenario.sensors.scatterometer
+    if section is None:
+        return None
+    return Scatterometer(section.relative_deviation, section.calibration_deviation, section.averaging_time_s)

@@ -12,6 +12,7 @@ from fogsim.values.fault import (
     DroppedFrames,
     Fault,
     FaultKind,
+    Fouled,
     FrozenFrame,
     Glare,
     HeadingBias,
@@ -21,6 +22,7 @@ from fogsim.values.fault import (
     LeadNarrowView,
     LeadNoise,
     Miscalibration,
+    NoSignal,
     Outage,
     PositionBias,
     SignsMissing,
@@ -367,6 +369,38 @@ class SignsMovedSection(SignFaultSection):
         return SignsMoved(self.where, self.ids, self.along_m, self.left_m, self.up_m)
 
 
+class ScatterometerFaultSection(FaultSection):
+    """A fault of the scatterometer."""
+
+    sensor: Literal["scatterometer"] = "scatterometer"
+    """Sensor that the fault is of."""
+
+
+class ScatterometerFouled(ScatterometerFaultSection):
+    """A scatterometer with dirty windows."""
+
+    fault: Literal["fouled"]
+    """`fouled`: its values are wrong by a factor, by dirt or water on its windows, or what else scatters its light."""
+
+    factor: Annotated[Number, Field(ge=0, le=1000)] = 0.5
+    """What it tells over what it should; below 1 it tells of thinner fog."""
+
+    def in_si(self) -> FaultKind:
+        """What is wrong, in SI units."""
+        return Fouled(self.factor)
+
+
+class ScatterometerNoSignal(ScatterometerFaultSection):
+    """A scatterometer that tells nothing."""
+
+    fault: Literal["no_signal"]
+    """`no_signal`: it tells nothing."""
+
+    def in_si(self) -> FaultKind:
+        """What is wrong, in SI units."""
+        return NoSignal()
+
+
 AnyFault = Annotated[
     CameraBlackout
     | CameraFrozen
@@ -384,7 +418,9 @@ AnyFault = Annotated[
     | GpsHeadingBias
     | GpsOutage
     | SignsMissingSection
-    | SignsMovedSection,
+    | SignsMovedSection
+    | ScatterometerFouled
+    | ScatterometerNoSignal,
     Field(discriminator="fault"),
 ]
 """Any fault of any sensor, known by its name."""

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from fogsim.scenario.section import Distance, Length, Number, Section
+from fogsim.scenario.section import Distance, Length, Number, Section, Time
 from fogsim.scenario.sensors.faults import AnyFault
 from fogsim.scenario.sensors.reports import Reports
 
@@ -48,6 +48,23 @@ class LightSensorSection(Section):
     """Full horizontal angle within which it looks for lamps."""
 
 
+class ScatterometerSection(Section):
+    """A forward-scatter visibility sensor at the ego's front, which measures the fog where the vehicle is.
+
+    Vaisala's PWD22 has an accuracy of ± 10 % from 10 m to 10 km, a consistency of ± 5 %, and a value every 15 s (user's
+    guide, table 21); the averaging time of one on a vehicle is an assumption.
+    """
+
+    relative_deviation: Annotated[Number, Field(ge=0, le=2)] = 0.05
+    """Standard deviation of its values about what it tells on average in such fog, relative to k."""
+
+    calibration_deviation: Annotated[Number, Field(ge=0, le=2)] = 0.1
+    """Standard deviation of its calibration, relative to k: one error for all of a run."""
+
+    averaging_time_s: Time = 5.0
+    """Time constant of its average, which fog and noise share."""
+
+
 class Sensors(Section):
     """Sensors beside the camera."""
 
@@ -62,6 +79,9 @@ class Sensors(Section):
 
     sign_reach_m: Length = 250.0
     """Distance up to which the map tells of signs ahead."""
+
+    scatterometer: ScatterometerSection | None = None
+    """The forward-scatter visibility sensor on board; none if not given."""
 
     reports: Reports = Reports()
     """What others tell of the fog where they are."""

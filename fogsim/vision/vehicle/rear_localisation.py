@@ -142,14 +142,32 @@ def _span(first: float, last: float, size: int) -> slice | None:
     return slice(low, high) if high - low >= 2 else None
 
 
-def _best_pair(body: NDArray[np.float32], scale: float, axis: float, noise: float) -> tuple[float, float] | None:
+def upright_steps(body: NDArray[np.float32], noise: float) -> tuple[Floats, float]:
+    """Steps of luminance across upright edges, column by column, and the least that stands out.
+
+    Parameters
+    ----------
+    body : (rows, cols) float32
+        Rows in which the edges are upright [linear grey levels].
+    noise : float
+        Standard deviation of single pixels [linear grey levels].
+
+    Returns
+    -------
+    (cols,) float64, float
+        Both in linear grey levels per pixel.
+    """
     padded = np.pad(body.astype(np.float64), ((0, 0), (2, 2)), mode="reflect")
     smooth = np.sum([share * padded[:, i : i + body.shape[1]] for i, share in enumerate(SMOOTHING)], axis=0)
     # The median down the rows keeps what is upright; marks of the road, which run aslant, drop out.
     step = np.asarray(np.median(np.gradient(smooth, axis=1), axis=0), np.float64)
     # Blur, difference and median leave half of a pixel's noise in one row, and what the road's texture adds.
     by_noise = LEAST_EDGE * max(0.5 * noise, LEAST_STEP) / math.sqrt(body.shape[0])
-    floor = max(by_noise, CLUTTER * float(np.median(np.abs(step))))
+    return step, max(by_noise, CLUTTER * float(np.median(np.abs(step))))
+
+
+def _best_pair(body: NDArray[np.float32], scale: float, axis: float, noise: float) -> tuple[float, float] | None:
+    step, floor = upright_steps(body, noise)
     wide = _pair(body, step, WIDTHS, scale, axis, floor)
     narrow = _pair(body, step, NARROW_WIDTHS, scale, axis, floor)
     if narrow is not None:

@@ -1,0 +1,226 @@
+"""Gabb et al. (2014): the radar follows the vehicle ahead through any fog; where the camera loses it tells the fog."""
+
+import math
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.estimators.image_check import ObservationCheck
+from fogsim.estimators.other_sensors.loss_likelihood import LossLikelihood
+from fogsim.parameters import Range, checked_parameters
+from fogsim.values.camera import Camera
+from fogsim.values.estimate import Estimate
+from fogsim.values.observation import LeadMeasurement, Observation
+from fogsim.vision.light.daylight import lit_by_lamps
+from fogsim.vision.light.luminance import linear_luminance
+from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation, levelled
+from fogsim.vision.region.road_image import CannotTellError
+from fogsim.vision.vehicle.presence import Presence, vehicle_presence
+from fogsim.vision.vehicle.rear_localisation import ASIDE, WIDTHS, search_window
+from fogsim.vision.vehicle.vehicle_crop import VehicleCrop, daytime_crop
+
+LARGE_ENOUGH = 5.0
+"""Width of the narrowest vehicle from which on it would be found in clear air [px]."""
+
+SHARPEST_BEND = 400.0
+"""Radius of a bend on which a vehicle that is not found may be [m]: none must be found up to that far aside."""
+
+SEEN_BEFORE, NEARLY_AHEAD = 5.0, 2.0
+"""Time [s] since it was found so near to the own axis [m] within which a vehicle has not gone beside it."""
+
+JUMP, SURPRISE = 15.0, 5.0
+"""Changes of range, as such and against what the relative speed says, that together mean another vehicle [m]."""
+
+LOST_AFTER = 2.0
+"""Time without a range after which the next one is another vehicle's [s]."""
+
+NEW_RANGE, NEW_TIME = 5.0, 5.0
+"""Change of range [m], and time [s], after which a look is as good as another one: texture and clutter stay before."""
+
+OUTSHINES, IN_NOISE = 1.1, 5.0
+"""Luminance over the sky's [-], and beyond that in deviations of a pixel, that only lamps have by day."""
+
+
+@checked_parameters
+class Gabb2014:
+    """A vehicle that the radar follows is looked for in the picture; the range at which it is lost tells the fog.
+
+    The range and the calibration say where in the picture the vehicle must be and how wide it is. There two upright
+    edges stand out of noise and clutter, or not. The contrast C0 of a vehicle fades as e^(−kd) (Duntley's law), and it
+    is found while that exceeds the picture's threshold C_t: where it is lost, k d = ln(C0 / C_t). Neither C0 nor that
+    range is known well, so what all looks say is taken together by Bayes' rule over k and C0. A vehicle that is found
+    at every range gives only `bounds` of k from above, one that is found at none from below, and one that is beyond the
+    radar's reach, or too small in the picture, none. One that was lost, or has come out of the fog, gives an estimate.
+    What was learnt fades with way and time.
+
+    M. Gabb, S. Krebs, O. Löhlein, M. Fritzsche, "Probabilistic inference of visibility conditions by means of sensor
+    fusion", IEEE Intelligent Vehicles Symposium 2014, 1211-1216. The paper's constants are not known here: the idea is
+    its, the likelihood and its constants are this project's own. Daytime only: lamps are seen farther.
+
+    Parameters
+    ----------
+    camera : Camera
+        The assumed calibration.
+    setback : float or None
+        Distance of the camera behind the front bumper, from which the range counts [m]; None for what observations
+        tell.
+    pitch_deviation : float
+        Standard deviation of the true pitch about the assumed one [rad].
+    fading_way, fading_time : float
+        Way [m] and time [s] after which what was learnt counts 1/e of what it did.
+
+    Raises
+    ------
+    InputError
+        If a parameter is out of range.
+    """
+
+    method = "gabb2014"
+
+    def __init__(
+        self,
+        camera: Camera,
+        *,
+        setback: Annotated[float, Range(0.0, 10.0, "m")] | None = None,
+        pitch_deviation: PitchDeviation = PITCH_DEVIATION,
+        fading_way: Annotated[float, Range(1.0, 1e6, "m")] = 1000.0,
+        fading_time: Annotated[float, Range(0.1, 1e6, "s")] = 60.0,
+    ) -> None:
+        self._camera, self._setback = camera, setback
+        self._check = ObservationCheck(camera)
+        self._pitch_deviation = pitch_deviation
+        self._fading_way, self._fading_time = fading_way, fading_time
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all vehicles and what they told."""
+        self._check.reset()
+        self._learnt = LossLikelihood()
+        self._time: float | None = None
+        self._lead: tuple[float, LeadMeasurement] | None = None
+        self._looked: tuple[float, float] | None = None
+        self._ahead_until = -math.inf
+
+    def update(self, observation: Observation) -> Estimate:
+        """Look for the vehicle ahead, and estimate from all looks.
+
+        Parameters
+        ----------
+        observation : Observation
+            Its image, time, speed, lead and, if no setback was told, camera_setback are used.
+
+        Returns
+        -------
+        Estimate
+            Diagnostics: ``found``, whether the vehicle was found in this picture, absent if that could not be told;
+            ``threshold``, the least contrast that is found [-]; ``distance`` of the vehicle [m]; ``note``, why nothing
+            was looked for; or ``reason``.
+
+        Raises
+        ------
+        InputError
+            If camera, image or time do not fit (see `fogsim.estimators.image_check`).
+        """
+        image = self._check.image_of(observation)
+        self._fade(observation)
+        found: dict[str, object] = {"horizon_row": self._camera.horizon_row}
+        note, lead = "no vehicle ahead is tracked", observation.lead
+        if lead is not None and math.isfinite(lead.distance) and lead.distance >= 0.0:
+            self._follow(lead, observation.time)
+            setback = observation.camera_setback if self._setback is None else self._setback
+            depth = lead.distance + setback
+            try:
+                note = self._look(image, depth, observation, found)
+            except CannotTellError as error:
+                return Estimate.invalid(self.method, str(error), **found)
+        return self._estimate(note, found)
+
+    def _fade(self, observation: Observation) -> None:
+        time, speed = observation.time, observation.speed
+        elapsed = 0.0 if self._time is None else max(time - self._time, 0.0)
+        way = speed * elapsed if math.isfinite(speed) and speed > 0.0 else 0.0
+        self._learnt.fade(way / self._fading_way + elapsed / self._fading_time)
+        self._time = time
+
+    def _follow(self, lead: LeadMeasurement, time: float) -> None:
+        """Begin anew with another vehicle, whose contrast is another."""
+        if self._lead is not None:
+            before, earlier = self._lead
+            expected = earlier.distance + earlier.relative_speed * (time - before)
+            jumped = abs(lead.distance - earlier.distance) > JUMP and not abs(lead.distance - expected) <= SURPRISE
+            if jumped or time - before > LOST_AFTER:
+                self._learnt.meet_another()
+                self._looked, self._ahead_until = None, -math.inf
+        self._lead = time, lead
+
+    def _look(
+        self,
+        image: NDArray[np.uint8] | NDArray[np.uint16],
+        depth: float,
+        observation: Observation,
+        found: dict[str, object],
+    ) -> str:
+        """Learn from one picture; why nothing was learnt, or nothing.
+
+        Raises
+        ------
+        CannotTellError
+            If this is no road by day.
+        """
+        if search_window(self._camera, depth) is None and depth > 1.0:
+            return "the vehicle ahead is too small in the image, or outside it"
+        crop = daytime_crop(image, self._camera, depth, self._pitch_deviation)
+        level = levelled(image, self._camera)
+        if why := lit_by_lamps(level, self._camera, observation.lead):
+            raise CannotTellError(why)
+        light = crop.sky.luminance, crop.noise
+        seen = vehicle_presence(crop.luminance, crop.origin, self._camera, depth, ASIDE, light)
+        found |= {"distance": depth, "threshold": seen.threshold}
+        if seen.found and _has_lamps(crop):
+            return "lamps of the vehicle ahead outshine the fog"
+        if seen.found and abs(seen.aside) <= NEARLY_AHEAD:
+            self._ahead_until = observation.time + SEEN_BEFORE
+        if not seen.found and not self._is_lost(level, crop, observation.time):
+            return "the vehicle ahead may be beside where it is looked for, or be too small"
+        found["found"] = seen.found
+        self._learn(seen, depth, observation.time)
+        return ""
+
+    def _is_lost(self, level: NDArray[np.uint8] | NDArray[np.uint16], crop: VehicleCrop, time: float) -> bool:
+        """Whether a vehicle that was not found would be in clear air, and none is aside on what may be a bend."""
+        if WIDTHS[0] * crop.scale < LARGE_ENOUGH:
+            return False
+        if time <= self._ahead_until:
+            return True
+        aside = ASIDE + 0.5 * crop.depth**2 / SHARPEST_BEND
+        middle, half = self._camera.principal_point[0], (aside + WIDTHS[1]) * crop.scale
+        columns = slice(max(math.floor(middle - half), 0), min(math.ceil(middle + half), self._camera.width))
+        rows = slice(crop.origin[1], crop.origin[1] + crop.luminance.shape[0])
+        camera = self._camera
+        wide = linear_luminance(level[rows, columns], camera.response, camera.bits, camera.black_level)
+        light = crop.sky.luminance, crop.noise
+        return not vehicle_presence(wide, (columns.start, rows.start), camera, crop.depth, aside, light).found
+
+    def _learn(self, seen: Presence, depth: float, time: float) -> None:
+        weight = 1.0
+        if self._looked is not None:
+            before, earlier = self._looked
+            weight = min(abs(depth - earlier) / NEW_RANGE + (time - before) / NEW_TIME, 1.0)
+        self._looked = time, depth
+        self._learnt.learn(depth, seen.threshold, weight, found=seen.found)
+
+    def _estimate(self, note: str, found: dict[str, object]) -> Estimate:
+        told = self._learnt.told()
+        if isinstance(told, tuple):
+            if note:
+                found["note"] = note
+            extinction, deviation, reach = told
+            return Estimate(self.method, extinction, deviation, diagnostics=found, reach=reach)
+        reason = note or "the vehicle ahead has not been seen to disappear or to come out of the fog"
+        return Estimate(self.method, 0.0, math.inf, valid=False, diagnostics={"reason": reason, **found}, bounds=told)
+
+
+def _has_lamps(crop: VehicleCrop) -> bool:
+    """Whether something about the vehicle is brighter than the sky, as only lamps are: they are seen farther."""
+    return bool((crop.luminance > OUTSHINES * crop.sky.luminance + IN_NOISE * crop.noise).any())

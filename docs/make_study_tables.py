@@ -55,6 +55,14 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
         OVERDRIVING,
         ("max_deceleration_mps2", "hardest braking [m/s²]", 1.0, 1),
     ),
+    "which_sensor": (
+        ("belief_median_error_percent", "error here and now [%]", 1.0, 0),
+        ("belief_coverage_share", "held [%]", 100.0, 0),
+        ("dense_fog_known_before_m", "bank known before it [m]", 1.0, 0),
+        ("mean_advised_speed_mps", "speed advised [km/h]", 3.6, 0),
+        EGO,
+        COLLISIONS,
+    ),
     "belief_over_places": (
         ("belief_median_error_percent", "error here and now [%]", 1.0, 1),
         ("belief_coverage_share", "held [%]", 100.0, 0),

@@ -159,7 +159,9 @@ class FieldFilter:
             self._field.learn_at_most(min(estimate.reach, self._sight(most)), math.log(most), 0.3)
             return
         if estimate.optical_depths is None:
-            self._learn(0.0, min(estimate.reach, self._sight(k)), math.log(k), relative)
+            end = min(estimate.reach, self._sight(k))
+            for start in (0.0, 0.5 * end):
+                self._learn(start, start + 0.5 * end, math.log(k), math.sqrt(2.0) * relative)
             return
         for start, end, value, deviation in curve_stretches(estimate.optical_depths, FARTHEST).tolist():
             self._learn(start, end, value, max(deviation, 0.5 * relative))

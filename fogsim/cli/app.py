@@ -17,6 +17,7 @@ from fogsim.cli.fog import fog_command
 from fogsim.cli.printing import BAD_INPUT, print_error, print_remarks, stdout
 from fogsim.cli.recover import recover_command
 from fogsim.cli.reproduce import reproduce_command
+from fogsim.cli.restore import restore_command
 from fogsim.cli.run import run_command
 from fogsim.cli.scenarios import list_command, validate_command
 from fogsim.cli.signs import signs_command
@@ -65,6 +66,7 @@ app.command("schema")(schema_command)
 app.command("signs")(signs_command)
 app.command("dataset")(dataset_command)
 app.command("fog")(fog_command)
+app.command("restore")(restore_command)
 app.command("estimate")(estimate_command)
 app.add_typer(calibrate, name="calibrate")
 app.command("reproduce")(reproduce_command)

@@ -1,0 +1,112 @@
+"""``fogsim restore``: contrast that fog has taken from images and videos, restored."""
+
+import contextlib
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from fogsim.cli.printing import BAD_INPUT, escape, print_error, print_remarks, stderr, stdout
+from fogsim.cli.progress import progress_bar
+from fogsim.errors import InputError
+
+if TYPE_CHECKING:
+    from fogsim.offline.restoration import RestorationWish, Restored
+
+
+def restore_command(
+    images: Annotated[
+        list[str],
+        typer.Argument(metavar="IMAGES|VIDEO", help="Image files, folders, patterns like 'a/*.png', or a video."),
+    ],
+    camera: Annotated[
+        Path, typer.Option(help="camera.yaml: the calibration; fogsim estimate --guess-camera makes it.")
+    ],
+    out: Annotated[Path, typer.Option(help="The restored image or .mp4; of several images the folder.")],
+    method: Annotated[str, typer.Option(help="planar, dark_channel or tarel2009.")] = "planar",
+    visibility: Annotated[
+        float | None, typer.Option(help="Meteorological visibility in metres; else joint_road estimates it.")
+    ] = None,
+    most_gain: Annotated[
+        float | None, typer.Option(help="Most by which light and noise are amplified; else 5.")
+    ] = None,
+    airlight: Annotated[
+        str | None, typer.Option(metavar="R,G,B", help="Its pixel values; else those above the horizon.")
+    ] = None,
+    tone_map: Annotated[bool, typer.Option("--tone-map", help="Make the result to be looked at.")] = False,
+    beside: Annotated[bool, typer.Option("--beside", help="The original and the restored side by side.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what is there already.")] = False,
+) -> None:
+    """Restore the contrast that daytime fog took from your own images or video (docs/restoration.md)."""
+    from fogsim.offline import find_source, load_calibration, straightened
+    from fogsim.offline.restoration import RestorationWish, restore_files, restore_video
+    from fogsim.offline.source import ImageFiles
+    from fogsim.restoration import MOST_GAIN
+
+    light = None if airlight is None else _pixel_values(airlight)
+    gain = MOST_GAIN if most_gain is None else most_gain
+    wish = RestorationWish(method, visibility, gain, light, tone_map, beside)
+    calibration = load_calibration(camera)
+    print_remarks("assumed", calibration.remarks)
+    given = find_source(images)
+    source, pinhole = straightened(given, calibration)
+    restore = restore_files if isinstance(given, ImageFiles) else restore_video
+    lacking, told = list["Restored"](), Counter[str]()
+    with (
+        progress_bar(stderr) as progress,
+        contextlib.closing(restore(source, pinhole, wish, out, overwrite=overwrite)) as results,
+    ):
+        task = progress.add_task(source.description, total=source.count)
+        for one in results:
+            lacking += [one] if one.image is None else []
+            told["restored" if one.image is not None else "lacking"] += 1
+            told["held"] += one.held
+            last = one
+            progress.advance(task)
+    _tell(out, wish, told, last)
+    _tell_lacking(lacking, isinstance(given, ImageFiles))
+
+
+def _tell(out: Path, wish: "RestorationWish", told: "Counter[str]", last: "Restored") -> None:
+    from fogsim.units import visibility_from_extinction
+
+    if not told["restored"]:
+        return
+    number = told["restored"]
+    text = f"{out}: {'1 image' if number == 1 else f'{number} images'} restored by {wish.method}"
+    if last.extinction is not None and number == 1:
+        text += f", visibility {visibility_from_extinction(last.extinction):.4g} m"
+        text += " (estimated by joint_road)" if wish.estimates else ""
+    stdout.print(escape(text), soft_wrap=True)
+    if told["held"]:
+        print_remarks("held", (f"in {told['held']} images no fog was found; the last estimate was taken for them",))
+
+
+def _tell_lacking(lacking: "list[Restored]", files: bool) -> None:
+    """Say which images were not restored; frames of a video have stayed as they were.
+
+    Raises
+    ------
+    typer.Exit
+        If image files were left out.
+    """
+    if not lacking:
+        return
+    if not files:
+        text = f"{len(lacking)} frames before the first estimate are as they were: {lacking[0].reason}"
+        print_remarks("not restored", (text,))
+        return
+    print_error(f"{len(lacking)} of the images could not be restored (--visibility does without an estimate):")
+    for one in lacking:
+        named = one.reason if one.picture.error else f"{one.picture.name}: {one.reason}"
+        stderr.print(f"  {escape(named, in_one_line=True)}", soft_wrap=True)
+    raise typer.Exit(BAD_INPUT)
+
+
+def _pixel_values(text: str) -> tuple[float, ...]:
+    """Pixel value, or three with commas between them."""
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(f"--airlight {text}: expected a pixel value, or red, green and blue as R,G,B") from None

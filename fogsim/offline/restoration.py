@@ -1,0 +1,319 @@
+"""Contrast restoration of images and videos from disk."""
+
+from collections.abc import Generator, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.errors import InputError
+from fogsim.files.atomic import partial_path, publish, refuse_missing_folder
+from fogsim.offline.estimation import estimates_of
+from fogsim.offline.fog_image import refuse_out
+from fogsim.offline.fog_video import RATE_FACTOR
+from fogsim.offline.image_files import Pixels, write_image
+from fogsim.offline.source import Picture, Source
+from fogsim.recorders.video import Encoder, encoder_command
+from fogsim.restoration import METHODS, MOST_GAIN, restore_contrast
+from fogsim.restoration.picture import largest_value
+from fogsim.units import LUMINANCE_WEIGHTS, extinction_from_visibility
+from fogsim.values import Camera, Estimate
+from fogsim.values.camera_response import respond
+
+ESTIMATOR = "joint_road"
+"""What tells the extinction where no visibility is given."""
+
+
+@dataclass(frozen=True, slots=True)
+class RestorationWish:
+    """How images are to be restored.
+
+    Attributes
+    ----------
+    method : str
+        A name in `fogsim.restoration.METHODS`.
+    visibility : float or None
+        Meteorological visibility V_met [m], ``inf`` for none to undo; None to estimate it, by methods that use it.
+    most_gain : float
+        Most by which light is amplified [-].
+    airlight : tuple of float or None
+        Pixel value of the airlight: one, or red, green and blue; None to take it from the images.
+    tone_map : bool
+        Whether results are made to be looked at.
+    beside : bool
+        Whether the image as it was stands to the left of the restored one.
+
+    Raises
+    ------
+    InputError
+        If there is no such method, or the visibility is not positive or of no use to the method.
+    """
+
+    method: str = "planar"
+    visibility: float | None = None
+    most_gain: float = MOST_GAIN
+    airlight: tuple[float, ...] | None = None
+    tone_map: bool = False
+    beside: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be restored."""
+        needs = METHODS.find(self.method).needs_extinction
+        if self.visibility is None:
+            return
+        if not self.visibility > 0:
+            raise InputError(f"--visibility must be a positive length in metres, got {self.visibility!r}")
+        if not needs:
+            raise InputError(f"--visibility goes with planar; {self.method} finds the veil in the image itself")
+
+    @property
+    def estimates(self) -> bool:
+        """Whether the extinction comes from an estimator."""
+        return self.visibility is None and METHODS.find(self.method).needs_extinction
+
+
+@dataclass(frozen=True, slots=True)
+class Restored:
+    """What came of one image.
+
+    Attributes
+    ----------
+    picture : Picture
+        The image as it was, or why it could not be read.
+    image : (rows, cols[, 3]) uint8 or uint16, or None
+        The restored image, the original beside it if that is wished; None if it could not be restored.
+    extinction : float or None
+        Extinction coefficient that it was restored with [1/m]; None by methods without.
+    reason : str
+        Why it could not be restored, else empty.
+    held : bool
+        Whether the extinction is that of an earlier image, since this one tells none.
+    """
+
+    picture: Picture
+    image: Pixels | None
+    extinction: float | None = None
+    reason: str = ""
+    held: bool = False
+
+
+def restored_images(source: Source, camera: Camera, wish: RestorationWish) -> Iterator[Restored]:
+    """Restore the images of a source.
+
+    The extinction is estimated by `joint_road` in each image; in a sequence the last that it was sure of holds.
+
+    Parameters
+    ----------
+    source : Source
+        The images.
+    camera : Camera
+        Their calibration.
+    wish : RestorationWish
+        How.
+
+    Yields
+    ------
+    Restored
+        For each image in turn.
+
+    Raises
+    ------
+    InputError
+        If the images are not of the camera, or airlight or gain are impossible.
+    """
+    last: Estimate | None = None
+    for picture, estimate in _estimated(source, camera, wish):
+        if picture.image is None:
+            yield Restored(picture, None, reason=picture.error)
+            continue
+        held = False
+        if estimate is not None:
+            held = not estimate.valid and source.temporal and last is not None
+            last = estimate if estimate.valid or not source.temporal else last
+            if last is None or not last.valid:
+                yield Restored(picture, None, reason=f"no fog found: {estimate.diagnostics.get('reason', 'unknown')}")
+                continue
+        yield _restored(picture, picture.image, camera, wish, last, held)
+
+
+def _estimated(source: Source, camera: Camera, wish: RestorationWish) -> Iterator[tuple[Picture, Estimate | None]]:
+    """Images, with their estimates where some are wanted."""
+    if wish.estimates:
+        for result in estimates_of(source, camera, (ESTIMATOR,)):
+            yield result.picture, next(iter(result.estimates), None)
+        return
+    for picture in source.pictures():
+        yield picture, None
+
+
+def _restored(
+    picture: Picture, image: Pixels, camera: Camera, wish: RestorationWish, estimate: Estimate | None, held: bool
+) -> Restored:
+    extinction = None if estimate is None else estimate.extinction
+    if wish.visibility is not None:
+        extinction = extinction_from_visibility(wish.visibility)
+    try:
+        done = restore_contrast(
+            image,
+            camera,
+            extinction,
+            _airlight(image, camera, wish, estimate),
+            method=wish.method,
+            most_gain=wish.most_gain,
+            tone_map=wish.tone_map,
+        ).image
+    except InputError as error:
+        raise InputError(f"{picture.name}: {error}") from error
+    shown = np.concatenate([image, done], axis=1) if wish.beside else done
+    return Restored(picture, shown, extinction, held=held)
+
+
+def _airlight(
+    image: Pixels, camera: Camera, wish: RestorationWish, estimate: Estimate | None
+) -> NDArray[np.float64] | None:
+    """Pixel values of the airlight that is given, or of the picture's own with the estimate's luminance."""
+    if wish.airlight is not None:
+        return np.array(wish.airlight)
+    told = None if estimate is None else estimate.diagnostics.get("airlight")
+    if not isinstance(told, float):
+        return None
+    full = largest_value(image, camera)
+    channels = image.reshape(*image.shape[:2], -1)
+    light = METHODS.find(wish.method).airlight(channels, camera, int(full))
+    weights = np.array(LUMINANCE_WEIGHTS if len(light) == 3 else (1.0,))
+    scaled = np.minimum(light * (told / 255.0 / float((light * weights).sum())), 1.0)
+    return np.asarray(full * respond(scaled, camera.response, camera.black_level))
+
+
+def restore_files(
+    source: Source, camera: Camera, wish: RestorationWish, out: Path, *, overwrite: bool = False
+) -> Generator[Restored]:
+    """Restore image files: one into a file, several into a folder, by their own names.
+
+    Parameters
+    ----------
+    source : Source
+        The images.
+    camera : Camera
+        Their calibration.
+    wish : RestorationWish
+        How.
+    out : Path
+        The file, or for several images the folder, which is made if it is not there.
+    overwrite : bool
+        True to replace files that are there.
+
+    Yields
+    ------
+    Restored
+        For each image in turn, after it was written.
+
+    Raises
+    ------
+    InputError
+        If a file must not or cannot be written, or anything does not fit.
+    """
+    targets = _targets(source.paths, out)
+    for target in targets:
+        refuse_out(target, source.paths, overwrite)
+    if len(targets) > 1:
+        refuse_missing_folder(out, "--out")
+        out.mkdir(exist_ok=True)
+    for target, one in zip(targets, restored_images(source, camera, wish), strict=True):
+        if one.image is not None:
+            # Stored with blue first.
+            write_image(target, one.image if one.image.ndim == 2 else one.image[..., ::-1].copy())
+        yield one
+
+
+def _targets(paths: tuple[Path, ...], out: Path) -> tuple[Path, ...]:
+    """Where each image goes.
+
+    Raises
+    ------
+    InputError
+        If two would go to the same file, or several into what is no folder.
+    """
+    if len(paths) == 1:
+        refuse_missing_folder(out, "--out")
+        return (out,)
+    if out.is_file():
+        raise InputError(f"--out {out} is a file; {len(paths)} images go into a folder")
+    names = [path.name for path in paths]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise InputError(f"{twice}: two images have this name, and both would go to {out / twice}; restore them apart")
+    return tuple(out / name for name in names)
+
+
+def restore_video(
+    source: Source, camera: Camera, wish: RestorationWish, out: Path, *, overwrite: bool = False
+) -> Generator[Restored]:
+    """Restore a video frame by frame; under its final name only when it is whole.
+
+    Frames before the first in which fog is found are kept as they are.
+
+    Parameters
+    ----------
+    source : Source
+        The video.
+    camera : Camera
+        Its calibration.
+    wish : RestorationWish
+        How.
+    out : Path
+        The restored video, ``.mp4``.
+    overwrite : bool
+        True to replace a file that is there.
+
+    Yields
+    ------
+    Restored
+        For each frame in turn.
+
+    Raises
+    ------
+    InputError
+        If anything does not fit, the video is cut off, or fog is found in no frame.
+    """
+    _refuse_unfit(source, camera, out, overwrite)
+    columns = camera.width * (2 if wish.beside else 1)
+    encoder: Encoder | None = None
+    found, reason = False, ""
+    try:
+        for one in restored_images(source, camera, wish):
+            seen = one.picture.image
+            if seen is None:
+                raise InputError(one.picture.error)
+            if encoder is None:
+                command = encoder_command(partial_path(out), source.period, (columns, camera.height), RATE_FACTOR)
+                encoder = Encoder(command)
+            shown = one.image
+            if shown is None:
+                shown = np.concatenate([seen, seen], axis=1) if wish.beside else seen
+            encoder.write(shown.tobytes())
+            found, reason = found or one.image is not None, reason or one.reason
+            yield one
+        if not found:
+            raise InputError(f"{source.paths[0]}: in no frame {reason}; --visibility restores it all the same")
+        if encoder is not None:
+            finished, encoder = encoder, None
+            finished.finish()
+            publish(out)
+    finally:
+        if encoder is not None:
+            encoder.finish()
+        partial_path(out).unlink(missing_ok=True)
+
+
+def _refuse_unfit(source: Source, camera: Camera, out: Path, overwrite: bool) -> None:
+    if out.suffix.lower() != ".mp4":
+        raise InputError(f"--out {out}: a restored video is written as .mp4, got {out.suffix or 'no ending'}")
+    refuse_missing_folder(out, "--out")
+    refuse_out(out, source.paths, overwrite)
+    if camera.width % 2 or camera.height % 2:
+        raise InputError(
+            f"{source.paths[0]}: frames of {camera.width} × {camera.height} pixels cannot be written as .mp4, which "
+            "wants even numbers; cut a row or column off and give the camera of what is left"
+        )

@@ -1,0 +1,76 @@
+"""The airlight of a picture, from the picture itself."""
+
+import cv2
+import numpy as np
+
+from fogsim.restoration.picture import Floats, Light, Pixels, light_table
+from fogsim.units import LUMINANCE_WEIGHTS
+from fogsim.values.camera import Camera
+
+BAND = 0.15
+"""Rows above the horizon that the airlight is sought in, as a share of the image's: higher up sky may be brighter."""
+
+BRIGHTEST = 1 / 3
+"""Share of the band, the brightest, whose median is taken: trees and vehicles are darker [-]."""
+
+SIDE = 4
+"""Side of the blocks whose means count [px]."""
+
+DARKEST = 0.001
+"""Airlight of a black picture, relative to full scale [-]."""
+
+
+def horizon_airlight(pixels: Pixels, camera: Camera, full: int) -> Light:
+    """Airlight from what is just above the horizon: the median of its brightest third, of each channel.
+
+    Parameters
+    ----------
+    pixels : (rows, cols, channels) uint8 or uint16
+        Pixel values.
+    camera : Camera
+        The assumed calibration. Where its horizon is above the image, the uppermost rows are taken.
+    full : int
+        Largest pixel value.
+
+    Returns
+    -------
+    (channels,) float64
+        Light relative to full scale.
+    """
+    rows = pixels.shape[0]
+    bottom = round(min(max(camera.horizon_row, BAND * rows), rows))
+    light = _blocks(pixels[max(bottom - round(BAND * rows), 0) : max(bottom, 1)], camera, full)
+    brightness = _luminance(light)
+    brightest = light[brightness >= np.quantile(brightness, 1.0 - BRIGHTEST)]
+    return np.asarray(np.maximum(np.median(brightest, axis=0), DARKEST), np.float64)
+
+
+def dark_channel_airlight(pixels: Pixels, camera: Camera, full: int) -> Light:
+    """Airlight by the dark channel: the brightest of the thousandth of blocks whose darkest neighbour is brightest.
+
+    He, Sun & Tang 2011 (IEEE TPAMI 33(12), section 4.4), on means of blocks of 4 × 4 pixels and neighbourhoods of 4 × 4
+    of them, since single pixels are noise.
+
+    Parameters
+    ----------
+    pixels, camera, full
+        As of `horizon_airlight`.
+    """
+    rows, cols = max(pixels.shape[0] // SIDE, 1), max(pixels.shape[1] // SIDE, 1)
+    light = _blocks(pixels, camera, full)
+    dark = cv2.erode(light.min(axis=1).reshape(rows, cols), np.ones((SIDE, SIDE), np.uint8)).reshape(-1)
+    candidates = np.argsort(dark, kind="stable")[-max(1, round(0.001 * pixels.shape[0] * pixels.shape[1])) :]
+    brightest = candidates[np.argmax(_luminance(light[candidates]))]
+    return np.asarray(np.maximum(light[brightest], DARKEST), np.float64)
+
+
+def _blocks(pixels: Pixels, camera: Camera, full: int) -> Floats:
+    """Mean light of blocks, (blocks, channels)."""
+    rows, cols, channels = pixels.shape
+    table = light_table(camera.response, full, camera.black_level).astype(np.float32)
+    size = (max(cols // SIDE, 1), max(rows // SIDE, 1))
+    return np.asarray(cv2.resize(table[pixels], size, interpolation=cv2.INTER_AREA), np.float32).reshape(-1, channels)
+
+
+def _luminance(light: Floats) -> Floats:
+    return light[:, 0] if light.shape[1] == 1 else (light * np.array(LUMINANCE_WEIGHTS, np.float32)).sum(axis=1)

@@ -1,0 +1,44 @@
+"""The methods of contrast restoration, in one registry."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from fogsim.registry import Registry
+from fogsim.restoration.airlight import dark_channel_airlight, horizon_airlight
+from fogsim.restoration.dark_channel import dark_channel
+from fogsim.restoration.picture import Floats, FoggyPicture, Light, Pixels
+from fogsim.restoration.planar import planar
+from fogsim.restoration.tarel2009 import tarel2009
+from fogsim.values.camera import Camera
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """A method of contrast restoration.
+
+    Attributes
+    ----------
+    transmission : callable
+        Gives the transmission (rows, cols) of a picture, which is then undone.
+    airlight : callable
+        Finds the airlight of pixels of a camera and its largest pixel value, where none is given.
+    needs_extinction : bool
+        Whether it reckons with an extinction coefficient; the others find the veil in the picture.
+    smooths : bool
+        Whether noise is smoothed before it is amplified.
+    """
+
+    transmission: Callable[[FoggyPicture], Floats]
+    airlight: Callable[[Pixels, Camera, int], Light]
+    needs_extinction: bool = False
+    smooths: bool = False
+
+
+METHODS: Registry[Method] = Registry(
+    "restoration method",
+    {
+        "planar": Method(planar, horizon_airlight, needs_extinction=True, smooths=True),
+        "dark_channel": Method(dark_channel, dark_channel_airlight),
+        "tarel2009": Method(tarel2009, horizon_airlight),
+    },
+)

@@ -1,0 +1,108 @@
+"""Compiled search of what stands on the road, column by column from the road up."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+
+Floats = NDArray[np.float32]
+Pixels = NDArray[np.uint8] | NDArray[np.uint16]
+
+
+@kernel
+def standing_transmission(
+    light: Floats, plane: Floats, distance: Floats, tall: float, least: float, road: float, dark: float, sure: float
+) -> Floats:
+    """Transmission of what stands on the road, (rows, cols) float32; 0 where nothing is found.
+
+    Restored as road, what stands on it becomes darker the farther the road behind it is. A run of such pixels up a
+    column stands where the lowest of them is, if some pixel of it comes out darker than black.
+
+    Parameters
+    ----------
+    light : (rows, cols) float32
+        Light relative to the airlight, the smallest channel.
+    plane : (rows, cols) float32
+        Transmission of the road, at least `least`.
+    distance : (rows, cols) float32
+        Distance of the road [m].
+    tall : float
+        Rows of 1 m at 1 m distance over which a run may be bright: a vehicle's boot between shadow and window [px·m].
+    least : float
+        Least transmission [-].
+    road : float
+        Luminance of the road relative to the airlight [-].
+    dark : float
+        Share of that below which a pixel may be the foot of something [-].
+    sure : float
+        How far below black a pixel must come out, relative to the airlight [-].
+    """
+    rows, cols = light.shape
+    out = np.zeros((rows, cols), np.float32)
+    for col in range(cols):
+        foot, last, found = -1, -1, False
+        for row in range(rows - 1, -1, -1):
+            restored = 1.0 + (light[row, col] - 1.0) / plane[row, col]
+            if restored < dark * road:
+                if foot < 0:
+                    foot = row
+                last = row
+                found = found or restored < -sure
+            elif foot >= 0 and (last - row > tall / distance[foot, col] or (not found and restored < 2.0 * road)):
+                if found:
+                    _fill(out, light, plane, col, foot, last, least)
+                foot, found = -1, False
+        if found:
+            _fill(out, light, plane, col, foot, last, least)
+    return out
+
+
+@kernel
+def _fill(out: Floats, light: Floats, plane: Floats, col: int, foot: int, last: int, least: float) -> None:
+    """Give a run the transmission of its foot, or what its own darkness demands if it has none on the road."""
+    stands = plane[foot, col] if plane[foot, col] > 1.01 * least else np.float32(0.0)
+    for row in range(last, foot + 1):
+        out[row, col] = max(stands, np.float32(1.0) - light[row, col])
+
+
+@kernel
+def bounded_transmission(
+    pixels: Pixels, tables: Floats, plane: Floats, standing: Floats, least: float, road: float
+) -> Floats:
+    """Transmission of road and of what stands on it, no less than a bound, (rows, cols) float32.
+
+    The bound is soft, √(t² + t_min²): where it is hard, the road ends in an edge across it.
+
+    Parameters
+    ----------
+    pixels : (rows, cols, channels) uint8 or uint16
+        Pixel values.
+    tables : (channels, levels) float32
+        Light of each value, relative to the airlight.
+    plane : (rows, cols) float32
+        Transmission of the road.
+    standing : (rows, cols) float32
+        By how much that of what stands there is more; where a pixel comes out as bright as the road, it is road beside.
+    least : float
+        Least transmission t_min [-].
+    road : float
+        Luminance of the road relative to the airlight [-].
+    """
+    rows, cols, channels = pixels.shape
+    out = np.empty((rows, cols), np.float32)
+    square, one, none = np.float32(least * least), np.float32(1.0), np.float32(0.0)
+    for row in range(rows):
+        for col in range(cols):
+            through = plane[row, col]
+            out[row, col] = min(np.sqrt(through * through + square), one)
+    for row in range(rows):
+        for col in range(cols):
+            if standing[row, col] > none:
+                light = one
+                for channel in range(channels):
+                    light = min(light, tables[channel, pixels[row, col, channel]])
+                restored = one + (light - one) / out[row, col]
+                share = np.float32(2.0) * (one - restored / np.float32(road))
+                out[row, col] += min(max(share, none), one) * standing[row, col]
+                out[row, col] = min(out[row, col], one)
+    return out

@@ -1,0 +1,110 @@
+"""Contrast restoration of one picture."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.errors import InputError
+from fogsim.restoration.methods import METHODS, Method
+from fogsim.restoration.picture import FoggyPicture, Light, Pixels, Restoration, largest_value
+from fogsim.restoration.unveiling import without_veil
+from fogsim.values.camera import Camera
+from fogsim.values.camera_response import exposure_of, respond
+
+MOST_GAIN = 5.0
+"""Most by which light, and with it noise, is amplified if nothing else is asked for [-]; chosen on pool 0 of
+benchmarks/restoration.py: more shows vehicles farther away, and more that is none."""
+
+
+def restore_contrast(
+    image: Pixels,
+    camera: Camera,
+    extinction: float | None = None,
+    airlight: Sequence[float] | NDArray[np.float64] | None = None,
+    *,
+    method: str = "planar",
+    most_gain: float = MOST_GAIN,
+    tone_map: bool = False,
+) -> Restoration:
+    """Restore the contrast that daytime fog has taken from a picture.
+
+    Parameters
+    ----------
+    image : (rows, cols) or (rows, cols, 3) uint8 or uint16
+        Pixel values, red first.
+    camera : Camera
+        The assumed calibration: its response says what pixel values stand for, its place where the road is.
+    extinction : float or None
+        Extinction coefficient k [1/m], ≥ 0: 0 gives the image back; ``planar`` needs it, the others do not use it.
+    airlight : (channels,) sequence of float or None
+        Pixel values of the airlight, one or one a channel; None to take it from the picture.
+    method : str
+        A name in `fogsim.restoration.METHODS`.
+    most_gain : float
+        Most by which light is amplified, at least 1 [-].
+    tone_map : bool
+        Make the result to be looked at; else its light is that of the scene, at the picture's exposure.
+
+    Returns
+    -------
+    Restoration
+        The restored picture, and the transmission that was undone.
+
+    Raises
+    ------
+    InputError
+        If the image is not of this camera, there is no such method, or a number is out of its range.
+    """
+    chosen = METHODS.find(method)
+    pixels, full = _checked(image, camera)
+    if not (most_gain >= 1.0 and math.isfinite(most_gain)):
+        raise InputError(f"most_gain must be a finite number of at least 1, got {most_gain!r}")
+    if extinction is not None and not (extinction >= 0.0 and math.isfinite(extinction)):
+        raise InputError(f"extinction must be a finite number of 1/m, at least 0, got {extinction!r}")
+    light = _airlight(pixels, camera, full, airlight, chosen)
+    shown = np.asarray(full * respond(light, camera.response, camera.black_level))
+    if chosen.needs_extinction and extinction == 0.0:
+        return Restoration(image.copy(), np.ones(image.shape[:2], np.float32), shown, method)
+    picture = FoggyPicture(pixels, camera, full, light, extinction, most_gain)
+    transmission = chosen.transmission(picture)
+    restored = without_veil(picture, transmission, smooths=chosen.smooths, tone_map=tone_map)
+    return Restoration(restored.reshape(image.shape), transmission, shown, method)
+
+
+def _checked(image: Pixels, camera: Camera) -> tuple[Pixels, float]:
+    """Pixels with an axis of channels, and their largest value."""
+    if image.dtype not in (np.uint8, np.uint16) or image.ndim not in (2, 3) or image.shape[2:] not in ((), (1,), (3,)):
+        raise InputError(
+            f"expected a grey or colour image (rows, cols[, 3]) of uint8 or uint16, got {image.shape} {image.dtype}"
+        )
+    if image.shape[:2] != (camera.height, camera.width):
+        raise InputError(
+            f"the image has {image.shape[1]} × {image.shape[0]} pixels, the camera {camera.width} × {camera.height}; "
+            "they must be the same"
+        )
+    pixels: Pixels = image.reshape(*image.shape[:2], -1).copy(order="C")
+    return pixels, largest_value(image, camera)
+
+
+def _airlight(
+    pixels: Pixels,
+    camera: Camera,
+    full: float,
+    given: Sequence[float] | NDArray[np.float64] | None,
+    method: Method,
+) -> Light:
+    """Light of the airlight relative to full scale, one a channel."""
+    if given is None:
+        return method.airlight(pixels, camera, int(full))
+    values, channels = np.atleast_1d(np.asarray(given, np.float64)), pixels.shape[2]
+    if values.shape not in ((1,), (channels,)):
+        raise InputError(f"airlight must be one pixel value or {channels}, got {values.size}")
+    light = exposure_of(values / full, camera.response, camera.black_level)
+    if not ((light > 0.0).all() and (values <= full).all()):
+        told = ", ".join(f"{value:g}" for value in values)
+        raise InputError(
+            f"airlight must be brighter than black and at most {full:g}, the largest pixel value, got {told}"
+        )
+    return np.broadcast_to(light, (channels,)).copy()

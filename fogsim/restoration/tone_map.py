@@ -1,0 +1,42 @@
+"""A tone map for restored pictures that are looked at."""
+
+import numpy as np
+
+from fogsim.restoration.picture import Floats, FoggyPicture, Light, ToneCurve
+from fogsim.units import LUMINANCE_WEIGHTS
+
+KEY = 0.18
+"""Luminance that the middle of what is seen gets, relative to full scale [-] (Reinhard et al. 2002)."""
+
+WHITE_QUANTILE, DARKEST = 0.99, 0.01
+"""What is as bright as this share of all becomes white; what is darker than that, of the airlight, counts as it [-]."""
+
+
+def tone_curve(light: Floats, transmission: Floats, picture: FoggyPicture) -> ToneCurve:
+    """Curve that brings out what the fog lets through: L (1 + L / L_w²) / (1 + L) (Reinhard et al. 2002, eq. 4).
+
+    L is light over its logarithmic mean, times 0.18. Unlike the paper's, the mean is weighted by transmission: the
+    sky and what the fog has hidden, which are brighter than all else, do not make the road black.
+
+    Parameters
+    ----------
+    light : (rows, cols, channels) float32
+        Restored light relative to the airlight, of some of the pixels.
+    transmission : (rows, cols) float32
+        Of each of them [-].
+    picture : FoggyPicture
+        The picture that it was restored from.
+    """
+    some = light.astype(np.float64) * picture.airlight
+    luminance = some[..., 0] if some.shape[2] == 1 else (some * LUMINANCE_WEIGHTS).sum(axis=2)
+    luminance = np.maximum(luminance, DARKEST * float(picture.airlight.max()))
+    weights = transmission.astype(np.float64)
+    middle = float(np.exp((weights * np.log(luminance)).sum() / weights.sum()))
+    exposure = KEY / middle
+    white = max(exposure * float(np.quantile(luminance, WHITE_QUANTILE)), 1.0)
+
+    def curve(shown: Light) -> Light:
+        scaled = exposure * shown
+        return np.asarray(scaled * (1.0 + scaled / white**2) / (1.0 + scaled))
+
+    return curve

@@ -90,6 +90,7 @@ def record_run(
     - ``trajectories.parquet``, by ``trajectories``: a row for each vehicle and step, in SUMO's FCD columns.
     - ``events.parquet``, by ``events``: a row for each event: of the timeline, collisions, faults of sensors, the end.
     - ``video.mp4``, by ``video``: a frame of 1024×480 px (H.264) for each step, at real speed.
+    - ``restored.mp4``, by ``restored_video``: the same, the right half of the picture with contrast restored.
     - ``report.html``, by ``report``: metrics, figures and pictures in one file.
     - ``sumo_outputs``, a folder: what SUMO writes, where its files or options ask for outputs.
 

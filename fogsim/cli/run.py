@@ -76,6 +76,10 @@ def run_command(
     video: Annotated[
         bool | None, typer.Option("--video/--no-video", help="Write video.mp4 (as a rule where there is an ego).")
     ] = None,
+    restored_video: Annotated[
+        bool,
+        typer.Option("--restored-video", help="Write restored.mp4 too: half the picture with its contrast restored."),
+    ] = False,
     report: Annotated[bool, typer.Option(help="Write report.html.")] = True,
     trajectories: Annotated[bool, typer.Option(help="Write trajectories.parquet, all vehicles.")] = False,
     events: Annotated[
@@ -99,6 +103,7 @@ def run_command(
     chosen = {
         "table": True,
         "video": _filmed(loaded, video),
+        "restored_video": restored_video and _filmed(loaded, wanted=True),
         "report": report,
         "trajectories": trajectories,
         "events": bool(loaded.timeline) if events is None else events,

@@ -8,6 +8,7 @@ from fogsim.recorders.exchange.openscenario import OpenScenarioRecorder
 from fogsim.recorders.exchange.osi import OsiRecorder
 from fogsim.recorders.manifest import Manifest, Status, versions
 from fogsim.recorders.panel.frame_panel import PICTURE_SIZE, FramePanel
+from fogsim.recorders.panel.restored_picture import draw_restored_picture
 from fogsim.recorders.panel.view_from_above import draw_view_from_above
 from fogsim.recorders.protocol import (
     DERIVED_QUANTITIES,
@@ -40,6 +41,9 @@ RECORDERS: Registry[RecorderFactory] = Registry(
     {
         "table": lambda run: TableRecorder(run.directory.table, run.methods),
         "video": lambda run: VideoRecorder(run.directory.video, run.frame_period),
+        "restored_video": lambda run: VideoRecorder(
+            run.directory.restored_video, run.frame_period, draw_restored_picture
+        ),
         "report": ReportRecorder,
         "trajectories": lambda run: TrajectoryRecorder(run.directory.trajectories),
         "events": lambda run: EventRecorder(run.directory.events),

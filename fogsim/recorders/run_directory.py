@@ -38,6 +38,7 @@ _NAMES = {
     "openscenario": "scenario.xosc",
     "osi": "ground_truth.osi",
     "video": "video.mp4",
+    "restored_video": "restored.mp4",
     "report": "report.html",
 }
 _RESERVE = "reserve"
@@ -245,6 +246,11 @@ class RunDirectory:
     def video(self) -> Path:
         """What the camera saw, with a panel beside it."""
         return self.unfinished / _NAMES["video"]
+
+    @property
+    def restored_video(self) -> Path:
+        """The same with half of the picture restored."""
+        return self.unfinished / _NAMES["restored_video"]
 
     @property
     def report(self) -> Path:

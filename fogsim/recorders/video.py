@@ -2,13 +2,16 @@
 
 import subprocess
 import tempfile
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 
 import imageio_ffmpeg
+from PIL import Image
 
 from fogsim.errors import FogSimError, MissingDependencyError
 from fogsim.files.atomic import partial_path, publish
+from fogsim.recorders.panel.camera_picture import draw_camera_picture
 from fogsim.recorders.panel.frame_panel import FRAME_HEIGHT, FRAME_WIDTH, FramePanel
 from fogsim.recorders.protocol import Derived
 from fogsim.values import Step
@@ -18,7 +21,7 @@ CLOSING_LIMIT = 5.0
 
 
 class VideoRecorder:
-    """Writes ``video.mp4`` (H.264, yuv420p): the camera's image with a panel of what is known and done.
+    """Writes a video (H.264, yuv420p): the camera's image with a panel of what is known and done.
 
     A run without steps leaves no video.
 
@@ -28,6 +31,8 @@ class VideoRecorder:
         The file.
     frame_period : float
         Time between two steps [s]; the video plays at real speed.
+    draw_picture : callable
+        Draws what stands beside the panel; the camera's image if not given.
 
     Raises
     ------
@@ -35,9 +40,11 @@ class VideoRecorder:
         If there is no ffmpeg.
     """
 
-    def __init__(self, path: Path, frame_period: float) -> None:
+    def __init__(
+        self, path: Path, frame_period: float, draw_picture: Callable[[Step], Image.Image] = draw_camera_picture
+    ) -> None:
         self._path = path
-        self._panel = FramePanel()
+        self._panel = FramePanel(draw_picture)
         self._command = encoder_command(partial_path(path), frame_period)
         self._encoder: Encoder | None = None
 

@@ -21,6 +21,7 @@ def test_every_registered_recorder_writes_its_file(tmp_path: Path) -> None:
             "ground_truth.osi",
             "manifest.json",
             "report.html",
+            "restored.mp4",
             "scenario.xosc",
             "steps.parquet",
             "trajectories.parquet",

@@ -7,6 +7,7 @@ levels. For each visibility:
 
 ``bounds``       share of updates in which there is no estimate but bounds, and of those how many hold the truth to
                  their softness (central 90 %)
+``at least``     what such bounds say at least, over V (median)
 ``estimates``    share of updates with an estimate; their error |V_est − V| / V (median, 95th percentile), and how many
                  of their 90 % intervals hold the truth
 ``drives``       share of drives with an estimate at some time, and the error of the first one
@@ -55,6 +56,7 @@ class Found:
 
     updates: int = 0
     held: list[bool] = field(default_factory=list)
+    least: list[float] = field(default_factory=list)
     errors: list[float] = field(default_factory=list)
     covered: list[bool] = field(default_factory=list)
     first: list[float | None] = field(default_factory=list)
@@ -116,13 +118,15 @@ def judged(estimator: Estimator, seen: Observation, visibility: float, found: Fo
         found.covered.append(low <= visibility <= high)
     elif estimate.bounds is not None:
         found.held.append(low <= visibility <= high)
+        if low > 0.0:
+            found.least.append(low / visibility)
     return estimate
 
 
 def together(found: dict[float, Found]) -> Found:
     """All visibilities as one."""
     every = Found(sum(one.updates for one in found.values()))
-    for name in ("held", "errors", "covered", "first", "spent"):
+    for name in ("held", "least", "errors", "covered", "first", "spent"):
         getattr(every, name).extend(value for one in found.values() for value in getattr(one, name))
     return every
 
@@ -136,6 +140,7 @@ def record(visibility: str, found: Found, pool: int) -> Row:
         "updates": found.updates,
         "bounds_share": len(found.held) / found.updates,
         "bounds_hold": float(np.mean(found.held)) if found.held else None,
+        "at_least_over_v": float(np.median(found.least)) if found.least else None,
         "valid_share": len(found.errors) / found.updates,
         "median_pct": float(np.median(found.errors)) if found.errors else None,
         "p95_pct": float(np.quantile(found.errors, 0.95)) if found.errors else None,
@@ -149,15 +154,16 @@ def record(visibility: str, found: Found, pool: int) -> Row:
 
 def table(rows: list[Row]) -> Iterator[str]:
     """Lines of the table."""
-    names = ("updates", "bounds", "which hold", "estimates", "median/p95, %", "intervals hold", "drives", "first", "ms")
+    names = ("updates", "bounds", "held", "at least", "estimates", "median/p95, %", "held", "drives", "first", "ms")
     yield f"| V_met, m | {' | '.join(names)} |"
-    yield "|---|---|---|---|---|---|---|---|---|---|"
+    yield "|---|---|---|---|---|---|---|---|---|---|---|"
     for row in rows:
         share = [f"{100.0 * row[key]:.0f} %" for key in ("bounds_share", "valid_share", "drives_share")]
-        told = ["–" if row[key] is None else f"{row[key]:.2f}" for key in ("bounds_hold", "coverage")]
+        keys = ("bounds_hold", "at_least_over_v", "coverage")
+        told = ["–" if row[key] is None else f"{row[key]:.2f}" for key in keys]
         error = "–" if row["median_pct"] is None else f"{row['median_pct']:.0f}/{row['p95_pct']:.0f}"
         first = "–" if row["first_median_pct"] is None else f"{row['first_median_pct']:.0f} %"
-        cells = (row["visibility"], str(row["updates"]), share[0], told[0], share[1], error, told[1], share[2], first)
+        cells = (row["visibility"], str(row["updates"]), share[0], *told[:2], share[1], error, told[2], share[2], first)
         yield f"| {' | '.join(cells)} | {row['ms']:.1f} |"
 
 

@@ -23,10 +23,10 @@ from fogsim.vision.vehicle.vehicle_crop import VehicleCrop, daytime_crop
 LARGE_ENOUGH = 5.0
 """Width of the narrowest vehicle from which on it would be found in clear air [px]."""
 
-SHARPEST_BEND = 400.0
+SHARPEST_BEND = 600.0
 """Radius of a bend on which a vehicle that is not found may be [m]: none must be found up to that far aside."""
 
-SEEN_BEFORE, NEARLY_AHEAD = 5.0, 2.0
+SEEN_BEFORE, NEARLY_AHEAD = 10.0, 2.0
 """Time [s] since it was found so near to the own axis [m] within which a vehicle has not gone beside it."""
 
 JUMP, SURPRISE = 15.0, 5.0
@@ -35,11 +35,8 @@ JUMP, SURPRISE = 15.0, 5.0
 LOST_AFTER = 2.0
 """Time without a range after which the next one is another vehicle's [s]."""
 
-NEW_RANGE, NEW_TIME = 5.0, 5.0
+NEW_RANGE, NEW_TIME = 5.0, 3.0
 """Change of range [m], and time [s], after which a look is as good as another one: texture and clutter stay before."""
-
-OUTSHINES, IN_NOISE = 1.1, 5.0
-"""Luminance over the sky's [-], and beyond that in deviations of a pixel, that only lamps have by day."""
 
 
 @checked_parameters
@@ -177,8 +174,6 @@ class Gabb2014:
         light = crop.sky.luminance, crop.noise
         seen = vehicle_presence(crop.luminance, crop.origin, self._camera, depth, ASIDE, light)
         found |= {"distance": depth, "threshold": seen.threshold}
-        if seen.found and _has_lamps(crop):
-            return "lamps of the vehicle ahead outshine the fog"
         if seen.found and abs(seen.aside) <= NEARLY_AHEAD:
             self._ahead_until = observation.time + SEEN_BEFORE
         if not seen.found and not self._is_lost(level, crop, observation.time):
@@ -219,8 +214,3 @@ class Gabb2014:
             return Estimate(self.method, extinction, deviation, diagnostics=found, reach=reach)
         reason = note or "the vehicle ahead has not been seen to disappear or to come out of the fog"
         return Estimate(self.method, 0.0, math.inf, valid=False, diagnostics={"reason": reason, **found}, bounds=told)
-
-
-def _has_lamps(crop: VehicleCrop) -> bool:
-    """Whether something about the vehicle is brighter than the sky, as only lamps are: they are seen farther."""
-    return bool((crop.luminance > OUTSHINES * crop.sky.luminance + IN_NOISE * crop.noise).any())

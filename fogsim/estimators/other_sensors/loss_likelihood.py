@@ -26,7 +26,10 @@ SLOPE = 0.25
 ASTRAY = 0.03
 """Share of looks that go astray either way: clutter that looks like a vehicle, something that hides it [-]."""
 
-END = 0.1
+SUREST = 4.0
+"""Largest logarithm of a ratio of likelihoods that is kept [-]: fog changes, and then what contradicts counts."""
+
+END = 0.25
 """Likelihood at both ends of the grid, over the largest, up to which there is an estimate [-]."""
 
 KNOWN = 0.35
@@ -70,7 +73,8 @@ class LossLikelihood:
 
     def meet_another(self) -> None:
         """Look at another vehicle from now on."""
-        self._past = self._learnt()
+        learnt = self._learnt()
+        self._past = np.maximum(learnt - learnt.max(), -SUREST)
         self._present = np.zeros_like(self._present)
 
     def learn(self, distance: float, threshold: float, weight: float, *, found: bool) -> None:
@@ -92,6 +96,7 @@ class LossLikelihood:
         # A logistic curve is a normal distribution's within 0.01.
         share = ASTRAY + (1.0 - 2.0 * ASTRAY) / (1.0 + np.exp(-1.702 * above))
         self._present += weight * np.log(share if found else 1.0 - share)
+        self._present = np.maximum(self._present - self._present.max(), -SUREST)
         self._reach = distance
 
     def _learnt(self) -> Floats:
@@ -105,9 +110,10 @@ class LossLikelihood:
         learnt = self._learnt()
         likelihood = np.exp(learnt - learnt.max())
         if max(likelihood[0], likelihood[-1]) < END:
-            share = likelihood / likelihood.sum()
-            mean = float(share @ LOG_EXTINCTION)
-            deviation = math.hypot(math.sqrt(float(share @ (LOG_EXTINCTION - mean) ** 2)), LEAST_DEVIATION)
+            # Tails are by looks that go astray: a normal distribution has e^(−½) of its height one deviation aside.
+            near = LOG_EXTINCTION[likelihood >= math.exp(-0.5)]
+            mean, deviation = 0.5 * float(near[0] + near[-1]), 0.5 * float(near[-1] - near[0])
+            deviation = math.hypot(deviation, LEAST_DEVIATION)
             if deviation <= WIDEST:
                 return math.exp(mean), deviation * math.exp(mean), self._reach
         most, above = _fall(likelihood, LOG_EXTINCTION)

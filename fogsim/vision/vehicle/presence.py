@@ -52,6 +52,9 @@ def vehicle_presence(
 ) -> Presence:
     """Look for two upright edges, one up and one down, as far apart as a vehicle's sides.
 
+    What is brighter than the airlight, as lamps are, counts as bright as that: so no contrast exceeds e^(−kd), by what
+    light ever it comes.
+
     Parameters
     ----------
     luminance : (rows, cols) float32
@@ -74,7 +77,7 @@ def vehicle_presence(
     for higher in PLACED:
         top, bottom = (foot - (height + higher) * scale for height in (BODY[1], BODY[0]))
         rows = slice(max(math.floor(top), 0), max(math.ceil(bottom) + 1, 0))
-        body = luminance[rows]
+        body = np.minimum(luminance[rows], np.float32(airlight))
         if body.shape[0] >= 2 and body.shape[1] >= 8:
             step, floor = upright_steps(body, noise)
             best, middle = _strongest_pair(step, scale, camera.principal_point[0] - origin[0], aside)

@@ -48,7 +48,8 @@ def drive() -> list[Step]:
     """A few frames in traffic with every method that is registered."""
     methods = ", ".join(f"{{method: {name}}}" for name in METHODS)
     size = (EARLY, "camera.width=320", "camera.height=240", "duration_s=2", "fog.visibility_m=80")
-    scenario = fogsim.load_scenario("motorway_fog_bank", [*size, f"estimators=[{methods}]"])
+    sensors = "sensors.scatterometer={}"
+    scenario = fogsim.load_scenario("motorway_fog_bank", [*size, sensors, f"estimators=[{methods}]"])
     return list(fogsim.run(scenario, seed=1))
 
 
@@ -77,7 +78,7 @@ def test_the_drive_tells_each_method_apart(as_it_is: list[Step]) -> None:
     """What follows would hold of methods that never say anything: most of these do."""
     telling = {estimate.method for step in as_it_is for estimate in step.estimates if estimate.valid}
     assert [estimate.method for estimate in as_it_is[0].estimates] == METHODS
-    assert telling >= {"negru2013", "zhu2015", "huang2015", "huang2015_rough", "joint_road"}
+    assert telling >= {"negru2013", "zhu2015", "huang2015", "huang2015_rough", "joint_road", "scatterometer"}
     assert as_it_is[-1].observation.lead is not None
 
 

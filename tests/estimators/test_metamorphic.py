@@ -24,6 +24,8 @@ NOT_BY_DAY = {
     "belaroussi2015": "needs signs: tests/estimators/signs/test_belaroussi2015.py",
     "sign_contrast": "needs signs: tests/estimators/signs/test_sign_contrast.py",
     "hautiere2006_stereo": "needs a second camera: tests/estimators/test_hautiere2006_stereo.py",
+    "gabb2014": "needs a vehicle that disappears: tests/estimators/test_gabb2014.py",
+    "scatterometer": "needs a sensor of its own: tests/estimators/test_scatterometer.py",
     "night_road": "reads lamplight: tests/estimators/night/test_night_road.py",
     "night_glow": "reads lamplight: tests/estimators/night/test_night_glow.py",
     "gallen2014": "reads lamplight: tests/estimators/night/test_gallen2014.py",

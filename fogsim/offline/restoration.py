@@ -296,7 +296,9 @@ def restore_video(
             found, reason = found or one.image is not None, reason or one.reason
             yield one
         if not found:
-            raise InputError(f"{source.paths[0]}: in no frame {reason}; --visibility restores it all the same")
+            raise InputError(
+                f"{source.paths[0]}: {reason}, nor in any other frame; --visibility restores it all the same"
+            )
         if encoder is not None:
             finished, encoder = encoder, None
             finished.finish()

@@ -8,6 +8,9 @@ from fogsim.jit import kernel
 Floats = NDArray[np.float32]
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
+MIXED = 0.8
+"""Share of the road's luminance below which a block under something is partly that [-]."""
+
 
 @kernel
 def standing_transmission(
@@ -50,17 +53,23 @@ def standing_transmission(
                 found = found or restored < -sure
             elif foot >= 0 and (last - row > tall / distance[foot, col] or (not found and restored < 2.0 * road)):
                 if found:
-                    _fill(out, light, plane, col, foot, last, least)
+                    _fill(out, light, plane, col, foot, last, least, road)
                 foot, found = -1, False
         if found:
-            _fill(out, light, plane, col, foot, last, least)
+            _fill(out, light, plane, col, foot, last, least, road)
     return out
 
 
 @kernel
-def _fill(out: Floats, light: Floats, plane: Floats, col: int, foot: int, last: int, least: float) -> None:
+def _fill(out: Floats, light: Floats, plane: Floats, col: int, foot: int, last: int, least: float, road: float) -> None:
     """Give a run the transmission of its foot, or what its own darkness demands if it has none on the road."""
-    stands = plane[foot, col] if plane[foot, col] > 1.01 * least else np.float32(0.0)
+    stands = np.float32(0.0)
+    if plane[foot, col] > 1.01 * least:
+        below = min(foot + 1, len(plane) - 1)
+        restored = 1.0 + (light[below, col] - 1.0) / plane[below, col]
+        # It stands within the block below, which is partly road, or at that block's upper edge.
+        share = np.float32(1.0 if restored < MIXED * road else 0.5)
+        stands = share * plane[below, col] + (np.float32(1.0) - share) * plane[foot, col]
     for row in range(last, foot + 1):
         out[row, col] = max(stands, np.float32(1.0) - light[row, col])
 

@@ -8,8 +8,9 @@ from fogsim.units import LUMINANCE_WEIGHTS
 KEY = 0.18
 """Luminance that the middle of what is seen gets, relative to full scale [-] (Reinhard et al. 2002)."""
 
-WHITE_QUANTILE, DARKEST = 0.99, 0.01
-"""What is as bright as this share of all becomes white; what is darker than that, of the airlight, counts as it [-]."""
+BRIGHT, WHITE, DARKEST = 0.99, 1.25, 0.01
+"""White is so many times what this share of the picture is darker than; what is darker than that share of the airlight
+counts as that [-]."""
 
 
 def tone_curve(light: Floats, transmission: Floats, picture: FoggyPicture) -> ToneCurve:
@@ -33,7 +34,7 @@ def tone_curve(light: Floats, transmission: Floats, picture: FoggyPicture) -> To
     weights = transmission.astype(np.float64)
     middle = float(np.exp((weights * np.log(luminance)).sum() / weights.sum()))
     exposure = KEY / middle
-    white = max(exposure * float(np.quantile(luminance, WHITE_QUANTILE)), 1.0)
+    white = max(exposure * WHITE * float(np.quantile(luminance, BRIGHT)), 1.0)
 
     def curve(shown: Light) -> Light:
         scaled = exposure * shown

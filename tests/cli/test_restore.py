@@ -1,0 +1,139 @@
+"""``fogsim restore``."""
+
+from collections.abc import Callable
+from pathlib import Path
+from subprocess import CompletedProcess
+
+import cv2
+import numpy as np
+import pytest
+from flat_road import Road, photograph, scan
+
+from fogsim.offline.camera_file import load_calibration
+from fogsim.offline.source import VideoFile
+from fogsim.recorders.video import Encoder, encoder_command
+
+Command = Callable[..., "CompletedProcess[str]"]
+
+CAMERA = """width: 320
+height: 240
+focal_length_px: 288.0
+principal_point_px: [159.5, 119.5]
+mount_height_m: 1.38
+pitch_deg: 2.0
+response: srgb
+"""
+WITH_CAMERA = ("--camera", "camera.yaml")
+FOG = (*WITH_CAMERA, "--visibility", "80")
+
+
+@pytest.fixture(scope="module")
+def foggy(tmp_path_factory: pytest.TempPathFactory) -> np.ndarray:
+    """A photograph of a road in fog of 80 m."""
+    file = tmp_path_factory.mktemp("camera") / "camera.yaml"
+    file.write_text(CAMERA, encoding="utf-8")
+    road = Road(80.0, camera=load_calibration(file).camera)
+    return np.repeat(photograph(road, scan(road, 1, 2), 1)[..., None], 3, axis=2)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, foggy: np.ndarray) -> Path:
+    (tmp_path / "camera.yaml").write_text(CAMERA, encoding="utf-8")
+    cv2.imwrite(str(tmp_path / "fog.png"), foggy)
+    return tmp_path
+
+
+def contrast(image: np.ndarray) -> float:
+    return float(image.astype(float).std())
+
+
+def test_an_image_is_restored_by_the_visibility_that_it_shows_itself(folder: Path, command: Command) -> None:
+    done = command("restore", "fog.png", *WITH_CAMERA, "--out", "out.png", "--beside", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    visibility = float(done.stdout.split("visibility ")[1].split(" m")[0])
+    assert visibility == pytest.approx(80.0, rel=0.1)
+    assert "estimated by joint_road" in done.stdout
+    out, seen = (cv2.imread(str(folder / name)) for name in ("out.png", "fog.png"))
+    assert out.shape == (240, 640, 3)
+    assert np.array_equal(out[:, :320], seen)
+    assert contrast(out[:, 320:]) > 1.3 * contrast(seen)
+
+
+def test_several_images_go_into_a_folder_and_are_replaced_only_when_it_is_asked_for(
+    folder: Path, command: Command
+) -> None:
+    cv2.imwrite(str(folder / "other.png"), cv2.imread(str(folder / "fog.png"))[:, ::-1])
+    line = ("restore", "fog.png", "other.png", *WITH_CAMERA, "--method", "tarel2009", "--out", "clear")
+    assert command(*line, cwd=folder).returncode == 0
+    assert sorted(path.name for path in (folder / "clear").iterdir()) == ["fog.png", "other.png"]
+    refused = command(*line, cwd=folder)
+    assert refused.returncode == 2
+    assert "fog.png is there already" in refused.stderr
+    assert command(*line, "--overwrite", cwd=folder).returncode == 0
+
+
+def test_an_image_without_road_is_named_and_not_written(folder: Path, command: Command) -> None:
+    cv2.imwrite(str(folder / "dark.png"), np.zeros((240, 320, 3), np.uint8))
+    done = command("restore", "dark.png", "fog.png", *WITH_CAMERA, "--out", "clear", cwd=folder)
+    assert done.returncode == 2
+    assert "dark.png: no fog found: too dark above the horizon" in done.stderr
+    assert [path.name for path in (folder / "clear").iterdir()] == ["fog.png"]
+
+
+def put_video(path: Path, frames: list[np.ndarray]) -> None:
+    encoder = Encoder(encoder_command(path, 0.1, (320, 240), 8))
+    for frame in frames:
+        encoder.write(frame.tobytes())
+    encoder.finish()
+
+
+def test_in_a_video_the_last_estimate_holds(folder: Path, foggy: np.ndarray, command: Command) -> None:
+    dark = np.zeros_like(foggy)
+    put_video(folder / "drive.mp4", [dark, foggy, dark])
+    done = command("restore", "drive.mp4", *WITH_CAMERA, "--out", "clear.mp4", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert "in 1 images no fog was found; the last estimate was taken" in done.stderr
+    assert "1 frames before the first estimate are as they were: no fog found" in done.stderr
+    frames = [picture.image for picture in VideoFile.open(folder / "clear.mp4").pictures()]
+    assert len(frames) == 3
+    assert frames[1] is not None
+    assert contrast(frames[1]) > 1.3 * contrast(foggy)
+
+
+def test_a_video_in_which_no_fog_is_found_leaves_nothing(folder: Path, foggy: np.ndarray, command: Command) -> None:
+    put_video(folder / "drive.mp4", [np.zeros_like(foggy)])
+    done = command("restore", "drive.mp4", *WITH_CAMERA, "--out", "clear.mp4", cwd=folder)
+    assert done.returncode == 2
+    assert "drive.mp4: no fog found: too dark" in done.stderr
+    assert sorted(path.name for path in folder.iterdir()) == ["camera.yaml", "drive.mp4", "fog.png"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("nofog.png", *FOG), "nofog.png: there is no such file"),
+        (("fog.png", *FOG, "--method", "plannar"), "did you mean 'planar'"),
+        (("fog.png", *WITH_CAMERA, "--visibility", "0"), "--visibility must be a positive length"),
+        (("fog.png", *FOG, "--method", "dark_channel"), "--visibility goes with planar"),
+        (("fog.png", *FOG, "--most-gain", "0"), "most_gain must be"),
+        (("fog.png", *FOG, "--airlight", "white"), "--airlight white"),
+        (("fog.png", *FOG, "--out", "fog.png", "--overwrite"), "would replace what is read"),
+        (("fog.png", *FOG, "--out", "no/out.png"), "there is no folder no"),
+    ],
+)
+def test_mistakes_end_in_one_line_and_exit_code_2(
+    folder: Path, arguments: tuple[str, ...], told: str, command: Command
+) -> None:
+    out = () if "--out" in arguments else ("--out", "out.png")
+    done = command("restore", *arguments, *out, cwd=folder)
+    assert done.returncode == 2
+    assert told in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not (folder / "out.png").exists()
+
+
+def test_an_image_of_another_size_is_refused(folder: Path, command: Command) -> None:
+    cv2.imwrite(str(folder / "small.png"), np.zeros((24, 32, 3), np.uint8))
+    done = command("restore", "small.png", *FOG, "--out", "out.png", cwd=folder)
+    assert done.returncode == 2
+    assert "small.png: the image has 32 × 24 pixels, the camera 320 × 240" in done.stderr

@@ -72,6 +72,7 @@ def compile_kernels() -> Iterator[str]:
             pool.submit(_find_lamps): "lamps",
             pool.submit(_read_own_beams): "methods of the night",
             pool.submit(_light_a_road): "head lamps on the road",
+            pool.submit(_restore_contrast): "contrast restoration",
         }
         while pending:
             for done in wait(pending, return_when=FIRST_COMPLETED).done:
@@ -118,6 +119,21 @@ def _estimate_visibility() -> None:
             for parameters in ({}, *published):
                 _read(factory(camera=camera, **parameters), camera)
     _follow_a_bend(camera)
+
+
+def _restore_contrast() -> None:
+    """Restore pictures of a foggy road of 8 and 16 bits, for the eye too."""
+    import numpy as np
+
+    from fogsim.restoration import METHODS, restore_contrast
+    from fogsim.values import Camera
+
+    (width, height), *_ = _SIZES
+    camera = Camera(width, height, 0.9 * width, (width / 2, height / 2), 1.4, pitch=0.03)
+    image = _foggy_road(camera, 25.0)
+    for seen in (image, image.astype(np.uint16) * 257):
+        for method in METHODS:
+            restore_contrast(seen, camera, 0.03, method=method, tone_map=True)
 
 
 def _follow_a_bend(camera: "Camera") -> None:

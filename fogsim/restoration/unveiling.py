@@ -12,7 +12,7 @@ from fogsim.units import LUMINANCE_WEIGHTS
 STRIDE = 4
 """Every how manyeth pixel of every how manyeth row is looked at for noise and tones."""
 
-RADIUS, MORE_NOISE, COLOUR_NOISE = 2, 4.0, 10.0
+RADIUS, MORE_NOISE, COLOUR_NOISE = 2, 4.0, 2.0
 """Windows in which noise is smoothed are 2 r + 1 wide [px]; what counts as noise, in its variance: local variances
 scatter, and three channels have more of it than their mean. Chosen on pool 0 of benchmarks/restoration.py."""
 

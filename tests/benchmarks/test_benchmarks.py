@@ -81,6 +81,23 @@ def records(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
             {"method", "visibility", "airlight", "camera", "vehicle", "median_pct", "p95_pct", "coverage", "ms"},
         ),
         (
+            "restoration.py",
+            ("--vehicles", "1", "--step", "1", "--visibilities", "100"),
+            {
+                "pool",
+                "visibility_m",
+                "method",
+                "psnr_db",
+                "ssim",
+                "e",
+                "r",
+                "s_pct",
+                "sift_range_m",
+                "range_ratio",
+                "ms",
+            },
+        ),
+        (
             "frames.py",
             ("--size", "64x48", "--frames", "2", "--repeat", "1"),
             {"renderer", "light", "width", "height", "samples", "ms_median", "ms_min", "ms_render"},

@@ -29,6 +29,10 @@ SHARPEST_BEND = 600.0
 SEEN_BEFORE, NEARLY_AHEAD = 10.0, 2.0
 """Time [s] since it was found so near to the own axis [m] within which a vehicle has not gone beside it."""
 
+DENSEST, ABRUPT = 0.1, 3.0
+"""Extinction of the densest fog in which a vehicle fades [1/m], and what must then be left of its contrast for it to be
+hidden and not lost, over the threshold [-]."""
+
 JUMP, SURPRISE = 15.0, 5.0
 """Changes of range, as such and against what the relative speed says, that together mean another vehicle [m]."""
 
@@ -98,6 +102,7 @@ class Gabb2014:
         self._lead: tuple[float, LeadMeasurement] | None = None
         self._looked: tuple[float, float] | None = None
         self._ahead_until = -math.inf
+        self._last: tuple[float, float, float] | None = None
 
     def update(self, observation: Observation) -> Estimate:
         """Look for the vehicle ahead, and estimate from all looks.
@@ -148,7 +153,7 @@ class Gabb2014:
             jumped = abs(lead.distance - earlier.distance) > JUMP and not abs(lead.distance - expected) <= SURPRISE
             if jumped or time - before > LOST_AFTER:
                 self._learnt.meet_another()
-                self._looked, self._ahead_until = None, -math.inf
+                self._looked, self._ahead_until, self._last = None, -math.inf, None
         self._lead = time, lead
 
     def _look(
@@ -165,7 +170,7 @@ class Gabb2014:
         CannotTellError
             If this is no road by day.
         """
-        if search_window(self._camera, depth) is None and depth > 1.0:
+        if depth > 1.0 and search_window(self._camera, depth) is None:
             return "the vehicle ahead is too small in the image, or outside it"
         crop = daytime_crop(image, self._camera, depth, self._pitch_deviation)
         level = levelled(image, self._camera)
@@ -178,6 +183,11 @@ class Gabb2014:
             self._ahead_until = observation.time + SEEN_BEFORE
         if not seen.found and not self._is_lost(level, crop, observation.time):
             return "the vehicle ahead may be beside where it is looked for, or be too small"
+        left = self._left(depth, observation.time)
+        if seen.found and seen.step >= left:
+            self._last = observation.time, depth, seen.step
+        if not seen.found and left > ABRUPT * seen.threshold:
+            return "the vehicle ahead went out of sight faster than fog hides it"
         found["found"] = seen.found
         self._learn(seen, depth, observation.time)
         return ""
@@ -196,6 +206,12 @@ class Gabb2014:
         wide = linear_luminance(level[rows, columns], camera.response, camera.bits, camera.black_level)
         light = crop.sky.luminance, crop.noise
         return not vehicle_presence(wide, (columns.start, rows.start), camera, crop.depth, aside, light).found
+
+    def _left(self, depth: float, time: float) -> float:
+        """What even the densest fog must have left of the contrast that the vehicle had a moment ago [-]."""
+        if self._last is None or time - self._last[0] > SEEN_BEFORE:
+            return 0.0
+        return self._last[2] * math.exp(-DENSEST * max(depth - self._last[1], 0.0))
 
     def _learn(self, seen: Presence, depth: float, time: float) -> None:
         weight = 1.0

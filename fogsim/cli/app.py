@@ -12,12 +12,12 @@ from fogsim.cli.calibrate import calibrate
 from fogsim.cli.compile import compile_command
 from fogsim.cli.dataset import dataset_command
 from fogsim.cli.doctor import doctor_command
-from fogsim.cli.estimate import estimate_command
-from fogsim.cli.fog import fog_command
+from fogsim.cli.images.estimate import estimate_command
+from fogsim.cli.images.fog import fog_command
+from fogsim.cli.images.restore import restore_command
 from fogsim.cli.printing import BAD_INPUT, print_error, print_remarks, stdout
 from fogsim.cli.recover import recover_command
 from fogsim.cli.reproduce import reproduce_command
-from fogsim.cli.restore import restore_command
 from fogsim.cli.run import run_command
 from fogsim.cli.scenarios import list_command, validate_command
 from fogsim.cli.signs import signs_command

@@ -87,7 +87,7 @@ def test_noise_rises_by_no_more_than_the_bound(method: str, most_gain: float) ->
     difference = (one.image.astype(np.float64) - other.image)[sky].std() / 4095
     assert difference <= 1.05 * most_gain * 0.002
     if method == "planar":
-        assert difference < 0.5 * most_gain * 0.002  # what is noise alone is smoothed
+        assert difference < 0.65 * most_gain * 0.002  # what is noise alone is smoothed
 
 
 @pytest.mark.parametrize("image", [image_of(np.full((120, 160, 3), 0.4)), image_of(np.full((120, 160), 0.4))])

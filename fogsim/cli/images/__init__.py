@@ -1,0 +1,1 @@
+"""Commands on images and videos from disk: fog laid on them, estimated in them, and taken from them."""

@@ -15,8 +15,8 @@ from fogsim.estimators.night.night_glow import NightGlow
 from fogsim.estimators.night.night_road import NightRoad
 from fogsim.estimators.other_sensors.gabb2014 import Gabb2014
 from fogsim.estimators.other_sensors.hautiere2006_stereo import Hautiere2006Stereo
-from fogsim.estimators.protocol import Estimator
 from fogsim.estimators.other_sensors.scatterometer import Scatterometer
+from fogsim.estimators.protocol import Estimator
 from fogsim.estimators.signs.belaroussi2015 import Belaroussi2015
 from fogsim.estimators.signs.sign_contrast import SignContrast
 from fogsim.estimators.zhu2015 import Zhu2015

@@ -23,10 +23,10 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from docs_table import write_table
 from rich.console import Console
 from rich.progress import track
 
@@ -47,8 +47,6 @@ PLACES = (50.0, 100.0, 200.0, 400.0)
 LEAD, DELAY, REPORT_DEVIATION = 300.0, 1.0, 0.1
 BANK_START, ENTERED, SETTLING = 1300.0, 60.0, 5.0
 FUSIONS = ("mixture_filter", "grid_filter", "field_filter", "reported")
-DOCS = Path(__file__).resolve().parents[1] / "docs" / "estimators.md"
-MARK, END = "<!-- table: belief -->", "<!-- end of belief -->"
 
 Row = dict[str, Any]
 
@@ -218,13 +216,6 @@ def table(rows: list[Row]) -> Iterator[str]:
         yield f"| {row['drive']} | {row['fusion']} | {ahead} | {here} | {entered} | {' | '.join(there)} |"
 
 
-def write_docs(rows: list[Row]) -> None:
-    """Write the table into docs/estimators.md."""
-    before, rest = DOCS.read_text(encoding="utf-8").split(MARK)
-    _, after = rest.split(END)
-    DOCS.write_text(f"{before}{MARK}\n\n" + "\n".join(table(rows)) + f"\n\n{END}{after}", encoding="utf-8")
-
-
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -239,7 +230,7 @@ def main() -> None:
             follow(name, seen, found.setdefault((drive.kind, name), Found()), drive.seed)
     rows = list(records(found, arguments.pool))
     if arguments.docs:
-        write_docs(rows)
+        write_table("estimators.md", "belief", table(rows))
     print(json.dumps(rows, indent=2) if arguments.json else "\n".join(table(rows)))
 
 

@@ -24,10 +24,10 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from docs_table import write_table
 from lead_accuracy import CAMERAS, OTHERS, SETBACK, VEHICLES
 from rich.console import Console
 from rich.progress import track
@@ -44,8 +44,6 @@ POOLS = ((tuple(CAMERAS)[1:3], VEHICLES), (tuple(CAMERAS)[::3], OTHERS))
 RANGES = np.arange(12.0, 200.1, 2.5)
 LEVELS = (120.0, 200.0, 255.0)
 SWAY, MISALIGNED, RANGE_NOISE, SPEED_NOISE = math.radians(0.07), math.radians(0.1), 0.25, 0.1
-DOCS = Path(__file__).resolve().parents[1] / "docs" / "estimators.md"
-MARK, END = "<!-- table: disappearing vehicles -->", "<!-- end of disappearing vehicles -->"
 
 Row = dict[str, Any]
 
@@ -167,13 +165,6 @@ def table(rows: list[Row]) -> Iterator[str]:
         yield f"| {' | '.join(cells)} | {row['ms']:.1f} |"
 
 
-def write_docs(rows: list[Row]) -> None:
-    """Write the table into docs/estimators.md."""
-    before, rest = DOCS.read_text(encoding="utf-8").split(MARK)
-    _, after = rest.split(END)
-    DOCS.write_text(f"{before}{MARK}\n\n" + "\n".join(table(rows)) + f"\n\n{END}{after}", encoding="utf-8")
-
-
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -188,7 +179,7 @@ def main() -> None:
     rows = [record(f"{visibility:g}", one, arguments.pool) for visibility, one in found.items()]
     rows.append(record("all", together(found), arguments.pool))
     if arguments.docs:
-        write_docs(rows)
+        write_table("estimators.md", "disappearing vehicles", table(rows))
     print(json.dumps(rows, indent=2) if arguments.json else "\n".join(table(rows)))
 
 

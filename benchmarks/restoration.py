@@ -31,6 +31,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from docs_table import write_table
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 from restoration_measures import DETECTORS, Found, blind_indicators, detect, psnr, ssim, vehicle_box
@@ -71,9 +72,6 @@ MOUNTS = ((1.3, 1.0, 42.0), (1.4, 1.5, 40.0))
 
 CROP = (300, 130, 200)
 """What detectors look at: columns to either side of the principal point, rows above and below the horizon [px]."""
-
-DOCS = Path(__file__).resolve().parents[1] / "docs" / "restoration.md"
-MARK, END = "<!-- table: restoration -->", "<!-- end of restoration -->"
 
 
 def camera(pool: int, width: int, height: int, field_of_view: float | None = None) -> Camera:
@@ -222,13 +220,6 @@ def table(rows: list[Row]) -> Iterator[str]:
         yield "| " + " | ".join(cell(row) for cell in COLUMNS.values()) + " |"
 
 
-def write_docs(rows: list[Row]) -> None:
-    """Write the table into docs/restoration.md."""
-    before, rest = DOCS.read_text(encoding="utf-8").split(MARK)
-    _, after = rest.split(END)
-    DOCS.write_text(f"{before}{MARK}\n\n" + "\n".join(table(rows)) + f"\n\n{END}{after}", encoding="utf-8")
-
-
 def draw(path: Path) -> None:
     """Draw the picture of the docs: clear, foggy and restored, at V_met 80 and 150 m."""
     seen_by, rng = camera(1, 640, 480, 58.0), np.random.default_rng(1)
@@ -273,7 +264,7 @@ def main() -> None:
         return
     rows = measure(arguments)
     if arguments.docs:
-        write_docs(rows)
+        write_table("restoration.md", "restoration", table(rows))
     print(json.dumps(rows, indent=2) if arguments.json else "\n".join(table(rows)))
 
 

@@ -21,10 +21,10 @@ import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from docs_table import write_table
 from rich.console import Console
 from rich.progress import track
 
@@ -45,8 +45,6 @@ ERRORS = (
     "camera.stereo.pitch_error_deg=0.02",
 )
 CLOCKS = ("clocks.camera_period_s=1", "clocks.decision_period_s=1", "duration_s=15", "traffic.events=[]", "expect={}")
-DOCS = Path(__file__).resolve().parents[1] / "docs" / "estimators.md"
-MARK, END = "<!-- table: stereo -->", "<!-- end of stereo -->"
 METHODS = ("hautiere2006_stereo", "as published", "joint_road")
 
 Row = dict[str, Any]
@@ -148,10 +146,8 @@ def table(rows: Sequence[Row]) -> Iterator[str]:
 
 def write_docs(rows: Sequence[Row]) -> None:
     """Write the table into docs/estimators.md."""
-    before, rest = DOCS.read_text(encoding="utf-8").split(MARK)
-    _, after = rest.split(END)
     cost = f"One estimate takes {rows[0]['ms']:.0f} ms, the second picture {rows[0]['ms_rig']:.0f} ms a step."
-    DOCS.write_text(f"{before}{MARK}\n\n" + "\n".join(table(rows)) + f"\n\n{cost}\n\n{END}{after}", encoding="utf-8")
+    write_table("estimators.md", "stereo", [*table(rows), "", cost])
 
 
 def main() -> None:

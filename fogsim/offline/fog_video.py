@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
-from fogsim.files.atomic import partial_path, publish, refuse_missing_folder
 from fogsim.offline.fog_image import (
     BRIGHTEST_ABOVE_ROAD,
     airlight_of,
@@ -15,16 +14,12 @@ from fogsim.offline.fog_image import (
     given_airlight,
     in_layer,
     refuse_other_size,
-    refuse_out,
 )
 from fogsim.offline.layered_fog import FogLayer
 from fogsim.offline.road_plane import RoadPlane
 from fogsim.offline.source import VideoFile
-from fogsim.recorders.video import Encoder, encoder_command
+from fogsim.offline.video_file import VideoWriter, refuse_unfit_video
 from fogsim.values import Camera
-
-RATE_FACTOR = 12
-"""Constant rate factor of fogged videos: what is left of the road far away is a few pixel values, and is to be kept."""
 
 
 def fog_video(
@@ -68,42 +63,18 @@ def fog_video(
         If anything does not fit, the video is cut off, or there is a file `out` that must not be replaced.
     """
     camera = road.calibration.camera
-    _refuse_unfit(video, camera, out, overwrite)
+    refuse_unfit_video(out, video.paths, camera, kind="fogged", overwrite=overwrite)
+    refuse_other_size(video.path, video.size, camera)
     distance, sines = road.distance(), road.sines()
     air: NDArray[np.float64] | None = None
-    encoder: Encoder | None = None
-    try:
+    with VideoWriter(out, video.period) as writer:
         for picture in video.pictures():
             if picture.image is None:
                 raise InputError(picture.error)
             if air is None:
                 air = _airlight(picture.image, distance, camera, airlight, layer)
-            fogged = fog_image(picture.image, distance, visibility, camera, air, layer, sines)
-            if encoder is None:
-                encoder = Encoder(encoder_command(partial_path(out), video.period, video.size, RATE_FACTOR))
-            encoder.write(fogged.tobytes())
+            writer.write(fog_image(picture.image, distance, visibility, camera, air, layer, sines))
             yield air
-        if encoder is not None:
-            finished, encoder = encoder, None
-            finished.finish()
-            publish(out)
-    finally:
-        if encoder is not None:
-            encoder.finish()
-        partial_path(out).unlink(missing_ok=True)
-
-
-def _refuse_unfit(video: VideoFile, camera: Camera, out: Path, overwrite: bool) -> None:
-    if out.suffix.lower() != ".mp4":
-        raise InputError(f"--out {out}: a fogged video is written as .mp4, got {out.suffix or 'no ending'}")
-    refuse_missing_folder(out, "--out")
-    refuse_out(out, video.paths, overwrite)
-    refuse_other_size(video.path, video.size, camera)
-    if camera.width % 2 or camera.height % 2:
-        raise InputError(
-            f"{video.path}: frames of {camera.width} × {camera.height} pixels cannot be written as .mp4, which wants "
-            "even numbers; cut a row or column off and give the camera of what is left"
-        )
 
 
 def _airlight(

@@ -8,13 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
-from fogsim.files.atomic import partial_path, publish, refuse_missing_folder
+from fogsim.files.atomic import refuse_missing_folder
 from fogsim.offline.estimation import estimates_of
 from fogsim.offline.fog_image import refuse_out
-from fogsim.offline.fog_video import RATE_FACTOR
 from fogsim.offline.image_files import Pixels, write_image
 from fogsim.offline.source import Picture, Source
-from fogsim.recorders.video import Encoder, encoder_command
+from fogsim.offline.video_file import VideoWriter, refuse_unfit_video
 from fogsim.restoration import METHODS, MOST_GAIN, restore_contrast
 from fogsim.restoration.picture import largest_value
 from fogsim.units import LUMINANCE_WEIGHTS, extinction_from_visibility
@@ -277,45 +276,18 @@ def restore_video(
     InputError
         If anything does not fit, the video is cut off, or fog is found in no frame.
     """
-    _refuse_unfit(source, camera, out, overwrite)
-    columns = camera.width * (2 if wish.beside else 1)
-    encoder: Encoder | None = None
+    refuse_unfit_video(out, source.paths, camera, kind="restored", overwrite=overwrite)
     found, reason = False, ""
-    try:
+    with VideoWriter(out, source.period) as writer:
         for one in restored_images(source, camera, wish):
             seen = one.picture.image
             if seen is None:
                 raise InputError(one.picture.error)
-            if encoder is None:
-                command = encoder_command(partial_path(out), source.period, (columns, camera.height), RATE_FACTOR)
-                encoder = Encoder(command)
-            shown = one.image
-            if shown is None:
-                shown = np.concatenate([seen, seen], axis=1) if wish.beside else seen
-            encoder.write(shown.tobytes())
+            as_it_was = np.concatenate([seen, seen], axis=1) if wish.beside else seen
+            writer.write(as_it_was if one.image is None else one.image)
             found, reason = found or one.image is not None, reason or one.reason
             yield one
         if not found:
             raise InputError(
                 f"{source.paths[0]}: {reason}, nor in any other frame; --visibility restores it all the same"
             )
-        if encoder is not None:
-            finished, encoder = encoder, None
-            finished.finish()
-            publish(out)
-    finally:
-        if encoder is not None:
-            encoder.finish()
-        partial_path(out).unlink(missing_ok=True)
-
-
-def _refuse_unfit(source: Source, camera: Camera, out: Path, overwrite: bool) -> None:
-    if out.suffix.lower() != ".mp4":
-        raise InputError(f"--out {out}: a restored video is written as .mp4, got {out.suffix or 'no ending'}")
-    refuse_missing_folder(out, "--out")
-    refuse_out(out, source.paths, overwrite)
-    if camera.width % 2 or camera.height % 2:
-        raise InputError(
-            f"{source.paths[0]}: frames of {camera.width} × {camera.height} pixels cannot be written as .mp4, which "
-            "wants even numbers; cut a row or column off and give the camera of what is left"
-        )

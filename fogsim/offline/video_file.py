@@ -1,0 +1,92 @@
+"""Videos that are written frame by frame, and are there only when they are whole."""
+
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from fogsim.errors import InputError
+from fogsim.files.atomic import partial_path, publish, refuse_missing_folder
+from fogsim.offline.fog_image import refuse_out
+from fogsim.offline.image_files import Pixels
+from fogsim.recorders.video import Encoder, encoder_command
+from fogsim.values import Camera
+
+RATE_FACTOR = 12
+"""Constant rate factor: what is left of the road far away in fog is a few pixel values, and is to be kept."""
+
+
+class VideoWriter:
+    """Writes a video; as a context it takes its name at the end, and leaves nothing if an error ends it.
+
+    Parameters
+    ----------
+    out : Path
+        The video, ``.mp4``.
+    period : float
+        Time between two frames [s].
+    """
+
+    def __init__(self, out: Path, period: float) -> None:
+        self._out, self._period = out, period
+        self._encoder: Encoder | None = None
+
+    def write(self, frame: Pixels) -> None:
+        """Add a frame.
+
+        Parameters
+        ----------
+        frame : (rows, cols, 3) uint8
+            Pixel values, red first; of the first frame's size.
+        """
+        if self._encoder is None:
+            size = frame.shape[1], frame.shape[0]
+            self._encoder = Encoder(encoder_command(partial_path(self._out), self._period, size, RATE_FACTOR))
+        self._encoder.write(frame.tobytes())
+
+    def __enter__(self) -> Self:
+        """Begin; the file is made with the first frame."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Give the video its name, or leave none."""
+        try:
+            if self._encoder is not None:
+                self._encoder.finish()
+                if kind is None:
+                    publish(self._out)
+        finally:
+            partial_path(self._out).unlink(missing_ok=True)
+
+
+def refuse_unfit_video(out: Path, read: tuple[Path, ...], camera: Camera, *, kind: str, overwrite: bool) -> None:
+    """Refuse what cannot be written as a video of a camera's frames.
+
+    Parameters
+    ----------
+    out : Path
+        The video to be written.
+    read : tuple of Path
+        What is read.
+    camera : Camera
+        The camera.
+    kind : str
+        What video it is: "fogged".
+    overwrite : bool
+        True to replace a file that is there.
+
+    Raises
+    ------
+    InputError
+        If it does not end in ``.mp4``, must not be written, or has frames of an odd size.
+    """
+    if out.suffix.lower() != ".mp4":
+        raise InputError(f"--out {out}: a {kind} video is written as .mp4, got {out.suffix or 'no ending'}")
+    refuse_missing_folder(out, "--out")
+    refuse_out(out, read, overwrite)
+    if camera.width % 2 or camera.height % 2:
+        raise InputError(
+            f"{read[0]}: frames of {camera.width} × {camera.height} pixels cannot be written as .mp4, which wants "
+            "even numbers; cut a row or column off and give the camera of what is left"
+        )

@@ -43,6 +43,8 @@ COMMON = (
     "renderer=cpu",
     "camera.width=160",
     "camera.height=120",
+    "camera.stereo={baseline_m: 1}",
+    "sensors.scatterometer={}",
     f"estimators=[{', '.join(ESTIMATORS)}]",
 )
 CHASED = Camera(240, 180, 216.0, (119.5, 89.5), mount_height=1.3, pitch=0.03)

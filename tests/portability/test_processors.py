@@ -132,10 +132,16 @@ def test_what_is_compared_is_a_drive_in_fog_with_advice(answers: Answers) -> Non
 def test_every_method_of_the_day_sees_the_fog_in_what_is_compared(answers: Answers) -> None:
     valid = answers["here"].result()["chase"]["valid"]
     assert list(valid) == list(ESTIMATORS)
-    # The chase passes no signs, and is by day.
-    silent = {"belaroussi2015", "sign_contrast", *NIGHT_METHODS}
+    # The chase passes no signs, and is by day; the vehicle stays in sight, and other sensors there are none.
+    silent = {"belaroussi2015", "sign_contrast", "gabb2014", "hautiere2006_stereo", "scatterometer", *NIGHT_METHODS}
     telling = [frames for method, frames in valid.items() if method not in silent]
     assert all(sum(frames) >= 5 for frames in telling)
+
+
+def test_second_cameras_and_scatterometers_tell_in_what_is_compared(answers: Answers) -> None:
+    last = answers["here"].result()["day"]["decisions"][-1]
+    assert "hautiere2006_stereo True" in last
+    assert "scatterometer True" in last
 
 
 def test_a_difference_is_told(answers: Answers, differences: Callable[[Any, Any], Iterator[str]]) -> None:

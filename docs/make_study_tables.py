@@ -56,11 +56,11 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
         ("max_deceleration_mps2", "hardest braking [m/s²]", 1.0, 1),
     ),
     "which_sensor": (
-        ("belief_median_error_percent", "error here and now [%]", 1.0, 0),
-        ("belief_coverage_share", "held [%]", 100.0, 0),
         ("dense_fog_known_before_m", "bank known before it [m]", 1.0, 0),
-        ("mean_advised_speed_mps", "speed advised [km/h]", 3.6, 0),
+        ("advised_time_share", "advised [% of time]", 100.0, 0),
+        ("mean_speed_mps", "speed of the ego [km/h]", 3.6, 0),
         EGO,
+        ("max_deceleration_mps2", "hardest braking [m/s²]", 1.0, 1),
         COLLISIONS,
     ),
     "belief_over_places": (

@@ -3,6 +3,7 @@
 import cv2
 import numpy as np
 
+from fogsim.linear_algebra import matrix_product
 from fogsim.restoration import light_kernels
 from fogsim.restoration.guided_filter import guided_filter
 from fogsim.restoration.picture import Floats, FoggyPicture
@@ -38,7 +39,7 @@ def dark_channel(picture: FoggyPicture) -> Floats:
     light = light_kernels.relative_light(picture.pixels, tables)
     dark = cv2.erode(least_channel(light), np.ones((PATCH, PATCH), np.uint8))
     coarse = np.float32(1.0) - np.float32(KEPT) * np.asarray(dark, np.float32)
-    grey = light[..., 0] if light.shape[2] == 1 else light @ np.array(LUMINANCE_WEIGHTS, np.float32)
+    grey = light[..., 0] if light.shape[2] == 1 else matrix_product(light, np.array(LUMINANCE_WEIGHTS, np.float32))
     refined = guided_filter(grey, coarse, RADIUS, REGULARISER)
     return np.asarray(np.clip(refined, 1.0 / picture.most_gain, 1.0), np.float32)
 

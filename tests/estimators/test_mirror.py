@@ -23,10 +23,11 @@ from fogsim.values import Camera, Estimate, Frame, LeadMeasurement, Observation,
 OF_SIGNS = {"belaroussi2015", "sign_contrast"}
 """They need a map, which these pictures do not have."""
 
-ONE_SIDED = {"hautiere2006_stereo"}
-"""Its second camera is to the right of the first: mirrored, that is another rig."""
+OTHER_SENSORS = {"hautiere2006_stereo", "gabb2014", "scatterometer"}
+"""A second camera to the right is another rig when mirrored, a vehicle that stays in sight gives bounds alone (below),
+and a scatterometer looks at no picture."""
 
-METHODS = sorted(set(ESTIMATORS) - OF_SIGNS - ONE_SIDED - set(NIGHT_METHODS))
+METHODS = sorted(set(ESTIMATORS) - OF_SIGNS - OTHER_SENSORS - set(NIGHT_METHODS))
 RANGES = (14.0, 18.0, 22.0, 26.0, 30.0, 35.0, 40.0)
 
 
@@ -90,3 +91,17 @@ def test_a_mirrored_drive_says_the_same(method: str, roll: float) -> None:
         other = two.update(Observation(Frame(time, image[:, ::-1].copy(), mirrored(camera)), 25.0, lead))
     assert found.valid
     assert same(found, other), (found, other)
+
+
+def test_a_mirrored_vehicle_that_stays_in_sight_bounds_the_fog_alike() -> None:
+    camera = Camera(400, 300, 360.0, (190.5, 149.5), 1.38, np.radians(2.0))
+    one, two = make("gabb2014", camera), make("gabb2014", mirrored(camera))
+    for index, distance in enumerate(RANGES):
+        road = Road(camera=camera, lead_distance=distance + 1.7, verge=True)
+        image, lead = photograph(road, scan(road, index, 1), index), LeadMeasurement(distance, 10.0)
+        found = one.update(Observation(Frame(0.4 * index, image, camera), 25.0, lead))
+        other = two.update(Observation(Frame(0.4 * index, image[:, ::-1].copy(), mirrored(camera)), 25.0, lead))
+    assert found.bounds is not None
+    assert other.bounds is not None
+    assert 0.0 < found.bounds.most < np.inf
+    assert other.bounds.most == pytest.approx(found.bounds.most, rel=1e-6)

@@ -1,6 +1,7 @@
 """Results of a run whose process has died."""
 
 import contextlib
+import shutil
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -48,6 +49,11 @@ def recover_run(path: Path, overwrite: bool = False) -> list[str]:
     """
     folder = path / UNFINISHED
     manifest = read_manifest(folder)
+    if not manifest and folder.exists() and read_manifest(path):
+        # Its process was killed when all results were in their places.
+        with WriterLock(path):
+            shutil.rmtree(folder)
+        return whole_files(path)
     if not manifest:
         raise InputError(f"{path} holds no run that did not come to its end")
     with WriterLock(path):

@@ -105,7 +105,8 @@ class RunDirectory:
             raise InputError(f"{outputs} is not of an earlier run; move it, or choose another directory with --out")
         if overwrite:
             return
-        if self.unfinished.exists():
+        # Without a manifest it is what a run left that was killed when all its results were in their places.
+        if self.manifest.exists():
             raise InputError(
                 f"{self.path} holds rows of a run that did not come to its end: {_fate_of_run(self.unfinished)}. "
                 f"fogsim recover {self.path} makes them readable, --overwrite replaces them, --out goes elsewhere"

@@ -99,3 +99,14 @@ def test_a_place_that_may_not_be_written_is_refused(tmp_path: Path, monkeypatch:
     monkeypatch.setattr(Path, "mkdir", refuse)
     with pytest.raises(InputError, match=r"cannot make the directory .*: Permission denied"):
         RunDirectory(tmp_path / "out")
+
+
+def test_a_folder_left_when_all_results_were_in_their_places_is_cleared_away(tmp_path: Path) -> None:
+    (tmp_path / "manifest.json").write_text('{"status": "complete", "files": ["manifest.json"]}')
+    (tmp_path / "unfinished").mkdir()
+    with pytest.raises(InputError, match="results of an earlier run"):
+        RunDirectory(tmp_path)
+    assert recover_run(tmp_path) == ["manifest.json"]
+    assert not (tmp_path / "unfinished").exists()
+    with pytest.raises(InputError, match="no run that did not come to its end"):
+        recover_run(tmp_path)

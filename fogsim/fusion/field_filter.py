@@ -40,11 +40,12 @@ lies behind it."""
 class FieldFilter:
     """A Gaussian process of ln k over the way, ahead and behind, beside `GridFilter`'s belief of the here and now.
 
-    Each estimate tells of the mean extinction over the stretch that it has seen; a curve of optical depths, of several
-    stretches. Denser fog that is announced is believed where it is told; a report, where it was measured, the less the
-    older it is. What nobody has told of is known by what is near, and beyond that by nothing but that fog varies: the
-    interval widens. Where the filter of the here and now, which believes in leaps, surely differs from the field, the
-    edge of a bank has been driven through: what was believed ahead is doubted.
+    Each estimate tells of the mean extinction over both halves of the stretch that it has seen, for it has taken the
+    fog for even; a curve of optical depths, of several stretches. Denser fog that is announced is believed where it
+    is told; a report, where it was measured, the less the older it is; two side by side that contradict what was
+    believed, and agree, are the edge of a bank. What nobody has told of is known by what is near, and beyond that by
+    nothing but that fog varies: the interval widens. Where the filter of the here and now, which believes in leaps,
+    surely differs from the field, the edge of a bank has been driven through: what was believed ahead is doubted.
 
     The scalar belief is the distribution of the mean extinction from the vehicle to where 95 % of the light is lost.
 

@@ -16,15 +16,18 @@ from fogsim.offline.estimation import FrameEstimates
 from fogsim.offline.image_files import Pixels
 from fogsim.offline.results import denser_text, interval_text, metres
 from fogsim.offline.source import Source
+from fogsim.offline.video_file import VideoWriter
 from fogsim.recorders.panel.camera_picture import found_row, scale_image
 from fogsim.recorders.sign_marks import draw_signs
 from fogsim.recorders.style import GROUND, MUTED, TEXT, Colour, font, method_colours
-from fogsim.recorders.video import Encoder, encoder_command
 from fogsim.values import Camera, Estimate
 from fogsim.values.camera_response import eight_bit
 
 WIDEST, NARROWEST = 1280, 640
 """Columns that an image is scaled to if it has more or fewer [px]."""
+
+LOOKED_AT = 20
+"""Constant rate factor of a video that is made to be looked at."""
 
 _LINE = 30
 """Height of a line below the image [px]."""
@@ -188,9 +191,8 @@ class OverlayFile:
     ) -> None:
         _check(path, source, overwrite)
         self._path = path
-        self._period = source.period
         self._overlay = Overlay(camera, methods)
-        self._encoder: Encoder | None = None
+        self._video = VideoWriter(path, source.period, LOOKED_AT)
         self._format = PICTURE_FORMATS.get(path.suffix.lower())
         self._written = False
 
@@ -205,13 +207,10 @@ class OverlayFile:
         if result.picture.image is None:
             return
         drawn = self._overlay.draw(result)
-        if self._format is not None:
-            drawn.save(partial_path(self._path), self._format)
-        else:
-            if self._encoder is None:
-                command = encoder_command(partial_path(self._path), self._period, self._overlay.size)
-                self._encoder = Encoder(command)
-            self._encoder.write(drawn.tobytes())
+        if self._format is None:
+            self._video.write(np.asarray(drawn))
+            return
+        drawn.save(partial_path(self._path), self._format)
         self._written = True
 
     def __enter__(self) -> Self:
@@ -220,9 +219,10 @@ class OverlayFile:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if self._format is None:
+            self._video.__exit__(kind, error, trace)
+            return
         try:
-            if self._encoder is not None:
-                self._encoder.finish()
             if kind is None and self._written:
                 publish(self._path)
         finally:

@@ -24,10 +24,12 @@ class VideoWriter:
         The video, ``.mp4``.
     period : float
         Time between two frames [s].
+    rate_factor : int
+        libx264's constant rate factor, 0 … 51 [-].
     """
 
-    def __init__(self, out: Path, period: float) -> None:
-        self._out, self._period = out, period
+    def __init__(self, out: Path, period: float, rate_factor: int = RATE_FACTOR) -> None:
+        self._out, self._period, self._rate_factor = out, period, rate_factor
         self._encoder: Encoder | None = None
 
     def write(self, frame: Pixels) -> None:
@@ -40,7 +42,7 @@ class VideoWriter:
         """
         if self._encoder is None:
             size = frame.shape[1], frame.shape[0]
-            self._encoder = Encoder(encoder_command(partial_path(self._out), self._period, size, RATE_FACTOR))
+            self._encoder = Encoder(encoder_command(partial_path(self._out), self._period, size, self._rate_factor))
         self._encoder.write(frame.tobytes())
 
     def __enter__(self) -> Self:

@@ -58,12 +58,12 @@ def test_a_curve_of_optical_depths_tells_of_stretches():
     assert profile.at(150.0)[0] == pytest.approx(math.log(0.034), abs=0.5)
 
 
-def test_short_sight_in_even_fog_is_no_reason_to_believe_it_thinner_ahead():
-    fusion = make("field_filter")
-    driven(fusion, [seen(2000.0, 0.2, reach=200.0)], 10.0)
-    for i in range(40):
-        belief = fusion.update_at([seen(60.0, 0.16, reach=36.0)], 20.0 + i, 250.0 + 8.0 * i)
-    assert belief.visibility == pytest.approx(60.0, rel=0.15)
+def test_an_estimate_of_one_number_speaks_of_all_that_it_has_seen():
+    """It has taken the fog for even: denser here and thinner there would have the same mean."""
+    profile = make("field_filter").update_at([seen(60.0, 0.12, reach=60.0)], 0.0, 0.0).profile
+    for distance in (15.0, 45.0):
+        assert profile.visibility_quantile(distance, 0.5) == pytest.approx(60.0, rel=0.1)
+        assert profile.at(distance)[1] < 0.6
 
 
 def test_announced_fog_is_believed_where_it_is_told():

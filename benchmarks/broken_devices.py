@@ -31,7 +31,7 @@ from fogsim.values.belief import certain_belief
 SOUND = "none: the sound device"
 
 ROOT = Path(__file__).resolve().parent.parent
-DOCS = ROOT / "docs" / "tests.md"
+DOCS = ROOT / "docs" / "reference" / "tests.md"
 MARK, END = "<!-- table: broken devices -->", "<!-- end of broken devices -->"
 
 
@@ -292,7 +292,7 @@ def main() -> int:
     """Run and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", action="store_true", help="print records")
-    parser.add_argument("--docs", action="store_true", help="put the table into docs/tests.md")
+    parser.add_argument("--docs", action="store_true", help="put the table into docs/reference/tests.md")
     parser.add_argument("--all", action="store_true", help="all scenarios, also after the first that fails")
     parser.add_argument("-j", type=int, default=1, help="devices at once")
     parser.add_argument("--devices", nargs="+", choices=DEVICES, default=list(DEVICES))

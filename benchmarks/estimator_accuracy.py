@@ -47,7 +47,7 @@ from fogsim.values.scene import USUAL_PAVEMENT
 AIRLIGHT_LEVELS = (120.0, 200.0, 255.0)
 METHODS = ("negru2013", "zhu2015", "huang2015_rough", "joint_road")
 PUBLISHED = ", as published"
-DOCS = Path(__file__).resolve().parent.parent / "docs" / "estimators.md"
+DOCS = Path(__file__).resolve().parent.parent / "docs" / "explanation" / "estimators.md"
 HEADING = "## Accuracy of single frames"
 MARK, END = "<!-- table: accuracy -->", "<!-- end of table -->"
 
@@ -179,7 +179,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the tables of docs/estimators.md")
+    parser.add_argument("--docs", action="store_true", help="write the tables of docs/explanation/estimators.md")
     parser.add_argument("--methods", nargs="+", default=list(METHODS), help="estimators of single frames")
     parser.add_argument("--pitch-deviation", type=float, default=0.1, help="deviation of the told pitch [deg]")
     parser.add_argument("--cameras", type=int, default=len(CAMERAS), help="how many of the cameras")

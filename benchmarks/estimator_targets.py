@@ -29,7 +29,7 @@ from rich.progress import track
 from target_pictures import KINDS, Row, measure_unit
 from target_tables import records, table
 
-DOCS = Path(__file__).resolve().parent.parent / "docs" / "estimators.md"
+DOCS = Path(__file__).resolve().parent.parent / "docs" / "explanation" / "estimators.md"
 HEADING = "## Targets"
 MARK, END = "<!-- table: targets -->", "<!-- end of targets -->"
 
@@ -86,7 +86,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/estimators.md")
+    parser.add_argument("--docs", action="store_true", help="write the table of docs/explanation/estimators.md")
     parser.add_argument("--images", type=some, default=24, help="drawings of each kind")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--keep", type=Path, help="file in which to keep what is measured, and from which to go on")

@@ -50,7 +50,7 @@ BENDS = {
 }
 """Drawn roads, their curvatures [1/m]; every other one bends to the right."""
 
-DOCS, MARK = Path(__file__).resolve().parents[1] / "docs" / "estimators.md", "<!-- table: grades -->"
+DOCS, MARK = Path(__file__).resolve().parents[1] / "docs" / "explanation" / "estimators.md", "<!-- table: grades -->"
 
 Found = tuple[float, float, float]
 """A visibility and its 90 % interval [m]."""
@@ -161,7 +161,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1, help="seed of the drive")
     parser.add_argument("--duration", type=float, default=180.0, help="longest simulated time [s]")
     parser.add_argument("--drawings", type=int, default=4, help="drawings of each bend and camera")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/estimators.md")
+    parser.add_argument("--docs", action="store_true", help="write the table of docs/explanation/estimators.md")
     arguments = parser.parse_args()
     visibilities = arguments.visibility or [100.0, 200.0, 300.0, 500.0]
     records = [

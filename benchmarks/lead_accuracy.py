@@ -66,7 +66,7 @@ SETBACK = 1.7
 """From the own bumper, where ranges begin, back to the camera [m]."""
 
 MIDDLING = (50.0, 300.0)
-DOCS = Path(__file__).resolve().parent.parent / "docs" / "estimators.md"
+DOCS = Path(__file__).resolve().parent.parent / "docs" / "explanation" / "estimators.md"
 MARK, END = "<!-- table: lead accuracy -->", "<!-- end of lead accuracy -->"
 
 
@@ -217,7 +217,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the tables of docs/estimators.md")
+    parser.add_argument("--docs", action="store_true", help="write the tables of docs/explanation/estimators.md")
     parser.add_argument("--methods", nargs="+", default=list(METHODS), choices=list(METHODS), help="what is measured")
     parser.add_argument("--cameras", type=int, default=3, help="how many of the cameras")
     parser.add_argument("--vehicles", type=int, default=len(VEHICLES), help="how many of the vehicles")

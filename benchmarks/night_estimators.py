@@ -132,7 +132,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print records as JSON")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/night.md")
+    parser.add_argument("--docs", action="store_true", help="write the table of docs/explanation/night.md")
     parser.add_argument("--pool", type=int, default=1)
     parser.add_argument("--pictures", type=int, default=40, help="of each variant")
     asked = parser.parse_args()
@@ -151,8 +151,8 @@ def main() -> None:
 
 
 def write_table(records: list[dict[str, Any]], times: dict[str, float]) -> None:
-    """Put the table into docs/night.md."""
-    page = Path(__file__).parents[1] / "docs" / "night.md"
+    """Put the table into docs/explanation/night.md."""
+    page = Path(__file__).parents[1] / "docs" / "explanation" / "night.md"
     head, body, end = "<!-- table: night-estimators -->\n", [], "<!-- end of table -->"
     keys = ("method", "variant", "median_pct", "p95_pct", "bands", "coverage", "clear", "valid")
     body += ["| method | not as taken | median error [%] | p95 [%] | in bands | coverage | clear is clear | valid |"]

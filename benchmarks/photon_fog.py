@@ -33,7 +33,7 @@ from fogsim.reproduce.road_sweeps import CAMERA
 from fogsim.reproduce.scenes import road_renderer
 from fogsim.values import Estimate
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "airlight.md"
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "explanation" / "airlight.md"
 ALBEDOS = (0.05, 0.1, 0.2, 0.4, 0.8)
 ALL_ALBEDOS = f"{ALBEDOS[0]:g} … {ALBEDOS[-1]:g}"
 VISIBILITIES = (50.0, 100.0, 150.0, 200.0, 300.0)
@@ -118,7 +118,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/airlight.md")
+    parser.add_argument("--docs", action="store_true", help="write the table of docs/explanation/airlight.md")
     parser.add_argument("--pool", type=int, choices=(0, 1), default=1)
     parser.add_argument("--drives", type=int, default=4, help="of each camera and kind")
     parser.add_argument("--droplets", nargs="+", choices=[str(kind) for kind in Droplets], default=list(KINDS))

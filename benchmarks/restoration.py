@@ -249,7 +249,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/restoration.md")
+    parser.add_argument("--docs", action="store_true", help="write the table of docs/how_to/restoration.md")
     parser.add_argument("--pool", type=int, choices=(0, 1), default=1, help="0: constants chosen on it")
     parser.add_argument(
         "--step", type=float, default=0.1, help="of the logarithm of the range, from picture to picture"
@@ -264,7 +264,7 @@ def main() -> None:
         return
     rows = measure(arguments)
     if arguments.docs:
-        write_table("restoration.md", "restoration", table(rows))
+        write_table("how_to/restoration.md", "restoration", table(rows))
     print(json.dumps(rows, indent=2) if arguments.json else "\n".join(table(rows)))
 
 

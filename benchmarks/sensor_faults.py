@@ -59,7 +59,7 @@ PARAMETERS = {method: inspect.signature(ESTIMATORS[method]).parameters for metho
 SETTLED = 1.0
 """How much of a fault is not counted yet [s]."""
 
-DOCS = Path(__file__).resolve().parent.parent / "docs" / "sensors.md"
+DOCS = Path(__file__).resolve().parent.parent / "docs" / "reference" / "sensors.md"
 MARK, END = "<!-- table: sensor faults -->", "<!-- end of sensor faults -->"
 
 
@@ -153,7 +153,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/sensors.md")
+    parser.add_argument("--docs", action="store_true", help="write the table of docs/reference/sensors.md")
     parser.add_argument("--faults", nargs="+", choices=FAULTS, default=list(FAULTS), help="only these")
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS, help="estimators")
     parser.add_argument("--seeds", type=int, default=3, help="drives for each fault")

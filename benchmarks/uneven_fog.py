@@ -45,7 +45,7 @@ CAMERAS = (
     ("camera.width=800", "camera.height=600", "camera.field_of_view_deg=50", "camera.response=linear"),
 )
 CLEAR_ROADS = ("motorway_fog_bank", "graded_motorway", "clear_day", "ramp_merge")
-DOCS = Path(__file__).resolve().parents[1] / "docs" / "estimators.md"
+DOCS = Path(__file__).resolve().parents[1] / "docs" / "explanation" / "estimators.md"
 Row = dict[str, Any]
 
 
@@ -199,7 +199,7 @@ def records(found: dict[tuple[str, str], Found], pool: int) -> Iterator[Row]:
 
 
 def table(rows: list[Row]) -> Iterator[str]:
-    """Lines of the table of docs/estimators.md."""
+    """Lines of the table of docs/explanation/estimators.md."""
     yield "| fog | method | frames | valid | median / p95, % | bias, % | 90 % intervals hold | τ(d) held |"
     yield "|---|---|---|---|---|---|---|---|"
     for row in rows:
@@ -217,7 +217,7 @@ def table(rows: list[Row]) -> Iterator[str]:
 
 
 def write_docs(rows: list[Row]) -> None:
-    """Write the table into docs/estimators.md."""
+    """Write the table into docs/explanation/estimators.md."""
     text = DOCS.read_text(encoding="utf-8")
     head, rest = text.split("<!-- table: uneven fog -->\n")
     _, tail = rest.split("<!-- end of uneven fog -->")
@@ -229,7 +229,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/estimators.md")
+    parser.add_argument("--docs", action="store_true", help="write the table of docs/explanation/estimators.md")
     parser.add_argument("--pool", type=int, choices=(0, 1), default=1, help="0: constants chosen on it")
     parser.add_argument("--methods", nargs="+", default=["joint_road"], help="names of estimators")
     parser.add_argument("--clear", type=float, default=60.0, help="minutes of driving in clear air")

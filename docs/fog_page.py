@@ -1,4 +1,4 @@
-"""Draw the pictures and curves of docs/fog.md: ``python docs/fog_page.py [NAME ...]`` (about a minute)."""
+"""Draw the pictures and curves of docs/explanation/fog.md: ``python docs/fog_page.py [NAME ...]`` (about a minute)."""
 
 import argparse
 import dataclasses

@@ -1,4 +1,4 @@
-"""Fill the tables of docs/airlight.md: ``python docs/make_airlight_tables.py [RECORDS]``.
+"""Fill the tables of docs/explanation/airlight.md: ``python docs/make_airlight_tables.py [RECORDS]``.
 
 RECORDS is what ``fogsim reproduce airlight --json --out docs/pictures`` prints; without it only the table of photon
 counts between trees and under clouds is filled, from what ``benchmarks/monte_carlo.py surroundings`` wrote.
@@ -13,7 +13,7 @@ from typing import Any
 
 from make_tables import filled
 
-PAGE = Path(__file__).parent / "airlight.md"
+PAGE = Path(__file__).parent / "explanation" / "airlight.md"
 COUNTS = Path(__file__).parents[1] / "tests" / "data" / "monte_carlo_surroundings.csv"
 SHOWN = "100"
 """V_met of the counts that are shown [m]."""

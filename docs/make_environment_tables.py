@@ -1,4 +1,6 @@
-"""Write the tables of docs/environments.md that are measured: what each baseline is worth, how near the surrogate is.
+"""Write the tables of docs/reference/environments.md that are measured.
+
+What each baseline is worth, and how near the surrogate is:
 
     python docs/make_environment_tables.py [--episodes 50] [--ids fogsim/FogAdvisory-v1 …] [--density] [--surrogate]
         [--corridor]
@@ -26,7 +28,7 @@ from fogsim_envs.baselines import BASELINES
 from fogsim_envs.evaluation import bootstrap_interval
 from fogsim_envs.spaces import action_of
 
-PAGE = Path(__file__).with_name("environments.md")
+PAGE = Path(__file__).parent / "reference" / "environments.md"
 DISCOUNTS = (1.0, 0.99)
 DENSITIES = {300.0: "300 vehicles/h", 2100.0: "2100 vehicles/h"}
 CORRIDOR_TERMS = ("delay", "overdriving", "conflict", "collision")
@@ -136,7 +138,7 @@ def table(text: str, name: str, header: list[str], body: list[str]) -> str:
         pattern, lambda found: found[1] + "\n" + "\n".join(lines) + "\n" + found[2], text, flags=re.DOTALL
     )
     if count != 1:
-        raise SystemExit(f"docs/environments.md has {count} places for the table {name!r}")
+        raise SystemExit(f"docs/reference/environments.md has {count} places for the table {name!r}")
     return new
 
 

@@ -35,7 +35,7 @@ EXCERPT = {
 
 def readme() -> Rows:
     """Errors of some methods with an untold vehicle ahead, as the page on estimators has them, to two digits."""
-    page = (HERE / "estimators.md").read_text(encoding="utf-8")
+    page = (HERE / "explanation" / "estimators.md").read_text(encoding="utf-8")
     table = page.split("<!-- table: accuracy -->", 1)[1].split("\n\n")[2].splitlines()
     heading, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table]
     found = {row[0]: row[2:] for row in rows if row[1] == "untold"}
@@ -80,16 +80,16 @@ def drivers_traffic() -> Rows:
 
 TABLES: dict[str, tuple[str, Callable[[], Rows]]] = {
     "readme": ("README.md", readme),
-    "night-veils": ("docs/night.md", night_deviations.veils),
-    "night-gallen2014": ("docs/night.md", night_deviations.veils_of_gallen),
-    "night-glows": ("docs/night.md", night_deviations.glows),
-    "night-lobes": ("docs/night.md", night_deviations.lobes),
-    "night-lamps": ("docs/night.md", night_deviations.lamp_fluxes),
-    "night-limits": ("docs/night.md", night_deviations.limits),
-    "night-directions": ("docs/night.md", night_deviations.directions),
-    "zhu2015": ("docs/estimators.md", zhu2015),
-    "drivers-published": ("docs/drivers.md", drivers),
-    "drivers-traffic": ("docs/drivers.md", drivers_traffic),
+    "night-veils": ("docs/explanation/night.md", night_deviations.veils),
+    "night-gallen2014": ("docs/explanation/night.md", night_deviations.veils_of_gallen),
+    "night-glows": ("docs/explanation/night.md", night_deviations.glows),
+    "night-lobes": ("docs/explanation/night.md", night_deviations.lobes),
+    "night-lamps": ("docs/explanation/night.md", night_deviations.lamp_fluxes),
+    "night-limits": ("docs/explanation/night.md", night_deviations.limits),
+    "night-directions": ("docs/explanation/night.md", night_deviations.directions),
+    "zhu2015": ("docs/explanation/estimators.md", zhu2015),
+    "drivers-published": ("docs/explanation/drivers.md", drivers),
+    "drivers-traffic": ("docs/explanation/drivers.md", drivers_traffic),
 }
 """Page and rows of each table, by its name and marker."""
 

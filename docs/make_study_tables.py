@@ -15,9 +15,9 @@ from pathlib import Path
 
 from make_tables import HERE, filled
 
-PAGE = HERE / "policies.md"
+PAGE = HERE / "benchmarks" / "policies.md"
 PAGES = {"lighting_policies": HERE.parent / "scenarios" / "rural_night_fog" / "README.md"}
-"""Pages of studies whose tables are not in docs/policies.md."""
+"""Pages of studies whose tables are not in docs/benchmarks/policies.md."""
 
 Cells = tuple[str, ...]
 

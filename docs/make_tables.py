@@ -271,7 +271,7 @@ def openscenario_passed_over() -> list[tuple[str, ...]]:
 
 
 TABLES = {
-    "drivers.md": {
+    "explanation/drivers.md": {
         "speeds": (("name", "speed in fog"), speed_choices),
         "kinds": (("kind", "how they follow", "constants [s], [m], [-]", "share by default"), kinds_of_drivers),
         "compliances": (
@@ -279,7 +279,7 @@ TABLES = {
             compliances,
         ),
     },
-    "estimators.md": {
+    "explanation/estimators.md": {
         f"repairs-{name}": (("repair", "the paper", "corrected (the default)"), partial(repairs, kind))
         for name, kind in (
             ("negru2013", Negru2013Repair),
@@ -287,21 +287,21 @@ TABLES = {
             ("huang2015_rough", Huang2015Repair),
         )
     },
-    "estimate.md": {"methods": (("method", "what it reads"), methods)},
-    "scenarios.md": {
+    "how_to/estimate.md": {"methods": (("method", "what it reads"), methods)},
+    "reference/scenarios.md": {
         "signs": (("kind", "code", "meaning"), signs),
         "keys": (("key", "default", "allowed", "meaning"), scenario_keys),
         "parameters": (("method", "parameter", "default", "allowed", "meaning"), parameters),
     },
-    "openscenario.md": {
+    "how_to/openscenario.md": {
         "supported": (("element", "what becomes of it"), openscenario_elements),
         "passed_over": (("element", "what it is"), openscenario_passed_over),
     },
-    "tests.md": {
+    "reference/tests.md": {
         "signals": (("signal", "unit or kind", "meaning", "needs"), signals),
     },
-    "night.md": {"laws": (("rules", "what", "from, up to [m]", "source"), laws)},
-    "results.md": {
+    "explanation/night.md": {"laws": (("rules", "what", "from, up to [m]", "source"), laws)},
+    "reference/results.md": {
         "columns": (("column", "type", "meaning"), columns),
         "traffic_columns": (("column", "type", "meaning"), traffic_columns),
         "trajectories": (("column", "type", "meaning"), trajectory_columns),

@@ -81,7 +81,7 @@ def record_run(
     """Run a scenario and write its results into a directory.
 
     From the first step on they are written into its folder ``unfinished``. When the run is over they take the place of
-    what is there in one go; docs/results.md tells what is in them:
+    what is there in one go; docs/reference/results.md tells what is in them:
 
     - ``manifest.json``, always: status, ending, seed, resolved scenario, versions, command line, process, times [UTC].
       Its status is "running" from the first step to the end.

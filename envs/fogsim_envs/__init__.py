@@ -24,7 +24,7 @@ def __getattr__(name: str) -> Any:
 
 
 # A reward_threshold lies halfway between FogSim's rule, which goes by the belief alone, and the oracle, which knows the
-# fog: docs/environments.md has the returns.
+# fog: docs/reference/environments.md has the returns.
 
 gymnasium.register(
     id="fogsim/FogAdvisory-v0",

@@ -28,7 +28,7 @@ STATE_FEATURES = (
     "advised_speed",
     "fog_lamps",
 )
-"""Meaning of the entries of ``state``; docs/environments.md and the class docstring give their scales."""
+"""Meaning of the entries of ``state``; docs/reference/environments.md and the class docstring give their scales."""
 
 SPEED_SCALE = 50.0
 LEAD_SCALE = 200.0

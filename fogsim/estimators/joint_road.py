@@ -116,7 +116,8 @@ class JointRoad:
     Nor need the airlight be: over dark land it brightens upward from the horizon and darkens toward the road, in a
     shape that radiative transfer has, for small and large droplets, and by one factor, which goes by the albedo of the
     land and is fitted too (prior: the sky's own brightening in the picture). That is weighed against even airlight by
-    evidence; fog that it is found in counts as even (`fogsim.vision.strips.airlight_slopes`, docs/airlight.md).
+    evidence; fog that it is found in counts as even (`fogsim.vision.strips.airlight_slopes`,
+    docs/explanation/airlight.md).
 
     Own method: no paper describes it. It stands on Hautière et al. 2006 and negru2013 for the geometry of fog on a
     flat road. Daytime only; the road must be darker than the airlight.

@@ -395,7 +395,8 @@ class DriversSection(Section):
 
     following: Following | None = None
     """How they follow: a kind of driver, or shares of several that together are 1 (`{in_sight: 0.6, careful: 0.4}`). By
-    default the mixture of docs/drivers.md with observed speeds, and as in clear air with the other choices."""
+    default the mixture of docs/explanation/drivers.md with observed speeds, and as in clear air with the other
+    choices."""
 
     distance_misjudgement: Annotated[Number, Field(ge=0, le=10)] = 0.0
     """By which share they take distances for longer where lamps show and the outline does not, and so follow closer;

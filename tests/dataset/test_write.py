@@ -19,7 +19,7 @@ from fogsim.dataset.inputs import input_digests
 from fogsim.errors import InputError
 from fogsim.scenario import Scenario, scenario_from_config
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "dataset.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "how_to" / "dataset.md"
 FRAMES, EVERY = 5, 2
 """A run of 0.5 s has the steps 0 … 5, of which 0, 2 and 4 are taken: the second run begins with frame 3."""
 

@@ -22,8 +22,8 @@ from fogsim.recorders.video import Encoder, encoder_command
 from fogsim.scenario import catalogue
 
 CHECKOUT = Path(__file__).resolve().parents[2]
-PLUGIN = (CHECKOUT / "docs" / "plugin.md").read_text(encoding="utf-8")
-SCENARIOS = (CHECKOUT / "docs" / "scenarios.md").read_text(encoding="utf-8")
+PLUGIN = (CHECKOUT / "docs" / "how_to" / "plugin.md").read_text(encoding="utf-8")
+SCENARIOS = (CHECKOUT / "docs" / "reference" / "scenarios.md").read_text(encoding="utf-8")
 VISIBILITY, SAMPLES = 80.0, 2
 
 TRIPS = """<routes>

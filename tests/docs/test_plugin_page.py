@@ -10,7 +10,7 @@ from subprocess import CompletedProcess
 import pytest
 
 CHECKOUT = Path(__file__).resolve().parents[2]
-PAGE = (CHECKOUT / "docs" / "plugin.md").read_text(encoding="utf-8")
+PAGE = (CHECKOUT / "docs" / "how_to" / "plugin.md").read_text(encoding="utf-8")
 (CONNECT,) = (block for block in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL) if "fogsim.connect" in block)
 
 Run = Callable[..., "CompletedProcess[str]"]

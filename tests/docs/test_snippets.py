@@ -27,7 +27,7 @@ TEXTS = {
     str(page.relative_to(CHECKOUT)): page.read_text(encoding="utf-8")
     for page in (
         *(CHECKOUT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")),
-        *sorted((CHECKOUT / "docs").glob("*.md")),
+        *sorted((CHECKOUT / "docs").glob("**/*.md")),
         *sorted((CHECKOUT / "scenarios").glob("*/README.md")),
     )
 }
@@ -114,15 +114,16 @@ def test_what_is_printed_runs(
     for part in re.split(r"^== ", done.stdout, flags=re.MULTILINE)[1:]:
         page, _, found = part.partition(":")
         printed[page] += found.partition("\n")[2]
-    for page in ("README.md", "docs/estimate.md"):
+    for page in ("README.md", "docs/how_to/estimate.md"):
         estimates = [float(one) for one in re.findall(r"^(?:.* )?([\d.]+) \([\d.]+, ", printed[page], re.MULTILINE)]
         assert estimates, page
         assert estimates == pytest.approx([80.0] * len(estimates), rel=0.05), page
-    told = [json.loads(line) for line in printed["docs/estimate.md"].splitlines() if line.startswith("{")]
-    (example,) = re.findall(r"```json\n(.*?)```", TEXTS["docs/estimate.md"], re.DOTALL)
+    told = [json.loads(line) for line in printed["docs/how_to/estimate.md"].splitlines() if line.startswith("{")]
+    (example,) = re.findall(r"```json\n(.*?)```", TEXTS["docs/how_to/estimate.md"], re.DOTALL)
     assert {tuple(one) for one in told} == {tuple(json.loads(example))}
     loops = [
-        list(map(float, row)) for row in re.findall(r"^([\d.]+) ([\d.]+)\b", printed["docs/plugin.md"], re.MULTILINE)
+        list(map(float, row))
+        for row in re.findall(r"^([\d.]+) ([\d.]+)\b", printed["docs/how_to/plugin.md"], re.MULTILINE)
     ]
     assert max(time for time, _ in loops) > 4.0
     assert loops[-1][1] == pytest.approx(120.0, rel=0.3)

@@ -17,7 +17,7 @@ from fogsim_envs.corridor import FogCorridorEnv
 CHECKOUT = Path(__file__).resolve().parents[2]
 PAGES = [
     *(CHECKOUT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")),
-    *sorted((CHECKOUT / "docs").glob("*.md")),
+    *sorted((CHECKOUT / "docs").glob("**/*.md")),
     *sorted((CHECKOUT / "scenarios").glob("*/README.md")),
 ]
 

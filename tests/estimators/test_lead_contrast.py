@@ -27,7 +27,9 @@ DARK_LAND = {
     30.0: ((-10, -5, -2, 0, 2, 5, 10, 30), (0.58, 0.71, 0.87, 1.0, 1.11, 1.22, 1.40, 2.00)),
     400.0: ((-10, -5, -2, 0, 2, 5, 10, 30), (0.61, 0.69, 0.81, 1.0, 1.22, 1.39, 1.64, 2.36)),
 }
-"""Airlight over that at the horizon by elevation [deg], over land of albedo 0.1, by V_met [m] (docs/airlight.md)."""
+"""Airlight over that at the horizon by elevation [deg], over land of albedo 0.1, by V_met [m].
+
+From docs/explanation/airlight.md."""
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ def test_editors_find_nothing_wrong_with_shipped_scenarios(scenarios, name):
 
 @pytest.mark.parametrize("page", ["tests", "roads"])
 def test_editors_find_nothing_wrong_with_whole_scenarios_of_the_docs(scenarios, page):
-    text = (ROOT / "docs" / f"{page}.md").read_text()
+    text = (ROOT / "docs" / "reference" / f"{page}.md").read_text()
     whole = [block for block in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL) if re.search("^name:", block, re.M)]
     assert whole
     assert [places(scenarios, block) for block in whole] == [[]] * len(whole)

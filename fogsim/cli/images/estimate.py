@@ -68,7 +68,7 @@ def estimate_command(
         float | None, typer.Option(help="For a guess: row of the horizon, in place of the lines of the road.")
     ] = None,
 ) -> None:
-    """Estimate the visibility in your own images or video (docs/estimate.md)."""
+    """Estimate the visibility in your own images or video (docs/how_to/estimate.md)."""
     from fogsim.offline import NIGHT_METHODS, find_source
 
     if guess_camera:

@@ -38,7 +38,7 @@ def restore_command(
     beside: Annotated[bool, typer.Option("--beside", help="The original and the restored side by side.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what is there already.")] = False,
 ) -> None:
-    """Restore the contrast that daytime fog took from your own images or video (docs/restoration.md)."""
+    """Restore the contrast that daytime fog took from your own images or video (docs/how_to/restoration.md)."""
     from fogsim.offline import find_source, load_calibration, straightened
     from fogsim.offline.restoration import RestorationWish, restore_files, restore_video
     from fogsim.offline.source import ImageFiles

@@ -50,7 +50,7 @@ NOTES = (
     "Fog of 250 m, CIE overcast sky, flat Lambertian land of one albedo; small droplets (moderate radiation fog). The "
     "drawn road is the same in all: its own albedo is about 0.1.",
     "Koschmieder: the airlight is that of a white surface, 0.94 E/π, everywhere. Photons: about (0.34 + 0.66 ρ) E/π "
-    "level, brighter upward, less toward the road (docs/airlight.md).",
+    "level, brighter upward, less toward the road (docs/explanation/airlight.md).",
     "Transmission along every line of sight is the same in both; extinction coefficients are equal.",
     "Exposure: 95 % of the picture's pixels below 0.65 of saturation, in both.",
 )

@@ -45,7 +45,7 @@ NOTES = (
     "Veil: references are simulated, not frames of the same fog chamber's video as the paper's; a straight road with"
     " marks and signs is driven along while the fog dissipates. 'as published' is exp(aV² + bV + c) through five"
     " references.",
-    "Figure 2 and equations 11 and 12: docs/night.md says with which beams and veils they come out.",
+    "Figure 2 and equations 11 and 12: docs/explanation/night.md says with which beams and veils they come out.",
 )
 
 _LOW = Lamp.POSITION | Lamp.LOW_BEAM

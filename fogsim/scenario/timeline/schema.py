@@ -406,7 +406,8 @@ class TimelineEntry(Section):
     """Name in conditions, expectations and messages; `timeline.N` without one."""
 
     when: WrittenCondition
-    """Condition: text such as `gap(ego, slow) < 80 m and ego.speed > 50 km/h`, or a mapping; see docs/tests.md."""
+    """Condition: text such as `gap(ego, slow) < 80 m and ego.speed > 50 km/h`, or a mapping; see
+    docs/reference/tests.md."""
 
     delay_s: Time = 0.0
     """Time from then until it begins."""

@@ -1,6 +1,7 @@
 """How far the night models of `fogsim.atmosphere` are from photons and from gallen2014.
 
-The tables of docs/explanation/night.md. Also how much less light a Henyey–Greenstein function with g = 0.85 sends back than the droplets do.
+The tables of docs/explanation/night.md. Also how much less light a Henyey–Greenstein function with g = 0.85 sends
+back than the droplets do.
 
     python benchmarks/night_deviations.py
 

@@ -1,6 +1,8 @@
 """Fog by the lamps of others: halos told from clear nights, and the glow of tail lamps ahead.
 
-For docs/explanation/night.md. ``python benchmarks/night_sources.py --part halos`` calibrates a threshold on one pool of scenes and counts on another,
+For docs/explanation/night.md:
+
+``python benchmarks/night_sources.py --part halos`` calibrates a threshold on one pool of scenes and counts on another,
 at exposures and strengths of lamps that the calibration did not see; ``--part glow`` drives up to a vehicle ahead;
 ``--part speed`` takes the time of both. Constants were chosen on ``--pool 1`` and 2; what is reported is of 7.
 """

@@ -131,7 +131,7 @@ def test_own_sight_falls_with_fog_and_glare_and_high_beams_lose_by_their_veil() 
 
 
 def test_the_veil_before_the_road_is_that_of_photons() -> None:
-    """0.31 and 1.58 cd/m² at V_met = 100 m from 1.5 m above the road; a car's driver sits lower (docs/explanation/night.md)."""
+    """0.31, 1.58 cd/m² at V_met = 100 m, 1.5 m above the road (docs/explanation/night.md); car drivers sit lower."""
     assert 0.31 < own_veil(LOW, 100.0, 40.0) < 3.0 * 0.31
     assert 1.58 < own_veil(HIGH, 100.0, 40.0) < 2.0 * 1.58
     assert own_veil(LOW, math.inf, 40.0) == 0.0

@@ -44,7 +44,8 @@ def high_beam_veil(extinction: float) -> float:
     """What fog adds to the veil before a driver's eyes when high beams take the place of low beams [cd/m²].
 
     A fit to the veil of the pictures in moderate radiation fog (docs/explanation/night.md), from a car driver's eyes
-    toward the road 40 m ahead: within 10 % from V_met = 30 m to 1000 m. From higher up it is less: 0.6 of it from 1.5 m.
+    toward the road 40 m ahead: within 10 % from V_met = 30 m to 1000 m. From higher up it is less: 0.6 of it from
+    1.5 m.
 
     Parameters
     ----------

@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 export PYTHONDONTWRITEBYTECODE :=
 
 .DEFAULT_GOAL := help
-.PHONY: help check demo test quick hooks portability cluster notebooks lint types contracts ci figures clean
+.PHONY: help check demo test quick hooks portability cluster notebooks site browse lint types contracts ci figures clean
 
 help: ## Show what can be made
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -41,8 +41,8 @@ demo: $(VENV)/.installed ## Run the demo scenario; results go to runs/demo/
 # tenth of the time of tests that paint. Other C libraries do not know these names.
 test: export MALLOC_MMAP_THRESHOLD_ := 1000000000
 test: export MALLOC_TRIM_THRESHOLD_ := 2000000000
-test: $(VENV)/.installed-test $(VENV)/.compiled ## Run the whole test suite but for portability, cluster and notebooks
-	@$(BIN)/python -m pytest -n auto --dist worksteal --ignore tests/portability --ignore tests/cluster --ignore tests/notebooks
+test: $(VENV)/.installed-test $(VENV)/.compiled ## Run the whole test suite but for portability, cluster, notebooks and the site
+	@$(BIN)/python -m pytest -n auto --dist worksteal --ignore tests/portability --ignore tests/cluster --ignore tests/notebooks --ignore tests/site
 
 quick: $(VENV)/.installed-test ## Run the tests that take half a minute together
 	@$(BIN)/python -m pytest -q tests/advice tests/files tests/fusion tests/lighting tests/metrics tests/sensors tests/values
@@ -68,6 +68,19 @@ $(VENV)/.installed-notebooks: pyproject.toml $(VENV)/.installed-test
 notebooks: $(VENV)/.installed-notebooks ## Run the notebooks from their first cell to their last
 	@$(BIN)/python -m pytest -q tests/notebooks
 
+$(VENV)/.installed-docs: pyproject.toml $(VENV)/.installed-test
+	@echo "Installing MkDocs into $(VENV) (once) …"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --use-pep517 --editable '.[docs]'
+	@touch $@
+
+site: export NO_MKDOCS_2_WARNING := 1
+site: $(VENV)/.installed-docs ## Build the documentation site into site/, to be opened in a browser
+	@$(BIN)/mkdocs build --quiet
+	@echo "site/index.html"
+
+browse: $(VENV)/.installed-docs ## Build the site and look at it in a headless browser, without changing site/
+	@$(BIN)/python -m pytest -q tests/site
+
 lint: $(VENV)/.installed-test ## Check style
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check .
 
@@ -77,7 +90,7 @@ types: $(VENV)/.installed-test ## Check types
 contracts: $(VENV)/.installed-test ## Check which stage may import which
 	@$(BIN)/lint-imports
 
-ci: lint types contracts test portability cluster notebooks ## Everything that .ci/run checks
+ci: lint types contracts test portability cluster notebooks browse ## Everything that .ci/run checks
 
 figures: $(VENV)/.installed-test ## Measure the accuracies in the docs' tables anew (an hour or two)
 	@for name in estimator_accuracy estimator_targets lead_accuracy; do \
@@ -85,4 +98,4 @@ figures: $(VENV)/.installed-test ## Measure the accuracies in the docs' tables a
 	@$(BIN)/python docs/make_measured_tables.py
 
 clean: ## Remove the environment, results and caches
-	rm -rf $(VENV) runs dist build .mypy_cache .ruff_cache .pytest_cache
+	rm -rf $(VENV) runs dist build site .cache .mypy_cache .ruff_cache .pytest_cache

@@ -2,8 +2,8 @@
 
 Without names all of them (minutes, for zhu2015 and drivers). ``--check`` writes nothing and says which are out of date;
 the last digit may differ by one, as rounding on another processor may. Three benchmarks write their own tables:
-``python benchmarks/estimator_accuracy.py --docs``, ``estimator_targets.py``, ``lead_accuracy.py``. The README has an
-excerpt of the first, so write it after that. ``make figures`` does all of it in order.
+``python benchmarks/estimator_accuracy.py --docs``, ``estimator_targets.py``, ``lead_accuracy.py``. The page on
+performance has an excerpt of the first, so write it after that. ``make figures`` does all of it in order.
 """
 
 import argparse
@@ -30,10 +30,10 @@ EXCERPT = {
     "negru2013": "negru2013, corrected",
     "negru2013, as published": "negru2013, as published",
 }
-"""Methods of the README's table, by what the page on estimators calls them."""
+"""Methods of the excerpt, by what the page on estimators calls them."""
 
 
-def readme() -> Rows:
+def excerpt() -> Rows:
     """Errors of some methods with an untold vehicle ahead, as the page on estimators has them, to two digits."""
     page = (HERE / "explanation" / "estimators.md").read_text(encoding="utf-8")
     table = page.split("<!-- table: accuracy -->", 1)[1].split("\n\n")[2].splitlines()
@@ -79,7 +79,7 @@ def drivers_traffic() -> Rows:
 
 
 TABLES: dict[str, tuple[str, Callable[[], Rows]]] = {
-    "readme": ("README.md", readme),
+    "excerpt": ("docs/benchmarks/performance.md", excerpt),
     "night-veils": ("docs/explanation/night.md", night_deviations.veils),
     "night-gallen2014": ("docs/explanation/night.md", night_deviations.veils_of_gallen),
     "night-glows": ("docs/explanation/night.md", night_deviations.glows),

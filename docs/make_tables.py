@@ -301,12 +301,12 @@ TABLES = {
         "signals": (("signal", "unit or kind", "meaning", "needs"), signals),
     },
     "explanation/night.md": {"laws": (("rules", "what", "from, up to [m]", "source"), laws)},
+    "reference/metrics.md": {"metrics": (("key", "meaning"), metrics)},
     "reference/results.md": {
         "columns": (("column", "type", "meaning"), columns),
         "traffic_columns": (("column", "type", "meaning"), traffic_columns),
         "trajectories": (("column", "type", "meaning"), trajectory_columns),
         "events": (("column", "type", "meaning"), event_columns),
-        "metrics": (("key", "meaning"), metrics),
     },
 }
 """Tables by file and marker, with their headings and rows."""

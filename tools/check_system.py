@@ -2,8 +2,8 @@
 
     python3 tools/check_system.py [--all-tests] [--packages]
 
-``--all-tests`` asks also for what only the tests need: OpenGL, without which FogSim draws on the processor, and a
-display without a screen for sumo-gui. ``--packages`` prints nothing but the names of the Debian packages.
+``--all-tests`` asks also for what only the tests need: OpenGL, without which FogSim draws on the processor, a
+display without a screen for sumo-gui, and the browser that opens the documentation site. ``--packages`` prints nothing but the names of the Debian packages.
 Runs before anything is installed, so it uses the standard library alone.
 """
 
@@ -21,7 +21,7 @@ TEST_LIBRARIES = {
     "libGL.so.1": "libgl1",
     "libOSMesa.so.8": "libosmesa6",
 }
-TEST_PROGRAMS = {"Xvfb": "xvfb"}
+TEST_PROGRAMS = {"Xvfb": "xvfb", "chromium": "chromium"}
 
 
 def missing_packages(for_all_tests: bool = False) -> list[str]:

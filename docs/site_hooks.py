@@ -1,0 +1,106 @@
+"""What MkDocs is told beside mkdocs.yml: pages that stand elsewhere in the checkout, and links that lead to them.
+
+Scenarios' own pages, notebooks, the changelog and the command line's reference are pages of the site without being files
+of docs/, so that no text is there twice. Links are written as they hold in the checkout, and are led to those pages.
+"""
+
+import posixpath
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.plugins import event_priority
+from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
+
+ROOT = Path(__file__).resolve().parents[1]
+LINK = re.compile(r"(!?\[[^\[\]]*\])\(([^)\s#]*)(#[^)\s]*)?\)")
+
+
+def pages_elsewhere() -> Iterator[tuple[str, Path]]:
+    """Place on the site, and file in the checkout, of each page that is no file of docs/."""
+    yield "changelog.md", ROOT / "CHANGELOG.md"
+    yield "contributing.md", ROOT / "CONTRIBUTING.md"
+    yield "notices.md", ROOT / "THIRD_PARTY_NOTICES.md"
+    for page in sorted((ROOT / "scenarios").glob("*/README.md")):
+        yield f"gallery/{page.parent.name}.md", page
+    for notebook in sorted((ROOT / "notebooks").glob("*.ipynb")):
+        yield f"notebooks/{notebook.name}", notebook
+
+
+PLACES = {page.relative_to(ROOT).as_posix(): place for place, page in pages_elsewhere()}
+"""Where each of them is on the site, by its path in the checkout."""
+
+
+@event_priority(100)  # before the notebooks' plugin, which looks for what it reads
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add the pages that are no files of docs/."""
+    for place, page in pages_elsewhere():
+        if page.suffix == ".ipynb":
+            files.append(linked_notebook(place, page, config))
+        else:
+            files.append(File.generated(config, place, content=page.read_text(encoding="utf-8")))
+    return files
+
+
+def linked_notebook(place: str, notebook: Path, config: MkDocsConfig) -> File:
+    """Give a notebook whose links hold on the site, as a file that the notebooks' plugin reads."""
+    folder = ROOT / "build" / "site"
+    copy = folder / place
+    copy.parent.mkdir(parents=True, exist_ok=True)
+    text = notebook.read_text(encoding="utf-8")
+    led = led_to_pages(text, notebook.relative_to(ROOT).parent.as_posix(), place)
+    copy.write_text(re.sub(r"\.md(#[^)\s]*)?\)", r".html\1)", led), encoding="utf-8")
+    return File(place, str(folder), config.site_dir, config.use_directory_urls)
+
+
+@event_priority(100)
+def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:  # noqa: ARG001 - MkDocs'
+    """Lead links that hold in the checkout to pages of the site; what the site has not stays as text."""
+    place = page.file.src_uri
+    source = next((path for path, led in PLACES.items() if led == place), f"docs/{place}")
+    if place == "reference/cli.md":
+        markdown += command_line_reference()
+    return led_to_pages(markdown, posixpath.dirname(source), place)
+
+
+def led_to_pages(text: str, folder: str, place: str) -> str:
+    """Lead the links of a text to pages of the site.
+
+    Parameters
+    ----------
+    text : str
+        Markdown, or a notebook.
+    folder : str
+        Where it stands in the checkout.
+    place : str
+        Where it is on the site.
+    """
+
+    def led(found: re.Match[str]) -> str:
+        words, target, anchor = found[1], found[2], found[3] or ""
+        if not target or "://" in target:
+            return found[0]
+        path = posixpath.normpath(posixpath.join(folder, target))
+        page = PLACES.get(path) or (path.removeprefix("docs/") if path.startswith("docs/") else None)
+        # What the site does not have is a file of the source tree: its name is left.
+        return f"{words}({posixpath.relpath(page, posixpath.dirname(place) or '.')}{anchor})" if page else words[1:-1]
+
+    return LINK.sub(led, text)
+
+
+def command_line_reference() -> str:
+    """Every command with its arguments and options, as ``--help`` has them."""
+    sys.path.insert(0, str(ROOT))
+    import typer.main
+    from typer.cli import get_docs_for_click
+
+    from fogsim.cli.app import app
+
+    command = typer.main.get_command(app)
+    text = get_docs_for_click(
+        obj=command, ctx=command.make_context("fogsim", [], resilient_parsing=True), name="fogsim"
+    )
+    return "\n" + text.partition("\n")[2]

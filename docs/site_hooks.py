@@ -1,19 +1,22 @@
 """What MkDocs is told beside mkdocs.yml: pages that stand elsewhere in the checkout, and links that lead to them.
 
-Scenarios' own pages, notebooks, the changelog and the command line's reference are pages of the site without being files
-of docs/, so that no text is there twice. Links are written as they hold in the checkout, and are led to those pages.
+Scenarios' own pages, notebooks, the changelog and the command line's reference are pages of the site without being
+files of docs/, so that no text is there twice. Links are written as they hold in the checkout, and are led to them.
 """
 
 import posixpath
 import re
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import typer.main
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.plugins import event_priority
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
+from typer.cli import get_docs_for_click
+
+from fogsim.cli.app import app
 
 ROOT = Path(__file__).resolve().parents[1]
 LINK = re.compile(r"(!?\[[^\[\]]*\])\(([^)\s#]*)(#[^)\s]*)?\)")
@@ -63,7 +66,18 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     source = next((path for path, led in PLACES.items() if led == place), f"docs/{place}")
     if place == "reference/cli.md":
         markdown += command_line_reference()
+    if source.startswith("scenarios/"):
+        markdown = with_picture(markdown, Path(source).parent.name)
     return led_to_pages(markdown, posixpath.dirname(source), place)
+
+
+def with_picture(markdown: str, scenario: str) -> str:
+    """Put the gallery's picture of a scenario below the title of its page, if there is one."""
+    picture = f"docs/pictures/gallery/{scenario}.jpg"
+    if not (ROOT / picture).is_file():
+        return markdown
+    title, _, rest = markdown.partition("\n")
+    return f"{title}\n\n![What the ego's camera sees](../../{picture})\n{rest}"
 
 
 def led_to_pages(text: str, folder: str, place: str) -> str:
@@ -93,14 +107,7 @@ def led_to_pages(text: str, folder: str, place: str) -> str:
 
 def command_line_reference() -> str:
     """Every command with its arguments and options, as ``--help`` has them."""
-    sys.path.insert(0, str(ROOT))
-    import typer.main
-    from typer.cli import get_docs_for_click
-
-    from fogsim.cli.app import app
-
     command = typer.main.get_command(app)
-    text = get_docs_for_click(
-        obj=command, ctx=command.make_context("fogsim", [], resilient_parsing=True), name="fogsim"
-    )
+    context = command.make_context("fogsim", [], resilient_parsing=True)
+    text = get_docs_for_click(obj=command, ctx=context, name="fogsim")
     return "\n" + text.partition("\n")[2]

@@ -17,6 +17,7 @@ def list_command() -> None:
     from fogsim.lighting import LIGHTING_POLICIES
     from fogsim.render import RENDERERS
     from fogsim.scenario import catalogue, load_scenario
+    from fogsim.study.shipped import shipped_studies
 
     table = Table(title="Scenarios", title_justify="left", box=None, pad_edge=False)
     table.add_column("name", style="bold", no_wrap=True)
@@ -27,6 +28,7 @@ def list_command() -> None:
         table.add_row(name, "test" if scenario.expect else "", scenario.description)
     stdout.print(table)
     stdout.print()
+    stdout.print(f"[bold]study[/]: {', '.join(shipped_studies())}")
     for registry in (ESTIMATORS, FUSIONS, ADVISERS, LIGHTING_POLICIES, RENDERERS):
         stdout.print(f"[bold]{registry.kind}[/]: {', '.join(registry)}")
 

@@ -19,7 +19,7 @@ class EngineName(StrEnum):
 
 
 def study_command(
-    study: Annotated[Path, typer.Argument(help="The study file.")],
+    study: Annotated[str, typer.Argument(help="A study file, or a study that comes with FogSim (fogsim list).")],
     out: Annotated[
         Path | None, typer.Option(help="Directory; one that was interrupted is continued. [runs/STUDY]")
     ] = None,

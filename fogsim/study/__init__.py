@@ -14,6 +14,7 @@ from fogsim.study.pool import ProcessPool
 from fogsim.study.pooled_profiles import pool_profiles
 from fogsim.study.ray_cluster import RayCluster
 from fogsim.study.report import write_report
+from fogsim.study.shipped import shipped_studies
 from fogsim.study.table import Row, write_table
 
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "Watch",
     "load_study",
     "run_study",
+    "shipped_studies",
 ]
 
 

@@ -20,6 +20,7 @@ from fogsim.scenario.schema import NO_RENDERER
 from fogsim.scenario.section import Id, Section, Seed, Share, Text
 from fogsim.scenario.traffic_alone import NO_EGO
 from fogsim.study.main_metrics import unknown_metrics
+from fogsim.study.shipped import study_file
 from fogsim.traffic.road.configuration import configured_demand, configured_files
 
 MOST_RUNS = 1_000_000
@@ -215,19 +216,20 @@ def _digest(path: Path, _: int) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()[:20]
 
 
-def load_study(path: Path) -> Study:
+def load_study(name_or_path: str | Path) -> Study:
     """Read a study file and check every scenario of its grid, before anything is run.
 
     Parameters
     ----------
-    path : Path
-        The file.
+    name_or_path : str or Path
+        The file, or the name of a study that comes with FogSim (`fogsim.study.shipped_studies`).
 
     Raises
     ------
     InputError
         If anything does not fit; one line for each mistake, with file, line, key path, value and what is allowed.
     """
+    path = study_file(name_or_path)
     document = read_document(path)
     try:
         written = StudyFile.model_validate(document.data)

@@ -2,9 +2,10 @@ from pathlib import Path
 
 import pytest
 
-from fogsim.errors import InputError
+from fogsim.errors import InputError, UnknownNameError
 from fogsim.scenario.loading import catalogue
 from fogsim.study import load_study
+from fogsim.study.shipped import shipped_studies, study_file
 
 STUDY = """
 scenario: motorway_fog_bank
@@ -112,3 +113,17 @@ def test_runs_that_nothing_sees_draw_no_frames(tmp_path: Path) -> None:
     # Lamps that go by the camera's fog need it, too.
     lamps = load_study(written(tmp_path, text.replace("low_beam", "fog_lamp_rules")))
     assert {run.scenario.renderer for run in lamps.runs} == {"auto"}
+
+
+def test_a_study_that_comes_with_fogsim_is_known_by_its_name(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)
+    known = shipped_studies()
+    assert {"motorway_policies", "which_sensor"} <= set(known)
+    assert study_file("which_sensor") == known["which_sensor"]
+    # A file of one's own comes first, as with scenarios.
+    Path("which_sensor").write_text(STUDY, encoding="utf-8")
+    assert study_file("which_sensor") == Path("which_sensor")
+    with pytest.raises(UnknownNameError, match="did you mean 'which_sensor'"):
+        study_file("which_sensors")
+    with pytest.raises(InputError, match=r"nothing\.yaml: cannot be read"):
+        load_study("nothing.yaml")

@@ -76,7 +76,7 @@ def _default(field: FieldInfo) -> str:
     value = field.get_default(call_default_factory=True)
     if value is PydanticUndefined:
         return "required"
-    if value is None:
+    if value is None or value == "":
         return "none"
     if isinstance(value, tuple):
         return "`[" + ", ".join(str(getattr(v, "method", v)) for v in value) + "]`"

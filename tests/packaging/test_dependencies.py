@@ -4,8 +4,11 @@ import ast
 import re
 import sys
 import tomllib
-from importlib.metadata import packages_distributions
+from importlib.metadata import packages_distributions, requires
 from pathlib import Path
+
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 OWN = {"fogsim", "fogsim_envs"}
@@ -44,3 +47,28 @@ def test_every_import_is_a_declared_dependency_and_every_dependency_is_imported(
     distributions = packages_distributions()
     needed = {BROUGHT_ALONG.get(name, distributions[name][0].lower().replace("_", "-")) for name in names}
     assert needed == declared
+
+
+def brought_along(name: str, extras: frozenset[str], seen: set[tuple[str, frozenset[str]]]) -> set[str]:
+    """Names of what an installation of a distribution brings along here, itself left out."""
+    found: set[str] = set()
+    seen.add((name, extras))
+    for line in requires(name) or []:
+        one = Requirement(line)
+        if one.marker and not any(one.marker.evaluate({"extra": extra}) for extra in (*extras, "")):
+            continue
+        needed, asked = canonicalize_name(one.name), frozenset(one.extras)
+        found.add(needed)
+        if (needed, asked) not in seen:
+            found |= brought_along(needed, asked, seen)
+    return found
+
+
+def test_the_page_says_why_each_package_is_there() -> None:
+    page = (CHECKOUT / "docs" / "explanation" / "dependencies.md").read_text(encoding="utf-8")
+    listed = [row.split("|")[1] for row in page.splitlines() if row.startswith("| ")][2:]
+    names = {name.strip(" *"): "**" in cell for cell in listed for name in cell.split(",")}
+    project = tomllib.loads((CHECKOUT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert {name for name, own in names.items() if own} == names_of(project["dependencies"])
+    # Another version of a dependency may need less.
+    assert brought_along("fogsim", frozenset(), set()) - set(names) == set()

@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 export PYTHONDONTWRITEBYTECODE :=
 
 .DEFAULT_GOAL := help
-.PHONY: help check demo test quick hooks portability cluster notebooks site browse lint types contracts ci figures clean
+.PHONY: help check demo test quick hooks portability cluster notebooks site browse lint types contracts ci tables clean
 
 help: ## Show what can be made
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -92,10 +92,8 @@ contracts: $(VENV)/.installed-test ## Check which stage may import which
 
 ci: lint types contracts test portability cluster notebooks browse ## Everything that .ci/run checks
 
-figures: $(VENV)/.installed-test ## Measure the accuracies in the docs' tables anew (an hour or two)
-	@for name in estimator_accuracy estimator_targets lead_accuracy; do \
-		$(BIN)/python benchmarks/$$name.py --docs >/dev/null || exit 1; done
-	@$(BIN)/python docs/make_measured_tables.py
+tables: $(VENV)/.installed-test ## Measure the docs' tables anew (a day; goes on if interrupted), say what moved; TABLES="belief …"
+	@$(BIN)/python docs/rerun_tables.py $(TABLES)
 
 clean: ## Remove the environment, results and caches
 	rm -rf $(VENV) runs dist build site .cache .mypy_cache .ruff_cache .pytest_cache

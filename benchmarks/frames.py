@@ -12,7 +12,7 @@ camera's own low beam and everyone's lamps light it; `photons` is the day with t
 the repetitions' medians, the fastest frame, and each stage's median; on a machine that does other work too, only the
 fastest says something.
 
-    python benchmarks/frames.py [--json] [--renderer cpu ...] [--light night ...] [--size 640x480 ...]
+    python benchmarks/frames.py [--json] [--docs] [--renderer cpu ...] [--light night ...] [--size 640x480 ...]
         [--samples 2 ...] [--frames 60] [--repeat 5]
 """
 
@@ -26,6 +26,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from docs_table import write_table
 from numpy.typing import NDArray
 
 import fogsim
@@ -213,10 +214,23 @@ def record(key: Key, runs: list[NDArray[np.float64]]) -> dict[str, Any]:
     } | {f"ms_{name}": round(float(value), 3) for name, value in zip(STAGES, stages, strict=True)}
 
 
+def table(records: list[dict[str, Any]]) -> list[str]:
+    """Lines of the table of docs/benchmarks/performance.md: the fastest frames [ms] by day and night."""
+    shown = [one for one in records if one["light"] in ("day", "night") and one["samples"] == 1]
+    cells = {(one["renderer"], f"{one['light']} {one['width']}×{one['height']}"): one["ms_min"] for one in shown}
+    cases = list(dict.fromkeys(case for _, case in cells))
+    lines = [f"| | {' | '.join(cases)} |", "|---" * (len(cases) + 1) + "|"]
+    for renderer, told in (("cpu", "cpu"), ("opengl", "opengl on llvmpipe")):
+        values = [cells.get((renderer, case), math.nan) for case in cases]
+        lines.append(f"| {told} | {' | '.join(f'{one:.1f}' if one < 9.95 else f'{one:.0f}' for one in values)} |")
+    return lines
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
+    parser.add_argument("--docs", action="store_true", help="write the table of docs/benchmarks/performance.md")
     parser.add_argument("--renderer", action="append", choices=RENDERERS, help="default: all")
     parser.add_argument("--light", action="append", choices=LIGHTS, help="default: all")
     parser.add_argument("--size", action="append", help="camera WIDTHxHEIGHT (default 160x120 and 640x480)")
@@ -238,6 +252,8 @@ def main() -> None:
     records = [one | shared for one in measure(cases, arguments.frames, arguments.repeat)]
     for one in cases.values():
         one.close()
+    if arguments.docs:
+        write_table("benchmarks/performance.md", "frames", table(records))
     if arguments.json:
         print(json.dumps(records, indent=2))
         return

@@ -24,6 +24,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "pictures"))
 
+from docs_table import write_table
 from flat_road import Road, photograph, scan
 from target_pictures import CAMERAS, PITCH_DEVIATION
 
@@ -50,7 +51,6 @@ BENDS = {
 }
 """Drawn roads, their curvatures [1/m]; every other one bends to the right."""
 
-DOCS, MARK = Path(__file__).resolve().parents[1] / "docs" / "explanation" / "estimators.md", "<!-- table: grades -->"
 
 Found = tuple[float, float, float]
 """A visibility and its 90 % interval [m]."""
@@ -148,9 +148,7 @@ def write_docs(records: list[dict[str, object]]) -> None:
                 for method in methods
             )
             lines.append(f"| {road} | {visibility:.0f} m | {' | '.join(cells)} |")
-    before, after = DOCS.read_text(encoding="utf-8").split(MARK)
-    rest = after[after.index("\n\n## ") :] if "\n\n## " in after else ""
-    DOCS.write_text(before + MARK + "\n\n" + "\n".join(lines) + rest, encoding="utf-8")
+    write_table("explanation/estimators.md", "grades", lines)
 
 
 def main() -> None:

@@ -11,7 +11,7 @@ Errors are |V_est − V| / V of valid estimates in %; an infinite estimate is an
 ln(V_est / V) in %, `coverage` the share of 90 % intervals of k that hold the truth, `valid` the share of pictures with
 an estimate.
 
-    python benchmarks/photograph_roads.py [--json] [--pool 1] [--images 60] [--methods joint_road …]
+    python benchmarks/photograph_roads.py [--json] [--docs] [--pool 1] [--images 60] [--methods joint_road …]
         [--laid-on light] [--show FOLDER]
 
 With `--laid-on light` the fog is laid on the light, and the photograph is taken of the foggy road: the tone curve, of
@@ -28,6 +28,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from docs_table import write_table
 from photograph_pictures import CAMERAS, photograph
 from PIL import Image
 from rich.console import Console
@@ -101,6 +102,16 @@ def table(found: list[Row]) -> str:
     return "\n".join(lines)
 
 
+def docs_table(found: list[Row]) -> list[str]:
+    """Lines of the table of docs/explanation/estimators.md, of one method."""
+    lines = ["| V_met, m | median/p95, % | bias, % | 90 % intervals hold | valid |", "|---|---|---|---|---|"]
+    for one in found:
+        errors = (f"{one[key]:.1f}" if one[key] < 9.95 else f"{one[key]:.0f}" for key in ("median_pct", "p95_pct"))
+        bias, place = f"{one['bias_pct']:.1f}".replace("-", "−"), one["visibility_m"].replace("-", "–")
+        lines.append(f"| {place} | {'/'.join(errors)} | {bias} | {one['coverage']:.2f} | {one['valid_share']:.2f} |")
+    return lines
+
+
 def show(folder: Path, pool: int) -> None:
     """Write pictures to be looked at."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -114,6 +125,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
+    parser.add_argument("--docs", action="store_true", help="write the table of docs/explanation/estimators.md")
     parser.add_argument("--pool", type=int, choices=range(len(CAMERAS)), default=1, help="0: constants chosen on it")
     parser.add_argument("--images", type=int, default=60, help="photographs")
     parser.add_argument("--methods", nargs="+", default=["joint_road"], help="names of estimators")
@@ -126,6 +138,8 @@ def main() -> None:
     found = list(
         records(measure(arguments.pool, arguments.images, arguments.methods, arguments.laid_on), arguments.pool)
     )
+    if arguments.docs:
+        write_table("explanation/estimators.md", "photographs", docs_table(found))
     print(json.dumps(found, indent=2) if arguments.json else table(found))
 
 

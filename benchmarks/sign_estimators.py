@@ -8,7 +8,7 @@ of every valid estimate, `final` of the last one of a drive; `coverage` is the s
 the truth, `bounds` the share of bounds that do. Constants were chosen on `--pool 0`; what is reported is of `--pool
 1`.
 
-    python benchmarks/sign_estimators.py [--json] [--pool 1] [--drives 8] [--wrong 0 0.2] [--visibilities 60 …]
+    python benchmarks/sign_estimators.py [--json] [--docs] [--pool 1] [--drives 8] [--wrong 0 0.2] [--visibilities 60 …]
 """
 
 import argparse
@@ -18,6 +18,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
+from docs_table import write_table
 from sign_drives import CAMERA, Drive, drives
 
 from fogsim.estimators.protocol import Estimator
@@ -85,10 +86,26 @@ def _percent(values: list[float], percentile: float) -> float | None:
     return round(100.0 * float(np.percentile(values, percentile)), 2) if values else None
 
 
+def docs_table(found: list[dict[str, Any]]) -> list[str]:
+    """Lines of the table of docs/explanation/estimators.md: `sign_contrast` with right signs, and with wrong ones."""
+    told = {(one["visibility"], one["wrong_share"]): one for one in found if one["method"] == "sign_contrast"}
+    shares = list(dict.fromkeys(share for _, share in told))
+    heads = ["median/p95, %", "90 % intervals hold"]
+    for share in shares[1:]:
+        heads += [f"with {100 * share:.0f} % of signs wrong", "intervals hold"]
+    lines = [f"| V_met, m | {' | '.join(heads)} |", "|---" * (1 + len(heads)) + "|"]
+    for visibility in dict.fromkeys(visibility for visibility, _ in told):
+        cells = [told[visibility, share] for share in shares]
+        parts = (f"{one['median_pct']:.1f}/{one['p95_pct']:.1f} | {one['coverage']:.2f}" for one in cells)
+        lines.append(f"| {visibility:.0f} | {' | '.join(parts)} |")
+    return lines
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
+    parser.add_argument("--docs", action="store_true", help="write the table of docs/explanation/estimators.md")
     parser.add_argument("--pool", type=int, default=1, help="which drives")
     parser.add_argument("--drives", type=int, default=8, help="how many of them")
     parser.add_argument("--wrong", type=float, nargs="+", default=[0.0, 0.2], help="shares of signs that are wrong")
@@ -99,6 +116,8 @@ def main() -> None:
         for wrong in arguments.wrong
         for record in records(driven(arguments.pool, arguments.drives, wrong, arguments.visibilities), wrong)
     ]
+    if arguments.docs:
+        write_table("explanation/estimators.md", "sign estimators", docs_table(found))
     if arguments.json:
         print(json.dumps(found, indent=2))
         return

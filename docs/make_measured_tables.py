@@ -3,17 +3,17 @@
 Without names all of them (minutes, for zhu2015 and drivers). ``--check`` writes nothing and says which are out of date;
 the last digit may differ by one, as rounding on another processor may. Three benchmarks write their own tables:
 ``python benchmarks/estimator_accuracy.py --docs``, ``estimator_targets.py``, ``lead_accuracy.py``. The page on
-performance has an excerpt of the first, so write it after that. ``make figures`` does all of it in order.
+performance has an excerpt of the first, so write it after that. ``make tables`` does all of it in order.
 """
 
 import argparse
 import functools
-import re
 import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from make_tables import END, HERE, filled
+from page_tables import same
 
 ROOT = HERE.parent
 sys.path.insert(0, str(ROOT / "benchmarks"))
@@ -100,17 +100,6 @@ def chosen(names: list[str]) -> list[str]:
         if not any(known.startswith(name) for known in TABLES):
             sys.exit(f"no table is called {name}; there are {', '.join(TABLES)}")
     return [known for known in TABLES if not names or any(known.startswith(name) for name in names)]
-
-
-def same(kept: str, measured: str) -> bool:
-    """Whether two texts differ in no more than the last digits of their numbers, by one."""
-    number = r"\d+(?:\.\d+)?"
-    ours, theirs = re.findall(number, kept), re.findall(number, measured)
-    return re.split(number, kept) == re.split(number, measured) and all(
-        len(one.partition(".")[2]) == len(other.partition(".")[2])
-        and abs(round((float(one) - float(other)) * 10 ** len(one.partition(".")[2]))) <= 1
-        for one, other in zip(ours, theirs, strict=True)
-    )
 
 
 def kept_table(text: str, marker: str) -> str:

@@ -1,0 +1,209 @@
+"""The measured tables of the docs: the command that writes each, how long it takes, and what it rests on.
+
+A table that has no command, but figures, is in `UNWRITTEN`. Tables that come from the code alone are those of
+docs/make_tables.py and docs/make_gallery.py.
+"""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """Tables that are measured together.
+
+    Attributes
+    ----------
+    name : str
+        As the command line has it. What a command needs to go on after an interruption it keeps in
+        ``runs/tables/NAME`` or ``runs/tables/NAME.kept``.
+    commands : tuple of str
+        Command lines, one after the other, in the checkout.
+    minutes : float
+        About how long they take together on two cores [min].
+    rests_on : tuple of str
+        Scripts, modules, data and folders of scenarios; what these import is found.
+    tables : tuple of str
+        Names of the tables, as their marks have them; by default the measurement's own.
+    times : str
+        What in the tables is time on the clock, which is other on each machine and in each run.
+    """
+
+    name: str
+    commands: tuple[str, ...]
+    minutes: float
+    rests_on: tuple[str, ...]
+    tables: tuple[str, ...] = ()
+    times: str = ""
+
+    def __post_init__(self) -> None:
+        """Name the table."""
+        if not self.tables:
+            object.__setattr__(self, "tables", (self.name,))
+
+
+def benchmark(
+    name: str, minutes: float, tables: tuple[str, ...] = (), options: str = "", *, times: str = "", more: str = ""
+) -> Measurement:
+    """A script of benchmarks/ that writes its own tables with ``--docs``."""
+    command = f"python benchmarks/{name}.py --docs{options}"
+    return Measurement(
+        name, (command, more) if more else (command,), minutes, (f"benchmarks/{name}.py",), tables, times
+    )
+
+
+def study(name: str, minutes: float) -> Measurement:
+    """A study of scenarios/studies."""
+    file, folder = f"scenarios/studies/{name}.yaml", f"runs/tables/{name}"
+    commands = (f"fogsim study {file} -j 2 --out {folder}", f"python docs/make_study_tables.py {folder}")
+    rests_on = (file, "fogsim/cli/study.py", "docs/make_study_tables.py")
+    return Measurement(name, commands, minutes, (*rests_on, *SIMULATIONS.get(name, ())))
+
+
+def environment(name: str, minutes: float, tables: tuple[str, ...], options: str, *rests_on: str) -> Measurement:
+    """Tables of docs/make_environment_tables.py."""
+    command = f"python docs/make_environment_tables.py --ids {options}"
+    return Measurement(
+        name,
+        (command,),
+        minutes,
+        ("docs/make_environment_tables.py", "envs/fogsim_envs/evaluation.py", "envs/fogsim_envs/task", *rests_on),
+        tables,
+    )
+
+
+SIMULATIONS = {"field_sizes": ("scenarios/studies/motorway",)}
+"""Folders of studies that run a SUMO simulation, and no scenario."""
+
+ACCURACY_KEPT = " --keep runs/tables/estimator_accuracy.kept"
+TARGETS_KEPT = " --keep runs/tables/estimator_targets.kept"
+
+NIGHT = ("directions", "veils", "gallen2014", "lobes", "lamps", "glows", "limits")
+DEVIATIONS = "benchmarks/night_deviations.py"
+AIRLIGHT = "fogsim/reproduce/airlight/__init__.py"
+PHOTONS = "tests/data/monte_carlo_surroundings.csv"
+
+MEASUREMENTS = (
+    Measurement(
+        "night",
+        ("python docs/make_measured_tables.py night",),
+        1,
+        (DEVIATIONS, *(f"tests/data/monte_carlo_{name}.csv" for name in ("veil", "halo", "lobes"))),
+        tuple(f"night-{name}" for name in NIGHT),
+    ),
+    benchmark("stereo", 3, times="ms"),
+    benchmark("belief", 5),
+    benchmark("disappearing_vehicles", 5, ("disappearing vehicles",), times="ms"),
+    benchmark("night_estimators", 5, ("night-estimators",), times="ms"),
+    Measurement(
+        "restoration",
+        ("OMP_NUM_THREADS=1 python benchmarks/restoration.py --docs",),
+        4,
+        ("benchmarks/restoration.py",),
+        times="ms",
+    ),
+    benchmark("frames", 2, times="all"),
+    benchmark("photograph_roads", 5, ("photographs",)),
+    benchmark("sign_estimators", 10, ("sign estimators",), " --drives 12"),
+    benchmark("sensor_faults", 10, ("sensor faults",)),
+    benchmark("broken_devices", 15, ("broken devices",), " -j 2"),
+    benchmark("grades", 15),
+    benchmark("uneven_fog", 30, ("uneven fog",)),
+    benchmark("lead_accuracy", 20, ("lead accuracy",), times="ms"),
+    benchmark("estimator_targets", 40, ("targets",), TARGETS_KEPT),
+    benchmark(
+        "estimator_accuracy",
+        60,
+        ("accuracy", "excerpt"),
+        ACCURACY_KEPT,
+        times="ms",
+        more="python docs/make_measured_tables.py excerpt",
+    ),
+    Measurement("zhu2015", ("python docs/make_measured_tables.py zhu2015",), 3, ("fogsim/reproduce/zhu2015.py",)),
+    Measurement(
+        "drivers",
+        ("python docs/make_measured_tables.py drivers",),
+        8,
+        ("fogsim/reproduce/drivers/__init__.py",),
+        ("drivers-published", "drivers-traffic"),
+    ),
+    Measurement(
+        "airlight",
+        (
+            "fogsim reproduce airlight --json --out docs/pictures > runs/tables/airlight.kept",
+            "python docs/make_airlight_tables.py runs/tables/airlight.kept",
+        ),
+        10,
+        (AIRLIGHT, "docs/make_airlight_tables.py"),
+        ("lands", "conditions", "car", "lorry"),
+    ),
+    benchmark("photon_fog", 14, ("mended",), " --drives 2"),
+    Measurement(
+        "surroundings",
+        (f"python benchmarks/monte_carlo.py surroundings {PHOTONS}", "python docs/make_airlight_tables.py"),
+        60,
+        ("benchmarks/monte_carlo.py", "docs/make_airlight_tables.py"),
+    ),
+    study("belief_over_places", 10),
+    study("which_sensor", 20),
+    study("who_tells_of_the_bank", 40),
+    study("lighting_policies", 40),
+    study("estimators_in_the_loop", 40),
+    study("motorway_compliance", 60),
+    study("field_sizes", 40),
+    study("motorway_policies", 180),
+    environment(
+        "advisory", 15, ("returns fogsim/FogAdvisory-v1",), "fogsim/FogAdvisory-v1 --episodes 30", "fogsim/loop.py"
+    ),
+    environment("advisory_fast", 8, ("returns fogsim/FogAdvisoryFast-v1",), "fogsim/FogAdvisoryFast-v1"),
+    environment("densities", 8, ("densities",), "--density"),
+    environment("surrogate", 10, ("surrogate",), "--surrogate --episodes 90", "benchmarks/surrogate.py"),
+    environment(
+        "corridor",
+        20,
+        ("returns fogsim/FogCorridor-v1",),
+        "--corridor --episodes 8",
+        "benchmarks/corridor.py",
+        "envs/fogsim_envs/corridor",
+    ),
+)
+"""All of them, the quick ones first."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unwritten:
+    """Tables with figures that no command writes.
+
+    Attributes
+    ----------
+    page : str
+        Where they are.
+    about : str
+        What they tell.
+    figures : str
+        Command that prints their figures, or whence they are.
+    """
+
+    page: str
+    about: str
+    figures: str
+
+
+UNWRITTEN = (
+    Unwritten("docs/benchmarks/policies.md", "beside what was seen on real roads", "from `field_sizes`, by hand"),
+    Unwritten("docs/explanation/drivers.md", "who sees what at night", "`fogsim.traffic.drivers.own_beams`, by hand"),
+    Unwritten("docs/explanation/drivers.md", "how far a traffic light is seen", "Allard's law, by hand"),
+    Unwritten("docs/explanation/drivers.md", "gaps accepted at a crossing", "`python benchmarks/junctions.py`"),
+    Unwritten("docs/explanation/drivers.md", "collisions behind who stands", "`python benchmarks/collisions.py`"),
+    Unwritten("docs/explanation/drivers.md", "networks that FogSim did not write", "`python benchmarks/networks.py`"),
+    Unwritten("docs/explanation/drivers.md", "cost beside SUMO's step", "`python benchmarks/traffic.py`"),
+    Unwritten("docs/explanation/estimators.md", "what of the papers is reached", "`fogsim reproduce NAME`"),
+    Unwritten("docs/explanation/night.md", "pictures taken for fog, glow", "`python benchmarks/night_sources.py`"),
+    Unwritten("docs/explanation/night.md", "pictures of drives taken for fog", "`fogsim reproduce gallen2014`"),
+    Unwritten("docs/explanation/night.md", "sight by low and high beams", "`fogsim.lighting.own_sight`, by hand"),
+    Unwritten("docs/explanation/physics.md", "how roads reflect", "`python tools/make_road_reflectance.py`"),
+    Unwritten("docs/explanation/signs.md", "how well signs are found", "`python benchmarks/sign_detector.py`"),
+    Unwritten("docs/explanation/signs.md", "visibility by first detection", "`fogsim reproduce belaroussi2015`"),
+    Unwritten("docs/reference/environments.md", "returns beside thresholds", "`fogsim_envs.evaluate`, by hand"),
+    Unwritten("docs/reference/environments.md", "what an agent learned", "`python examples/train_ppo.py`"),
+)
+"""Tables of figures that are written by hand."""

@@ -1,0 +1,117 @@
+"""Tables between marks of pages, ``<!-- table: NAME -->`` … ``<!-- end of … -->``, and the line that dates one."""
+
+import hashlib
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+NUMBER = r"\d+(?:\.\d+)?"
+MARK = re.compile(r"<!-- table: (.+?) -->\n")
+END = "<!-- end of "
+LINE = "\n\n*Measured with {} <!-- measured: {} -->"
+
+
+def pages(root: Path) -> list[Path]:
+    """Pages that have tables."""
+    return [root / "README.md", *sorted(root.glob("docs/**/*.md")), *sorted(root.glob("scenarios/*/README.md"))]
+
+
+def places(root: Path) -> dict[str, Path]:
+    """Page of every table, by its name."""
+    return {name: page for page in pages(root) for name in MARK.findall(page.read_text(encoding="utf-8"))}
+
+
+def block(text: str, name: str) -> str:
+    """What stands between a table's marks."""
+    return _parts(text, name)[1]
+
+
+def with_block(text: str, name: str, new: str) -> str:
+    """A page's text with something else between a table's marks."""
+    before, _, after = _parts(text, name)
+    return before + new + after
+
+
+def with_line(text: str, name: str, told: str) -> str:
+    """A page's text with the line below a table that says when it was measured."""
+    text = re.sub(rf"\n\n\*Measured with [^\n]* <!-- measured: {re.escape(name)} -->", "", text)
+    before, table, after = _parts(text, name)
+    end, rest = after.split("\n", 1)
+    return before + table + end + LINE.format(told, name) + "\n" + rest
+
+
+def _parts(text: str, name: str) -> tuple[str, str, str]:
+    mark = f"<!-- table: {name} -->\n"
+    before, rest = text.split(mark, 1)
+    table, _, after = rest.partition(END)
+    return before + mark, table, END + after
+
+
+def link(page: Path, to: Path, anchor: str = "") -> str:
+    """A relative link from one page to another."""
+    return os.path.relpath(to, page.parent) + anchor
+
+
+def grid(table: str) -> list[list[str]]:
+    """Cells by rows, without the rules below headings; a line that is no row is one cell."""
+    rows = [re.split(r"(?<!\\)\|", line.strip().strip("|")) for line in table.splitlines() if line.strip()]
+    cells = [[cell.strip() for cell in row] for row in rows]
+    return [row for row in cells if not all(re.fullmatch(r":?-+:?", cell) for cell in row)]
+
+
+def digest(table: str) -> str:
+    """Digest of what a table says."""
+    return hashlib.sha256(repr(grid(table)).encode()).hexdigest()[:12]
+
+
+def same(kept: str, measured: str) -> bool:
+    """Whether two texts differ in no more than the last digits of their numbers, by one."""
+    ours, theirs = re.findall(NUMBER, kept), re.findall(NUMBER, measured)
+    return re.split(NUMBER, kept) == re.split(NUMBER, measured) and all(
+        len(one.partition(".")[2]) == len(other.partition(".")[2])
+        and abs(round((float(one) - float(other)) * 10 ** len(one.partition(".")[2]))) <= 1
+        for one, other in zip(ours, theirs, strict=True)
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """A cell of a table that says something else than before.
+
+    Attributes
+    ----------
+    table, row, column : str
+        Where it is: name, first cells of the row, heading.
+    old, new : str
+        What it said, and what it says.
+    """
+
+    table: str
+    row: str
+    column: str
+    old: str
+    new: str
+
+
+def moved(name: str, before: str, after: str) -> list[Moved]:
+    """Cells that differ by more than the last digit; if rows or columns are others, the table as one."""
+    old, new = grid(before), grid(after)
+    if [len(row) for row in old] != [len(row) for row in new]:
+        sizes = (f"{len(rows)} rows of {max(map(len, rows), default=0)}" for rows in (old, new))
+        return [Moved(name, "all", "all", *sizes)]
+    found = []
+    heading: list[str] = []
+    for ours, theirs in zip(old, new, strict=True):
+        if len(heading) != len(theirs):
+            heading = theirs
+        row = " | ".join(theirs[: max(1, _words(theirs))])
+        for column, one, other in zip(heading, ours, theirs, strict=True):
+            if not same(one, other):
+                found.append(Moved(name, row, column, one, other))
+    return found
+
+
+def _words(row: list[str]) -> int:
+    """How many cells at the beginning of a row say what it is about: up to three, the first of figures included."""
+    return next((place for place, cell in enumerate(row[:3]) if re.match(r"[-+−]?\d.*[./±\[]", cell)), min(3, len(row)))

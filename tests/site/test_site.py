@@ -85,9 +85,8 @@ def browser() -> Iterator[Browser]:
 @pytest.fixture(scope="module")
 def visits(site: Path, browser: Browser) -> dict[str, Visit]:
     """Every page of the site, at the width of a phone, by its path."""
-    page = browser.new_page(viewport=PHONE)
     pages = sorted(path for path in site.rglob("*.html") if path.name != "404.html")
-    return {path.relative_to(site).as_posix(): visited(page, path) for path in pages}
+    return {path.relative_to(site).as_posix(): visited(browser.new_page(viewport=PHONE), path) for path in pages}
 
 
 def visited(page: Page, path: Path) -> Visit:
@@ -112,8 +111,7 @@ def visited(page: Page, path: Path) -> Visit:
         complaints=tuple(complaints),
         elsewhere=tuple(elsewhere),
     )
-    for event in ("pageerror", "requestfailed", "request"):
-        page.remove_all_listeners(event)
+    page.close()
     return found
 
 
@@ -169,7 +167,8 @@ def test_search_finds_it(query: str, browser: Browser, site: Path) -> None:
     page = browser.new_page(viewport=DESK)
     page.goto((site / "index.html").as_uri())
     page.click(".md-search__input")
-    page.fill(".md-search__input", query)
+    # The theme listens to keys, as a person presses them.
+    page.locator(".md-search__input").press_sequentially(query)
     page.wait_for_selector(".md-search-result__item a", timeout=30_000)
     found = page.eval_on_selector_all(".md-search-result__item a", "all => all.map(a => a.href)")
     assert any(QUERIES[query] in link for link in found[:20]), found[:20]
@@ -181,6 +180,6 @@ def test_text_can_be_read_on_a_phone(browser: Browser, site: Path) -> None:
     page.goto((site / "tutorial" / "first_run.html").as_uri())
     size = page.evaluate("parseFloat(getComputedStyle(document.querySelector('article p')).fontSize)")
     assert size >= 14
-    page.click("label[for='__drawer']")
+    page.click("label.md-header__button[for='__drawer']")
     assert page.is_visible(".md-nav--primary")
     page.close()

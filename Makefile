@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 export PYTHONDONTWRITEBYTECODE :=
 
 .DEFAULT_GOAL := help
-.PHONY: help check demo test quick hooks portability cluster notebooks site browse lint types contracts ci tables clean
+.PHONY: help check demo test quick hooks portability cluster notebooks site browse pythons lint types contracts ci tables clean
 
 help: ## Show what can be made
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -41,8 +41,9 @@ demo: $(VENV)/.installed ## Run the demo scenario; results go to runs/demo/
 # tenth of the time of tests that paint. Other C libraries do not know these names.
 test: export MALLOC_MMAP_THRESHOLD_ := 1000000000
 test: export MALLOC_TRIM_THRESHOLD_ := 2000000000
-test: $(VENV)/.installed-test $(VENV)/.compiled ## Run the whole test suite but for portability, cluster, notebooks and the site
-	@$(BIN)/python -m pytest -n auto --dist worksteal --ignore tests/portability --ignore tests/cluster --ignore tests/notebooks --ignore tests/site
+test: $(VENV)/.installed-test $(VENV)/.compiled ## Run the whole test suite but for what has a command of its own
+	@$(BIN)/python -m pytest -n auto --dist worksteal --ignore tests/portability --ignore tests/cluster --ignore tests/notebooks --ignore tests/site \
+		--ignore tests/pythons
 
 quick: $(VENV)/.installed-test ## Run the tests that take half a minute together
 	@$(BIN)/python -m pytest -q tests/advice tests/files tests/fusion tests/lighting tests/metrics tests/sensors tests/values
@@ -80,6 +81,9 @@ site: $(VENV)/.installed-docs ## Build the documentation site into site/, to be 
 
 browse: $(VENV)/.installed-docs ## Build the site and look at it in a headless browser, without changing site/
 	@$(BIN)/python -m pytest -q tests/site
+
+pythons: $(VENV)/.installed-test ## Install the wheel into an empty environment of each Python 3.11 to 3.13 that is here, and run it
+	@$(BIN)/python -m pytest -q tests/pythons
 
 lint: $(VENV)/.installed-test ## Check style
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check .

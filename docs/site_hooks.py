@@ -7,6 +7,7 @@ files of docs/, so that no text is there twice. Links are written as they hold i
 import posixpath
 import re
 from collections.abc import Iterator
+from importlib.metadata import version
 from pathlib import Path
 
 import typer.main
@@ -37,6 +38,12 @@ PLACES = {page.relative_to(ROOT).as_posix(): place for place, page in pages_else
 """Where each of them is on the site, by its path in the checkout."""
 
 
+def on_config(config: MkDocsConfig) -> MkDocsConfig:
+    """Put the version below each page."""
+    config.copyright = f"FogSim {version('fogsim')}"
+    return config
+
+
 @event_priority(100)  # before the notebooks' plugin, which looks for what it reads
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages that are no files of docs/."""
@@ -44,7 +51,9 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         if page.suffix == ".ipynb":
             files.append(linked_notebook(place, page, config))
         else:
-            files.append(File.generated(config, place, content=page.read_text(encoding="utf-8")))
+            # What once changed is not what somebody looks for.
+            hidden = "---\nsearch:\n  exclude: true\n---\n" if place == "changelog.md" else ""
+            files.append(File.generated(config, place, content=hidden + page.read_text(encoding="utf-8")))
     return files
 
 

@@ -15,7 +15,7 @@ def test_the_changelog_and_the_citation_have_the_version_and_its_date() -> None:
     assert citation["version"] == VERSION
     headings = re.findall(r"^## (.+)$", (CHECKOUT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
     released = next(heading for heading in headings if heading != "Unreleased")
-    assert released == f"{VERSION} - {citation['date-released']}"
+    assert released == f"{VERSION} – {citation['date-released']}"
 
 
 def test_the_citation_has_what_its_format_asks_for() -> None:

@@ -10,11 +10,13 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 VERSION = tomllib.loads((CHECKOUT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
 
 
-def test_the_changelog_and_the_citation_have_the_version_and_its_date() -> None:
+def test_changelog_citation_and_page_have_the_version_and_its_date() -> None:
     citation = yaml.safe_load((CHECKOUT / "CITATION.cff").read_text(encoding="utf-8"))
     assert citation["version"] == VERSION
     headings = re.findall(r"^## (.+)$", (CHECKOUT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
     released = next(heading for heading in headings if heading != "Unreleased")
+    page = (CHECKOUT / "docs" / "benchmarks" / "reproducibility.md").read_text(encoding="utf-8")
+    assert f"version = {{{VERSION}}}" in page
     assert released == f"{VERSION} – {citation['date-released']}"
 
 

@@ -30,7 +30,8 @@ def list_command() -> None:
     stdout.print()
     stdout.print(f"[bold]study[/]: {', '.join(shipped_studies())}")
     for registry in (ESTIMATORS, FUSIONS, ADVISERS, LIGHTING_POLICIES, RENDERERS):
-        stdout.print(f"[bold]{registry.kind}[/]: {', '.join(registry)}")
+        # FogSim's own in their order, then what installed packages announce.
+        stdout.print(f"[bold]{registry.kind}[/]: {', '.join(dict.fromkeys((*registry, *registry.known)))}")
 
 
 def validate_command(files: Annotated[list[str], typer.Argument(help="Scenario files, folders or names.")]) -> None:

@@ -199,6 +199,19 @@ def test_list_names_scenarios_and_methods(command: Command) -> None:
     assert (marked["rising_sun"], marked["graded_motorway"]) == ("test", "A")
 
 
+def test_list_names_methods_of_installed_packages(
+    tmp_path: Path, command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    info = tmp_path / "road_fade-0.1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: road-fade\nVersion: 0.1.0\n")
+    (info / "entry_points.txt").write_text("[fogsim.estimators]\nroad_fade = road_fade:RoadFade\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    done = command("list")
+    assert done.returncode == 0, done.stderr
+    assert "scatterometer, road_fade" in done.stdout
+
+
 def test_signs_are_written_as_geojson(tmp_path: Path, command: Command) -> None:
     out = tmp_path / "new" / "signs.geojson"
     done = command("signs", "motorway_fog_bank", "--out", str(out))

@@ -143,7 +143,7 @@ MEASUREMENTS = (
         60,
         ("benchmarks/monte_carlo.py", "docs/make_airlight_tables.py"),
     ),
-    study("belief_over_places", 10),
+    study("belief_over_places", 40),
     study("which_sensor", 20),
     study("who_tells_of_the_bank", 40),
     study("lighting_policies", 40),

@@ -95,23 +95,27 @@ class Moved:
 
 
 def moved(name: str, before: str, after: str) -> list[Moved]:
-    """Cells that differ by more than the last digit; if rows or columns are others, the table as one."""
+    """Cells that differ by more than the last digit, and rows that are new or gone, or have other columns."""
     old, new = grid(before), grid(after)
-    if [len(row) for row in old] != [len(row) for row in new]:
-        sizes = (f"{len(rows)} rows of {max(map(len, rows), default=0)}" for rows in (old, new))
-        return [Moved(name, "all", "all", *sizes)]
-    found = []
-    heading: list[str] = []
-    for ours, theirs in zip(old, new, strict=True):
-        if len(heading) != len(theirs):
-            heading = theirs
-        row = " | ".join(theirs[: max(1, _words(theirs))])
-        for column, one, other in zip(heading, ours, theirs, strict=True):
-            if not same(one, other):
-                found.append(Moved(name, row, column, one, other))
+    if [len(row) for row in old] == [len(row) for row in new]:
+        pairs = list(zip(old, new, strict=True))
+    else:
+        known = {_label(row): row for row in old}
+        pairs = [(known.pop(_label(row), []), row) for row in new]
+        pairs += [(row, []) for row in known.values()]
+    found, heading = [], new[0] if new else []
+    for ours, theirs in pairs:
+        row = _label(theirs or ours)
+        if len(ours) != len(theirs):
+            found.append(Moved(name, row, "all", " | ".join(ours) or "–", " | ".join(theirs) or "–"))
+            continue
+        heading = heading if len(heading) == len(theirs) else theirs
+        cells = zip(heading, ours, theirs, strict=True)
+        found += [Moved(name, row, column, one, other) for column, one, other in cells if not same(one, other)]
     return found
 
 
-def _words(row: list[str]) -> int:
-    """How many cells at the beginning of a row say what it is about: up to three, the first of figures included."""
-    return next((place for place, cell in enumerate(row[:3]) if re.match(r"[-+−]?\d.*[./±\[]", cell)), min(3, len(row)))
+def _label(row: list[str]) -> str:
+    """What a row is about: its first cells, three at most, up to the first of figures."""
+    figures = (place for place, cell in enumerate(row[:3]) if re.match(r"[-+−]?\d.*[./±\[]", cell))
+    return " | ".join(row[: max(1, next(figures, 3))])

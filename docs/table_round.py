@@ -1,5 +1,6 @@
 """Running the commands that measure tables: one after the other, interruptible, and what moved by them."""
 
+import contextlib
 import json
 import os
 import shutil
@@ -133,7 +134,7 @@ class Round:
         """What moved in this round, written to runs/tables/moved.md and moved.json as well."""
         finished = self._kept["finished"]
         cells = [Moved(**cell) for found in finished.values() for cell in found["moved"]]
-        lines = [f"# {len(cells)} figures moved in the tables of {', '.join(finished) or 'none'}", ""]
+        lines = [f"# Figures that moved in the tables of {', '.join(finished) or 'none'}: {len(cells)}", ""]
         if cells:
             lines += ["| table | row | column | was | is |", "| --- | --- | --- | --- | --- |"]
         told = [[text.replace("|", "·") for text in asdict(cell).values()] for cell in cells]
@@ -154,12 +155,21 @@ def wait(process: "subprocess.Popen[bytes]", tick: Callable[[], None]) -> int:
             except subprocess.TimeoutExpired:
                 tick()
     except BaseException:
-        os.killpg(process.pid, signal.SIGINT)
-        try:
-            process.wait(timeout=PATIENCE)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
+        end(process)
         raise
+
+
+def end(process: "subprocess.Popen[bytes]") -> None:
+    """End a command and all that it started: it may take some time to put its results in order, and no longer."""
+    until = time.monotonic() + PATIENCE
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGTERM)
+        while time.monotonic() < until:
+            process.poll()
+            time.sleep(0.1)
+            os.killpg(process.pid, 0)
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
 
 
 def restore(before: dict[Path, str], old: dict[str, str], where: dict[str, Path]) -> None:

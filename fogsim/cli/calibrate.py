@@ -25,7 +25,7 @@ def _commands() -> None:
 
 @calibrate.command("signs")
 def calibrate_signs_command(
-    camera: Annotated[Path, typer.Option(help="Camera file (docs/how_to/estimate.md), of images that are straight.")],
+    camera: Annotated[Path, typer.Option(help="Camera file (docs/how_to/own_camera.md), of images that are straight.")],
     sign_diameter: Annotated[float, typer.Option(help="Size of the signs in m.", min=0.1, max=5.0)] = 0.9,
     out: Annotated[Path, typer.Option(help="File of the calibration.")] = Path("signs_range.json"),
     approaches: Annotated[int, typer.Option(help="Signs that are driven up to in each fog.", min=4)] = 24,
@@ -76,7 +76,7 @@ def calibrate_signs_command(
 
 @calibrate.command("halos")
 def calibrate_halos_command(
-    camera: Annotated[Path, typer.Option(help="Camera file (docs/how_to/estimate.md), of images that are straight.")],
+    camera: Annotated[Path, typer.Option(help="Camera file (docs/how_to/own_camera.md), of images that are straight.")],
     out: Annotated[Path, typer.Option(help="File of the calibration.")] = Path("halos.json"),
     scenes: Annotated[int, typer.Option(help="Scenes that are drawn, each in clear air and in fog.", min=4)] = 80,
     lens_glare: Annotated[
@@ -125,7 +125,7 @@ def calibrate_halos_command(
 
 @calibrate.command("veil")
 def calibrate_veil_command(
-    camera: Annotated[Path, typer.Option(help="Camera file (docs/how_to/estimate.md), of images that are straight.")],
+    camera: Annotated[Path, typer.Option(help="Camera file (docs/how_to/own_camera.md), of images that are straight.")],
     lamps: Annotated[
         Path | None, typer.Option(help="File of the head lamps (docs/explanation/night.md). Default: a car's.")
     ] = None,

@@ -254,7 +254,7 @@ def test_the_command_straightens(draw: Draw, tmp_path: Path) -> None:
 
 
 def test_the_page_shows_a_file_that_can_be_read(tmp_path: Path) -> None:
-    page = (Path(__file__).resolve().parents[2] / "docs" / "how_to" / "estimate.md").read_text(encoding="utf-8")
+    page = (Path(__file__).resolve().parents[2] / "docs" / "how_to" / "own_camera.md").read_text(encoding="utf-8")
     (tmp_path / "camera.yaml").write_text(page.split("```yaml\n")[1].split("```")[0], encoding="utf-8")
     calibration = load_calibration(tmp_path / "camera.yaml")
     assert len(calibration.distortion) == 4

@@ -106,7 +106,7 @@ def _fog_depth(
     if kind is None:
         raise InputError("--depth-kind is missing: planar or range? Data sets differ, and the wrong one goes unseen")
     if camera is None:
-        raise InputError("--camera is missing: a depth map needs the camera file (docs/how_to/estimate.md)")
+        raise InputError("--camera is missing: a depth map needs the camera file (docs/how_to/own_camera.md)")
     if is_video(image):
         raise InputError(f"{image}: a depth map is of one image; on a video fog is laid with --road-plane")
     calibration = load_calibration(camera)

@@ -5,6 +5,7 @@ And what lets two of them work at once on a picture's rows.
 
 import _thread
 import functools
+import gc
 import hashlib
 import logging
 import multiprocessing
@@ -21,6 +22,10 @@ from numba.core import event, serialize
 # Where Intel's vector functions are installed, numba would take them, and they round otherwise than the C library does.
 os.environ["NUMBA_DISABLE_INTEL_SVML"] = "1"
 import numba
+
+from fogsim.code_libraries import LinkedLibrary, defer_code
+
+defer_code()
 
 # For the class of each array or named tuple that a kernel returns, numba calls this, and goes on whatever comes of it:
 # an exception of a signal's handler in it is lost, or the process is. Nothing is interrupted within a cache in C.
@@ -65,7 +70,7 @@ class Announcement(event.Listener):  # type: ignore[misc] # numba is untyped
             if self._told is None and self._spent > _PATIENCE:
                 self._told = self._started
                 self._tell(
-                    "fogsim: compiling for this processor, one to three minutes, the first time only "
+                    "fogsim: compiling for this processor, a minute or two, the first time only "
                     "(ahead of time and on all cores: fogsim compile)"
                 )
         self._depth += 1
@@ -82,7 +87,36 @@ class Announcement(event.Listener):  # type: ignore[misc] # numba is untyped
                 self._tell(f"fogsim: compiled {self._compiled} functions in {self._spent:.0f} s")
 
 
+class Economy(event.Listener):  # type: ignore[misc] # numba is untyped
+    """Leaves out what costs time while one of FogSim's kernels is compiled, with all that it calls.
+
+    That is the search for garbage, of which compiling makes little among millions of objects, and machine code for
+    functions that are compiled into others (`LinkedLibrary`).
+    """
+
+    def __init__(self) -> None:
+        self._depth = 0
+        self._collects = False
+
+    def on_start(self, compiling: Any) -> None:
+        """Begin at the outermost kernel."""
+        if self._depth == 0 and compiling.data["dispatcher"].py_func.__module__.startswith(f"{__package__}."):
+            self._collects = gc.isenabled()
+            gc.disable()
+            LinkedLibrary.deferring = True
+        self._depth += 1
+
+    def on_end(self, _: Any) -> None:
+        """End where it began."""
+        self._depth -= 1
+        if self._depth == 0 and LinkedLibrary.deferring:
+            LinkedLibrary.deferring = False
+            if self._collects:
+                gc.enable()
+
+
 event.register("numba:compile", Announcement(logging.getLogger(__package__).warning))
+event.register("numba:compile", Economy())
 
 
 def kernel(function: F) -> F:
@@ -94,23 +128,26 @@ def kernel(function: F) -> F:
     Parameters
     ----------
     function : callable
-        Of arrays, numbers and named tuples of them.
+        Of arrays, numbers and named tuples of them; it does not call itself.
     """
-    options = {"nogil": True, "fastmath": False, "error_model": "numpy"}
+    options = {"nogil": True, "fastmath": False, "error_model": "numpy", "no_cfunc_wrapper": True}
     plain = cast("FunctionType", function)
     # numba names the file after the function, and compiles again when the function's module changes, but not when
     # another does that it calls or takes constants from: so the name that numba sees says what those were.
     name = plain.__qualname__
     plain.__qualname__ = f"{name}-{_fingerprint(plain)}"
     try:
-        compiled = numba.njit(cache=True, **options)(function)
+        compiled: Any = numba.njit(cache=True, **options)(function)
         _forgive_outdated_index(compiled)
-        return cast("F", compiled)
     except RuntimeError:
         # numba found no place for its cache
-        return cast("F", numba.njit(cache=False, **options)(function))
+        compiled = numba.njit(cache=False, **options)(function)
     finally:
         plain.__qualname__ = name
+    # Other kernels take one in that Python cannot call and that is not kept: they are kept, and it is in them.
+    inner: Any = numba.njit(cache=False, no_cpython_wrapper=True, **options)(function)
+    compiled.get_call_template, compiled.get_overload = inner.get_call_template, inner.get_overload
+    return cast("F", compiled)
 
 
 def _forgive_outdated_index(compiled: Any) -> None:

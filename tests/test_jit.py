@@ -116,3 +116,96 @@ def test_a_signal_in_a_kernels_call_is_a_keyboard_interrupt_and_no_crash() -> No
     done = subprocess.run([sys.executable, "-c", INTERRUPTED], capture_output=True, text=True, check=False, timeout=120)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == "{'KeyboardInterrupt': 5000}"
+
+
+SCRATCH = """
+import gc
+
+import numpy as np
+
+import fogsim.jit
+from fogsim.code_libraries import LinkedLibrary
+
+fogsim.jit.__package__ = "scratch"
+
+@fogsim.jit.kernel
+def root(x):
+    if x < 0.0:
+        raise ValueError("less than nothing", x)
+    return np.sqrt(np.array([x]))[0]
+
+@fogsim.jit.kernel
+def doubled_root(x):
+    return 2.0 * root(x)
+
+def failure(function):
+    try:
+        function(-1.0)
+    except ValueError as error:
+        return str(error.args)
+
+made = []
+make_code = LinkedLibrary._make_code
+LinkedLibrary._make_code = lambda self: made.append(self.name) or make_code(self)
+"""
+"""A kernel that raises an error, and one that takes it in; both belong to a package that is taken for FogSim."""
+
+WHAT_SCRATCH_DOES = """
+from scratch.kernels import *
+print(doubled_root(4.0), failure(doubled_root))
+print([name for name in made if name != "nrt"])
+print(root(9.0), failure(root), gc.isenabled(), LinkedLibrary.deferring)
+"""
+
+
+def test_a_kernel_within_another_gets_no_code_of_its_own_until_python_calls_it(tmp_path: Path) -> None:
+    """Errors that it raises are the same within the other, compiled or from the disk."""
+    (tmp_path / "scratch").mkdir()
+    (tmp_path / "scratch" / "__init__.py").touch()
+    (tmp_path / "scratch" / "kernels.py").write_text(SCRATCH)
+    error = "('less than nothing', -1.0)"
+    for compiled in ("['doubled_root']", "[]"):
+        done = subprocess.run(
+            [sys.executable, "-c", WHAT_SCRATCH_DOES],
+            env={**os.environ, "PYTHONPATH": os.pathsep.join((str(tmp_path), *sys.path))},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert done.stdout.splitlines() == [f"4.0 {error}", compiled, f"3.0 {error} True False"]
+
+
+OTHERS = """
+import numba
+
+import fogsim.jit
+from fogsim.code_libraries import LinkedLibrary
+
+made = []
+make_code = LinkedLibrary._make_code
+LinkedLibrary._make_code = lambda self: made.append(self.name) or make_code(self)
+
+@numba.njit
+def inner(x):
+    return x + 1
+
+@numba.vectorize
+def each(x):
+    return inner(x)
+
+@numba.njit
+def apply(function, x):
+    return function(x)
+
+@numba.cfunc("float64(float64)")
+def callback(x):
+    return inner(x)
+
+import numpy as np
+print(each(np.arange(3.0)).tolist(), apply(inner, 1.0), callback.ctypes(3.0), len(made) > 3)
+"""
+
+
+def test_functions_that_others_compile_with_numba_are_compiled_as_ever() -> None:
+    done = subprocess.run([sys.executable, "-c", OTHERS], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[1.0, 2.0, 3.0] 2.0 4.0 True"

@@ -1,0 +1,98 @@
+"""Machine code for what Python calls, and none for what is compiled into it: half of a first run's time in LLVM.
+
+numba makes machine code of each function that another one calls, though the caller has a copy of its own.
+"""
+
+from typing import Any, ClassVar
+
+import numba
+from llvmlite.binding import ModuleRef  # type: ignore[import-untyped]
+from numba.core import codegen
+from numba.core.environment import lookup_environment
+
+_KNOWN = {(0, 68)}
+"""Versions of numba whose inner working is known to be as it is taken here; others compile as they do, only longer."""
+
+_ENVIRONMENT = "_ZN08NumbaEnv"
+"""Begins the name of the place where a function's code finds what belongs to it in Python, as errors that it raises."""
+
+_CALLED_FROM_PYTHON = "_ZN7cpython"
+"""Begins the name of a function that takes Python's objects."""
+
+
+class LinkedLibrary(codegen.JITCodeLibrary):  # type: ignore[misc] # numba is untyped
+    """Compiled functions that others link; machine code is made of them when it is asked for.
+
+    Attributes
+    ----------
+    deferring : bool
+        Whether what is compiled is put off so: within FogSim's kernels, and not within anybody else's.
+    """
+
+    deferring: ClassVar[bool] = False
+
+    _put_off = False
+
+    def _optimize_functions(self, ll_module: ModuleRef) -> None:
+        """Simplify what is defined in a module; numba takes what is only declared too, which is most."""
+        ll_module.data_layout = self._codegen._data_layout
+        for function in ll_module.functions:
+            if not function.is_declaration:
+                passes, builder = self._codegen._function_pass_manager()
+                passes.run(function, builder)
+
+    def _is_linked_only(self) -> bool:
+        return self.deferring and not any(
+            function.name.startswith(_CALLED_FROM_PYTHON) and not function.is_declaration
+            for function in self._final_module.functions
+        )
+
+    def _finalize_final_module(self) -> None:
+        if self._object_caching_enabled and self._compiled_object:
+            # It comes from the disk with its machine code.
+            super()._finalize_final_module()
+        elif self._is_linked_only():
+            self._finalize_dynamic_globals()
+            self._verify_declare_only_symbols()
+            self._put_off = self._finalized = True
+        else:
+            self._make_code()
+
+    def _make_code(self) -> None:
+        self._put_off = False
+        super()._finalize_final_module()
+        # What is linked has its places here alone.
+        for variable in self._final_module.global_variables:
+            if variable.name.startswith(_ENVIRONMENT):
+                environment = lookup_environment(variable.name)
+                if environment is not None:
+                    self._codegen.set_env(variable.name, environment)
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Address of a function, whose machine code is made now if it was put off; 0 if it is not defined here."""
+        self._ensure_finalized()
+        if self._put_off:
+            if all(function.name != name or function.is_declaration for function in self._final_module.functions):
+                return 0
+            self._make_code()
+        return int(super().get_pointer_to_function(name))
+
+    def _get_compiled_object(self) -> Any:
+        if self._put_off:
+            self._make_code()
+        return super()._get_compiled_object()
+
+
+def defer_code() -> None:
+    """Let numba use `LinkedLibrary`, if this version is known."""
+    if numba.version_info.short not in _KNOWN or codegen.JITCPUCodegen._library_class is LinkedLibrary:
+        return
+    codegen.JITCPUCodegen._library_class = LinkedLibrary
+    set_env = codegen.JITCPUCodegen.set_env
+
+    def set_env_if_there(self: Any, name: str, environment: Any) -> None:
+        """Do without the place that code has which was not made."""
+        if self._engine.get_global_value_address(name):
+            set_env(self, name, environment)
+
+    codegen.JITCPUCodegen.set_env = set_env_if_there

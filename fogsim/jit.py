@@ -11,7 +11,8 @@ import logging
 import multiprocessing
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any, TypeVar, cast
@@ -119,6 +120,56 @@ event.register("numba:compile", Announcement(logging.getLogger(__package__).warn
 event.register("numba:compile", Economy())
 
 
+class Beside:
+    """Another process that compiles kernels of some modules: who finds one of these not compiled waits for it."""
+
+    def __init__(self) -> None:
+        self._wait: Callable[[], object] | None = None
+        self._packages: tuple[str, ...] = ()
+
+    @contextmanager
+    def compiles(self, wait: Callable[[], object], packages: Sequence[str]) -> Iterator[None]:
+        """Reckon with another process.
+
+        Parameters
+        ----------
+        wait : callable
+            Returns when that process has ended.
+        packages : sequence of str
+            Beginnings of the names of modules whose kernels it compiles and keeps on the disk.
+        """
+        self._wait, self._packages = wait, tuple(packages)
+        try:
+            yield
+        finally:
+            self._wait = None
+
+    def is_awaited(self, module: str) -> bool:
+        """Wait for the other process if it compiles a module's kernels; whether it did, once."""
+        if self._wait is None or not module.startswith(self._packages):
+            return False
+        wait, self._wait = self._wait, None
+        wait()
+        return True
+
+
+BESIDE = Beside()
+"""What is compiled beside this process, in another one."""
+
+
+def is_kept(compiled: object) -> bool | None:
+    """Whether anything of a kernel is on the disk; None where nothing can be kept.
+
+    Parameters
+    ----------
+    compiled : callable
+        A kernel.
+    """
+    file: Any = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
+    path = getattr(file, "_index_path", None)
+    return None if path is None else Path(path).exists()
+
+
 def kernel(function: F) -> F:
     """Compile a function on its first call, without Python's lock and without threads (forks must stay possible).
 
@@ -139,6 +190,7 @@ def kernel(function: F) -> F:
     try:
         compiled: Any = numba.njit(cache=True, **options)(function)
         _forgive_outdated_index(compiled)
+        _look_again(compiled)
     except RuntimeError:
         # numba found no place for its cache
         compiled = numba.njit(cache=False, **options)(function)
@@ -164,6 +216,17 @@ def _forgive_outdated_index(compiled: Any) -> None:
             return {}
 
     file._load_index = load_index
+
+
+def _look_again(compiled: Any) -> None:
+    """Let a kernel that another process compiles meanwhile be looked for on the disk again when that has ended."""
+    load, module = compiled._cache.load_overload, compiled.py_func.__module__
+
+    def load_overload(signature: Any, target: Any) -> Any:
+        found = load(signature, target)
+        return load(signature, target) if found is None and BESIDE.is_awaited(module) else found
+
+    compiled._cache.load_overload = load_overload
 
 
 def _fingerprint(function: FunctionType) -> str:

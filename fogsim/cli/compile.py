@@ -3,10 +3,10 @@
 import dataclasses
 import logging
 import multiprocessing
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from itertools import islice
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from fogsim.cli.printing import stderr, stdout
 
@@ -70,7 +70,7 @@ def compile_kernels() -> Iterator[str]:
             pool.submit(_estimate_visibility): "estimators",
             pool.submit(_detect_signs): "signs",
             pool.submit(_find_lamps): "lamps",
-            pool.submit(_read_own_beams): "methods of the night",
+            pool.submit(read_own_beams): "methods of the night",
             pool.submit(_light_a_road): "head lamps on the road",
             pool.submit(_restore_contrast): "contrast restoration",
         }
@@ -121,6 +121,26 @@ def _estimate_visibility() -> None:
     _follow_a_bend(camera)
 
 
+def read_foggy_road(method: str, parameters: Mapping[str, Any], size: Sequence[int]) -> None:
+    """Let a method read pictures of a foggy road by day.
+
+    Parameters
+    ----------
+    method : str
+        Its name.
+    parameters : mapping
+        Its own.
+    size : (2,) sequence of int
+        Width and height of the pictures [px].
+    """
+    from fogsim.estimators import ESTIMATORS
+    from fogsim.values import Camera
+
+    width, height = size
+    camera = Camera(width, height, 0.9 * width, (width / 2, height / 2), 1.4, pitch=0.03)
+    _read(ESTIMATORS[method](camera=camera, **parameters), camera)
+
+
 def _restore_contrast() -> None:
     """Restore pictures of a foggy road of 8 and 16 bits, for the eye too."""
     import numpy as np
@@ -164,7 +184,7 @@ def _read(estimator: "Estimator", camera: "Camera") -> None:
         estimator.update(Observation(frame, 20.0, LeadMeasurement(distance, 5.0), ()))
 
 
-def _read_own_beams() -> None:
+def read_own_beams() -> None:
     """Let methods of the night read pictures of a lit road, in colour and in grey."""
     import numpy as np
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
+from fogsim.cli.compile_beside import compiling_beside
 from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
 from fogsim.cli.progress import SimulationProgress
 from fogsim.cli.scenario_options import (
@@ -114,7 +115,11 @@ def run_command(
     if loaded.traffic.has_ego:
         record = partial(record_run, camera_processes=_camera_processes(loaded, camera_processes))
     directory = out or Path("runs", f"{loaded.name}-{of_file.folder_name}")
-    with warnings.catch_warnings(), SimulationProgress(stderr, loaded.duration_s) as progress:
+    with (
+        warnings.catch_warnings(),
+        compiling_beside(loaded),
+        SimulationProgress(stderr, loaded.duration_s) as progress,
+    ):
         # The summary names all of it.
         warnings.simplefilter("ignore", UnplayedWarning)
         result = record(

@@ -1,0 +1,95 @@
+"""A first run compiles in two processes, and nothing but its time differs by that."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from fogsim.jit import Beside, processors
+
+START = """
+import os, subprocess, sys
+import fogsim
+from fogsim.cli import compile_beside
+
+started = []
+class Told(subprocess.Popen):
+    def __init__(self, *arguments, **options):
+        super().__init__(*arguments, **options)
+        started.append(self)
+compile_beside.subprocess.Popen = Told
+settings = ["estimators=[huang2015_lead]", "camera.width=64", "camera.height=48"]
+scenario = fogsim.load_scenario("motorway_fog_bank", settings)
+"""
+
+READ = """
+with compile_beside.compiling_beside(scenario):
+    from fogsim.cli.compile import read_foggy_road
+    from fogsim.vision.light.pixel_kernels import colour_luminance
+    read_foggy_road("huang2015_lead", {}, (64, 48))
+    stats = colour_luminance.stats
+    print(len(started), sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
+print(len(started), all(one.poll() is not None for one in started))
+"""
+
+FAIL = """
+try:
+    with compile_beside.compiling_beside(scenario):
+        raise KeyboardInterrupt
+except KeyboardInterrupt:
+    print(len(started), started[0].poll() is not None)
+"""
+
+DIE = """
+compile_beside.compiling_beside(scenario).__enter__()
+print(started[0].pid, flush=True)
+os._exit(1)
+"""
+
+pytestmark = pytest.mark.skipif(processors() < 2, reason="one processor compiles by itself")
+
+
+def run(code: str, kept: Path) -> list[str]:
+    done = subprocess.run(
+        [sys.executable, "-c", START + code],
+        env={**os.environ, "NUMBA_CACHE_DIR": str(kept)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "Traceback" not in done.stderr, done.stderr
+    return done.stdout.split()
+
+
+def test_what_the_other_process_compiles_is_loaded_and_a_second_run_needs_none(tmp_path: Path) -> None:
+    assert run(READ, tmp_path) == ["1", "1", "0", "1", "True"]
+    assert run(READ, tmp_path) == ["0", "1", "0", "0", "True"]
+
+
+def test_an_interrupted_run_takes_the_other_process_along(tmp_path: Path) -> None:
+    assert run(FAIL, tmp_path) == ["1", "True"]
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="looks a process up in /proc")
+def test_a_killed_run_leaves_no_process(tmp_path: Path) -> None:
+    (number,) = run(DIE, tmp_path)
+    command = Path("/proc", number, "cmdline")
+    until = time.monotonic() + 60.0
+    while command.exists() and b"read_pictures" in command.read_bytes():
+        assert time.monotonic() < until
+        time.sleep(0.2)
+
+
+def test_one_waits_once_and_for_the_other_process_s_modules_alone() -> None:
+    waited: list[int] = []
+    beside = Beside()
+    assert not beside.is_awaited("fogsim.vision.light")
+    with beside.compiles(lambda: waited.append(1), ("fogsim.vision.",)):
+        assert not beside.is_awaited("fogsim.render.cpu")
+        assert waited == []
+        assert beside.is_awaited("fogsim.vision.light")
+        assert not beside.is_awaited("fogsim.vision.light")
+    assert waited == [1]

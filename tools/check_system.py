@@ -3,7 +3,8 @@
     python3 tools/check_system.py [--all-tests] [--packages]
 
 ``--all-tests`` asks also for what only the tests need: OpenGL, without which FogSim draws on the processor, a
-display without a screen for sumo-gui, and the browser that opens the documentation site. ``--packages`` prints nothing but the names of the Debian packages.
+display without a screen for sumo-gui, and the browser that opens the documentation site. ``--packages`` prints
+nothing but the names of the Debian packages.
 Runs before anything is installed, so it uses the standard library alone.
 """
 

@@ -21,7 +21,7 @@ class Told(subprocess.Popen):
         super().__init__(*arguments, **options)
         started.append(self)
 compile_beside.subprocess.Popen = Told
-settings = ["estimators=[huang2015_lead]", "camera.width=64", "camera.height=48"]
+settings = ["estimators=[huang2015_lead]", "camera.width=160", "camera.height=120"]
 scenario = fogsim.load_scenario("motorway_fog_bank", settings)
 """
 
@@ -29,7 +29,7 @@ READ = """
 with compile_beside.compiling_beside(scenario):
     from fogsim.cli.compile import read_foggy_road
     from fogsim.vision.light.pixel_kernels import colour_luminance
-    read_foggy_road("huang2015_lead", {}, (64, 48))
+    read_foggy_road("huang2015_lead", {}, (160, 120))
     stats = colour_luminance.stats
     print(len(started), sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
 print(len(started), all(one.poll() is not None for one in started))

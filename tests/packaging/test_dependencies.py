@@ -12,7 +12,7 @@ from packaging.utils import canonicalize_name
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 OWN = {"fogsim", "fogsim_envs"}
-BROUGHT_ALONG = {"OpenGL": "pyrender", "pydantic_core": "pydantic"}
+BROUGHT_ALONG = {"OpenGL": "pyrender", "llvmlite": "numba", "pydantic_core": "pydantic"}
 """Imports that a dependency pins to what it works with, and that one."""
 OPTIONAL = {
     "minari": ("rl", "minari"),

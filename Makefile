@@ -67,7 +67,7 @@ $(VENV)/.installed-notebooks: pyproject.toml $(VENV)/.installed-test
 	@touch $@
 
 notebooks: $(VENV)/.installed-notebooks ## Run the notebooks from their first cell to their last
-	@$(BIN)/python -m pytest -q tests/notebooks
+	@$(BIN)/python -m pytest -q -n auto tests/notebooks
 
 $(VENV)/.installed-docs: pyproject.toml $(VENV)/.installed-test
 	@echo "Installing MkDocs into $(VENV) (once) …"

@@ -43,6 +43,9 @@ _GAIN = 0.05
 _PATIENCE = 0.5
 """Time that a process compiles before it says so [s]: one kernel more is no news, a first run is."""
 
+_LOOKS_AGAIN = 0.05
+"""Time between two looks for a kernel that another process compiles [s]."""
+
 _NEWS_PERIOD = 10.0
 """Time between two lines on what has been compiled [s]."""
 
@@ -124,32 +127,34 @@ class Beside:
     """Another process that compiles kernels of some modules: who finds one of these not compiled waits for it."""
 
     def __init__(self) -> None:
-        self._wait: Callable[[], object] | None = None
+        self._is_over: Callable[[], bool] | None = None
         self._packages: tuple[str, ...] = ()
 
     @contextmanager
-    def compiles(self, wait: Callable[[], object], packages: Sequence[str]) -> Iterator[None]:
+    def compiles(self, is_over: Callable[[], bool], packages: Sequence[str]) -> Iterator[None]:
         """Reckon with another process.
 
         Parameters
         ----------
-        wait : callable
-            Returns when that process has ended.
+        is_over : callable
+            Whether that process has ended.
         packages : sequence of str
             Beginnings of the names of modules whose kernels it compiles and keeps on the disk.
         """
-        self._wait, self._packages = wait, tuple(packages)
+        self._is_over, self._packages = is_over, tuple(packages)
         try:
             yield
         finally:
-            self._wait = None
+            self._is_over = None
 
-    def is_awaited(self, module: str) -> bool:
-        """Wait for the other process if it compiles a module's kernels; whether it did, once."""
-        if self._wait is None or not module.startswith(self._packages):
+    def may_bring(self, module: str) -> bool:
+        """Whether a kernel of a module that was not on the disk is worth another look, after a short while."""
+        if self._is_over is None or not module.startswith(self._packages):
             return False
-        wait, self._wait = self._wait, None
-        wait()
+        if self._is_over():
+            self._is_over = None
+        else:
+            time.sleep(_LOOKS_AGAIN)
         return True
 
 
@@ -224,7 +229,9 @@ def _look_again(compiled: Any) -> None:
 
     def load_overload(signature: Any, target: Any) -> Any:
         found = load(signature, target)
-        return load(signature, target) if found is None and BESIDE.is_awaited(module) else found
+        while found is None and BESIDE.may_bring(module):
+            found = load(signature, target)
+        return found
 
     compiled._cache.load_overload = load_overload
 

@@ -43,7 +43,7 @@ def compiling_beside(scenario: "Scenario") -> Iterator[None]:
     quiet = subprocess.DEVNULL
     process = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)  # noqa: S603 - this module's own
     try:
-        with BESIDE.compiles(process.wait, PACKAGES):
+        with BESIDE.compiles(lambda: process.poll() is not None, PACKAGES):
             yield
     finally:
         process.terminate()

@@ -83,13 +83,13 @@ def test_a_killed_run_leaves_no_process(tmp_path: Path) -> None:
         time.sleep(0.2)
 
 
-def test_one_waits_once_and_for_the_other_process_s_modules_alone() -> None:
-    waited: list[int] = []
+def test_one_looks_again_while_the_other_process_runs_and_once_when_it_has_ended() -> None:
+    over = iter((False, False, True))
     beside = Beside()
-    assert not beside.is_awaited("fogsim.vision.light")
-    with beside.compiles(lambda: waited.append(1), ("fogsim.vision.",)):
-        assert not beside.is_awaited("fogsim.render.cpu")
-        assert waited == []
-        assert beside.is_awaited("fogsim.vision.light")
-        assert not beside.is_awaited("fogsim.vision.light")
-    assert waited == [1]
+    assert not beside.may_bring("fogsim.vision.light")
+    with beside.compiles(lambda: next(over), ("fogsim.vision.",)):
+        assert not beside.may_bring("fogsim.render.cpu")
+        assert [beside.may_bring("fogsim.vision.light") for _ in range(5)] == [True, True, True, False, False]
+    with beside.compiles(lambda: False, ("fogsim.vision.",)):
+        assert beside.may_bring("fogsim.vision.light")
+    assert not beside.may_bring("fogsim.vision.light")

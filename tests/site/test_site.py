@@ -42,9 +42,10 @@ pytestmark = pytest.mark.timeout(900)
 
 @dataclass(frozen=True)
 class Visit:
-    """What a browser found on a page."""
+    """What a browser found on a page; of its links, `told` are those of its text."""
 
     links: tuple[str, ...]
+    told: tuple[str, ...]
     anchors: frozenset[str]
     dead_pictures: tuple[str, ...]
     width: int
@@ -105,6 +106,7 @@ def visited(page: Page, path: Path) -> Visit:
     page.wait_for_function("[...document.images].every(i => i.complete)")
     found = Visit(
         links=tuple(page.eval_on_selector_all("a[href]", "all => all.map(a => a.href)")),
+        told=tuple(page.eval_on_selector_all("article a[href]", "all => all.map(a => a.href)")),
         anchors=frozenset(page.eval_on_selector_all("[id]", "all => all.map(e => e.id)")),
         dead_pictures=tuple(page.evaluate("[...document.images].filter(i => !i.naturalWidth).map(i => i.src)")),
         width=page.evaluate("document.documentElement.scrollWidth"),
@@ -155,8 +157,9 @@ def test_it_is_found_within_two_clicks(question: str, visits: dict[str, Visit], 
     assert page in visits
     assert not anchor or anchor in visits[page].anchors
 
+    # The navigation has every page in a drawer, which would make all of this true.
     def led(name: str) -> set[str]:
-        return {target[0] for link in visits[name].links if (target := led_to(link, site)) and target[0] in visits}
+        return {target[0] for link in visits[name].told if (target := led_to(link, site)) and target[0] in visits}
 
     once = led("index.html")
     assert page in once | set().union(*map(led, once))

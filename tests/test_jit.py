@@ -8,8 +8,10 @@ from pathlib import Path
 import pytest
 from numba.core import codegen
 
-CALLED = """
+import fogsim.jit  # noqa: F401 - lets numba use LinkedLibrary
 from fogsim.code_libraries import LinkedLibrary
+
+CALLED = """
 from fogsim.jit import kernel
 
 FACTOR = {factor}

@@ -32,16 +32,12 @@ def compiling_beside(scenario: "Scenario") -> Iterator[None]:
     scenario : Scenario
         What is about to be run.
     """
-    methods = _methods(scenario)
-    if not methods or not _is_first():
+    process = _started(scenario)
+    if process is None:
         yield
         return
     from fogsim.jit import BESIDE
 
-    told = json.dumps({"width": scenario.camera.width, "height": scenario.camera.height, "methods": methods})
-    command = [sys.executable, "-c", f"from {__name__} import read_pictures; read_pictures({told!r}, {os.getpid()})"]
-    quiet = subprocess.DEVNULL
-    process = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)  # noqa: S603 - this module's own
     try:
         with BESIDE.compiles(lambda: process.poll() is not None, PACKAGES):
             yield
@@ -51,6 +47,21 @@ def compiling_beside(scenario: "Scenario") -> Iterator[None]:
             process.wait(_ENDS_WITHIN)
         except subprocess.TimeoutExpired:
             process.kill()
+
+
+def _started(scenario: "Scenario") -> "subprocess.Popen[bytes] | None":
+    """Start the other process, if there is something for it to do; None also where there is no room for it."""
+    methods = _methods(scenario)
+    if not methods or not _is_first():
+        return None
+    told = json.dumps({"width": scenario.camera.width, "height": scenario.camera.height, "methods": methods})
+    command = [sys.executable, "-c", f"from {__name__} import read_pictures; read_pictures({told!r}, {os.getpid()})"]
+    quiet = subprocess.DEVNULL
+    try:
+        return subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)  # noqa: S603 - this module's own
+    except OSError:
+        # Too little memory or too many processes: this one compiles all by itself, as it would on one processor.
+        return None
 
 
 def _methods(scenario: "Scenario") -> list[tuple[str, Mapping[str, Any]]]:

@@ -43,6 +43,14 @@ except KeyboardInterrupt:
     print(len(started), started[0].poll() is not None)
 """
 
+NO_ROOM = """
+def refuse(*_, **__):
+    raise BlockingIOError(11, "Resource temporarily unavailable")
+compile_beside.subprocess.Popen = refuse
+with compile_beside.compiling_beside(scenario):
+    print("alone")
+"""
+
 DIE = """
 compile_beside.compiling_beside(scenario).__enter__()
 print(started[0].pid, flush=True)
@@ -71,6 +79,10 @@ def test_what_the_other_process_compiles_is_loaded_and_a_second_run_needs_none(t
 
 def test_an_interrupted_run_takes_the_other_process_along(tmp_path: Path) -> None:
     assert run(FAIL, tmp_path) == ["1", "True"]
+
+
+def test_where_there_is_no_room_for_it_a_run_compiles_alone(tmp_path: Path) -> None:
+    assert run(NO_ROOM, tmp_path) == ["alone"]
 
 
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="looks a process up in /proc")

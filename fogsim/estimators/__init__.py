@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from fogsim import registry
+from fogsim.estimators.cramer_rao import FoggyRoad, extinction_bound
 from fogsim.estimators.huang2015 import Huang2015
 from fogsim.estimators.huang2015_lead import Huang2015Lead
 from fogsim.estimators.huang2015_rough import Huang2015Rough
@@ -72,4 +73,4 @@ def make(name: str, camera: Camera, **options: object) -> Estimator:
     return registry.make(ESTIMATORS, name, camera, **options)
 
 
-__all__ = ["ESTIMATORS", "Estimator", "make"]
+__all__ = ["ESTIMATORS", "Estimator", "FoggyRoad", "extinction_bound", "make"]

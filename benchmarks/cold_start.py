@@ -71,7 +71,8 @@ def timed_run(scenario: str, folder: Path) -> tuple[float, float]:
     before, started = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
     subprocess.run(
         [*command, "--out", str(folder / "results")],
-        env={**os.environ, "NUMBA_CACHE_DIR": str(folder / "kernels")},
+        # As in the Makefile: modules are compiled by whoever needs them first.
+        env={**os.environ, "NUMBA_CACHE_DIR": str(folder / "kernels"), "PYTHONDONTWRITEBYTECODE": ""},
         capture_output=True,
         check=True,
     )

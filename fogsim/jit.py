@@ -23,10 +23,11 @@ from numba.core import event, serialize
 # Where Intel's vector functions are installed, numba would take them, and they round otherwise than the C library does.
 os.environ["NUMBA_DISABLE_INTEL_SVML"] = "1"
 import numba
+from numba.core.types.misc import unliteral
 
-from fogsim.code_libraries import LinkedLibrary, defer_code
+from fogsim.compiling import begin_economy, prepare_economy
 
-defer_code()
+prepare_economy()
 
 # For the class of each array or named tuple that a kernel returns, numba calls this, and goes on whatever comes of it:
 # an exception of a signal's handler in it is lost, or the process is. Nothing is interrupted within a cache in C.
@@ -94,27 +95,29 @@ class Announcement(event.Listener):  # type: ignore[misc] # numba is untyped
 class Economy(event.Listener):  # type: ignore[misc] # numba is untyped
     """Leaves out what costs time while one of FogSim's kernels is compiled, with all that it calls.
 
-    That is the search for garbage, of which compiling makes little among millions of objects, and machine code for
-    functions that are compiled into others (`LinkedLibrary`).
+    That is the search for garbage, of which compiling makes little among millions of objects, and what numba is spared
+    by `fogsim.compiling`.
     """
 
     def __init__(self) -> None:
         self._depth = 0
         self._collects = False
+        self._end: Callable[[], None] | None = None
 
     def on_start(self, compiling: Any) -> None:
         """Begin at the outermost kernel."""
         if self._depth == 0 and compiling.data["dispatcher"].py_func.__module__.startswith(f"{__package__}."):
             self._collects = gc.isenabled()
             gc.disable()
-            LinkedLibrary.deferring = True
+            self._end = begin_economy()
         self._depth += 1
 
     def on_end(self, _: Any) -> None:
         """End where it began."""
         self._depth -= 1
-        if self._depth == 0 and LinkedLibrary.deferring:
-            LinkedLibrary.deferring = False
+        if self._depth == 0 and self._end is not None:
+            self._end()
+            self._end = None
             if self._collects:
                 gc.enable()
 
@@ -203,8 +206,17 @@ def kernel(function: F) -> F:
         plain.__qualname__ = name
     # Other kernels take one in that Python cannot call and that is not kept: they are kept, and it is in them.
     inner: Any = numba.njit(cache=False, no_cpython_wrapper=True, **options)(function)
-    compiled.get_call_template, compiled.get_overload = inner.get_call_template, inner.get_overload
+    compiled.get_call_template, compiled.get_overload = _without_literals(inner.get_call_template), inner.get_overload
     return cast("F", compiled)
+
+
+def _without_literals(get_call_template: Callable[..., Any]) -> Callable[..., Any]:
+    """Let a kernel be compiled for numbers of a type, and not for 0, for 1 and for other numbers each anew."""
+
+    def get(arguments: Sequence[Any], keywords: dict[str, Any]) -> Any:
+        return get_call_template([unliteral(a) for a in arguments], {k: unliteral(a) for k, a in keywords.items()})
+
+    return get
 
 
 def _forgive_outdated_index(compiled: Any) -> None:

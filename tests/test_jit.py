@@ -9,7 +9,7 @@ import pytest
 from numba.core import codegen
 
 import fogsim.jit  # noqa: F401 - lets numba use LinkedLibrary
-from fogsim.code_libraries import LinkedLibrary
+from fogsim.compiling.code_libraries import LinkedLibrary
 
 CALLED = """
 from fogsim.jit import kernel
@@ -128,7 +128,7 @@ import gc
 import numpy as np
 
 import fogsim.jit
-from fogsim.code_libraries import LinkedLibrary
+from fogsim.compiling.code_libraries import LinkedLibrary
 
 fogsim.jit.__package__ = "scratch"
 
@@ -186,7 +186,7 @@ OTHERS = """
 import numba
 
 import fogsim.jit
-from fogsim.code_libraries import LinkedLibrary
+from fogsim.compiling.code_libraries import LinkedLibrary
 
 made = []
 make_code = LinkedLibrary._make_code

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from fogsim.estimators import Estimator
-    from fogsim.values import Camera
+    from fogsim.values import Camera, Estimate
 
 _SIZES = ((160, 120), (640, 480))
 """Pictures that are estimated: methods choose what they do by size [px]."""
@@ -121,8 +121,8 @@ def _estimate_visibility() -> None:
     _follow_a_bend(camera)
 
 
-def read_foggy_road(method: str, parameters: Mapping[str, Any], size: Sequence[int]) -> None:
-    """Let a method read pictures of a foggy road by day.
+def read_foggy_road(method: str, parameters: Mapping[str, Any], size: Sequence[int]) -> "list[Estimate]":
+    """Let a method read pictures of a foggy road by day, and say what it makes of each.
 
     Parameters
     ----------
@@ -138,7 +138,26 @@ def read_foggy_road(method: str, parameters: Mapping[str, Any], size: Sequence[i
 
     width, height = size
     camera = Camera(width, height, 0.9 * width, (width / 2, height / 2), 1.4, pitch=0.03)
-    _read(ESTIMATORS[method](camera=camera, **parameters), camera)
+    return _read(ESTIMATORS[method](camera=camera, **parameters), camera)
+
+
+def fuse_estimates(fusion: str, parameters: Mapping[str, Any], estimates: "Sequence[Sequence[Estimate]]") -> None:
+    """Let a fusion take in what methods said of the pictures that they read.
+
+    Parameters
+    ----------
+    fusion : str
+        Its name.
+    parameters : mapping
+        Its own.
+    estimates : sequence of sequence of Estimate
+        Of each method, of each picture.
+    """
+    from fogsim.fusion import fuse, make
+
+    chosen = make(fusion, **parameters)
+    for number, instant in enumerate(zip(*estimates, strict=True)):
+        fuse(chosen, instant, 0.1 * number, 3.0 * number)
 
 
 def _restore_contrast() -> None:
@@ -171,17 +190,19 @@ def _follow_a_bend(camera: "Camera") -> None:
     course_geometry(strip_geometry(camera, 1.0), camera, course)
 
 
-def _read(estimator: "Estimator", camera: "Camera") -> None:
+def _read(estimator: "Estimator", camera: "Camera") -> "list[Estimate]":
     """Let a method read pictures in colour and, in the end, in grey."""
     import numpy as np
 
     from fogsim.values import Frame, LeadMeasurement, Observation
 
+    said = []
     for index in range(4):
         distance = 25.0 + 5.0 * index
         image = _foggy_road(camera, distance, *((600.0, 60.0) if index == 1 else ()))
         frame = Frame(0.1 * index, image if index < 3 else np.ascontiguousarray(image[:, :, 0]), camera)
-        estimator.update(Observation(frame, 20.0, LeadMeasurement(distance, 5.0), ()))
+        said.append(estimator.update(Observation(frame, 20.0, LeadMeasurement(distance, 5.0), ())))
+    return said
 
 
 def read_own_beams() -> None:

@@ -1,22 +1,24 @@
 """A first run compiles in two processes: its own, which draws, and one beside it, which reads pictures.
 
-What each method asks of pictures shares hardly a kernel with what draws them, and takes nearly half of the time.
+What each method asks of pictures, and what makes a belief of it, shares hardly a kernel with what draws them, and takes
+half of the time.
 """
 
+import importlib
 import json
 import os
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from fogsim.scenario import Scenario
 
-PACKAGES = ("fogsim.vision.", "fogsim.estimators.")
+PACKAGES = ("fogsim.vision.", "fogsim.estimators.", "fogsim.fusion.")
 """Modules whose kernels the other process compiles."""
 
 _ENDS_WITHIN = 5.0
@@ -24,52 +26,74 @@ _ENDS_WITHIN = 5.0
 
 
 @contextmanager
-def compiling_beside(scenario: "Scenario") -> Iterator[None]:
-    """Compile what a scenario's methods need in another process, if nothing of it is kept on the disk yet.
+def compiling_beside() -> Iterator[Callable[["Scenario"], None]]:
+    """Start another process, if nothing of what it compiles is kept on the disk yet.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        What is about to be run.
+    It is started before a scenario is loaded, so that it has loaded what it needs when it hears of one.
+
+    Yields
+    ------
+    tell : callable
+        Gets the scenario that is about to be run: what its methods and its fusion need is compiled there.
     """
-    process = _started(scenario)
+    process = _started()
     if process is None:
-        yield
+        yield lambda _: None
         return
     from fogsim.jit import BESIDE
 
-    try:
-        with BESIDE.compiles(lambda: process.poll() is not None, PACKAGES):
-            yield
-    finally:
-        process.terminate()
-        try:
-            process.wait(_ENDS_WITHIN)
-        except subprocess.TimeoutExpired:
-            process.kill()
+    with ExitStack() as stack:
+        stack.callback(_end, process)
+
+        def tell(scenario: "Scenario") -> None:
+            methods = _methods(scenario)
+            if methods and _is_first():
+                stack.enter_context(BESIDE.compiles(lambda: process.poll() is not None, PACKAGES))
+                _send(process, {"size": (scenario.camera.width, scenario.camera.height), **methods})
+
+        yield tell
 
 
-def _started(scenario: "Scenario") -> "subprocess.Popen[bytes] | None":
-    """Start the other process, if there is something for it to do; None also where there is no room for it."""
-    methods = _methods(scenario)
-    if not methods or not _is_first():
+def _started() -> "subprocess.Popen[bytes] | None":
+    """Start the other process; None if there is nothing for it to do, or no room for it."""
+    import fogsim.vision.light.pixel_kernels  # noqa: F401 - what methods need first; it loads little
+
+    if not _is_first():
         return None
-    told = json.dumps({"width": scenario.camera.width, "height": scenario.camera.height, "methods": methods})
-    command = [sys.executable, "-c", f"from {__name__} import read_pictures; read_pictures({told!r}, {os.getpid()})"]
+    command = [sys.executable, "-c", f"from {__name__} import read_pictures; read_pictures({os.getpid()})"]
     quiet = subprocess.DEVNULL
     try:
-        return subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)  # noqa: S603 - this module's own
+        return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=quiet, stderr=quiet)  # noqa: S603 - this module's own
     except OSError:
         # Too little memory or too many processes: this one compiles all by itself, as it would on one processor.
         return None
 
 
-def _methods(scenario: "Scenario") -> list[tuple[str, Mapping[str, Any]]]:
-    """Names and parameters of the scenario's methods that are FogSim's own."""
-    from fogsim.estimators import ESTIMATORS
+def _send(process: "subprocess.Popen[bytes]", told: Mapping[str, Any]) -> None:
+    """Tell the other process what to compile; it may have died, and then this one compiles alone."""
+    if (pipe := process.stdin) is not None:
+        with suppress(OSError), pipe:
+            pipe.write(json.dumps(told).encode())
 
-    own = set(ESTIMATORS)
-    return [(one.method, dict(one.parameters)) for one in scenario.estimators if one.method in own]
+
+def _end(process: "subprocess.Popen[bytes]") -> None:
+    process.terminate()
+    try:
+        process.wait(_ENDS_WITHIN)
+    except subprocess.TimeoutExpired:
+        process.kill()
+
+
+def _methods(scenario: "Scenario") -> dict[str, Any]:
+    """Names and parameters of those methods of the scenario, and its fusion, that are FogSim's; {} without methods."""
+    from fogsim.estimators import ESTIMATORS
+    from fogsim.fusion import FUSIONS
+
+    own, fusions = set(ESTIMATORS), set(FUSIONS)
+    methods = [(one.method, dict(one.parameters)) for one in scenario.estimators if one.method in own]
+    chosen = scenario.fusion
+    fusion = (chosen.method, dict(chosen.parameters)) if chosen.method in fusions else None
+    return {"methods": methods, "fusion": fusion} if methods else {}
 
 
 def _is_first() -> bool:
@@ -82,25 +106,33 @@ def _is_first() -> bool:
     return processors() > 1 and False in kept and True not in kept
 
 
-def read_pictures(told: str, parent: int) -> None:
-    """Let methods read pictures until all that they need is on the disk; the other process's part.
+def read_pictures(parent: int) -> None:
+    """Let methods read pictures, and fuse what they say, until all that they need is on the disk.
+
+    The other process's part. What it is to do comes as JSON on its standard input: size of the pictures, methods with
+    their parameters, and a fusion.
 
     Parameters
     ----------
-    told : str
-        JSON: size of the pictures, and methods with their parameters.
     parent : int
         Process for which it is done: nobody needs it any more when that has ended.
     """
-    from fogsim.cli.compile import read_foggy_road, read_own_beams
-
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    from fogsim.cli.compile import fuse_estimates, read_foggy_road, read_own_beams
+
+    # What methods and fusions are made of is loaded while the scenario is.
+    for name in ("fogsim.estimators", "fogsim.fusion"):
+        importlib.import_module(name)
+    if not (told := sys.stdin.read()):
+        return
     wanted = json.loads(told)
-    size: Sequence[int] = (wanted["width"], wanted["height"])
-    for name, parameters in wanted["methods"]:
-        read_foggy_road(name, parameters, size)
+    size: Sequence[int] = wanted["size"]
+    estimates = [read_foggy_road(name, parameters, size) for name, parameters in wanted["methods"]]
     if any(name in {"night_road", "gallen2014_veil"} for name, _ in wanted["methods"]):
         read_own_beams()
+    if wanted["fusion"] is not None:
+        fusion, parameters = wanted["fusion"]
+        fuse_estimates(fusion, parameters, estimates)
 
 
 def _end_with(parent: int) -> None:

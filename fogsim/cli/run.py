@@ -98,39 +98,37 @@ def run_command(
     ] = None,
 ) -> None:
     """Run a scenario and write manifest.json, steps.parquet, metrics.json, video.mp4 and report.html."""
-    from fogsim.recording import record_run, record_traffic
+    with compiling_beside() as compile_for:
+        loaded, of_file = chosen_case(scenario, sumocfg, ego, visibility, settings, case, seed)
+        compile_for(loaded)
+        from fogsim.recording import record_run, record_traffic
 
-    loaded, of_file = chosen_case(scenario, sumocfg, ego, visibility, settings, case, seed)
-    chosen = {
-        "table": True,
-        "video": _filmed(loaded, video),
-        "restored_video": restored_video and _filmed(loaded, wanted=True),
-        "report": report,
-        "trajectories": trajectories,
-        "events": bool(loaded.timeline) if events is None else events,
-        "openscenario": xosc,
-        "osi": osi,
-    }
-    record: Callable[..., RecordedRun] = record_traffic
-    if loaded.traffic.has_ego:
-        record = partial(record_run, camera_processes=_camera_processes(loaded, camera_processes))
-    directory = out or Path("runs", f"{loaded.name}-{of_file.folder_name}")
-    with (
-        warnings.catch_warnings(),
-        compiling_beside(loaded),
-        SimulationProgress(stderr, loaded.duration_s) as progress,
-    ):
-        # The summary names all of it.
-        warnings.simplefilter("ignore", UnplayedWarning)
-        result = record(
-            loaded,
-            of_file.seed,
-            directory,
-            overwrite=overwrite,
-            recorders=[name for name, wanted in chosen.items() if wanted],
-            command_line=["fogsim", *sys.argv[1:]],
-            watch=progress.show,
-        )
+        chosen = {
+            "table": True,
+            "video": _filmed(loaded, video),
+            "restored_video": restored_video and _filmed(loaded, wanted=True),
+            "report": report,
+            "trajectories": trajectories,
+            "events": bool(loaded.timeline) if events is None else events,
+            "openscenario": xosc,
+            "osi": osi,
+        }
+        record: Callable[..., RecordedRun] = record_traffic
+        if loaded.traffic.has_ego:
+            record = partial(record_run, camera_processes=_camera_processes(loaded, camera_processes))
+        directory = out or Path("runs", f"{loaded.name}-{of_file.folder_name}")
+        with warnings.catch_warnings(), SimulationProgress(stderr, loaded.duration_s) as progress:
+            # The summary names all of it.
+            warnings.simplefilter("ignore", UnplayedWarning)
+            result = record(
+                loaded,
+                of_file.seed,
+                directory,
+                overwrite=overwrite,
+                recorders=[name for name, wanted in chosen.items() if wanted],
+                command_line=["fogsim", *sys.argv[1:]],
+                watch=progress.show,
+            )
     _print_summary(result.summary.values, SHOWN if loaded.traffic.has_ego else SHOWN_OF_TRAFFIC)
     written = "the results are partial and say so" if result.files else "before its first step; nothing was written"
     ended = result.ending.value if result.ending else f"{result.status.value}; {written}"

@@ -26,7 +26,8 @@ scenario = fogsim.load_scenario("motorway_fog_bank", settings)
 """
 
 READ = """
-with compile_beside.compiling_beside(scenario):
+with compile_beside.compiling_beside() as compile_for:
+    compile_for(scenario)
     from fogsim.cli.compile import read_foggy_road
     from fogsim.vision.light.pixel_kernels import colour_luminance
     read_foggy_road("huang2015_lead", {}, (160, 120))
@@ -37,22 +38,41 @@ print(len(started), all(one.poll() is not None for one in started))
 
 FAIL = """
 try:
-    with compile_beside.compiling_beside(scenario):
+    with compile_beside.compiling_beside() as compile_for:
+        compile_for(scenario)
         raise KeyboardInterrupt
 except KeyboardInterrupt:
     print(len(started), started[0].poll() is not None)
+"""
+
+UNTOLD = """
+try:
+    with compile_beside.compiling_beside():
+        raise ValueError("a mistake in the scenario")
+except ValueError:
+    print(len(started), started[0].poll() is not None)
+"""
+
+DEAD = """
+with compile_beside.compiling_beside() as compile_for:
+    started[0].kill()
+    started[0].wait()
+    compile_for(scenario)
+    from fogsim.cli.compile import read_foggy_road
+    print(len(read_foggy_road("huang2015_lead", {}, (160, 120))))
 """
 
 NO_ROOM = """
 def refuse(*_, **__):
     raise BlockingIOError(11, "Resource temporarily unavailable")
 compile_beside.subprocess.Popen = refuse
-with compile_beside.compiling_beside(scenario):
+with compile_beside.compiling_beside() as compile_for:
+    compile_for(scenario)
     print("alone")
 """
 
 DIE = """
-compile_beside.compiling_beside(scenario).__enter__()
+compile_beside.compiling_beside().__enter__()(scenario)
 print(started[0].pid, flush=True)
 os._exit(1)
 """
@@ -79,6 +99,14 @@ def test_what_the_other_process_compiles_is_loaded_and_a_second_run_needs_none(t
 
 def test_an_interrupted_run_takes_the_other_process_along(tmp_path: Path) -> None:
     assert run(FAIL, tmp_path) == ["1", "True"]
+
+
+def test_where_no_scenario_comes_the_other_process_ends(tmp_path: Path) -> None:
+    assert run(UNTOLD, tmp_path) == ["1", "True"]
+
+
+def test_where_the_other_process_dies_a_run_compiles_alone(tmp_path: Path) -> None:
+    assert run(DEAD, tmp_path) == ["4"]
 
 
 def test_where_there_is_no_room_for_it_a_run_compiles_alone(tmp_path: Path) -> None:

@@ -1,17 +1,14 @@
-"""Machine code for what Python calls, and none for what is compiled into it: a fifth less time for a first run.
+"""Machine code for what Python calls, and none for what is compiled into it.
 
-numba makes machine code of each function that another one calls, though the caller has a copy of its own.
+numba makes machine code of each function that another one calls, though the caller has a copy of its own, and optimises
+that copy anew in each caller of a caller. What is only linked is simplified here, once, and optimised where it arrives.
 """
 
 from typing import Any, ClassVar
 
-import numba
 from llvmlite.binding import ModuleRef  # type: ignore[import-untyped]
 from numba.core import codegen
 from numba.core.environment import lookup_environment
-
-_KNOWN = {(0, 68)}
-"""Versions of numba whose inner working is known to be as it is taken here; others compile as they do, only longer."""
 
 _ENVIRONMENT = "_ZN08NumbaEnv"
 """Begins the name of the place where a function's code finds what belongs to it in Python, as errors that it raises."""
@@ -34,12 +31,27 @@ class LinkedLibrary(codegen.JITCodeLibrary):  # type: ignore[misc] # numba is un
     _put_off = False
 
     def _optimize_functions(self, ll_module: ModuleRef) -> None:
-        """Simplify what is defined in a module; numba takes what is only declared too, which is most."""
+        """Simplify what is defined in a module, lightly: it is optimised once more where it arrives."""
+        if not self.deferring:
+            super()._optimize_functions(ll_module)
+            return
         ll_module.data_layout = self._codegen._data_layout
         for function in ll_module.functions:
             if not function.is_declaration:
-                passes, builder = self._codegen._function_pass_manager()
+                passes, builder = self._codegen._function_pass_manager(opt=1)
                 passes.run(function, builder)
+
+    def _optimize_final_module(self) -> None:
+        if not self.deferring:
+            super()._optimize_final_module()
+        elif not self._is_linked_only():
+            self._optimize_linked()
+
+    def _optimize_linked(self) -> None:
+        """As numba does, but at level 2: level 3 makes nothing faster here, and takes longer."""
+        for options in ({"loop_vectorize": True, "slp_vectorize": False, "opt": 0, "cost": "cheap"}, {"opt": 2}):
+            passes, builder = self._codegen._module_pass_manager(**options)
+            passes.run(self._final_module, builder)
 
     def _is_linked_only(self) -> bool:
         return self.deferring and not any(
@@ -59,6 +71,8 @@ class LinkedLibrary(codegen.JITCodeLibrary):  # type: ignore[misc] # numba is un
             self._make_code()
 
     def _make_code(self) -> None:
+        if self._put_off:
+            self._optimize_linked()
         self._put_off = False
         super()._finalize_final_module()
         # What is linked has its places here alone.
@@ -84,8 +98,8 @@ class LinkedLibrary(codegen.JITCodeLibrary):  # type: ignore[misc] # numba is un
 
 
 def defer_code() -> None:
-    """Let numba use `LinkedLibrary`, if this version is known."""
-    if numba.version_info.short not in _KNOWN or codegen.JITCPUCodegen._library_class is LinkedLibrary:
+    """Let numba use `LinkedLibrary`."""
+    if codegen.JITCPUCodegen._library_class is LinkedLibrary:
         return
     codegen.JITCPUCodegen._library_class = LinkedLibrary
     set_env = codegen.JITCPUCodegen.set_env

@@ -1,0 +1,204 @@
+"""What numba works out anew a hundred thousand times while it compiles, worked out once or not at all.
+
+Each stands in for a function of numba, and answers as that does.
+"""
+
+import functools
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from llvmlite.binding import ffi  # type: ignore[import-untyped]
+from numba.core import base, cgutils, cpu, ir, types
+from numba.core.runtime.context import NRTContext
+from numba.core.targetconfig import ConfigStack, TargetConfig
+from numba.core.types.functions import BaseFunction
+from numba.np import arrayobj
+
+
+class Shortcut(NamedTuple):
+    """A function that stands in for one of numba's.
+
+    Attributes
+    ----------
+    owner : module or class
+        Where that is found.
+    name : str
+        By which it is.
+    function : callable
+        What stands in for it.
+    """
+
+    owner: Any
+    name: str
+    function: Callable[..., Any]
+
+    def take(self) -> Callable[[], None]:
+        """Put it in place; what is returned puts numba's own back."""
+        own = vars(self.owner)[self.name]
+        setattr(self.owner, self.name, self.function)
+        return lambda: setattr(self.owner, self.name, own)
+
+
+class UnobservedLock:
+    """The lock of LLVM, taken and given back without the events by which numba times it.
+
+    Each of 200,000 calls of LLVM would be an event, told to all functions that are being compiled one within another.
+    """
+
+    def take(self) -> Callable[[], None]:
+        """Leave the events out; what is returned lets them in again."""
+        told = ffi.lib._lock._cblist
+        ffi.lib._lock._cblist = []
+
+        def restore() -> None:
+            ffi.lib._lock._cblist = told
+
+        return restore
+
+
+_call_type = BaseFunction.get_call_type
+_size = base.BaseContext.get_abi_sizeof
+_hash = TargetConfig.__hash__
+_index = arrayobj.basic_indexing
+_make_array = arrayobj.make_array
+
+
+def resolve_call(function: Any, context: Any, arguments: Any, keywords: Any) -> Any:
+    """Signature of a built-in function for types of arguments: looked for once, as its templates stay the same."""
+    options = ConfigStack()
+    known = vars(function).setdefault("_fogsim_signatures", {})
+    key = (context, tuple(arguments), tuple(keywords.items()), options.top() if options else None)
+    signature = known.get(key)
+    if signature is None:
+        signature = known[key] = _call_type(function, context, arguments, keywords)
+    return signature
+
+
+def compare_options(mine: Any, other: Any) -> Any:
+    """Whether compiler options are the same: first by those that were set, which are few."""
+    if not isinstance(other, TargetConfig):
+        return NotImplemented
+    if mine is other or (type(mine) is type(other) and mine._values == other._values):
+        return True
+    return _values(mine) == _values(other)
+
+
+def _values(options: Any) -> dict[str, Any]:
+    chosen = options._values
+    return {name: chosen.get(name, option.default) for name, option in options.options.items()}
+
+
+_hashes: dict[Any, int] = {}
+
+
+def hash_options(options: Any) -> int:
+    """Hash of compiler options: numba takes it of their names, so that it is the same for all of a kind."""
+    kind = type(options)
+    if kind not in _hashes:
+        _hashes[kind] = _hash(options)
+    return _hashes[kind]
+
+
+def reference_counts(runtime: Any, builder: Any, kind: Any, value: Any) -> list[tuple[Any, Any]]:
+    """Types and counters of references in a value: only those of its parts are taken out that have any.
+
+    numba takes out every number of every array of a named tuple, a fifth of all instructions, for LLVM to remove.
+    """
+    models = runtime._context.data_model_manager
+    model = models[kind]
+    if not _counts_references(models, kind):
+        return []
+    found = [(kind, model.get_nrt_meminfo(builder, value))] if model.has_nrt_meminfo() else []
+    for part, taken_from in model.traverse(builder):
+        # Asked here too: what is not asked for is not taken out.
+        if _counts_references(models, part):
+            found.extend(reference_counts(runtime, builder, part, taken_from(value)))
+    return found
+
+
+def _counts_references(models: Any, kind: Any) -> bool:
+    model = models[kind]
+    counts = getattr(model, "_fogsim_counts_references", None)
+    if counts is None:
+        counts = model._fogsim_counts_references = model.contains_nrt_meminfo()
+    return bool(counts)
+
+
+_sizes: dict[str, int] = {}
+
+
+def size_of(context: Any, kind: Any) -> int:
+    """Size of a type [byte]: LLVM parses a module of its own for each question."""
+    name = str(kind)
+    if name not in _sizes:
+        _sizes[name] = _size(context, kind)
+    return _sizes[name]
+
+
+def make_no_wrapper(*_: Any) -> None:
+    """No way into a function for code in C: what kernels call is called by kernels alone."""
+
+
+def variables_in(_: Any, value: Any) -> list[Any]:
+    """Variables that a part of an instruction names; this is asked a million times."""
+    if type(value) is ir.Var:
+        return [value]
+    if isinstance(value, ir.Inst):
+        return list(value.list_vars())
+    parts = value.values() if type(value) is dict else value if type(value) in (tuple, list) else ()
+    found = []
+    for part in parts:
+        if type(part) is ir.Var:
+            found.append(part)
+        elif isinstance(part, tuple | list | dict | ir.Inst):
+            found.extend(variables_in(_, part))
+    return found
+
+
+def index_element(
+    context: Any, builder: Any, kind: Any, array: Any, index_types: Any, indices: Any, boundscheck: Any = None
+) -> Any:
+    """Where an element of an array is: its shape is read once for all indices, its strides where they are needed."""
+    if boundscheck or len(indices) != kind.ndim or not all(isinstance(one, types.Integer) for one in index_types):
+        return _index(context, builder, kind, array, index_types, indices, boundscheck)
+    shape = cgutils.unpack_tuple(builder, array.shape, kind.ndim)
+    strides = () if kind.layout in "CF" else cgutils.unpack_tuple(builder, array.strides, kind.ndim)
+    places = [
+        arrayobj.fix_integer_index(context, builder, *index, length)
+        for *index, length in zip(index_types, indices, shape, strict=True)
+    ]
+    element = cgutils.get_item_pointer2(
+        context, builder, data=array.data, shape=shape, strides=strides, layout=kind.layout, inds=places
+    )
+    return element, [], []
+
+
+@functools.lru_cache(1024)
+def _plain_array(kind: Any) -> Any:
+    class Plain(_make_array(kind)):  # type: ignore[misc] # numba is untyped
+        """An array's fields; numba asks each time anew what an array is as an array."""
+
+        _make_refs = cgutils.create_struct_proxy(kind)._make_refs
+
+    return Plain
+
+
+def make_array(kind: Any) -> Any:
+    """Class of what tells an array's fields."""
+    return _plain_array(kind) if type(kind) is types.Array else _make_array(kind)
+
+
+SHORTCUTS = (
+    UnobservedLock(),
+    Shortcut(BaseFunction, "get_call_type", resolve_call),
+    Shortcut(TargetConfig, "__eq__", compare_options),
+    Shortcut(TargetConfig, "__hash__", hash_options),
+    Shortcut(NRTContext, "get_meminfos", reference_counts),
+    Shortcut(base.BaseContext, "get_abi_sizeof", size_of),
+    Shortcut(base, "_has_loc", functools.lru_cache(4096)(base._has_loc)),
+    Shortcut(cpu.CPUContext, "create_cfunc_wrapper", make_no_wrapper),
+    Shortcut(ir.Inst, "_rec_list_vars", variables_in),
+    Shortcut(arrayobj, "basic_indexing", index_element),
+    Shortcut(arrayobj, "make_array", make_array),
+)
+"""All of them; each has `take`."""

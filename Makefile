@@ -94,7 +94,20 @@ types: $(VENV)/.installed-test ## Check types
 contracts: $(VENV)/.installed-test ## Check which stage may import which
 	@$(BIN)/lint-imports
 
-ci: lint types contracts test portability cluster notebooks browse ## Everything that .ci/run checks
+# All at once, not four installations after one another.
+$(VENV)/.installed-ci: pyproject.toml | check
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@echo "Installing FogSim, the test tools, Jupyter's kernel, MkDocs and Ray into $(VENV) (once, a few minutes) …"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --use-pep517 --editable '.[test,notebooks,docs,ray]'
+	@touch $(VENV)/.installed $(VENV)/.installed-test $(VENV)/.installed-notebooks $(VENV)/.installed-docs $(VENV)/.installed-cluster $@
+
+# What works on one processor, or waits, goes beside something else; the tests themselves take all processors.
+ci: $(VENV)/.installed-ci ## Everything that .ci/run checks
+	@$(MAKE) --jobs=2 --output-sync=target types lint contracts $(VENV)/.compiled
+	@$(MAKE) test
+	@$(MAKE) notebooks
+	@$(MAKE) portability
+	@$(MAKE) --jobs=2 --output-sync=target browse cluster
 
 tables: $(VENV)/.installed-test ## Measure the docs' tables anew (a day; goes on if interrupted), say what moved; TABLES="belief …"
 	@$(BIN)/python docs/rerun_tables.py $(TABLES)

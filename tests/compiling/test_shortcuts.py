@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from llvmlite.binding import ffi
 from numba.core import base, compiler, ir, types
+from numba.core.caching import NullCache
 from numba.core.compiler import Flags
 from numba.core.errors import TypingError
 from numba.core.registry import cpu_target
@@ -25,9 +26,11 @@ pytestmark = pytest.mark.skipif(
 
 
 def fogsims(function: Any) -> Any:
-    """Kernel of a function that is taken for one of FogSim's."""
+    """Kernel of a function that is taken for one of FogSim's, compiled by each process anew."""
     function.__module__ = "fogsim.made_up"
-    return kernel(function)
+    made: Any = kernel(function)
+    made._cache = NullCache()
+    return made
 
 
 class Pair(NamedTuple):

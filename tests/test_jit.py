@@ -216,3 +216,27 @@ print(each(np.arange(3.0)).tolist(), apply(inner, 1.0), callback.ctypes(3.0), le
 def test_functions_that_others_compile_with_numba_are_compiled_as_ever() -> None:
     done = subprocess.run([sys.executable, "-c", OTHERS], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == f"[1.0, 2.0, 3.0] 2.0 4.0 {DEFERS}"
+
+
+LITERALS = """
+from fogsim.jit import kernel
+
+@kernel
+def scaled(x, times, twice):
+    return times * x if twice else x
+
+@kernel
+def answer(x, n):
+    return scaled(x, 1, True) + scaled(x, 2, False) + scaled(x, n, n > 0)
+
+print(answer(10.0, 3), len(scaled.get_overload.__self__.overloads))
+"""
+
+
+def test_a_kernel_is_compiled_once_for_all_numbers_of_a_type(tmp_path: Path) -> None:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+    (tmp_path / "literals.py").write_text(LITERALS)
+    done = subprocess.run(
+        [sys.executable, "literals.py"], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["50.0", "1"]

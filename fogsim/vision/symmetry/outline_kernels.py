@@ -80,7 +80,11 @@ def support(
     # Three sides of a square are those of a gap between windows.
     result[0] = min(share, _WITHOUT_QUARTER + 4.0 * near.min() / outline.shape[0])
     if seen >= _ENOUGH:
-        _solve(a, b, result)
+        if a[0, 0] == 0.0 or a[1, 1] == 0.0:
+            # One level side alone: along it the outline could lie anywhere.
+            result[0] = 0.0
+        else:
+            _solve(a, b, result)
     return result
 
 

@@ -49,7 +49,7 @@ class LinkedLibrary(codegen.JITCodeLibrary):  # type: ignore[misc] # numba is un
 
     def _optimize_linked(self) -> None:
         """As numba does, but at level 2: level 3 makes nothing faster here, and takes longer."""
-        for options in ({"loop_vectorize": True, "slp_vectorize": False, "opt": 0, "cost": "cheap"}, {"opt": 2}):
+        for options in ({"loop_vectorize": False, "slp_vectorize": False, "opt": 0, "cost": "cheap"}, {"opt": 2}):
             passes, builder = self._codegen._module_pass_manager(**options)
             passes.run(self._final_module, builder)
 

@@ -47,9 +47,12 @@ def compiling_beside() -> Iterator[Callable[["Scenario"], None]]:
 
         def tell(scenario: "Scenario") -> None:
             methods = _methods(scenario)
-            if methods and _is_first():
-                stack.enter_context(BESIDE.compiles(lambda: process.poll() is not None, PACKAGES))
-                _send(process, {"size": (scenario.camera.width, scenario.camera.height), **methods})
+            if not methods or not _is_first():
+                # Nothing for it to do in this run, however long that is.
+                _end(process)
+                return
+            stack.enter_context(BESIDE.compiles(lambda: process.poll() is not None, PACKAGES))
+            _send(process, {"size": (scenario.camera.width, scenario.camera.height), **methods})
 
         yield tell
 

@@ -129,15 +129,7 @@ def run_command(
                 command_line=["fogsim", *sys.argv[1:]],
                 watch=progress.show,
             )
-    _print_summary(result.summary.values, SHOWN if loaded.traffic.has_ego else SHOWN_OF_TRAFFIC)
-    written = "the results are partial and say so" if result.files else "before its first step; nothing was written"
-    ended = result.ending.value if result.ending else f"{result.status.value}; {written}"
-    stdout.print(f"\nThe run ended: [bold]{ended}[/].")
-    for line in result.unplayed.lines:
-        stdout.print(f"[yellow]not played:[/] {escape(line)}", soft_wrap=True)
-    stdout.print("Results:")
-    for name in result.files:
-        stdout.print(f"  {escape(result.directory / name)}", soft_wrap=True)
+    _print_result(result, SHOWN if loaded.traffic.has_ego else SHOWN_OF_TRAFFIC)
     if result.ending is None:
         raise typer.Exit(INTERRUPTED)
 
@@ -158,6 +150,19 @@ def _filmed(scenario: "Scenario", wanted: bool | None) -> bool:
             "--video shows what an ego's camera sees, and traffic.ego is none; leave it out, or name an ego"
         )
     return scenario.traffic.has_ego if wanted is None else wanted
+
+
+def _print_result(result: "RecordedRun", shown: Mapping[str, tuple[str, str]]) -> None:
+    """Say how the run went and ended, what was not played, and which files there are."""
+    _print_summary(result.summary.values, shown)
+    written = "the results are partial and say so" if result.files else "before its first step; nothing was written"
+    ended = result.ending.value if result.ending else f"{result.status.value}; {written}"
+    stdout.print(f"\nThe run ended: [bold]{ended}[/].")
+    for line in result.unplayed.lines:
+        stdout.print(f"[yellow]not played:[/] {escape(line)}", soft_wrap=True)
+    stdout.print("Results:")
+    for name in result.files:
+        stdout.print(f"  {escape(result.directory / name)}", soft_wrap=True)
 
 
 def _print_summary(values: Mapping[str, object], shown: Mapping[str, tuple[str, str]]) -> None:

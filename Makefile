@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 export PYTHONDONTWRITEBYTECODE :=
 
 .DEFAULT_GOAL := help
-.PHONY: help check demo test quick hooks portability cluster notebooks site browse pythons lint types contracts ci tables clean
+.PHONY: help check demo test quick hooks portability cluster notebooks site browse wheel pythons lint types contracts ci tables clean
 
 help: ## Show what can be made
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -81,6 +81,10 @@ site: $(VENV)/.installed-docs ## Build the documentation site into site/, to be 
 
 browse: $(VENV)/.installed-docs ## Build the site and look at it in a headless browser, without changing site/
 	@$(BIN)/python -m pytest -q tests/site
+
+wheel: export HATCH_BUILD_HOOK_ENABLE_CUSTOM := true
+wheel: $(VENV)/.installed-test ## Build sdist and wheel into dist/, the wheel with kernels compiled: its first run compiles none
+	@$(BIN)/python -m build --no-isolation --outdir dist
 
 pythons: $(VENV)/.installed-test ## Install the wheel into an empty environment of each Python 3.11 to 3.13 that is here, and run it
 	@$(BIN)/python -m pytest -q tests/pythons

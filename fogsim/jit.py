@@ -26,6 +26,7 @@ import numba
 from numba.core.types.misc import unliteral
 
 from fogsim.compiling import begin_economy, prepare_economy
+from fogsim.compiling.shipped_kernels import ShippedCache, shipped_cache
 
 prepare_economy()
 
@@ -166,13 +167,16 @@ BESIDE = Beside()
 
 
 def is_kept(compiled: object) -> bool | None:
-    """Whether anything of a kernel is on the disk; None where nothing can be kept.
+    """Whether anything of a kernel is on the disk, or came with the installation; None where nothing can be kept.
 
     Parameters
     ----------
     compiled : callable
         A kernel.
     """
+    shipped: ShippedCache | None = getattr(compiled, "shipped", None)
+    if shipped is not None and shipped.is_there():
+        return True
     file: Any = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
     path = getattr(file, "_index_path", None)
     return None if path is None else Path(path).exists()
@@ -181,8 +185,8 @@ def is_kept(compiled: object) -> bool | None:
 def kernel(function: F) -> F:
     """Compile a function on its first call, without Python's lock and without threads (forks must stay possible).
 
-    The compiled code is kept beside the module or, for a read-only installation, in the user's cache directory; where
-    neither can be written it is compiled again by each process.
+    What came compiled with the installation is taken. Other compiled code is kept beside the module or, for a read-only
+    installation, in the user's cache directory; where neither can be written it is compiled again by each process.
 
     Parameters
     ----------
@@ -196,14 +200,16 @@ def kernel(function: F) -> F:
     name = plain.__qualname__
     plain.__qualname__ = f"{name}-{_fingerprint(plain)}"
     try:
+        shipped = shipped_cache(plain)
         compiled: Any = numba.njit(cache=True, **options)(function)
         _forgive_outdated_index(compiled)
-        _look_again(compiled)
     except RuntimeError:
         # numba found no place for its cache
         compiled = numba.njit(cache=False, **options)(function)
     finally:
         plain.__qualname__ = name
+    compiled.shipped = shipped
+    _look_elsewhere(compiled)
     # Other kernels take one in that Python cannot call and that is not kept: they are kept, and it is in them.
     inner: Any = numba.njit(cache=False, no_cpython_wrapper=True, **options)(function)
     compiled.get_call_template, compiled.get_overload = _without_literals(inner.get_call_template), inner.get_overload
@@ -235,12 +241,17 @@ def _forgive_outdated_index(compiled: Any) -> None:
     file._load_index = load_index
 
 
-def _look_again(compiled: Any) -> None:
-    """Let a kernel that another process compiles meanwhile be looked for on the disk again when that has ended."""
-    load, module = compiled._cache.load_overload, compiled.py_func.__module__
+def _look_elsewhere(compiled: Any) -> None:
+    """Let a kernel that was never compiled here be looked for in what came with the installation.
+
+    One that another process compiles meanwhile is looked for on the disk again when that has ended.
+    """
+    load, module, shipped = compiled._cache.load_overload, compiled.py_func.__module__, compiled.shipped
 
     def load_overload(signature: Any, target: Any) -> Any:
         found = load(signature, target)
+        if found is None and shipped is not None:
+            found = shipped.load_overload(signature, target)
         while found is None and BESIDE.may_bring(module):
             found = load(signature, target)
         return found

@@ -72,6 +72,7 @@ def compile_kernels() -> Iterator[str]:
             pool.submit(_find_lamps): "lamps",
             pool.submit(read_own_beams): "methods of the night",
             pool.submit(_light_a_road): "head lamps on the road",
+            pool.submit(_cross_a_footway): "footways",
             pool.submit(_restore_contrast): "contrast restoration",
         }
         while pending:
@@ -108,17 +109,25 @@ def _drive(scenario: str, drives: Sequence[Sequence[str]]) -> None:
 
 def _estimate_visibility() -> None:
     """Let every daytime method, also as published, read pictures of a foggy road with a vehicle ahead that leaves."""
+    import numpy as np
+
     from fogsim.estimators import ESTIMATORS
+    from fogsim.fusion import FUSIONS
     from fogsim.parameters import accepted_parameters
     from fogsim.values import Camera
+    from fogsim.vision.vehicle.decay_fit import fit_decay
 
+    said: list[list[Estimate]] = []
     for width, height in _SIZES:
         camera = Camera(width, height, 0.9 * width, (width / 2, height / 2), 1.4, pitch=0.03)
         for factory in ESTIMATORS.values():
             published = [{"as_published": True}] if "as_published" in accepted_parameters(factory) else []
-            for parameters in ({}, *published):
-                _read(factory(camera=camera, **parameters), camera)
+            said += [_read(factory(camera=camera, **parameters), camera) for parameters in ({}, *published)]
+    for fusion in FUSIONS:
+        fuse_estimates(fusion, {}, said)
     _follow_a_bend(camera)
+    # A vehicle ahead that leaves far enough, over more pictures than these.
+    fit_decay(np.array([20.0, 40.0, 60.0]), np.array([0.5, 0.3, 0.2]), np.full(3, 0.01), 0.02, 0.01)
 
 
 def read_foggy_road(method: str, parameters: Mapping[str, Any], size: Sequence[int]) -> "list[Estimate]":
@@ -266,6 +275,19 @@ def _light_a_road() -> None:
     air = Air(FogField(0.03, airlight=(0.0, 0.0, 0.0)))
     view = View(np.full((120, 160, 3), 0.01, np.float32), *far)
     air.radiance(view, camera, CameraPose((0.0, 0.0, 1.4), 0.0), Lights((), LightSources.none(), beams=beams))
+
+
+def _cross_a_footway() -> None:
+    """Look whether vehicles drive over a footway, which most roads have not."""
+    import numpy as np
+
+    from fogsim.scene.junctions import walkable
+    from fogsim.values.road import Lane, LaneKind, LaneMarking, PavedArea
+
+    corners = np.array([[-2.0, -2.0, 0.0], [2.0, -2.0, 0.0], [2.0, 2.0, 0.0], [-2.0, 2.0, 0.0]])
+    along = np.array([[-50.0, 0.0, 0.0], [50.0, 0.0, 0.0]])
+    lane = Lane("", "", along, 3.5, 14.0, LaneMarking.NONE, LaneMarking.NONE, outermost=True)
+    walkable([PavedArea("", corners, LaneKind.FOOTWAY)], [lane])
 
 
 def _foggy_road(camera: "Camera", lead: float, visibility: float = 120.0, bank: float = _SKY) -> "NDArray[np.uint8]":

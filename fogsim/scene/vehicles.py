@@ -46,8 +46,12 @@ def vehicle_batches(state: TrafficState, skip: int | None) -> tuple[Batch, ...]:
     # Sorted all at once, and taken apart by slices, which cost little.
     transforms, paint = np.zeros((len(rows), 4, 4), np.float32), np.empty((len(rows), 3), np.float32)
     copies = _Copies(transforms, paint, np.empty(len(rows), np.int32))
-    size = (state.length, state.width, state.height)
-    _place_copies(rows, _Vehicles(state.position, state.heading, state.grade, *size, state.paint, state.lamps), copies)
+    # One vehicle's columns lie side by side, those of many may not: without this a kernel is compiled for either.
+    position, heading, grade, length, width, height, painted = map(
+        np.ascontiguousarray,
+        (state.position, state.heading, state.grade, state.length, state.width, state.height, state.paint),
+    )
+    _place_copies(rows, _Vehicles(position, heading, grade, length, width, height, painted, state.lamps), copies)
     return tuple(Batch(name, transforms[own], paint[own], copies.lamps[own], instance[own]) for name, own in shapes)
 
 

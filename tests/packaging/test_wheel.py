@@ -1,7 +1,11 @@
-"""The built wheel, installed into an environment of its own, runs the demo from outside the checkout."""
+"""The built wheel, installed into an environment of its own, runs the demo from outside the checkout.
+
+With kernels in it, it compiles none. The whole of them takes a minute to build: ``make pythons`` has that.
+"""
 
 import json
 import os
+import platform
 import shutil
 import subprocess
 import sys
@@ -10,6 +14,8 @@ import venv
 from pathlib import Path
 
 import pytest
+
+from fogsim.compiling.shipped_kernels import usable_kind
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 FEW_KERNELS = "estimators=[{method: negru2013, parameters: {as_published: true}}]"
@@ -45,20 +51,57 @@ def carry_kernels_over(checkout: Path, installed: Path) -> None:
             shutil.copy2(kernel, copy.parent / "__pycache__")
 
 
-@pytest.mark.packaging
-@pytest.mark.timeout(900)
-def test_the_wheel_runs_the_demo_outside_the_checkout(tmp_path: Path) -> None:
-    build = ("-m", "build", "--no-isolation", "--wheel", "--outdir", tmp_path / "dist")
-    call(sys.executable, *build, CHECKOUT, cwd=tmp_path)
-    (wheel,) = (tmp_path / "dist").glob("fogsim-*.whl")
-    venv.create(tmp_path / "venv")
-    python = tmp_path / "venv" / "bin" / "python"
-    (packages,) = (tmp_path / "venv").glob("lib/python*/site-packages")
+CONVOLVES = """
+import numpy as np
+from fogsim.linear_algebra import convolution
+print(convolution(np.ones(2), np.ones(2)), sum(convolution.stats.cache_hits.values()))
+"""
+
+COMPILES_ONE = """
+
+def compile_kernels() -> Iterator[str]:
+    from fogsim.linear_algebra import convolution
+    import numpy as np
+
+    convolution(np.ones(3), np.ones(2))
+    yield "one"
+"""
+
+
+def built_wheel(project: Path, folder: Path, **environment: str) -> Path:
+    call(
+        sys.executable,
+        "-m",
+        "build",
+        "--no-isolation",
+        "--wheel",
+        "--outdir",
+        folder,
+        project,
+        cwd=folder,
+        **environment,
+    )
+    (wheel,) = folder.glob("fogsim-*.whl")
+    return wheel
+
+
+def installed_wheel(wheel: Path, place: Path) -> tuple[Path, Path]:
+    """Python of a new environment with the wheel in it, and the folder of its packages."""
+    venv.create(place)
+    python = place / "bin" / "python"
+    (packages,) = place.glob("lib/python*/site-packages")
     # The wheel's dependencies are those that are here (test_dependencies.py has that none is missing); an editable
     # installation's own path is not taken along, for paths are read from the environment's own folder alone.
     (packages / "dependencies.pth").write_text(f"{sysconfig.get_path('purelib')}\n", encoding="utf-8")
     install = ("-m", "pip", "--python", python, "install", "--no-deps", "--no-compile", "--quiet")
-    call(sys.executable, *install, "--disable-pip-version-check", "--force-reinstall", wheel, cwd=tmp_path)
+    call(sys.executable, *install, "--disable-pip-version-check", "--force-reinstall", wheel, cwd=place)
+    return python, packages
+
+
+@pytest.mark.packaging
+@pytest.mark.timeout(900)
+def test_the_wheel_runs_the_demo_outside_the_checkout(tmp_path: Path) -> None:
+    python, packages = installed_wheel(built_wheel(CHECKOUT, tmp_path), tmp_path / "venv")
     installed = packages / "fogsim"
     carry_kernels_over(CHECKOUT, installed)
     home = tmp_path / "home"
@@ -77,3 +120,26 @@ def test_the_wheel_runs_the_demo_outside_the_checkout(tmp_path: Path) -> None:
     call(python, "-W", "error", "-c", code, cwd=tmp_path, HOME=str(home))
     where = call(python, "-c", "import fogsim; print(fogsim.__file__)", cwd=tmp_path).stdout
     assert str(tmp_path) in where
+
+
+@pytest.mark.packaging
+@pytest.mark.timeout(900)
+@pytest.mark.skipif(usable_kind() is None, reason="no kernels are shipped for this processor")
+def test_a_wheel_with_kernels_needs_not_compile_them(tmp_path: Path) -> None:
+    project = tmp_path / "project"
+    names = ("fogsim", "envs", "scenarios", "pyproject.toml", "README.md", "LICENSE", "THIRD_PARTY_NOTICES.md")
+    for name in (*names, "tools/ship_kernels.py"):
+        (project / name).parent.mkdir(parents=True, exist_ok=True)
+        copy = shutil.copytree if (CHECKOUT / name).is_dir() else shutil.copy2
+        copy(CHECKOUT / name, project / name)
+    with (project / "fogsim" / "cli" / "compile.py").open("a", encoding="utf-8") as file:
+        file.write(COMPILES_ONE)
+    wheel = built_wheel(project, tmp_path, HATCH_BUILD_HOOK_ENABLE_CUSTOM="true")
+    version = f"cp{sys.version_info.major}{sys.version_info.minor}"
+    assert wheel.name.endswith(f"-{version}-{version}-manylinux_2_17_{platform.machine()}.whl")
+    python, packages = installed_wheel(wheel, tmp_path / "venv")
+    kernels = [path.name for path in (packages / "fogsim" / "_kernels").rglob("*.nbc")]
+    assert [name.split("-")[0] for name in kernels] == ["linear_algebra.convolution"]
+    said = call(python, "-c", CONVOLVES, cwd=tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "cache")).stdout
+    assert said.split() == ["[1.", "2.", "1.]", "1"]
+    assert not list((tmp_path / "cache").rglob("*.nbc"))

@@ -213,7 +213,9 @@ class NightRoad:
         return hidden
 
     def _fit(self, seen: _Seen, references: VeilReferences) -> VeilFit:
-        parts = Parts(*(part[:, seen.used] for part in (references.veil, references.road, *references.slopes)))
+        # By rows, as those are of which one reference is made of three: one kernel is compiled for both.
+        kinds = (references.veil, references.road, *references.slopes)
+        parts = Parts(*(np.ascontiguousarray(part[:, seen.used]) for part in kinds))
         return fit_veil(seen.luminance, seen.floor, parts, self._shift)
 
     def _estimate(self, seen: _Seen, references: tuple[VeilReferences, ...]) -> Estimate:

@@ -1,0 +1,119 @@
+"""Kernels that came with the installation are taken where they are right, and nowhere else."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from fogsim.compiling import shipped_kernels
+from fogsim.compiling.shipped_kernels import KINDS, compiled_for, usable_kind
+
+SOURCE = """
+from fogsim.jit import kernel
+
+@kernel
+def twice(x):
+    return {factor} * x
+"""
+
+ASK = """
+import sys
+from pathlib import Path
+from fogsim.compiling import shipped_kernels
+shipped_kernels.PACKAGE, shipped_kernels.FOLDER = Path("package").resolve(), Path("shipped").resolve()
+sys.path.insert(0, "package/part")
+from doubling import twice
+from fogsim.jit import is_kept
+kept = is_kept(twice)
+print(twice(10.0), kept, sum(twice.stats.cache_hits.values()))
+"""
+
+COMPILED_FOR = compiled_for()
+pytestmark = pytest.mark.skipif(COMPILED_FOR is None, reason="none are shipped for this machine")
+
+Ask = Callable[..., list[str]]
+
+
+@pytest.fixture
+def ask(tmp_path: Path) -> Ask:
+    """What a process gets of a package whose installation came with a kernel."""
+
+    def told(**environment: str) -> list[str]:
+        inherited = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
+        done = subprocess.run(
+            [sys.executable, "-c", ASK],
+            cwd=tmp_path,
+            env={**inherited, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path), **environment},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout.split()
+
+    part = tmp_path / "package" / "part"
+    part.mkdir(parents=True)
+    (part / "doubling.py").write_text(SOURCE.format(factor=2.0))
+    assert told(**(COMPILED_FOR or {})) == ["20.0", "False", "0"]
+    (tmp_path / "shipped" / "part").mkdir(parents=True)
+    for file in (part / "__pycache__").glob("*.nb[ci]"):
+        file.rename(tmp_path / "shipped" / "part" / file.name)
+    return told
+
+
+def kept(folder: Path) -> list[Path]:
+    return list((folder / "package").rglob("*.nb[ci]"))
+
+
+@pytest.mark.skipif(usable_kind() is None, reason="this processor is older than those that kernels are shipped for")
+def test_what_came_is_taken_and_not_compiled_nor_kept_again(ask: Ask, tmp_path: Path) -> None:
+    assert ask() == ["20.0", "True", "1"]
+    assert not kept(tmp_path)
+
+
+@pytest.mark.skipif(usable_kind() is None, reason="this processor is older than those that kernels are shipped for")
+def test_what_came_is_taken_where_nothing_can_be_kept(ask: Ask, tmp_path: Path) -> None:
+    file = tmp_path / "package" / "part" / "__pycache__"
+    file.rmdir()
+    file.write_text("no folder")
+    assert ask(HOME=str(file), XDG_CACHE_HOME=str(file)) == ["20.0", "True", "1"]
+
+
+def test_a_changed_source_is_compiled(ask: Ask, tmp_path: Path) -> None:
+    (tmp_path / "package" / "part" / "doubling.py").write_text(SOURCE.format(factor=3.0))
+    assert ask()[0] == "30.0"
+    assert kept(tmp_path)
+
+
+@pytest.mark.parametrize("variable", [{"NUMBA_CPU_NAME": "generic"}, {"NUMBA_BOUNDSCHECK": "1"}])
+def test_who_tells_numba_how_to_compile_is_obeyed(ask: Ask, tmp_path: Path, variable: dict[str, str]) -> None:
+    assert ask(**variable) == ["20.0", "False", "0"]
+    assert kept(tmp_path)
+
+
+@pytest.mark.parametrize("suffix", ["nbc", "nbi"])
+def test_a_damaged_file_is_as_none(ask: Ask, tmp_path: Path, suffix: str) -> None:
+    (file,) = (tmp_path / "shipped").rglob(f"*.{suffix}")
+    file.write_bytes(file.read_bytes()[:100])
+    answer, _, hits = ask()
+    assert (answer, hits) == ("20.0", "0")
+    assert kept(tmp_path)
+
+
+def test_an_older_processor_compiles_for_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    (kind,) = KINDS.values()
+    for lacking in (None, "avx2"):
+        features = {name: name != lacking for name in kind.features}
+        monkeypatch.setattr(shipped_kernels.llvm, "get_host_cpu_features", features.copy)
+        assert usable_kind.__wrapped__() == (kind if lacking is None else None)
+
+
+def test_an_unknown_processor_compiles_for_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail() -> dict[str, bool]:
+        raise RuntimeError("failed to query host cpu features")
+
+    monkeypatch.setattr(shipped_kernels.llvm, "get_host_cpu_features", fail)
+    assert usable_kind.__wrapped__() is None

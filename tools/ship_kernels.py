@@ -1,0 +1,96 @@
+"""The wheel's kernels, compiled when it is built, so that a first run compiles none.
+
+hatchling's build hook. It needs all that FogSim needs and takes a minute, so it is off unless it is asked for, as
+``make wheel`` does; without it a wheel is for any machine and any Python, and first runs compile:
+
+    HATCH_BUILD_HOOK_ENABLE_CUSTOM=true python -m build
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+FOLDER = "fogsim/_kernels"
+"""Where the wheel has them, as `fogsim.compiling.shipped_kernels` finds them."""
+
+SOURCES = ("fogsim", "envs", "scenarios")
+COMPILE = ("-m", "fogsim", "compile")
+
+
+class KernelsHook(BuildHookInterface[Any]):
+    """Adds compiled kernels to a wheel, and says in its name for which Python and machine they are."""
+
+    PLUGIN_NAME = "custom"
+
+    _workplace: "tempfile.TemporaryDirectory[str] | None" = None
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Compile them, unless the installation is one of the checkout itself."""
+        variables = compiled_for(Path(self.root)) if version == "standard" else None
+        if variables is None:
+            return
+        self._workplace = tempfile.TemporaryDirectory()
+        self.app.display_info("Compiling FogSim's kernels, a minute or two …")
+        build_data["force_include"] |= compiled_kernels(Path(self.root), Path(self._workplace.name), variables)
+        python = f"cp{sys.version_info.major}{sys.version_info.minor}"
+        build_data["pure_python"] = False
+        # They call nothing of a C library but mathematics, which it has had as long as there are such wheels.
+        build_data["tag"] = f"{python}-{python}-manylinux_2_17_{os.uname().machine}"
+
+    def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:  # noqa: ARG002 - hatchling's
+        """Remove what they were compiled in."""
+        if self._workplace is not None:
+            self._workplace.cleanup()
+
+
+def compiled_for(root: Path) -> Mapping[str, str] | None:
+    """Environment in which they are compiled; None on systems for which none are shipped."""
+    if sys.platform != "linux":
+        return None
+    sys.path.insert(0, str(root))
+    # What hatchling imports must not need what only the build needs.
+    from fogsim.compiling.shipped_kernels import compiled_for as variables  # noqa: PLC0415
+
+    sys.path.remove(str(root))
+    return variables()
+
+
+def compiled_kernels(
+    root: Path, workplace: Path, variables: Mapping[str, str], command: Sequence[str] = COMPILE
+) -> dict[str, str]:
+    """Compile kernels in a copy of the sources.
+
+    Parameters
+    ----------
+    root : Path
+        The checkout, or the sdist.
+    workplace : Path
+        An empty folder, for the copy.
+    variables : mapping
+        Environment that says for which processors.
+    command : sequence of str
+        What Python runs.
+
+    Returns
+    -------
+    dict
+        For each of numba's files its place in the wheel.
+    """
+    for name in SOURCES:
+        shutil.copytree(root / name, workplace / name, ignore=shutil.ignore_patterns("__pycache__"))
+    inherited = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
+    path = os.pathsep.join((str(workplace), str(workplace / "envs")))
+    environment = {**inherited, **variables, "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
+    subprocess.run([sys.executable, *command], cwd=workplace, env=environment, check=True)  # noqa: S603 - FogSim's own
+    package = workplace / "fogsim"
+    return {
+        str(file): str(Path(FOLDER) / file.parents[1].relative_to(package) / file.name)
+        for file in sorted(package.rglob("__pycache__/*.nb[ci]"))
+    }

@@ -26,7 +26,7 @@ import numba
 from numba.core.types.misc import unliteral
 
 from fogsim.compiling import begin_economy, prepare_economy
-from fogsim.compiling.shipped_kernels import ShippedCache, shipped_cache
+from fogsim.compiling.shipped_kernels import ShippedCache, shipped_cache, why_not_taken
 
 prepare_economy()
 
@@ -75,9 +75,10 @@ class Announcement(event.Listener):  # type: ignore[misc] # numba is untyped
             self._started = self._clock()
             if self._told is None and self._spent > _PATIENCE:
                 self._told = self._started
+                why = why_not_taken()
                 self._tell(
                     "fogsim: compiling for this processor, a minute or two, the first time only "
-                    "(ahead of time and on all cores: fogsim compile)"
+                    f"(ahead of time and on all cores: fogsim compile{f'; {why}' if why else ''})"
                 )
         self._depth += 1
 

@@ -21,7 +21,8 @@ FOLDER = "fogsim/_kernels"
 """Where the wheel has them, as `fogsim.compiling.shipped_kernels` finds them."""
 
 SOURCES = ("fogsim", "envs", "scenarios")
-COMPILE = ("-m", "fogsim", "compile")
+COMPILE = ("-c", "from fogsim.cli.compile import compile_kernels\nfor ready in compile_kernels():\n    print(ready)")
+"""What Python runs: not the command itself, which wants to know the version of FogSim that is installed."""
 
 
 class KernelsHook(BuildHookInterface[Any]):
@@ -86,8 +87,9 @@ def compiled_kernels(
     for name in SOURCES:
         shutil.copytree(root / name, workplace / name, ignore=shutil.ignore_patterns("__pycache__"))
     inherited = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
-    path = os.pathsep.join((str(workplace), str(workplace / "envs")))
-    environment = {**inherited, **variables, "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
+    # The last is what build frontends have, to let Python find what they installed for the build alone.
+    path = (str(workplace), str(workplace / "envs"), os.environ.get("PYTHONPATH", ""))
+    environment = {**inherited, **variables, "PYTHONPATH": os.pathsep.join(path), "PYTHONDONTWRITEBYTECODE": "1"}
     subprocess.run([sys.executable, *command], cwd=workplace, env=environment, check=True)  # noqa: S603 - FogSim's own
     package = workplace / "fogsim"
     return {

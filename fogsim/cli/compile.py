@@ -2,6 +2,7 @@
 
 import dataclasses
 import logging
+import math
 import multiprocessing
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -20,6 +21,12 @@ if TYPE_CHECKING:
 _SIZES = ((160, 120), (640, 480))
 """Pictures that are estimated: methods choose what they do by size [px]."""
 
+_FEW = "estimators=[{method: negru2013, parameters: {as_published: true}}]"
+"""What needs few kernels."""
+
+_JOINT = "estimators=[joint_road]"
+"""What does more in some roads and fogs than in the pictures below."""
+
 _DRIVES: dict[str, tuple[str, tuple[tuple[str, ...], ...]]] = {
     "drives by day": (
         "motorway_fog_bank",
@@ -31,10 +38,16 @@ _DRIVES: dict[str, tuple[str, tuple[tuple[str, ...], ...]]] = {
     ),
     "drives in patches of fog": (
         "motorway_fog_bank",
-        (("camera.samples=2", "fog.patches={correlation_length_m: 20}", "fog.forward_scatter=0.1"),),
+        (("camera.samples=2", "fog.patches={correlation_length_m: 20}", "fog.forward_scatter=0.1", _JOINT),),
     ),
+    "drives out of a tunnel": ("tunnel_exit_into_fog", ((_JOINT,),)),
+    "drives on a clear day": ("clear_day", ((_JOINT,),)),
+    "drives in a city": ("city_fog", ((),)),
 }
 """Scenario, and what is set in one drive after the other, since it is drawn by kernels of its own."""
+
+_FRAMES = 10
+"""Frames of each drive."""
 
 _SKY = 1e6
 """Distance of the sky in those pictures [m]."""
@@ -90,7 +103,7 @@ def _be_quiet() -> None:
 
 
 def _drive(scenario: str, drives: Sequence[Sequence[str]]) -> None:
-    """Draw the first frames of a scenario with each of some settings, with an estimator that needs few kernels.
+    """Draw the first frames of a scenario with each of some settings.
 
     For its metrics all are in one junction.
     """
@@ -98,10 +111,9 @@ def _drive(scenario: str, drives: Sequence[Sequence[str]]) -> None:
     from fogsim.metrics import RunMetrics
     from fogsim.scenario import load_scenario
 
-    published = "estimators=[{method: negru2013, parameters: {as_published: true}}]"
     for overrides in drives:
         metrics = RunMetrics()
-        for step in islice(run(load_scenario(scenario, [published, *overrides]), seed=1), 3):
+        for step in islice(run(load_scenario(scenario, ["expect={}", _FEW, *overrides]), seed=1), _FRAMES):
             lane = (":junction_0_0",) * len(step.traffic.lane)
             metrics.update(dataclasses.replace(step, traffic=dataclasses.replace(step.traffic, lane=lane)))
         metrics.summary()
@@ -115,6 +127,7 @@ def _estimate_visibility() -> None:
     from fogsim.fusion import FUSIONS
     from fogsim.parameters import accepted_parameters
     from fogsim.values import Camera
+    from fogsim.vision.uneven.uneven_kernels import extinction_at
     from fogsim.vision.vehicle.decay_fit import fit_decay
 
     said: list[list[Estimate]] = []
@@ -126,8 +139,9 @@ def _estimate_visibility() -> None:
     for fusion in FUSIONS:
         fuse_estimates(fusion, {}, said)
     _follow_a_bend(camera)
-    # A vehicle ahead that leaves far enough, over more pictures than these.
+    # What takes more pictures than these: a vehicle ahead that leaves far enough, and fog that is sure to vary.
     fit_decay(np.array([20.0, 40.0, 60.0]), np.array([0.5, 0.3, 0.2]), np.full(3, 0.01), 0.02, 0.01)
+    extinction_at(np.array([10.0, 100.0]), np.full(2, math.log(0.03)), 50.0)
 
 
 def read_foggy_road(method: str, parameters: Mapping[str, Any], size: Sequence[int]) -> "list[Estimate]":
@@ -166,7 +180,7 @@ def fuse_estimates(fusion: str, parameters: Mapping[str, Any], estimates: "Seque
 
     chosen = make(fusion, **parameters)
     for number, instant in enumerate(zip(*estimates, strict=True)):
-        fuse(chosen, instant, 0.1 * number, 3.0 * number)
+        fuse(chosen, instant, 0.1 * number, 10.0 * number)
 
 
 def _restore_contrast() -> None:

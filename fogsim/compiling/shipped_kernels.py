@@ -8,11 +8,12 @@ import functools
 import platform
 from dataclasses import dataclass
 from pathlib import Path
-from pickle import UnpicklingError
+from pickle import UnpicklingError, load
 from types import FunctionType
 from typing import Any, cast
 
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
+import numba
 from numba.core import caching, config
 
 PACKAGE = Path(__file__).parents[1]
@@ -125,3 +126,20 @@ def shipped_cache(function: FunctionType) -> ShippedCache | None:
     if not FOLDER.is_dir() or not Path(function.__code__.co_filename).is_relative_to(PACKAGE) or usable_kind() is None:
         return None
     return ShippedCache(function)
+
+
+def why_not_taken() -> str | None:
+    """Why what came with the installation is not for this one; None if it is, or if nothing came."""
+    index = next(FOLDER.rglob("*.nbi"), None)
+    if index is None:
+        return None
+    if usable_kind() is None:
+        return f"those that came with it are for {KINDS[platform.machine()].name}"
+    try:
+        with index.open("rb") as file:
+            version = load(file)  # noqa: S301 - it came as all of the installation did
+    except (OSError, EOFError, UnpicklingError):
+        return "those that came with it cannot be read"
+    if version != numba.__version__:
+        return f"those that came with it are of numba {version}, and here is {numba.__version__}"
+    return None

@@ -1,15 +1,18 @@
 """Kernels that came with the installation are taken where they are right, and nowhere else."""
 
 import os
+import pickle
+import platform
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import numba
 import pytest
 
 from fogsim.compiling import shipped_kernels
-from fogsim.compiling.shipped_kernels import KINDS, compiled_for, usable_kind
+from fogsim.compiling.shipped_kernels import KINDS, compiled_for, usable_kind, why_not_taken
 
 SOURCE = """
 from fogsim.jit import kernel
@@ -117,3 +120,19 @@ def test_an_unknown_processor_compiles_for_itself(monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setattr(shipped_kernels.llvm, "get_host_cpu_features", fail)
     assert usable_kind.__wrapped__() is None
+
+
+def test_it_is_said_why_what_came_is_not_taken(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(shipped_kernels, "FOLDER", tmp_path)
+    monkeypatch.setattr(shipped_kernels, "usable_kind", lambda: KINDS[platform.machine()])
+    assert why_not_taken() is None
+    index = tmp_path / "part" / "doubling.twice-1.nbi"
+    index.parent.mkdir()
+    index.write_bytes(pickle.dumps(numba.__version__))
+    assert why_not_taken() is None
+    index.write_bytes(pickle.dumps("0.1"))
+    assert why_not_taken() == f"those that came with it are of numba 0.1, and here is {numba.__version__}"
+    index.write_bytes(b"")
+    assert why_not_taken() == "those that came with it cannot be read"
+    monkeypatch.setattr(shipped_kernels, "usable_kind", lambda: None)
+    assert why_not_taken() == "those that came with it are for x86-64-v3"

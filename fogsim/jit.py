@@ -26,7 +26,7 @@ import numba
 from numba.core.types.misc import unliteral
 
 from fogsim.compiling import begin_economy, prepare_economy
-from fogsim.compiling.shipped_kernels import ShippedCache, shipped_cache, why_not_taken
+from fogsim.compiling.shipped_code import ShippedCache, shipped_cache, why_not_taken
 
 prepare_economy()
 

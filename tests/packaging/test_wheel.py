@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from fogsim.compiling.shipped_kernels import usable_kind
+from fogsim.compiling.shipped_code import usable_kind
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 FEW_KERNELS = "estimators=[{method: negru2013, parameters: {as_published: true}}]"

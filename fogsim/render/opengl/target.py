@@ -29,7 +29,8 @@ class Target:
 
     def __init__(self, width: int, height: int) -> None:
         self.size = (width, height)
-        self._picture = np.empty((height, width), np.int32)
+        # Rows lie apart, as those that the processor draws do: for others the shading would be compiled anew.
+        self._rows = np.empty((height, width + 1), np.int32)
         self._framebuffer = int(GL.glGenFramebuffers(1))
         self._renderbuffers = [int(name) for name in GL.glGenRenderbuffers(2)]
         GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self._framebuffer)
@@ -52,9 +53,11 @@ class Target:
     def read(self) -> NDArray[np.int32]:
         """The finished picture, its first row the first that was drawn; valid until the next is read."""
         # PyOpenGL's own function would make a new array at each call.
-        place = self._picture.ctypes.data_as(ctypes.c_void_p)
+        place = self._rows.ctypes.data_as(ctypes.c_void_p)
+        GL.glPixelStorei(GL.GL_PACK_ROW_LENGTH, self._rows.shape[1])
         GL_1_1.glReadPixels(0, 0, *self.size, GL.GL_RED_INTEGER, GL.GL_INT, place)
-        return self._picture
+        GL.glPixelStorei(GL.GL_PACK_ROW_LENGTH, 0)
+        return self._rows[:, :-1]
 
     def delete(self) -> None:
         """Free the framebuffer."""

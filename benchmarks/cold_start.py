@@ -4,6 +4,8 @@ Each is a `fogsim run` of one simulated second in a process of its own, the firs
 compiled. Processor time says more than wall time on a machine that does other work too; both are told, with the
 machine's load when the run began, and how many kernels the first run kept.
 
+It measures the FogSim of the Python that runs it: away from the checkout, that of an environment with a wheel.
+
     python benchmarks/cold_start.py [--json] [--repeat 3] [--scenario motorway_fog_bank ...]
 """
 

@@ -47,11 +47,16 @@ def _numpy_features() -> str:
     return " ".join(newest or found)
 
 
-VARIANTS: Mapping[str, Mapping[str, str]] = {
-    **{f"OpenBLAS for {core}": {"OPENBLAS_CORETYPE": core} for core in _core_types()},
+BESIDE: Mapping[str, Mapping[str, str]] = {
+    "all else as it is": {},
     "numpy without AVX-512": {"NPY_DISABLE_CPU_FEATURES": _numpy_features()},
     "C library without FMA": {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA"},
 }
+VARIANTS: Mapping[str, Mapping[str, str]] = {
+    f"OpenBLAS for {core}, {name}": {"OPENBLAS_CORETYPE": core, **setting}
+    for core, (name, setting) in zip(_core_types(), BESIDE.items(), strict=False)
+}
+"""Two changes at a time, for each variant takes the time of two drives, and whatever differs is found all the same."""
 PARTS = ("shapes", "day", "night", "chase")
 GENERIC = {
     "numba for any processor": ("shapes", "day", "chase"),

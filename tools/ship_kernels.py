@@ -7,11 +7,12 @@ hatchling's build hook. It needs all that FogSim needs and takes a minute, so it
 """
 
 import os
+import platform
 import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -34,8 +35,11 @@ class KernelsHook(BuildHookInterface[Any]):
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile them, unless the installation is one of the checkout itself."""
-        variables = compiled_for(Path(self.root)) if version == "standard" else None
+        if version != "standard":
+            return
+        variables = compiled_for(Path(self.root))
         if variables is None:
+            self.app.display_warning(f"No kernels are shipped for {platform.platform()}: first runs will compile.")
             return
         self._workplace = tempfile.TemporaryDirectory()
         self.app.display_info("Compiling FogSim's kernels, a minute or two …")
@@ -43,7 +47,7 @@ class KernelsHook(BuildHookInterface[Any]):
         python = f"cp{sys.version_info.major}{sys.version_info.minor}"
         build_data["pure_python"] = False
         # They call nothing of a C library but mathematics, which it has had as long as there are such wheels.
-        build_data["tag"] = f"{python}-{python}-manylinux_2_17_{os.uname().machine}"
+        build_data["tag"] = f"{python}-{python}-manylinux_2_17_{platform.machine()}"
 
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:  # noqa: ARG002 - hatchling's
         """Remove what they were compiled in."""
@@ -53,7 +57,7 @@ class KernelsHook(BuildHookInterface[Any]):
 
 def compiled_for(root: Path) -> Mapping[str, str] | None:
     """Environment in which they are compiled; None on systems for which none are shipped."""
-    if sys.platform != "linux":
+    if platform.libc_ver()[0] != "glibc":
         return None
     sys.path.insert(0, str(root))
     # What hatchling imports must not need what only the build needs.
@@ -63,9 +67,7 @@ def compiled_for(root: Path) -> Mapping[str, str] | None:
     return variables()
 
 
-def compiled_kernels(
-    root: Path, workplace: Path, variables: Mapping[str, str], command: Sequence[str] = COMPILE
-) -> dict[str, str]:
+def compiled_kernels(root: Path, workplace: Path, variables: Mapping[str, str]) -> dict[str, str]:
     """Compile kernels in a copy of the sources.
 
     Parameters
@@ -76,8 +78,6 @@ def compiled_kernels(
         An empty folder, for the copy.
     variables : mapping
         Environment that says for which processors.
-    command : sequence of str
-        What Python runs.
 
     Returns
     -------
@@ -90,7 +90,7 @@ def compiled_kernels(
     # The last is what build frontends have, to let Python find what they installed for the build alone.
     path = (str(workplace), str(workplace / "envs"), os.environ.get("PYTHONPATH", ""))
     environment = {**inherited, **variables, "PYTHONPATH": os.pathsep.join(path), "PYTHONDONTWRITEBYTECODE": "1"}
-    subprocess.run([sys.executable, *command], cwd=workplace, env=environment, check=True)  # noqa: S603 - FogSim's own
+    subprocess.run([sys.executable, *COMPILE], cwd=workplace, env=environment, check=True)  # noqa: S603 - FogSim's own
     package = workplace / "fogsim"
     return {
         str(file): str(Path(FOLDER) / file.parents[1].relative_to(package) / file.name)

@@ -10,7 +10,8 @@ export PYTHONDONTWRITEBYTECODE :=
 # packages that pip is told of, pip does it.
 INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check uv \
 	&& $(BIN)/uv pip install --quiet --no-cache --python $(BIN)/python --editable '.$(EXTRAS)' \
-	|| $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --use-pep517 --editable '.$(EXTRAS)'
+	|| { echo "uv could not, so pip installs …"; \
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --use-pep517 --editable '.$(EXTRAS)'; }
 
 .DEFAULT_GOAL := help
 .PHONY: help check demo test quick hooks portability cluster notebooks site browse wheel pythons lint types contracts ci tables clean

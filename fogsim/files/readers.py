@@ -1,0 +1,77 @@
+"""Reading files that someone else wrote: regular files only, of limited size, and one error for all that is wrong."""
+
+import json
+import os
+import stat
+from pathlib import Path
+from typing import Any, NoReturn
+
+from fogsim.errors import InputError, shown
+
+MOST_BYTES = 64 * 2**20
+"""Largest file that is read whole, unless a reader has a limit of its own [bytes]."""
+
+
+def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
+    """Content of a regular file of at most `most` bytes.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is a pipe, a device or a folder (they may never end), or it is larger.
+    """
+    try:
+        # Opening a pipe would otherwise wait for a writer.
+        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+        with open(descriptor, "rb") as file:  # noqa: PTH123 - a descriptor has no Path
+            if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+                raise InputError(f"{path}: cannot be read: not a regular file")
+            content = file.read(most + 1)
+    except ValueError as error:  # a NUL in the name
+        raise error if isinstance(error, InputError) else InputError(f"{shown(str(path))}: {error}") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    if len(content) > most:
+        raise InputError(f"{path}: cannot be read: larger than {most} bytes")
+    return content
+
+
+def read_text(path: Path, most: int = MOST_BYTES) -> str:
+    """Text of a regular file in UTF-8, with or without a byte order mark.
+
+    Raises
+    ------
+    InputError
+        As `read_bytes`, or if it is not UTF-8; the message has the line and the byte.
+    """
+    content = read_bytes(path, most)
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = 1 + content[: error.start].count(b"\n")
+        raise InputError(
+            f"{path}:{line}: expected UTF-8 text, got the byte 0x{error.object[error.start]:02x}"
+        ) from error
+
+
+def read_json(path: Path, most: int = MOST_BYTES) -> Any:
+    """Value of a JSON file; NaN and Infinity, which are not JSON, are refused.
+
+    Raises
+    ------
+    InputError
+        As `read_text`, or if it is not JSON or nested too deeply.
+    """
+    text = read_text(path, most)
+    try:
+        return json.loads(text, parse_constant=_refuse_constant)
+    except json.JSONDecodeError as error:
+        raise InputError(f"{path}:{error.lineno}: not valid JSON: {error.msg}") from error
+    except RecursionError as error:
+        raise InputError(f"{path}: not valid JSON: nested too deeply") from error
+    except ValueError as error:
+        raise InputError(f"{path}: not valid JSON: {error}") from error
+
+
+def _refuse_constant(name: str) -> NoReturn:
+    raise ValueError(f"{name} is not a number of JSON")

@@ -28,6 +28,10 @@ class SimulationRunningError(SimulationError):
     """A simulation runs in this process already, and only one can."""
 
 
+class MethodError(FogSimError, RuntimeError):
+    """A method that a user brought failed; the message names it, its error and the line of its code."""
+
+
 class RenamedWarning(FutureWarning):
     """A value is called otherwise now and works by its old name; the message tells the new one."""
 

@@ -10,7 +10,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.errors import InputError, RecorderError
+from fogsim.errors import InputError, MethodError, RecorderError
 from fogsim.files.atomic import refuse_existing
 from fogsim.interruption import Interruption
 from fogsim.loop import run, warn_of_unplayed
@@ -131,6 +131,8 @@ def record_run(
         If a video is to be written and there is no ffmpeg.
     RecorderError
         If a recorder fails, with its name; the others' files are kept, and the manifest's status is "failed".
+    MethodError
+        If a user's method fails; the message names it and the line of its code.
     FogSimError
         If a part of the loop cannot start or fails on the way.
     ValueError, TypeError
@@ -145,14 +147,18 @@ def record_run(
     -----
     Any error is raised again. One before the first step leaves none of the files and none of the directories that were
     made for them, and earlier results as they were; one after it leaves what was recorded until then, and a manifest of
-    status "failed" with the error's message.
+    status "failed" with the error's message. An error of a user's method leaves that manifest in either case, where
+    there are no earlier results.
     """
-    of_ego = _Recorded(
-        lambda folder: run(scenario, seed, sumo_outputs=folder, camera_processes=camera_processes),
-        RunMetrics(build.safety_standard(scenario)),
-        RECORDERS,
-        watch,
-    )
+
+    def of_ego() -> _Recorded[Step]:
+        return _Recorded(
+            lambda folder: run(scenario, seed, sumo_outputs=folder, camera_processes=camera_processes),
+            RunMetrics(build.safety_standard(scenario)),
+            RECORDERS,
+            watch,
+        )
+
     return _record(of_ego, scenario, seed, out, overwrite, recorders, command_line)
 
 
@@ -204,14 +210,17 @@ def record_traffic(
     UnplayedWarning
         As of `record_run`.
     """
-    road = RoadSpeeds()
-    alone = _Recorded(
-        lambda folder: run_traffic(scenario, seed, folder),
-        TrafficRunMetrics(build.safety_standard(scenario), watchers=[road]),
-        TRAFFIC_RECORDERS,
-        watch,
-        road,
-    )
+
+    def alone() -> _Recorded[TrafficStep]:
+        road = RoadSpeeds()
+        return _Recorded(
+            lambda folder: run_traffic(scenario, seed, folder),
+            TrafficRunMetrics(build.safety_standard(scenario), watchers=[road]),
+            TRAFFIC_RECORDERS,
+            watch,
+            road,
+        )
+
     return _record(alone, scenario, seed, out, overwrite, recorders, command_line)
 
 
@@ -250,7 +259,7 @@ class _Recorded(Generic[AnyStep]):
 
 
 def _record(
-    what: _Recorded[AnyStep],
+    make: Callable[[], _Recorded[AnyStep]],
     scenario: Scenario,
     seed: int,
     out: Path,
@@ -267,6 +276,11 @@ def _record(
             command_line=command_line,
             own_methods=build.own_methods(scenario),
         )
+        try:
+            what = make()
+        except MethodError as error:
+            _note_failure(directory, manifest, error)
+            raise
         information = _information(what, scenario, seed, directory)
         opened = {name: checked_recorder(name, what.recorders[name](information)) for name in recorders}
         recording = Recording(directory, manifest, opened, what.metrics)
@@ -287,6 +301,13 @@ def _record(
             recording.begin_if_nothing_is_lost()
         except RecorderError:
             raise
+        except MethodError as error:
+            message = str(error)
+            recording.begin_if_nothing_is_lost()
+            raise
+        except SystemExit as error:
+            message = f"the run was ended by {error!r}"
+            raise MethodError(message) from error
         except Exception as error:
             message = f"{type(error).__name__}: {error}"
             raise
@@ -299,6 +320,14 @@ def _record(
     if last is not None and status is Status.COMPLETE:
         warn_of_unplayed(scenario, last)
     return RecordedRun(status, ending, what.metrics.summary(), directory.path, tuple(recording.files), unplayed)
+
+
+def _note_failure(directory: RunDirectory, manifest: Manifest, error: MethodError) -> None:
+    """Leave a manifest of a run that failed before it could begin, unless earlier results are there."""
+    if not (directory.earlier or directory.unfinished.exists()):
+        directory.begin(manifest.to_json())
+        ended = dataclasses.replace(manifest, status=Status.FAILED, message=str(error), ended=datetime.now(UTC))
+        directory.finish(ended.to_json())
 
 
 def _information(what: _Recorded[AnyStep], scenario: Scenario, seed: int, directory: RunDirectory) -> RunInformation:

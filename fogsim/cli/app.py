@@ -15,7 +15,7 @@ from fogsim.cli.doctor import doctor_command
 from fogsim.cli.images.estimate import estimate_command
 from fogsim.cli.images.fog import fog_command
 from fogsim.cli.images.restore import restore_command
-from fogsim.cli.printing import BAD_INPUT, print_error, print_remarks, stdout
+from fogsim.cli.printing import BAD_INPUT, FAILED, print_error, print_remarks, stdout
 from fogsim.cli.recover import recover_command
 from fogsim.cli.reproduce import reproduce_command
 from fogsim.cli.run import run_command
@@ -25,7 +25,7 @@ from fogsim.cli.starting import new_command, schema_command
 from fogsim.cli.study import study_command
 from fogsim.cli.test import check_command
 from fogsim.cli.view import view_command
-from fogsim.errors import FogSimError
+from fogsim.errors import FogSimError, MethodError
 from fogsim.interruption import ProgramSignals, leave, leave_on_signals
 
 app = typer.Typer(
@@ -105,7 +105,7 @@ def _run_app() -> object:
         return end.code
     except FogSimError as error:
         print_error(error)
-        return BAD_INPUT
+        return FAILED if isinstance(error, MethodError) else BAD_INPUT
     except OSError as error:
         print_error(f"the operating system refused: {error}")
         return BAD_INPUT

@@ -8,6 +8,9 @@ from collections.abc import Iterable
 from rich.console import Console
 from rich.markup import escape as escape_markup
 
+FAILED = 1
+"""Exit code if an expectation was not met, or a user's method failed."""
+
 BAD_INPUT = 2
 """Exit code of bad input."""
 

@@ -17,10 +17,12 @@ from fogsim.cli.scenario_options import (
     CaseValues,
     EgoId,
     HomogeneousVisibility,
+    MethodTimeout,
     ScenarioName,
     Settings,
     SumoConfiguration,
     chosen_case,
+    with_timeout,
 )
 from fogsim.errors import InputError, UnplayedWarning
 
@@ -96,8 +98,10 @@ def run_command(
             min=0, help="Processes that draw for equipped vehicles beside the ego. [one less than processors]"
         ),
     ] = None,
+    method_timeout: MethodTimeout = None,
 ) -> None:
     """Run a scenario and write manifest.json, steps.parquet, metrics.json, video.mp4 and report.html."""
+    settings = with_timeout(settings, method_timeout)
     with compiling_beside() as compile_for:
         loaded, of_file = chosen_case(scenario, sumocfg, ego, visibility, settings, case, seed)
         compile_for(loaded)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from fogsim.cli.printing import print_remarks
 from fogsim.errors import InputError
 
 if TYPE_CHECKING:
@@ -28,6 +29,30 @@ Settings = Annotated[
 CaseValues = Annotated[
     str, typer.Option("--case", metavar="NAME=VALUE,…", help="Only cases of a file that varies with these values.")
 ]
+
+MethodTimeout = Annotated[
+    float | None,
+    typer.Option(min=0.001, help="Fail a run in which one call of your own method takes longer [s]. [no limit]"),
+]
+
+
+def with_timeout(settings: Sequence[str] | None, method_timeout: float | None) -> list[str]:
+    """Settings with the time limit for methods [s] that an option gives."""
+    return [*(settings or ()), *([] if method_timeout is None else [f"method_timeout_s={method_timeout!r}"])]
+
+
+class CodeNotice:
+    """Names each Python file beside a scenario once, before it is imported, and allows it."""
+
+    def __init__(self) -> None:
+        self._named: set[Path] = set()
+
+    def __call__(self, file: Path) -> bool:
+        """Name a file."""
+        if file not in self._named:
+            self._named.add(file)
+            print_remarks("importing", (file,))
+        return True
 
 
 def chosen_scenario(
@@ -85,7 +110,7 @@ def chosen_case(
     from fogsim.scenario.loading import load_cases
     from fogsim.scenario.variation import Case
 
-    settings = settings or ()
+    settings, may_import = settings or (), CodeNotice()
     fog = [] if visibility is None else [f"fog.visibility_m={visibility!r}"]
     if sumocfg is not None and name is None:
         if ego is None:
@@ -96,12 +121,12 @@ def chosen_case(
             raise InputError(f"--sumocfg {sumocfg}: --visibility is missing, or a fog by --set fog.…")
         if case:
             raise InputError(f"--case {case}: a SUMO configuration has no cases; a scenario file that varies has")
-        return scenario_from_config(sumocfg, ego, [*fog, *settings]), Case({}, seed or 0)
+        return scenario_from_config(sumocfg, ego, [*fog, *settings], may_import=may_import), Case({}, seed or 0)
     if name is not None and sumocfg is None:
         if name.endswith(".sumocfg"):
             raise InputError(f"{name} is a SUMO configuration, not a scenario: run it with --sumocfg {name} --ego ID")
         changed = [*fog, *([] if ego is None else [f"traffic.ego={json.dumps(ego)}"]), *settings]
-        chosen, scenario = load_cases(name, changed, case, seed).cases[0]
+        chosen, scenario = load_cases(name, changed, case, seed, may_import=may_import).cases[0]
         return scenario, chosen
     given = "neither" if name is None else f"both: {name} and --sumocfg {sumocfg}"
     raise InputError(f"expected either a scenario or --sumocfg FILE, got {given}")

@@ -6,6 +6,7 @@ import typer
 from rich.table import Table
 
 from fogsim.cli.printing import BAD_INPUT, escape, print_error, stdout
+from fogsim.cli.scenario_options import CodeNotice
 from fogsim.errors import FogSimError
 
 
@@ -34,14 +35,22 @@ def list_command() -> None:
         stdout.print(f"[bold]{registry.kind}[/]: {', '.join(dict.fromkeys((*registry, *registry.known)))}")
 
 
-def validate_command(files: Annotated[list[str], typer.Argument(help="Scenario files, folders or names.")]) -> None:
+def validate_command(
+    files: Annotated[list[str], typer.Argument(help="Scenario files, folders or names.")],
+    allow_code: Annotated[
+        bool, typer.Option("--allow-code", help="Import Python files beside a scenario, to check their parameters too.")
+    ] = False,
+) -> None:
     """Check scenario files; every mistake is named with file, line, key, value and what is allowed."""
+    from fogsim.registry.user_code import import_nothing
     from fogsim.scenario.loading import load_cases
+
+    may_import = CodeNotice() if allow_code else import_nothing
 
     bad = 0
     for file in files:
         try:
-            cases = load_cases(file).cases
+            cases = load_cases(file, may_import=may_import).cases
         except FogSimError as error:
             bad += 1
             print_error(error)

@@ -17,7 +17,9 @@ def signs_command(
 ) -> None:
     """Write the signs of a scenario's road network, additional files and OpenDRIVE signals as GeoJSON."""
     from fogsim.recording import record_signs
+    from fogsim.registry.user_code import import_nothing
     from fogsim.scenario import load_scenario
 
-    signs = record_signs(load_scenario(scenario, settings or ()), out, overwrite=overwrite).signs
+    loaded = load_scenario(scenario, settings or (), may_import=import_nothing)
+    signs = record_signs(loaded, out, overwrite=overwrite).signs
     stdout.print(f"{len(signs)} sign{'' if len(signs) == 1 else 's'}: {escape(out)}", soft_wrap=True)

@@ -6,8 +6,9 @@ from typing import Annotated
 
 import typer
 
-from fogsim.cli.printing import BAD_INPUT, INTERRUPTED, escape, stderr, stdout
+from fogsim.cli.printing import FAILED, INTERRUPTED, escape, stderr, stdout
 from fogsim.cli.progress import STARTING, progress_bar
+from fogsim.cli.scenario_options import CodeNotice, MethodTimeout, with_timeout
 from fogsim.errors import InputError
 
 
@@ -36,15 +37,17 @@ def study_command(
     check: Annotated[
         bool, typer.Option("--check", help="Check the file and say how many runs it has; run none.")
     ] = False,
+    method_timeout: MethodTimeout = None,
 ) -> None:
     """Run a grid of policies, fogs, drivers and seeds, and write a table, differences with intervals, and a report."""
+    from fogsim.registry.user_code import import_nothing
     from fogsim.study import RayCluster, load_study, run_study
 
     if address is not None and engine is EngineName.POOL:
         raise InputError("--address is a Ray cluster's: give --engine ray with it")
     on_ray = engine is EngineName.RAY
     runner = {"engine": RayCluster(address, processes)} if on_ray else {"processes": processes}
-    loaded = load_study(study)
+    loaded = load_study(study, with_timeout(None, method_timeout), import_nothing if check else CodeNotice())
     shape = " × ".join(f"{len(levels)} {name}" for name, levels in loaded.factors.items())
     cells = len({tuple(run.levels.values()) for run in loaded.runs})
     stdout.print(f"{loaded.name}: {escape(shape)} × {len(loaded.runs) // cells} seeds = {len(loaded.runs)} runs")
@@ -74,6 +77,6 @@ def study_command(
     stdout.print("Results:")
     for name in ("study.parquet", "study.csv", "comparison.csv", "report.html"):
         stdout.print(f"  {escape(directory / name)}", soft_wrap=True)
-    if len(missing) == len(rows):
-        stdout.print("[yellow]No run is complete.[/]")
-        raise typer.Exit(BAD_INPUT)
+    if missing:
+        stdout.print(f"[yellow]{len(missing)} of {len(rows)} runs failed; the same command tries them again.[/]")
+        raise typer.Exit(FAILED)

@@ -8,16 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
+from fogsim.cli.printing import FAILED, INTERRUPTED, escape, stderr, stdout
 from fogsim.cli.progress import STARTING, progress_bar
-from fogsim.cli.scenario_options import CaseValues, Settings
+from fogsim.cli.scenario_options import CaseValues, CodeNotice, MethodTimeout, Settings, with_timeout
 
 if TYPE_CHECKING:
     from fogsim.testing import FileOutcome, FogTest
     from fogsim.testing.artefacts import Kept
-
-NOT_PASSED = 1
-"""Exit code if something failed, was inconclusive, or a run went wrong."""
 
 NOTHING_COLLECTED = 5
 """Exit code if there was no test, as of pytest."""
@@ -44,13 +41,14 @@ def check_command(
     shrink: Annotated[bool, typer.Option("--shrink", help="Look for the smallest case of what failed.")] = False,
     evidence: Annotated[bool, typer.Option(help="Keep a video and plots of what did not pass.")] = True,
     settings: Settings = None,
+    method_timeout: MethodTimeout = None,
 ) -> None:
     """Run scenario files with `expect:`, and exit with 0 (passed), 1 (not), 2 (bad input) or 5 (no tests)."""
     from fogsim.testing.junit import write_junit
     from fogsim.testing.page import PageContent, write_page
     from fogsim.testing.wording import totals_text
 
-    begun, chosen = time.monotonic(), settings or []
+    begun, chosen = time.monotonic(), with_timeout(settings, method_timeout)
     tests = _asked_for(files or ["."], keywords, case, chosen, out if of_last else None)
     number = processes or os.cpu_count() or 1
     try:
@@ -76,7 +74,7 @@ def check_command(
             stdout.print(f"  {escape(path)}", soft_wrap=True)
     _annotate(outcomes, chosen)
     if not all(one.is_passed for one in outcomes):
-        raise typer.Exit(NOT_PASSED)
+        raise typer.Exit(FAILED)
 
 
 def _asked_for(
@@ -86,7 +84,7 @@ def _asked_for(
 
     asked = None if keywords is None else parse_keywords(keywords)
     found = find_files(files)
-    tests = collect(found, settings, case, asked)
+    tests = collect(found, settings, case, asked, CodeNotice())
     noted = {} if failed_in is None else last_failed(failed_in)
     # As of pytest: where nothing has failed, all is run.
     tests = only_cases(tests, noted) or tests

@@ -131,7 +131,7 @@ class Huang2015Lead:
         InputError
             If camera, image or time do not fit (see `fogsim.estimators.image_check`), or the range is NaN.
         """
-        image = self._check.image_of(observation)
+        image = self._check.kernel_image(observation)
         if observation.lead is None:
             self._miss()
             return Estimate.invalid(self.method, "no vehicle is tracked ahead")

@@ -102,7 +102,7 @@ class Huang2015Rough:
         InputError
             If camera, image or time do not fit (see `fogsim.estimators.image_check`).
         """
-        image = self._check.image_of(observation)
+        image = self._check.kernel_image(observation)
         try:
             return self._read(image, observation.lead)
         except CannotTellError as reason:

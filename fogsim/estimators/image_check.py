@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fogsim.errors import InputError
 from fogsim.values.camera import Camera
-from fogsim.values.image import Frame
+from fogsim.values.image import Frame, for_kernels
 from fogsim.values.observation import Observation
 
 
@@ -56,6 +56,10 @@ class ObservationCheck:
             )
         self._time = time
         return image
+
+    def kernel_image(self, observation: Observation) -> NDArray[np.uint8] | NDArray[np.uint16]:
+        """As `image_of`, for FogSim's own methods, whose kernels only read it."""
+        return for_kernels(self.image_of(observation))
 
 
 def _checked_time(time: object) -> float:

@@ -187,7 +187,7 @@ class JointRoad:
         InputError
             If camera, image or time do not fit (see `fogsim.estimators.image_check`).
         """
-        image = self._check.image_of(observation)
+        image = self._check.kernel_image(observation)
         found: dict[str, object] = {
             "horizon_row": self._camera.horizon_row,
             "told_horizon_row": self._camera.horizon_row,

@@ -153,7 +153,7 @@ class LeadContrast:
         InputError
             If camera, image or time do not fit (see `fogsim.estimators.image_check`).
         """
-        image = self._check.image_of(observation)
+        image = self._check.kernel_image(observation)
         found: dict[str, object] = {"horizon_row": self._camera.horizon_row}
         lead = observation.lead
         if lead is None or not (math.isfinite(lead.distance) and lead.distance >= 0):

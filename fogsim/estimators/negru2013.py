@@ -200,7 +200,7 @@ class Negru2013:
         InputError
             If camera, image or time do not fit (see `fogsim.estimators.image_check`).
         """
-        image = self._check.image_of(observation)
+        image = self._check.kernel_image(observation)
         diagnostics: dict[str, object] = {"horizon_row": self._camera.horizon_row}
         try:
             return self._read(image, observation.lead, diagnostics)

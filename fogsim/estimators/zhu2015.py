@@ -151,7 +151,7 @@ class Zhu2015:
         InputError
             If camera, image or time do not fit (see `fogsim.estimators.image_check`).
         """
-        image = self._check.image_of(observation)
+        image = self._check.kernel_image(observation)
         diagnostics: dict[str, object] = {"state": self._state, "horizon_row": self._camera.horizon_row}
         try:
             road = seen_road(image, self._camera, self._pitch_deviation, self._growth, self._repairs, observation.lead)

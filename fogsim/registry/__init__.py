@@ -5,9 +5,20 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
-from fogsim.errors import InputError, UnknownNameError
+from fogsim.errors import InputError, UnknownNameError, shown
 from fogsim.parameters import parameter_mistakes
-from fogsim.registry.user_code import announced, import_object, is_object_name, load_announced, version_of
+from fogsim.registry.guard import guarded
+from fogsim.registry.user_code import (
+    MayImport,
+    announced,
+    check_source,
+    import_anything,
+    import_class,
+    is_class_name,
+    load_announced,
+    module_file,
+    version_of,
+)
 
 T = TypeVar("T")
 
@@ -15,8 +26,9 @@ T = TypeVar("T")
 class Registry(Mapping[str, T]):
     """Named factories of one kind; a duplicate is refused and an unknown name answers with the known ones.
 
-    Beside its own entries it finds what users bring: ``module:Object`` in a module of theirs, and what installed
-    packages announce as entry points.
+    It also finds what users bring: ``module:Class`` in a module beside their scenario, and what installed packages
+    announce as entry points. Such a class is given back guarded, so that its constructor and methods raise nothing but
+    `MethodError` and KeyboardInterrupt.
 
     Parameters
     ----------
@@ -27,7 +39,7 @@ class Registry(Mapping[str, T]):
     group : str
         Group of entry points by which packages announce further ones; "" if users can bring none.
     methods : sequence of str
-        Methods that a class of a user's own must have; one of those that are parted by "|".
+        Methods that a user's class must have; one of those with "|" between them.
     """
 
     def __init__(self, kind: str, entries: Mapping[str, T], group: str = "", methods: Sequence[str] = ()) -> None:
@@ -75,15 +87,17 @@ class Registry(Mapping[str, T]):
         """Names of all entries, and of what installed packages announce; sorted."""
         return sorted({*self._entries, *(announced(self._group) if self._group else ())})
 
-    def find(self, name: str, folder: Path | None = None) -> T:
+    def find(self, name: str, folder: Path | None = None, time_limit: float | None = None) -> T:
         """A factory by its name.
 
         Parameters
         ----------
         name : str
-            Of an entry, of one that an installed package announces, or ``module:Object``.
+            Of an entry, of one that an installed package announces, or ``module:Class``.
         folder : Path or None
-            Where the module is looked for first; None for the working directory.
+            Where the module lies; None for the working directory.
+        time_limit : float or None
+            Longest time that one call of a user's method may take [s]; None for any.
 
         Raises
         ------
@@ -96,33 +110,46 @@ class Registry(Mapping[str, T]):
             return self._entries[name]
         except (KeyError, TypeError):
             pass
-        if self._group and is_object_name(name):
-            return self._checked(name, import_object(name, folder))
+        if self._group and is_class_name(name):
+            return self._guarded(name, import_class(name, folder), time_limit)
         further = announced(self._group) if self._group else {}
         if name not in further:
             raise UnknownNameError(self.kind, name, self.known) from None
-        return self._checked(name, load_announced(further[name]))
+        return self._guarded(name, load_announced(further[name]), time_limit)
+
+    def find_if_allowed(self, name: str, folder: Path | None, may_import: MayImport = import_anything) -> T | None:
+        """As `find`; None for a class beside the scenario whose file may not be imported, and defines it.
+
+        Raises
+        ------
+        UnknownNameError, InputError
+            As `find`.
+        """
+        is_beside = bool(self._group) and name not in self._entries and is_class_name(name)
+        if is_beside and not may_import(module_file(name, folder)):
+            check_source(name, folder)
+            return None
+        return self.find(name, folder)
 
     def version(self, name: str, folder: Path | None = None) -> str | None:
-        """Version of a method of a user's own; None of FogSim's, and of those that a program has registered itself.
-
-        Parameters
-        ----------
-        name, folder
-            As of `find`.
-        """
+        """Version of a user's method; None for FogSim's, and for those that a program has registered itself."""
         return None if name in self._entries else version_of(name, self._group, folder)
 
-    def _checked(self, name: str, factory: Any) -> T:
-        if not callable(factory):
-            raise InputError(f"{self.kind} {name!r} must be a class or a function that makes one, got {factory!r}")
-        # What a function makes is known when it is called.
-        lacking = [wanted for wanted in self._methods if not any(hasattr(factory, one) for one in wanted.split("|"))]
-        if inspect.isclass(factory) and lacking:
+    def _guarded(self, name: str, cls: object, time_limit: float | None) -> T:
+        if not inspect.isclass(cls):
+            raise InputError(f"{self.kind} {name!r}: expected a class, got {shown(cls)}")
+        lacking = [wanted for wanted in self._methods if not any(_has_method(cls, one) for one in wanted.split("|"))]
+        if lacking:
             needed = " and ".join(f"{wanted.replace('|', '() or ')}()" for wanted in lacking)
             raise InputError(f"{self.kind} {name!r} must have a method {needed}")
-        checked: T = factory
-        return checked
+        methods = tuple(one for wanted in self._methods for one in wanted.split("|"))
+        made: Any = guarded(cls, f"{self.kind} {name!r}", methods, time_limit)
+        try:
+            inspect.signature(made, eval_str=True)
+        except Exception as error:
+            raise InputError(f"{self.kind} {name!r}: its parameters cannot be read: {error}") from error
+        factory: T = made
+        return factory
 
     def __getitem__(self, name: str) -> T:
         return self.find(name)
@@ -134,7 +161,11 @@ class Registry(Mapping[str, T]):
         return len(self._entries)
 
     def __contains__(self, name: object) -> bool:
-        return name in self._entries or (bool(self._group) and (is_object_name(name) or name in announced(self._group)))
+        return name in self._entries or (bool(self._group) and (is_class_name(name) or name in announced(self._group)))
+
+
+def _has_method(cls: type, name: str) -> bool:
+    return callable(getattr(cls, name, None))
 
 
 def parameters(factory: Callable[..., object]) -> dict[str, object]:

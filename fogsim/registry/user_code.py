@@ -1,93 +1,158 @@
-"""Methods of users' own: an object of a module of theirs, or one that an installed package announces."""
+"""Methods that users bring: a class in a module beside the scenario, or one that an installed package announces."""
 
+import ast
 import contextlib
 import functools
 import hashlib
 import importlib
 import importlib.util
+import inspect
 import re
 import sys
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from importlib import metadata
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from fogsim.errors import InputError, suggest
+from fogsim.errors import InputError, shown, suggest
+
+MayImport = Callable[[Path], bool]
+"""Decides whether a Python file beside a scenario may be imported, and so run; called before it is."""
 
 _NAME = re.compile(r"(?P<module>[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*):(?P<object>[A-Za-z_]\w*)\Z")
 
 
-def is_object_name(name: object) -> bool:
-    """Tell whether a name is one of an object in a module: ``module:Object``.
+def import_anything(_: Path) -> bool:
+    """Let every file be imported, as Python programs do that load a scenario."""
+    return True
 
-    Parameters
-    ----------
-    name : object
-        What a user has given.
-    """
+
+def import_nothing(_: Path) -> bool:
+    """Let no file be imported."""
+    return False
+
+
+def is_class_name(name: object) -> bool:
+    """Whether a name stands for a class in a module, ``module:Class``."""
     return isinstance(name, str) and _NAME.match(name) is not None
 
 
-def import_object(name: str, folder: Path | None = None) -> Any:
-    """Import an object of a user's module.
-
-    Parameters
-    ----------
-    name : str
-        ``module:Object``; the module lies in the folder, or is one that Python finds.
-    folder : Path or None
-        Where the scenario lies that names it; None for the working directory.
+def module_file(name: str, folder: Path | None) -> Path:
+    """File of the module in ``module:Class``; it lies in the scenario's folder, None for the working directory.
 
     Raises
     ------
     InputError
-        If there is no such module or object, or its import fails; the message says where.
+        If there is no such file. Neither the standard library nor installed packages are searched: a scenario file
+        alone must not be able to run any of their functions.
     """
+    module = _match(name)["module"]
+    home = (folder or Path.cwd()).resolve()
+    base = home.joinpath(*module.split("."))
+    files = base.with_name(f"{base.name}.py"), base / "__init__.py"
+    found = next((file for file in files if file.is_file()), None)
+    if found is None:
+        raise InputError(
+            f"{name}: there is no {module.replace('.', '/')}.py in {home}; the module of module:Class lies beside the "
+            "scenario, and an installed package announces its methods as entry points"
+        )
+    return found
+
+
+def check_source(name: str, folder: Path | None) -> None:
+    """Check that the module of ``module:Class`` defines the class, without running it.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is not Python, or it has no such name.
+    """
+    file = module_file(name, folder)
+    try:
+        body = ast.parse(file.read_bytes(), str(file)).body
+    except (SyntaxError, ValueError, RecursionError, MemoryError, OSError) as error:
+        line = getattr(error, "lineno", None)
+        raise InputError(f"{name}: {file}{f':{line}' if line else ''}: not valid Python: {error}") from error
+    names = [name for statement in body for name in _names_bound(statement)]
+    if _match(name)["object"] not in names and "*" not in names:
+        raise _no_class(name, file, names)
+
+
+def _names_bound(statement: ast.stmt) -> Iterator[str]:
+    """Names that a module's statement binds, `*` for those of another module."""
+    if isinstance(statement, ast.ClassDef | ast.FunctionDef):
+        yield statement.name
+    elif isinstance(statement, ast.Import | ast.ImportFrom):
+        yield from (one.asname or one.name for one in statement.names)
+    else:
+        yield from (one.id for one in ast.walk(statement) if isinstance(one, ast.Name))
+        yield from (one.name for one in ast.walk(statement) if isinstance(one, ast.ClassDef))
+
+
+def import_class(name: str, folder: Path | None = None) -> type:
+    """Import the class ``module:Class`` from a module in a folder, None for the working directory.
+
+    Raises
+    ------
+    InputError
+        If there is no such module or class, its import fails, or it is not defined in that folder.
+    """
+    file = module_file(name, folder)
+    home = (folder or Path.cwd()).resolve()
+    module, wanted = _module(name, file, home), _match(name)["object"]
+    if not hasattr(module, wanted):
+        raise _no_class(name, file, [key for key, value in vars(module).items() if inspect.isclass(value)])
+    found = getattr(module, wanted)
+    if not inspect.isclass(found):
+        raise InputError(f"{name}: expected a class, got {shown(found)}")
+    defined_in = getattr(sys.modules.get(found.__module__), "__file__", None)
+    if defined_in is None or not Path(defined_in).resolve().is_relative_to(home):
+        raise InputError(f"{name}: expected a class defined in {home}, got one of {found.__module__}")
+    return found
+
+
+def _match(name: str) -> re.Match[str]:
     match = _NAME.match(name)
     if match is None:
-        raise InputError(f"expected module:Object, got {name!r}")
-    module = _module(match["module"], (folder or Path.cwd()).resolve())
-    if not hasattr(module, match["object"]):
-        own = {key: value for key, value in vars(module).items() if callable(value) and not key.startswith("_")}
-        public = [key for key, value in own.items() if getattr(value, "__module__", None) == module.__name__]
-        raise InputError(
-            f"{name}: there is no {match['object']} in {module.__file__}; {suggest(match['object'], public)}"
-        )
-    return getattr(module, match["object"])
+        raise InputError(f"expected module:Class, got {shown(name)}")
+    return match
 
 
-def _module(name: str, folder: Path) -> ModuleType:
-    package = folder / name.partition(".")[0]
-    beside = package.with_suffix(".py").is_file() or (package / "__init__.py").is_file()
+def _no_class(name: str, file: Path, known: list[str]) -> InputError:
+    wanted, public = _match(name)["object"], [one for one in known if not one.startswith("_")]
+    return InputError(f"{name}: there is no {wanted} in {file}; {suggest(wanted, public)}")
+
+
+def _module(name: str, file: Path, home: Path) -> ModuleType:
     try:
-        return _module_beside(name, folder) if beside else importlib.import_module(name)
-    except ModuleNotFoundError as error:
-        if error.name != name:
-            raise InputError(f"{name}: its import fails: {error}, at {_place(error)}") from error
-        raise InputError(
-            f"{name}: there is no such module, neither in {folder} nor where Python looks (PYTHONPATH)"
-        ) from error
-    except Exception as error:
-        raise InputError(f"{name}: its import fails: {type(error).__name__}: {error}, at {_place(error)}") from error
+        return _imported(_match(name)["module"], file, home)
+    except KeyboardInterrupt:
+        raise
+    except InputError:
+        raise
+    except BaseException as error:  # a module may end the program as it is imported
+        raise InputError(f"{name}: its import fails: {described(error, file)}") from error
 
 
 @functools.cache
-def _module_beside(name: str, folder: Path) -> ModuleType:
-    """A module in a folder, under a name of its own: another folder may have one that is called the same."""
-    if "." in name or (folder / name / "__init__.py").is_file():
-        with _found_first(folder):
-            return importlib.import_module(name)
-    file = folder / f"{name}.py"
-    spec = importlib.util.spec_from_file_location(f"{name}_{hashlib.sha256(bytes(file)).hexdigest()[:8]}", file)
+def _imported(module: str, file: Path, home: Path) -> ModuleType:
+    """A module of a folder; a single file goes by a name of its own, as another folder may have one of that name."""
+    if file.parent != home:
+        with _found_first(home):
+            package = importlib.import_module(module)
+        if Path(package.__file__ or "").resolve() != file.resolve():
+            raise InputError(f"{module}: {file} cannot be imported: Python has {module} already, from another place")
+        return package
+    spec = importlib.util.spec_from_file_location(f"{module}_{hashlib.sha256(bytes(file)).hexdigest()[:8]}", file)
     if spec is None or spec.loader is None:
-        raise ModuleNotFoundError(name=name)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    with _found_first(folder):
-        spec.loader.exec_module(module)
-    return module
+        raise ModuleNotFoundError(name=module)
+    made = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = made
+    with _found_first(home):
+        spec.loader.exec_module(made)
+    return made
 
 
 @contextlib.contextmanager
@@ -100,38 +165,29 @@ def _found_first(folder: Path) -> Iterator[None]:
         sys.path.remove(str(folder))
 
 
-def _place(error: BaseException) -> str:
-    """File and line of the user's where an error arose."""
-    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if "importlib" not in frame.filename]
-    if isinstance(error, SyntaxError):
-        return f"{error.filename}:{error.lineno}"
-    return f"{frames[-1].filename}:{frames[-1].lineno}" if frames else "its first line"
+def described(error: BaseException, file: Path | None, otherwise: str = "") -> str:
+    """An error of a user's code in one line: its class, its text, and where in their file, or otherwise, it arose."""
+    text = " ".join(f"{type(error).__name__}: {error}".split())
+    if isinstance(error, SyntaxError) and error.filename:
+        return f"{text}, at {error.filename}:{error.lineno}"
+    own = [frame for frame in traceback.extract_tb(error.__traceback__) if Path(frame.filename) == file]
+    place = f"{own[-1].filename}:{own[-1].lineno}" if own else otherwise or file
+    return f"{text}, at {place}" if place else text
 
 
 def announced(group: str) -> Mapping[str, metadata.EntryPoint]:
-    """What installed packages announce under a group of entry points, by name.
-
-    Parameters
-    ----------
-    group : str
-        The group, such as "fogsim.advice".
-    """
+    """Entry points of installed packages in a group such as "fogsim.advice", by name."""
     return _announced(group, tuple(sys.path))
 
 
 @functools.cache
 def _announced(group: str, _: tuple[str, ...]) -> Mapping[str, metadata.EntryPoint]:
-    """What is announced, read anew when packages are looked for elsewhere."""
+    """Entry points of a group, read again where packages are searched elsewhere."""
     return {point.name: point for point in metadata.entry_points(group=group)}
 
 
 def load_announced(point: metadata.EntryPoint) -> Any:
     """Import what an installed package announces.
-
-    Parameters
-    ----------
-    point : EntryPoint
-        Of `announced`.
 
     Raises
     ------
@@ -140,31 +196,15 @@ def load_announced(point: metadata.EntryPoint) -> Any:
     """
     try:
         return point.load()
-    except Exception as error:
-        told = f"{type(error).__name__}: {error}, at {_place(error)}"
-        raise InputError(f"{point.name} of {point.value}: its import fails: {told}") from error
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        raise InputError(f"{point.name} of {point.value}: its import fails: {described(error, None, point.value)}") from error
 
 
 def version_of(name: str, group: str, folder: Path | None = None) -> str | None:
-    """Version of a method that is not FogSim's: of its package, or a digest of the file that it stands in.
-
-    Parameters
-    ----------
-    name : str
-        ``module:Object``, or a name that an installed package announces.
-    group : str
-        Group of entry points of its kind.
-    folder : Path or None
-        As of `import_object`.
-
-    Returns
-    -------
-    str or None
-        None if the method is neither, and so FogSim's own.
-    """
-    if is_object_name(name):
-        module = sys.modules.get(import_object(name, folder).__module__)
-        file = getattr(module, "__file__", None)
-        return None if file is None else f"sha256:{hashlib.sha256(Path(file).read_bytes()).hexdigest()[:16]}"
+    """Version of a user's method: of its package, or a digest of its file; None for FogSim's own methods."""
+    if is_class_name(name):
+        return f"sha256:{hashlib.sha256(module_file(name, folder).read_bytes()).hexdigest()[:16]}"
     point = announced(group).get(name)
     return None if point is None or point.dist is None else f"{point.dist.name} {point.dist.version}"

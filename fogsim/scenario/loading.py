@@ -3,7 +3,7 @@
 import json
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from fogsim.errors import InputError, UnknownNameError, nearest, shown, suggest
+from fogsim.registry.user_code import MayImport, import_anything
 from fogsim.scenario.document import Document, apply_overrides, read_scenario_document
 from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath, dotted
@@ -94,7 +95,11 @@ DAY = 86_400.0
 
 
 def load_scenario(
-    name_or_path: str | Path, overrides: Iterable[str] = (), *, others_add_vehicles: bool = False
+    name_or_path: str | Path,
+    overrides: Iterable[str] = (),
+    *,
+    others_add_vehicles: bool = False,
+    may_import: MayImport = import_anything,
 ) -> Scenario:
     """Load and check a scenario; of a file that varies something, its first case.
 
@@ -106,6 +111,9 @@ def load_scenario(
         ``key.path=value`` each, put in place of the file's values.
     others_add_vehicles : bool
         True if vehicles may come that are not in the route files, as in a simulation that has other clients.
+    may_import : callable
+        Decides, given its path, whether a Python file beside the scenario is imported, which runs it; where it is not,
+        the parameters of its methods are not checked.
 
     Returns
     -------
@@ -118,7 +126,13 @@ def load_scenario(
         If anything does not fit; one line for each mistake, with file, line, key path, value and what is allowed.
     """
     path = scenario_file(name_or_path)
-    return _checked(read_scenario_document(path), overrides, path.parent, closed_demand=not others_add_vehicles)
+    context = _context(path.parent, may_import)
+    return _checked(read_scenario_document(path), overrides, context, closed_demand=not others_add_vehicles)
+
+
+def _context(folder: Path, may_import: MayImport = import_anything) -> dict[str, Any]:
+    """What the schema's validators of methods are given; the folder is also where file names are relative to."""
+    return {"folder": folder, "may_import": may_import}
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +155,12 @@ class ScenarioCases:
 
 
 def load_cases(
-    name_or_path: str | Path, overrides: Iterable[str] = (), wanted: str = "", seed: int | None = None
+    name_or_path: str | Path,
+    overrides: Iterable[str] = (),
+    wanted: str = "",
+    seed: int | None = None,
+    *,
+    may_import: MayImport = import_anything,
 ) -> ScenarioCases:
     """Load and check the cases of a scenario file; one that varies nothing has one.
 
@@ -155,6 +174,8 @@ def load_cases(
         Which cases, ``name=value`` with commas between; empty for all.
     seed : int or None
         Seed of the runs; None for those of the cases.
+    may_import : callable
+        As of `load_scenario`.
 
     Raises
     ------
@@ -171,13 +192,18 @@ def load_cases(
         # What differs in its seed alone is the same scenario.
         key = json.dumps(put.data)
         if key not in checked:
-            checked[key] = _checked_case(put, case, path.parent)
+            checked[key] = _checked_case(put, case, _context(path.parent, may_import))
         cases.append((case, checked[key]))
     return ScenarioCases(document, variation, tuple(cases))
 
 
 def scenario_from_config(
-    config: Path, ego: str, overrides: Iterable[str] = (), *, others_add_vehicles: bool = False
+    config: Path,
+    ego: str,
+    overrides: Iterable[str] = (),
+    *,
+    others_add_vehicles: bool = False,
+    may_import: MayImport = import_anything,
 ) -> Scenario:
     """Make a scenario of a SUMO configuration.
 
@@ -189,7 +215,7 @@ def scenario_from_config(
         Id of the vehicle that becomes the ego.
     overrides : iterable of str
         ``key.path=value`` each; the fog must be among them.
-    others_add_vehicles : bool
+    others_add_vehicles, may_import
         As of `load_scenario`.
 
     Raises
@@ -199,7 +225,7 @@ def scenario_from_config(
     """
     traffic = {"config": config.name, "ego": ego, "warm_up_limit_s": DAY}
     document = Document(config, _bare(config.stem, traffic), {})
-    return _checked(document, overrides, config.parent, closed_demand=not others_add_vehicles)
+    return _checked(document, overrides, _context(config.parent, may_import), closed_demand=not others_add_vehicles)
 
 
 def attached_scenario(ego: str, overrides: Iterable[str]) -> Scenario:
@@ -218,14 +244,20 @@ def attached_scenario(ego: str, overrides: Iterable[str]) -> Scenario:
         If anything does not fit.
     """
     document = Document(Path("attached"), _bare("attached", {"ego": ego}), {})
-    return _checked(document, overrides, Path(), named_files=False)
+    return _checked(document, overrides, _context(Path()), named_files=False)
 
 
 def _bare(name: str, traffic: dict[str, Any]) -> dict[str, Any]:
     return {"name": re.sub(r"[^A-Za-z0-9_.-]", "_", name), "duration_s": LONG_RUN, "traffic": traffic}
 
 
-def override(scenario: Scenario, overrides: Iterable[str], *, others_add_vehicles: bool = False) -> Scenario:
+def override(
+    scenario: Scenario,
+    overrides: Iterable[str],
+    *,
+    others_add_vehicles: bool = False,
+    may_import: MayImport = import_anything,
+) -> Scenario:
     """Copy of a scenario with single keys changed.
 
     Parameters
@@ -234,7 +266,7 @@ def override(scenario: Scenario, overrides: Iterable[str], *, others_add_vehicle
         The scenario.
     overrides : iterable of str
         ``key.path=value`` each.
-    others_add_vehicles : bool
+    others_add_vehicles, may_import
         As of `load_scenario`.
 
     Raises
@@ -243,7 +275,8 @@ def override(scenario: Scenario, overrides: Iterable[str], *, others_add_vehicle
         If the changed scenario does not fit.
     """
     document = Document(scenario.directory / SCENARIO_FILE, resolved(scenario), {})
-    return _checked(document, overrides, scenario.directory, closed_demand=not others_add_vehicles)
+    context = _context(scenario.directory, may_import)
+    return _checked(document, overrides, context, closed_demand=not others_add_vehicles)
 
 
 def clock_settings(step: float, camera: float, decision: float) -> list[str]:
@@ -297,13 +330,13 @@ def _without_infinities(value: Any) -> Any:
 def _checked(
     document: Document,
     overrides: Iterable[str],
-    folder: Path,
+    context: Mapping[str, Any],
     named_files: bool = True,
     closed_demand: bool = True,
 ) -> Scenario:
     document = _overridden(document, overrides)
     case = read_variation(document).cases[0]
-    return _checked_case(with_case(document, case), case, folder, named_files, closed_demand)
+    return _checked_case(with_case(document, case), case, context, named_files, closed_demand)
 
 
 def _overridden(document: Document, overrides: Iterable[str]) -> Document:
@@ -316,25 +349,28 @@ def _overridden(document: Document, overrides: Iterable[str]) -> Document:
 
 
 def _checked_case(
-    document: Document, case: Case, folder: Path, named_files: bool = True, closed_demand: bool = True
+    document: Document, case: Case, context: Mapping[str, Any], named_files: bool = True, closed_demand: bool = True
 ) -> Scenario:
     """A scenario; a mistake in it is told with the case in which it is one."""
     try:
-        return _checked_scenario(document, folder, named_files, closed_demand)
+        return _checked_scenario(document, context, named_files, closed_demand)
     except InputError as error:
         if not case.label:
             raise
         raise InputError(f"{error}\nin the case {case.label}") from error
 
 
-def _checked_scenario(document: Document, folder: Path, named_files: bool, closed_demand: bool) -> Scenario:
+def _checked_scenario(
+    document: Document, context: Mapping[str, Any], named_files: bool, closed_demand: bool
+) -> Scenario:
     document, unfit = with_units_in_keys(document, Scenario)
     if unfit:
         raise InputError("\n".join(unfit))
     data = document.data
     mistakes = _unnamed_files(document, data) if named_files else []
     try:
-        scenario = Scenario.model_validate(data, context={"folder": folder}).model_copy(update={"directory": folder})
+        scenario = Scenario.model_validate(data, context=dict(context))
+        scenario = scenario.model_copy(update={"directory": context["folder"]})
     except ValidationError as error:
         raise InputError(mistake_lines(document, Scenario, error, mistakes, BESIDE)) from error
     # A simulation that runs already, or is none of SUMO's, keeps its own time.

@@ -150,11 +150,12 @@ def method_of(registry: Registry[Callable[..., Any]]) -> BeforeValidator:
         written = {"method": value} if isinstance(value, str) else value
         if isinstance(written, dict) and isinstance(written.get("method"), str):
             try:
-                factory = registry.find(written["method"], (info.context or {}).get("folder"))
+                factory = registry.find_if_allowed(written["method"], **(info.context or {"folder": None}))
             except InputError as error:
                 # Only a plain ValueError is a message to pydantic's user.
                 raise ValueError(str(error)) from None
-            _check_parameters(factory, written.get("parameters"))
+            if factory is not None:
+                _check_parameters(factory, written.get("parameters"))
         return written
 
     return BeforeValidator(check)

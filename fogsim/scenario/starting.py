@@ -6,6 +6,7 @@ from pathlib import Path
 
 from fogsim.errors import InputError, shown
 from fogsim.files.atomic import write_json
+from fogsim.registry.user_code import import_nothing
 from fogsim.scenario.json_schema import scenario_json_schema
 from fogsim.scenario.loading import SCENARIO_FILE, load_scenario, scenario_file
 
@@ -45,7 +46,7 @@ def begin_scenario(name: str, source: str, parent: Path) -> tuple[Path, ...]:
     """
     if not re.fullmatch(r"[A-Za-z0-9_.-]{1,100}", name) or set(name) == {"."}:
         raise InputError(f"a scenario's name has letters, digits, '_', '.' and '-', up to 100; got {shown(name)}")
-    old, text = load_scenario(source), scenario_file(source).read_text(encoding="utf-8")
+    old, text = load_scenario(source, may_import=import_nothing), scenario_file(source).read_text(encoding="utf-8")
     folder = parent / name
     if folder.exists():
         raise InputError(f"{folder} is there already; give another name")

@@ -1,7 +1,8 @@
 """One run of a study: its metrics in a row of plain values, and its profiles."""
 
+import traceback
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -80,7 +81,7 @@ def _flat(values: Mapping[str, object], prefix: str = "") -> list[tuple[str, Val
 
 
 def run_outcome(scenario: Scenario, seed: int, sumo_outputs: Path) -> dict[str, Any]:
-    """Run, and give what the file of a run holds; what goes wrong with the run is told there too.
+    """Run, and return the content of the run's file, which also says what went wrong with the run.
 
     Parameters
     ----------
@@ -96,12 +97,23 @@ def run_outcome(scenario: Scenario, seed: int, sumo_outputs: Path) -> dict[str, 
     dict
         ``status``, and what `measure_run` gives or a ``message``.
     """
+    return outcome_of(lambda: measure_run(scenario, seed, sumo_outputs))
+
+
+def outcome_of(measure: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """What a run gave with its ``status``, or the ``message`` of what ended it, which must not end the others.
+
+    Not even SystemExit passes: the exit code of a study or test comes from its outcomes.
+    """
     try:
-        return {"status": "complete", **measure_run(scenario, seed, sumo_outputs)}
+        return {"status": "complete", **measure()}
+    except KeyboardInterrupt:
+        raise
     except FogSimError as error:
         return failure(str(error))
-    except Exception as error:  # noqa: BLE001 - a broken run, of a user's own method perhaps, must not stop the others
-        return failure(f"{type(error).__name__}: {error}")
+    except BaseException as error:  # noqa: BLE001 - it is reported as the outcome
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        return failure(f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})")
 
 
 def failure(message: str) -> dict[str, Any]:

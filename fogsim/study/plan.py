@@ -5,7 +5,7 @@ import hashlib
 import itertools
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 
 from fogsim.errors import InputError, suggest
+from fogsim.registry.user_code import MayImport, import_anything
 from fogsim.scenario import Scenario, build, load_scenario, override, resolved, scenario_from_config
 from fogsim.scenario.document import Document, read_document
 from fogsim.scenario.mistakes import mistake_lines
@@ -216,13 +217,19 @@ def _digest(path: Path, _: int) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()[:20]
 
 
-def load_study(name_or_path: str | Path) -> Study:
+def load_study(
+    name_or_path: str | Path, settings: Sequence[str] = (), may_import: MayImport = import_anything
+) -> Study:
     """Read a study file and check every scenario of its grid, before anything is run.
 
     Parameters
     ----------
     name_or_path : str or Path
         The file, or the name of a study that comes with FogSim (`fogsim.study.shipped_studies`).
+    settings : sequence of str
+        ``key.path=value`` each, put in place of the scenario's in every run, after those of the file.
+    may_import : callable
+        As of `load_scenario`.
 
     Raises
     ------
@@ -233,13 +240,14 @@ def load_study(name_or_path: str | Path) -> Study:
     document = read_document(path)
     try:
         written = StudyFile.model_validate(document.data)
+        written = written.model_copy(update={"settings": (*written.settings, *settings)})
     except ValidationError as error:
         raise InputError(mistake_lines(document, StudyFile, error)) from error
     seeds = tuple(range(written.seeds)) if isinstance(written.seeds, int) else written.seeds
     grid = [dict(zip(written.factors, cell, strict=True)) for cell in itertools.product(*written.factors.values())]
     if len(grid) * len(seeds) > MOST_RUNS:
         raise InputError(f"{path}: {len(grid)} cells × {len(seeds)} seeds are more than {MOST_RUNS} runs")
-    runs = tuple(_runs(document, written, grid, seeds))
+    runs = tuple(_runs(document, written, grid, seeds, may_import))
     first, levels = next(iter(written.factors.items()))
     return Study(
         name=path.stem,
@@ -255,11 +263,15 @@ def load_study(name_or_path: str | Path) -> Study:
 
 
 def _runs(
-    document: Document, written: StudyFile, grid: list[dict[str, str]], seeds: tuple[int, ...]
+    document: Document,
+    written: StudyFile,
+    grid: list[dict[str, str]],
+    seeds: tuple[int, ...],
+    may_import: MayImport,
 ) -> Iterator[StudyRun]:
     number = 0
     for levels in grid:
-        scenario = _scenario(document, written, levels)
+        scenario = _scenario(document, written, levels, may_import)
         text = json.dumps([resolved(scenario), file_digests(scenario)], sort_keys=True)
         for seed in seeds:
             key = hashlib.sha256(f"{text} {seed}".encode()).hexdigest()[:20]
@@ -267,20 +279,24 @@ def _runs(
             number += 1
 
 
-def _scenario(document: Document, written: StudyFile, levels: Mapping[str, str]) -> Scenario:
+def _scenario(
+    document: Document, written: StudyFile, levels: Mapping[str, str], may_import: MayImport
+) -> Scenario:
     settings = [*written.settings]
     for factor, level in levels.items():
         settings += written.factors[factor][level]
     folder = document.path.parent
     try:
         if written.sumocfg is not None:
-            scenario = scenario_from_config(folder / written.sumocfg, written.ego or NO_EGO, settings)
+            scenario = scenario_from_config(
+                folder / written.sumocfg, written.ego or NO_EGO, settings, may_import=may_import
+            )
         else:
             name = str(written.scenario)
             beside = folder / name
-            scenario = load_scenario(beside if beside.exists() else name, settings)
+            scenario = load_scenario(beside if beside.exists() else name, settings, may_import=may_import)
         if written.frames == "where_needed" and not needs_camera(scenario):
-            scenario = override(scenario, [f"renderer={NO_RENDERER}", "estimators=[]"])
+            scenario = override(scenario, [f"renderer={NO_RENDERER}", "estimators=[]"], may_import=may_import)
     except InputError as error:
         raise InputError(f"{document.path}: {_label(levels)}: {error}") from error
     return scenario

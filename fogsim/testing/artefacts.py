@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from fogsim.conditions import Condition
 from fogsim.expectations import Always, Eventually, Finding, Whenever
@@ -18,6 +19,7 @@ from fogsim.recorders import VideoRecorder
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.expect.schema import clauses_of
 from fogsim.scenario.schema import NO_RENDERER
+from fogsim.study.execution import outcome_of
 from fogsim.study.plan import StudyRun
 from fogsim.study.pool import ProcessPool
 from fogsim.testing.collection import FogTest, label_of
@@ -154,15 +156,9 @@ class KeepFailures:
         """
         folder = result.with_suffix("")
         folder.mkdir(exist_ok=True)
-        message = None
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", UserWarning)
-                _keep(scenario, seed, self.findings[folder.name], folder)
-        except Exception as error:  # noqa: BLE001 - the test has failed for its own reasons, and this is but a picture
-            message = f"{type(error).__name__}: {error}"
-        write_json(result, {"message": message})
-        return message
+        outcome = outcome_of(lambda: _kept(scenario, seed, self.findings[folder.name], folder))
+        write_json(result, outcome)
+        return outcome.get("message")
 
 
 def conditions_of(scenario: Scenario, finding: Finding) -> Iterator[Condition]:
@@ -182,6 +178,13 @@ def conditions_of(scenario: Scenario, finding: Finding) -> Iterator[Condition]:
             elif isinstance(clause, Always | Eventually):
                 yield clause.condition
                 yield from () if clause.during is None else (clause.during,)
+
+
+def _kept(scenario: Scenario, seed: int, findings: Sequence[Finding], folder: Path) -> dict[str, Any]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        _keep(scenario, seed, findings, folder)
+    return {}
 
 
 def _keep(scenario: Scenario, seed: int, findings: Sequence[Finding], folder: Path) -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fogsim.errors import InputError
+from fogsim.registry.user_code import MayImport, import_anything
 from fogsim.scenario import build, resolved
 from fogsim.scenario.document import read_scenario_document
 from fogsim.scenario.loading import SCENARIO_FILE, ScenarioCases, load_cases, scenario_file
@@ -80,7 +81,11 @@ def _is_hidden(path: Path) -> bool:
 
 
 def collect(
-    files: Sequence[Path], settings: Sequence[str] = (), case: str = "", keywords: Keywords | None = None
+    files: Sequence[Path],
+    settings: Sequence[str] = (),
+    case: str = "",
+    keywords: Keywords | None = None,
+    may_import: MayImport = import_anything,
 ) -> list[FogTest]:
     """Tests of files; those of which nothing is asked for are left out.
 
@@ -94,6 +99,8 @@ def collect(
         Which cases, as ``--case`` has them; empty for all.
     keywords : Keywords or None
         Which expectations.
+    may_import : callable
+        As of `load_scenario`.
 
     Raises
     ------
@@ -103,7 +110,7 @@ def collect(
     tests, mistakes = [], []
     for file in files:
         try:
-            loaded = load_cases(file, settings, case)
+            loaded = load_cases(file, settings, case, may_import=may_import)
         except InputError as error:
             mistakes.append(str(error))
             continue

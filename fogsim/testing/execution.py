@@ -1,19 +1,18 @@
 """One case: a run that is watched by what is expected of it."""
 
 import time
-import traceback
 import warnings
 from pathlib import Path
 from typing import Any
 
-from fogsim.errors import FogSimError, UnplayedWarning
+from fogsim.errors import UnplayedWarning
 from fogsim.expectations import ExpectationWatch
 from fogsim.files.atomic import write_json
 from fogsim.loop import run
 from fogsim.metrics import RunMetrics, TrafficRunMetrics
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.expect.schema import clauses_of
-from fogsim.study.execution import failure, flat_metrics
+from fogsim.study.execution import flat_metrics, outcome_of
 from fogsim.testing.results import finding_to_json
 from fogsim.traffic_run import run_traffic
 
@@ -82,12 +81,6 @@ def check_to_file(scenario: Scenario, seed: int, result: Path) -> str | None:
         If the file cannot be written.
     """
     begun = time.monotonic()
-    try:
-        outcome = {"status": "complete", **check_case(scenario, seed, result.with_suffix(""))}
-    except FogSimError as error:
-        outcome = failure(str(error))
-    except Exception as error:  # noqa: BLE001 - a broken run, of a user's own method perhaps, must not stop the others
-        place = traceback.extract_tb(error.__traceback__)[-1]
-        outcome = failure(f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})")
+    outcome = outcome_of(lambda: check_case(scenario, seed, result.with_suffix("")))
     write_json(result, {**outcome, "duration_s": round(time.monotonic() - begun, 3)})
     return outcome.get("message")

@@ -1,11 +1,16 @@
 """What a camera could see, and what it did."""
 
+import contextlib
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
+
+T = TypeVar("T")
+Pixel = TypeVar("Pixel", np.uint8, np.uint16)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +46,7 @@ class Frame:
     time : float
         Instant of the exposure [s].
     image : (rows, cols, 3) or (rows, cols) uint8, or uint16 of a camera of 10 or 12 bits
-        Pixel values 0 … 2^bits − 1, red first.
+        Pixel values 0 … 2^bits − 1, red first; read-only.
     camera : Camera
         The calibration that the vehicle assumes, which may differ from the true one.
     """
@@ -49,3 +54,28 @@ class Frame:
     time: float
     image: NDArray[np.uint8] | NDArray[np.uint16]
     camera: Camera
+
+    def __post_init__(self) -> None:
+        """Keep a read-only view, so that no method changes what later ones read and recorders write."""
+        object.__setattr__(self, "image", read_only(self.image))
+
+
+def read_only(array: T) -> T:
+    """View of an array that cannot be written through; anything else as it is."""
+    if not isinstance(array, np.ndarray) or not array.flags.writeable:
+        return array
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+def for_kernels(image: NDArray[Pixel]) -> NDArray[Pixel]:
+    """An image for numba's kernels, which must not write into it: a read-only array is of another type to numba.
+
+    It would compile every kernel a second time, and take 20 µs to find the type at each call.
+    """
+    view = image.view()
+    # Pixels that nobody may write, such as those of bytes, stay as they are.
+    with contextlib.suppress(ValueError):
+        view.flags.writeable = True
+    return view

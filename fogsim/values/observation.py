@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fogsim.errors import InputError
 from fogsim.values.camera import Camera
-from fogsim.values.image import Frame
+from fogsim.values.image import Frame, read_only
 from fogsim.values.light import Lamp
 
 SIGN_MAP_REACH, SIGN_MAP_SIZE = 255.0, 2.0
@@ -131,6 +131,10 @@ class SecondView:
     image: NDArray[np.uint8] | NDArray[np.uint16]
     baseline: float
 
+    def __post_init__(self) -> None:
+        """Keep a read-only view of the image."""
+        object.__setattr__(self, "image", read_only(self.image))
+
 
 @dataclass(frozen=True, slots=True)
 class Observation:
@@ -170,6 +174,10 @@ class Observation:
     reports: tuple[FogReport, ...] = ()
     right: SecondView | None = None
     scattering: float | None = None
+
+    def __post_init__(self) -> None:
+        """Keep a read-only view of a bare array."""
+        object.__setattr__(self, "frame", read_only(self.frame))
 
     @property
     def image(self) -> NDArray[np.uint8] | NDArray[np.uint16]:

@@ -143,7 +143,7 @@ class Gallen2014:
         InputError
             If camera, image or time do not fit (see `fogsim.estimators.image_check`).
         """
-        image = self._check.image_of(observation)
+        image = self._check.kernel_image(observation)
         row = self._camera.horizon_row
         if not LEAST_ROWS <= row <= self._camera.height - 1 - LEAST_ROWS:
             why = f"the horizon (row {row:.1f}) is outside the image, or at its border"

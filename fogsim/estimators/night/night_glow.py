@@ -109,7 +109,7 @@ class NightGlow:
         InputError
             If camera, image or time do not fit (see `fogsim.estimators.image_check`).
         """
-        image = self._check.image_of(observation)
+        image = self._check.kernel_image(observation)
         distance = math.nan
         if observation.lead is not None:
             distance = observation.lead.distance + (observation.camera_setback or self._setback)

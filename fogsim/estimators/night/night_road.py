@@ -183,7 +183,7 @@ class NightRoad:
         InputError
             If camera, image or time do not fit (see `fogsim.estimators.image_check`).
         """
-        image = self._check.image_of(observation)
+        image = self._check.kernel_image(observation)
         lit = HEAD_LAMPS & (Lamp.LOW_BEAM if observation.lamps is None else observation.lamps)
         if not lit:
             return Estimate.invalid(self.method, "no head lamp is lit: this is a method for the night")

@@ -124,7 +124,7 @@ class Gabb2014:
         InputError
             If camera, image or time do not fit (see `fogsim.estimators.image_check`).
         """
-        image = self._check.image_of(observation)
+        image = self._check.kernel_image(observation)
         self._fade(observation)
         found: dict[str, object] = {"horizon_row": self._camera.horizon_row}
         note, lead = "no vehicle ahead is tracked", observation.lead

@@ -9,6 +9,7 @@ from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate, ExtinctionBounds
+from fogsim.values.image import for_kernels
 from fogsim.values.observation import Observation, SecondView
 from fogsim.vision.light.daylight import lit_by_lamps
 from fogsim.vision.lines.horizon import levelled, why_no_road
@@ -100,12 +101,12 @@ class Hautiere2006Stereo:
         InputError
             If camera, images or time do not fit (see `fogsim.estimators.image_check`), or the baseline is no length.
         """
-        image, right = self._check.image_of(observation), observation.right
+        image, right = self._check.kernel_image(observation), observation.right
         if right is None:
             return Estimate.invalid(self.method, "there is no second camera (scenario key camera.stereo)")
         if not (math.isfinite(right.baseline) and right.baseline > 0.0):
             raise InputError(f"the baseline of the second camera must be a positive length, got {right.baseline!r} m")
-        second = checked_image(right.image, self._camera)
+        second = for_kernels(checked_image(right.image, self._camera))
         if why := self._why_no_day(image, observation):
             return Estimate.invalid(self.method, why)
         edges = seen_edges(image, second, self._camera, right.baseline, VISIBLE)

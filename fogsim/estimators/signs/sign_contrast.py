@@ -149,7 +149,7 @@ class SignContrast:
         InputError
             If camera, image or time do not fit (see `fogsim.estimators.image_check`), or two signs have one id.
         """
-        image = self._check.image_of(observation)
+        image = self._check.kernel_image(observation)
         watched = self._watch.look(observation)
         found: dict[str, object] = {"horizon_row": self._camera.horizon_row}
         found["sign_looks"] = sign_looks(watched, self._watch.tracks)

@@ -12,6 +12,7 @@ from fogsim.estimators.signs.registration import Registration, register_signs
 from fogsim.estimators.signs.track import SignTrack, SignTracks
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import SignLook
+from fogsim.values.image import for_kernels
 from fogsim.values.observation import LeadMeasurement, Observation
 from fogsim.vision.light.daylight import lit_by_lamps
 from fogsim.vision.light.luminance import linear_pixels
@@ -99,7 +100,7 @@ class SignWatch:
         InputError
             If two signs have one id.
         """
-        image, sightings = observation.image, observation.signs
+        image, sightings = for_kernels(observation.image), observation.signs
         ids = [one.sign_id for one in sightings]
         if len(set(ids)) < len(ids):
             twice = next(one for one in ids if ids.count(one) > 1)

@@ -1,6 +1,7 @@
 """From a scenario to its methods: estimators, fusion, advisers, lighting, and what measures them."""
 
 import dataclasses
+from typing import TypeVar
 
 from fogsim.advice import ADVISERS, Adviser, VehicleAdviser
 from fogsim.calibration.veil_references import usual_references
@@ -10,8 +11,12 @@ from fogsim.estimators.night.references import TakesReferences
 from fogsim.fusion import FUSIONS, Fusion, LocatedFusion
 from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy, VehicleLightingPolicy
 from fogsim.metrics import SafetyStandard
+from fogsim.registry import Registry
 from fogsim.scenario.schema import NO_RENDERER, Scenario
+from fogsim.scenario.section import Method
 from fogsim.values import Camera
+
+T = TypeVar("T")
 
 
 def check_ego(scenario: Scenario, who: str) -> None:
@@ -66,7 +71,7 @@ def estimators(scenario: Scenario, assumed: Camera) -> tuple[Estimator, ...]:
     assumed : Camera
         The assumed calibration.
     """
-    made = tuple(ESTIMATORS.find(e.method, scenario.directory)(assumed, **e.parameters) for e in scenario.estimators)
+    made = tuple(_factory(ESTIMATORS, one, scenario)(assumed, **one.parameters) for one in scenario.estimators)
     for estimator in made:
         if isinstance(estimator, TakesReferences):
             estimator.take_references(usual_references)
@@ -81,7 +86,7 @@ def fusion(scenario: Scenario) -> Fusion | LocatedFusion:
     scenario : Scenario
         The scenario.
     """
-    return FUSIONS.find(scenario.fusion.method, scenario.directory)(**scenario.fusion.parameters)
+    return _factory(FUSIONS, scenario.fusion, scenario)(**scenario.fusion.parameters)
 
 
 def adviser(scenario: Scenario) -> Adviser | VehicleAdviser:
@@ -92,7 +97,7 @@ def adviser(scenario: Scenario) -> Adviser | VehicleAdviser:
     scenario : Scenario
         The scenario.
     """
-    return ADVISERS.find(scenario.advice.method, scenario.directory)(**scenario.advice.parameters)
+    return _factory(ADVISERS, scenario.advice, scenario)(**scenario.advice.parameters)
 
 
 def road_adviser(scenario: Scenario) -> Adviser:
@@ -159,5 +164,8 @@ def lighting_policy(scenario: Scenario) -> LightingPolicy | VehicleLightingPolic
     scenario : Scenario
         The scenario.
     """
-    policy = LIGHTING_POLICIES.find(scenario.lighting.method, scenario.directory)
-    return policy(**scenario.lighting.parameters)
+    return _factory(LIGHTING_POLICIES, scenario.lighting, scenario)(**scenario.lighting.parameters)
+
+
+def _factory(registry: Registry[T], written: Method, scenario: Scenario) -> T:
+    return registry.find(written.method, scenario.directory, scenario.method_timeout_s)

@@ -1,7 +1,6 @@
 """Signals that end a run: Ctrl-C (SIGINT), SIGTERM and SIGHUP, whatever runs when they come."""
 
 import contextlib
-import faulthandler
 import math
 import os
 import signal
@@ -11,8 +10,6 @@ import time
 from collections.abc import Callable, Iterator
 from types import FrameType, TracebackType
 from typing import Self
-
-from fogsim.errors import InputError
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """Signals that ask a program to end."""
@@ -228,46 +225,3 @@ def interruptible() -> Iterator[None]:
         if isinstance(error.__cause__, KeyboardInterrupt):
             raise error.__cause__ from None
         raise
-
-
-class TimeLimitError(BaseException):
-    """A call took too long; no `except Exception` of the code that is called stops it."""
-
-
-_GRACE = 5.0
-"""Time after a limit at which a process ends that compiled code keeps from raising an error [s]."""
-
-
-@contextlib.contextmanager
-def time_limit(seconds: float) -> Iterator[None]:
-    """Raise an error within a block that takes longer; where compiled code keeps it from being raised, end the process.
-
-    Raises
-    ------
-    TimeLimitError
-        When the time is over, and again each time it is over once more.
-    InputError
-        Outside the main thread, which alone can be interrupted.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        raise InputError("a time limit for methods needs the main thread of Python; run without one, or run there")
-
-    def give_up(_: int, __: FrameType | None) -> None:
-        raise TimeLimitError(f"took longer than {seconds:g} s")
-
-    before = signal.signal(signal.SIGALRM, give_up)
-    faulthandler.dump_traceback_later(seconds + _GRACE, exit=True, file=2)
-    signal.setitimer(signal.ITIMER_REAL, seconds, seconds)
-    try:
-        yield
-    except KeyboardInterrupt:
-        # Its own alarm, by which a lost signal comes again, goes on.
-        raise
-    except BaseException:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        raise
-    else:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-    finally:
-        faulthandler.cancel_dump_traceback_later()
-        signal.signal(signal.SIGALRM, before)

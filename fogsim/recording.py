@@ -301,15 +301,10 @@ def _record(
             recording.begin_if_nothing_is_lost()
         except RecorderError:
             raise
-        except MethodError as error:
-            message = str(error)
-            recording.begin_if_nothing_is_lost()
-            raise
-        except SystemExit as error:
-            message = f"the run was ended by {error!r}"
-            raise MethodError(message) from error
         except Exception as error:
             message = f"{type(error).__name__}: {error}"
+            if isinstance(error, MethodError):
+                recording.begin_if_nothing_is_lost()
             raise
         finally:
             ending, unplayed = (None, NOTHING_UNPLAYED) if last is None else (last.ending, last.unplayed)
@@ -326,7 +321,9 @@ def _note_failure(directory: RunDirectory, manifest: Manifest, error: MethodErro
     """Leave a manifest of a run that failed before it could begin, unless earlier results are there."""
     if not (directory.earlier or directory.unfinished.exists()):
         directory.begin(manifest.to_json())
-        ended = dataclasses.replace(manifest, status=Status.FAILED, message=str(error), ended=datetime.now(UTC))
+        ended = dataclasses.replace(
+            manifest, status=Status.FAILED, message=f"MethodError: {error}", ended=datetime.now(UTC)
+        )
         directory.finish(ended.to_json())
 
 

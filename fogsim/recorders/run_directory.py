@@ -1,6 +1,5 @@
 """The directory that the results of one run go to."""
 
-import json
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,7 +8,9 @@ from typing import Any, Self
 
 from fogsim.errors import InputError
 from fogsim.files.atomic import Reserve, partial_path, write_json
+from fogsim.files.readers import read_json
 from fogsim.files.writer_lock import WriterLock, WritingProcess
+from fogsim.recorders.manifest import Status
 
 UNFINISHED = "unfinished"
 """Folder in the directory that holds the results of a run until its end."""
@@ -276,7 +277,7 @@ def whole_files(folder: Path) -> list[str]:
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Manifest in a folder; empty if there is none that can be read.
+    """Manifest in a folder; empty if there is none, or it is damaged.
 
     Parameters
     ----------
@@ -284,10 +285,10 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         The folder.
     """
     try:
-        content = json.loads((folder / _NAMES["manifest"]).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        content = read_json(folder / _NAMES["manifest"])
+    except InputError:
         return {}
-    return content if isinstance(content, dict) else {}
+    return content if isinstance(content, dict) and content.get("status") in list(Status) else {}
 
 
 def finish_folder(path: Path, manifest: Mapping[str, object]) -> None:

@@ -135,7 +135,7 @@ class Registry(Mapping[str, T]):
         """Version of a user's method; None for FogSim's, and for those that a program has registered itself."""
         return None if name in self._entries else version_of(name, self._group, folder)
 
-    def _guarded(self, name: str, cls: object, time_limit: float | None) -> T:
+    def _guarded(self, name: str, cls: Any, time_limit: float | None) -> T:
         if not inspect.isclass(cls):
             raise InputError(f"{self.kind} {name!r}: expected a class, got {shown(cls)}")
         lacking = [wanted for wanted in self._methods if not any(_has_method(cls, one) for one in wanted.split("|"))]

@@ -199,7 +199,9 @@ def load_announced(point: metadata.EntryPoint) -> Any:
     except KeyboardInterrupt:
         raise
     except BaseException as error:
-        raise InputError(f"{point.name} of {point.value}: its import fails: {described(error, None, point.value)}") from error
+        raise InputError(
+            f"{point.name} of {point.value}: its import fails: {described(error, None, point.value)}"
+        ) from error
 
 
 def version_of(name: str, group: str, folder: Path | None = None) -> str | None:

@@ -169,7 +169,7 @@ class Scenario(Section):
     """How the belief becomes lamps; with `informed_by: truth`, how the true visibility does."""
 
     method_timeout_s: Period | None = None
-    """Longest time that one call of a user's method may take; a longer one fails the run. None, the default, for any."""
+    """Longest time that one call of a user's method may take; a longer one fails the run. By default any."""
 
     expect: Expectations = Field(default_factory=dict)
     """What must hold in the run, by name; `fogsim test` tells whether it does."""

@@ -1,20 +1,30 @@
 """The directory of a study: what it is about, and a file for each run that is done."""
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from pydantic import BaseModel, ValidationError
+
 from fogsim.errors import InputError, shown
 from fogsim.files.atomic import partial_path, write_json
+from fogsim.files.readers import read_json
 from fogsim.recorders.manifest import versions
 from fogsim.study.engine import result_file
-from fogsim.study.execution import Value
 from fogsim.study.plan import Study, StudyRun
 from fogsim.study.profiles import Profiles
+from fogsim.study.run_file import STUDY_RUN, CompleteRun, FailedRun, Value, read_run
 from fogsim.study.table import Row
 
 _MOST_TOLD = 5
+
+
+class _Manifest(BaseModel):
+    """What `study.json` says, as far as it is compared."""
+
+    versions: dict[str, str | None]
+    files: dict[str, str]
+    cells: dict[str, dict[str, Any]]
 
 
 class StudyDirectory:
@@ -58,12 +68,15 @@ class StudyDirectory:
 
     def _check_same(self, manifest: Path, described: dict[str, Any]) -> None:
         try:
-            there = json.loads(manifest.read_text(encoding="utf-8"))
-        except ValueError as error:
-            raise InputError(f"{manifest}: cannot be read: {error}") from error
+            there = _Manifest.model_validate(read_json(manifest)).model_dump()
+        except (InputError, ValidationError) as error:
+            raise InputError(
+                f"{manifest}: not the description of a study; choose another directory with --out, or remove the file "
+                "and the results beside it"
+            ) from error
         # The baseline and the number of seeds may change: runs that are done stay what they are.
         now = {**described, "versions": _deciding_versions(versions())}
-        before = {**there, "versions": _deciding_versions(there.get("versions", {}))}
+        before = {**there, "versions": _deciding_versions(there["versions"])}
         kinds = ("versions", "files", "cells")
         changed = [change for kind in kinds for change in _changes(before.get(kind, {}), now[kind])]
         if changed:
@@ -74,15 +87,11 @@ class StudyDirectory:
             )
 
     def missing(self) -> list[StudyRun]:
-        """Runs without a result; those that failed are tried again."""
-        return [run for run in self._study.runs if self._result(run).get("status") != "complete"]
+        """Runs without a whole result; those that failed are tried again."""
+        return [run for run in self._study.runs if not isinstance(self._result(run), CompleteRun)]
 
-    def _result(self, run: StudyRun) -> dict[str, Any]:
-        try:
-            found = json.loads(result_file(self.results, run).read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            return {}
-        return found if isinstance(found, dict) else {}
+    def _result(self, run: StudyRun) -> CompleteRun | FailedRun | None:
+        return read_run(result_file(self.results, run), STUDY_RUN)
 
     def rows(self) -> list[Row]:
         """The table: a row for each run, those without a result included."""
@@ -92,16 +101,20 @@ class StudyDirectory:
         """Levels, seed and profiles of each run that is done."""
         for run in self._study.runs:
             found = self._result(run)
-            if found.get("status") == "complete" and "profiles" in found:
-                yield run.levels, run.seed, found["profiles"]
+            if isinstance(found, CompleteRun):
+                yield run.levels, run.seed, found.profiles.model_dump()
 
     def _row(self, run: StudyRun) -> Row:
         found = self._result(run)
-        metrics: dict[str, Value] = found.get("metrics", {})
+        metrics = found.metrics if isinstance(found, CompleteRun) else {}
         if not run.scenario.estimators:
             # Without a camera what is believed is but where beliefs begin: no error to compare.
             metrics = {key: None if key.startswith("belief_") else value for key, value in metrics.items()}
-        about = {"seed": run.seed, "status": found.get("status", "missing"), "message": found.get("message")}
+        about = {
+            "seed": run.seed,
+            "status": "missing" if found is None else found.status,
+            "message": getattr(found, "message", None),
+        }
         outputs = result_file(self.results, run).with_suffix("")
         kept: dict[str, Value] = {"sumo_outputs": f"{self.results.name}/{outputs.name}"} if outputs.is_dir() else {}
         return {"run": run.number, **run.levels, **about, **kept, **metrics}

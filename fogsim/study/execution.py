@@ -12,11 +12,9 @@ from fogsim.loop import run
 from fogsim.metrics import MetricsOfRun, RunMetrics, RunSummary, TrafficRunMetrics
 from fogsim.scenario import Scenario, build
 from fogsim.study.profiles import RunProfiles
+from fogsim.study.run_file import Value
 from fogsim.traffic_run import run_traffic
 from fogsim.values import TrafficStep
-
-Value = str | float | int | None
-"""What a cell of the table holds."""
 
 
 def measure_run(scenario: Scenario, seed: int, sumo_outputs: Path | None = None) -> dict[str, Any]:

@@ -279,9 +279,7 @@ def _runs(
             number += 1
 
 
-def _scenario(
-    document: Document, written: StudyFile, levels: Mapping[str, str], may_import: MayImport
-) -> Scenario:
+def _scenario(document: Document, written: StudyFile, levels: Mapping[str, str], may_import: MayImport) -> Scenario:
     settings = [*written.settings]
     for factor, level in levels.items():
         settings += written.factors[factor][level]

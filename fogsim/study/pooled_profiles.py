@@ -77,9 +77,7 @@ class PooledProfiles:
         classes, road, hits = profiles["time_to_collision"], profiles["road"], profiles["collisions"]
         self.moving += np.array(classes["moving_s"])
         self.queue += np.array(classes["queue_s"])
-        places = road["place_m"]
-        # Runs of earlier versions have no extinctions of everybody.
-        for place, *sums in zip(places, *(road.get(name, [0.0] * len(places)) for name in _SUMS), strict=True):
+        for place, *sums in zip(road["place_m"], *(road[name] for name in _SUMS), strict=True):
             self.road[place] = self.road.get(place, np.zeros(len(_SUMS))) + np.array(sums)
         path = np.array([profiles["path"]["x_m"], profiles["path"]["y_m"]]).T
         self.path = path if len(path) > len(self.path) else self.path

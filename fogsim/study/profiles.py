@@ -25,6 +25,9 @@ CLASSES = 40
 MOST_COLLISIONS = 100
 """Collisions of which place and speed are kept; their number is a metric."""
 
+COLLISION_COLUMNS = ("time_s", "x_m", "y_m", "impact_speed_mps", "collider", "victim")
+PATH_COLUMNS = ("place_m", "x_m", "y_m")
+
 
 class RunProfiles:
     """Watches the steps of one run, and everybody in them as one of the watchers of its metrics."""
@@ -89,12 +92,11 @@ class RunProfiles:
         """
         moving, queue = self._by_class
         columns = list(zip(*self._collisions, strict=True)) or [()] * 6
-        names = ("time_s", "x_m", "y_m", "impact_speed_mps", "collider", "victim")
         return {
             "vehicle_time_s": _short(self._vehicle_time),
             "time_to_collision": {"class_s": CLASS_WIDTH, "moving_s": _column(moving), "queue_s": _column(queue)},
             **self._road_columns(),
-            "collisions": {name: [_short(v) for v in c] for name, c in zip(names, columns, strict=True)},
+            "collisions": {name: [_short(v) for v in c] for name, c in zip(COLLISION_COLUMNS, columns, strict=True)},
             "collision_count": self._collision_count,
         }
 
@@ -102,7 +104,7 @@ class RunProfiles:
         path = self._road.path[:: round(CELL_LENGTH / PATH_SPACING)]
         return {
             "road": {name: _column(column) for name, column in zip(ROAD_COLUMNS, self._road.sums().T, strict=True)},
-            "path": {name: _column(path[:, i]) for i, name in enumerate(("place_m", "x_m", "y_m"))},
+            "path": {name: _column(path[:, i]) for i, name in enumerate(PATH_COLUMNS)},
         }
 
 

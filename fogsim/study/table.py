@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from fogsim.files.atomic import write_bytes, write_text
-from fogsim.study.execution import Value
+from fogsim.study.run_file import Value
 
 Row = Mapping[str, Value]
 """Factors, seed, status, message, and every metric of one run."""

@@ -1,15 +1,17 @@
 """What came of the cases, read back from their files."""
 
 import dataclasses
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, TypeAdapter
 
 from fogsim.expectations import Finding, FindingVerdict
 from fogsim.study.engine import result_file
 from fogsim.study.plan import StudyRun
+from fogsim.study.run_file import FailedRun, Finite, Metrics, RunRecord, Word, read_run
 
 
 def finding_to_json(finding: Finding) -> dict[str, Any]:
@@ -24,14 +26,24 @@ def finding_to_json(finding: Finding) -> dict[str, Any]:
 
 
 def finding_from_json(values: Mapping[str, Any]) -> Finding:
-    """A finding of a file.
+    """A finding of a file, as `finding_to_json` writes it."""
+    return _FINDING.validate_python(values)
 
-    Parameters
-    ----------
-    values : mapping
-        As of `finding_to_json`.
-    """
-    return Finding(**{**values, "verdict": FindingVerdict(values["verdict"])})
+
+class CompleteCase(RunRecord):
+    """A case whose run came to its end."""
+
+    status: Literal["complete"]
+    findings: list[Finding]
+    metrics: Metrics
+    ending: Word | None
+    duration_s: Finite
+
+
+_FINDING = TypeAdapter(Finding)
+_CASE: TypeAdapter[CompleteCase | FailedRun] = TypeAdapter(
+    Annotated[CompleteCase | FailedRun, Field(discriminator="status")]
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,12 +94,10 @@ def read_result(folder: Path, run: StudyRun, expectations: Sequence[str]) -> Cas
     expectations : sequence of str
         Names of those that are asked for.
     """
-    try:
-        found = json.loads(result_file(folder, run).read_text(encoding="utf-8"))
-        took = float(found.get("duration_s", 0.0))
-        if found["status"] != "complete":
-            return CaseResult(run, str(found["message"]), duration=took)
-        findings = tuple(finding_from_json(one) for one in found["findings"] if one["name"] in expectations)
-        return CaseResult(run, None, findings, found["metrics"], took)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    found = read_run(result_file(folder, run), _CASE)
+    if isinstance(found, FailedRun):
+        return CaseResult(run, found.message, duration=found.duration_s)
+    if found is None or {one.name for one in found.findings}.isdisjoint(expectations):
         return None
+    findings = tuple(one for one in found.findings if one.name in expectations)
+    return CaseResult(run, None, findings, found.metrics, found.duration_s)

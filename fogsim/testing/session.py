@@ -1,14 +1,16 @@
 """Running tests: cases in parallel, results in files, what is left of an earlier call."""
 
-import json
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from pydantic import BaseModel, Field, ValidationError
+
 from fogsim.errors import InputError
 from fogsim.expectations import FindingVerdict
 from fogsim.files.atomic import partial_path, write_json
+from fogsim.files.readers import read_json
 from fogsim.files.writer_lock import WriterLock
 from fogsim.recorders.manifest import versions
 from fogsim.study.engine import Engine
@@ -143,19 +145,25 @@ def _begin(out: Path, resume: bool) -> Path:
         raise InputError(f"--out {out} holds something else than tests; choose another directory")
     out.mkdir(parents=True, exist_ok=True)
     last = _read_session(out)
-    if not (resume and last.get("versions") == versions()):
+    if not (resume and last.versions == versions()):
         shutil.rmtree(out / _RESULTS, ignore_errors=True)
-    write_json(session, {"versions": versions(), "not_passed": last.get("not_passed", {})})
+    write_json(session, {"versions": versions(), "not_passed": last.not_passed})
     (out / _RESULTS).mkdir(exist_ok=True)
     return out / _RESULTS
 
 
-def _read_session(out: Path) -> Mapping[str, object]:
+class _Session(BaseModel):
+    """What is kept between two calls."""
+
+    versions: dict[str, str | None] = Field(default_factory=dict)
+    not_passed: dict[str, list[str]] = Field(default_factory=dict)
+
+
+def _read_session(out: Path) -> _Session:
     try:
-        found = json.loads((out / _SESSION).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return found if isinstance(found, dict) else {}
+        return _Session.model_validate(read_json(out / _SESSION))
+    except (InputError, ValidationError):
+        return _Session()
 
 
 def _outcome(test: FogTest, found: Mapping[str, CaseResult | None]) -> FileOutcome:
@@ -190,5 +198,4 @@ def last_failed(out: Path) -> dict[Path, list[str]]:
     out : Path
         The directory.
     """
-    noted = _read_session(out).get("not_passed")
-    return {Path(file): list(cases) for file, cases in noted.items()} if isinstance(noted, dict) else {}
+    return {Path(file): cases for file, cases in _read_session(out).not_passed.items()}

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fogsim.values.camera import Camera
 
 T = TypeVar("T")
-Pixel = TypeVar("Pixel", np.uint8, np.uint16)
+Image = NDArray[np.uint8] | NDArray[np.uint16]
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,12 +69,12 @@ def read_only(array: T) -> T:
     return view
 
 
-def for_kernels(image: NDArray[Pixel]) -> NDArray[Pixel]:
+def for_kernels(image: Image) -> Image:
     """An image for numba's kernels, which must not write into it: a read-only array is of another type to numba.
 
     It would compile every kernel a second time, and take 20 µs to find the type at each call.
     """
-    view = image.view()
+    view: Image = image.view()
     # Pixels that nobody may write, such as those of bytes, stay as they are.
     with contextlib.suppress(ValueError):
         view.flags.writeable = True

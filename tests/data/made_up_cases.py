@@ -28,7 +28,7 @@ class MadeUpEngine:
             if len(self.ran) == self.stop_after:
                 raise KeyboardInterrupt
             outcome = self.told[run.key]
-            write_json(result_file(folder, run), {"metrics": {}, "duration_s": 1.5, **outcome})
+            write_json(result_file(folder, run), {"duration_s": 1.5, **outcome})
             self.ran.append(run.key)
             watch(run, outcome.get("message"))
 
@@ -42,7 +42,7 @@ def complete(*verdicts: str, **rest: Any) -> dict[str, Any]:
     """A run whose expectations e0, e1, … came out so."""
     names = [f"e{i}" for i in range(len(verdicts))]
     found = [finding(verdict, name, **rest) for name, verdict in zip(names, verdicts, strict=True)]
-    return {"status": "complete", "findings": found}
+    return {"status": "complete", "findings": found, "metrics": {"collisions": 0}, "ending": "time"}
 
 
 BROKEN = {"status": "failed", "message": "SUMO has ended <here>"}

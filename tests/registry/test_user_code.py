@@ -10,7 +10,7 @@ from fogsim import Belief, InputError, LeadMeasurement, Observation, SpeedAdvice
 from fogsim.advice import ADVISERS, VehicleAdviser
 from fogsim.errors import UnknownNameError
 from fogsim.recorders import Manifest, Status
-from fogsim.registry.user_code import import_object
+from fogsim.registry.user_code import import_class
 from fogsim.scenario import build
 from fogsim.values.belief import certain_belief
 
@@ -31,9 +31,9 @@ def test_an_object_of_a_module_beside_the_scenario_is_found_from_anywhere(tmp_pa
 def test_modules_of_one_name_in_two_folders_are_two(tmp_path):
     for folder, number in (("a", 1), ("b", 2)):
         (tmp_path / folder).mkdir()
-        (tmp_path / folder / "mine.py").write_text(f"def make(): return {number}\n")
-    assert import_object("mine:make", tmp_path / "a")() == 1
-    assert import_object("mine:make", tmp_path / "b")() == 2
+        (tmp_path / folder / "mine.py").write_text(f"class Mine: number = {number}\n")
+    assert import_class("mine:Mine", tmp_path / "a").number == 1
+    assert import_class("mine:Mine", tmp_path / "b").number == 2
     assert "mine" not in sys.modules
 
 
@@ -56,12 +56,16 @@ def test_an_installed_package_announces_its_methods(tmp_path, monkeypatch):
     ("name", "text", "told"),
     [
         ("own:Cautius", "class Cautious: advise = None", "there is no Cautius in .*own.py; did you mean 'Cautious'"),
-        ("owm:Cautious", "", "there is no such module, neither in"),
-        ("own:Cautious", "import nothing_of_that_name", r"own: its import fails: No module named .*own\.py:1"),
+        ("owm:Cautious", "", "there is no owm.py in .*entry points"),
+        (
+            "own:Cautious",
+            "import nothing_of_that_name",
+            r"import fails: ModuleNotFoundError: No module named .*own\.py:1",
+        ),
         ("own:Cautious", "x = 1\ndef f(:", r"SyntaxError.*own\.py:2"),
         ("own:Cautious", "1 / 0", r"ZeroDivisionError: division by zero, at .*own\.py:1"),
         ("own:Cautious", "class Cautious: pass", r"must have a method advise\(\) or advise_vehicle\(\)"),
-        ("own:Cautious", "Cautious = 3", "must be a class or a function that makes one, got 3"),
+        ("own:Cautious", "Cautious = 3", "expected a class, got 3"),
     ],
 )
 def test_what_is_wrong_with_a_users_module_is_told(tmp_path, name, text, told):

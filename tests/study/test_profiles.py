@@ -90,14 +90,6 @@ def test_speeds_along_a_named_road_need_no_ego() -> None:
     assert pooled.extinctions()[:, 1] == pytest.approx([k / t for k, t in zip(expected, (3, 4, 4, 4, 2), strict=True)])
 
 
-def test_profiles_of_earlier_versions_are_read() -> None:
-    found = profiles_of(drive())
-    del found["road"]["vehicle_extinction_time_s_per_m"]
-    pooled = PooledProfiles()
-    pooled.add(0, found)
-    assert pooled.extinctions()[:, 1] == pytest.approx([extinction_from_visibility(100.0)] * 5, rel=1e-5)
-
-
 def test_time_of_all_by_time_to_collision_apart_from_queues() -> None:
     # 2 s and 0.6 s from moving leaders, 2.2 s from a standing one, and one that comes no nearer.
     road = traffic(

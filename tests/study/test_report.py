@@ -39,6 +39,7 @@ def profiles(speed: float, exposed: float) -> dict[str, object]:
             "ego_extinction_time_s_per_m": [0.02, 0.06, 0.12],
             "vehicle_time_s": [10.0, 20.0, 10.0],
             "vehicle_way_m": [10 * speed, 40 * speed, 10 * speed],
+            "vehicle_extinction_time_s_per_m": [0.0] * 3,
         },
         "path": {"place_m": [0.0, 50.0, 100.0], "x_m": [0.0, 40.0, 80.0], "y_m": [0.0, 30.0, 60.0]},
         "collisions": {

@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
@@ -20,6 +21,7 @@ from fogsim.study import StudyRun, load_study, run_study
 from fogsim.study.directory import StudyDirectory
 from fogsim.study.engine import RunWatch, result_file
 from fogsim.study.execution import run_to_file
+from fogsim.study.profiles import RunProfiles
 from fogsim.values import SpeedAdvice
 
 STUDY = f"""
@@ -148,6 +150,11 @@ def test_the_command_says_that_finished_runs_are_kept(tmp_path: Path, monkeypatc
     assert "Finished runs are kept" in done.output
 
 
+def complete(metrics: dict[str, str | float | int | None]) -> dict[str, Any]:
+    """What the file of a run holds that came to its end."""
+    return {"status": "complete", "metrics": metrics, "profiles": RunProfiles().to_json()}
+
+
 class PlayedRuns:
     """An engine that computes nothing."""
 
@@ -159,7 +166,7 @@ class PlayedRuns:
         for run in runs:
             self.run_numbers.append(run.number)
             metrics = {"mean_speed_mps": float(run.number), "collisions": run.number % 2}
-            write_json(result_file(folder, run), {"status": "complete", "metrics": metrics})
+            write_json(result_file(folder, run), complete(metrics))
             watch(run, None)
 
 
@@ -167,11 +174,34 @@ def test_a_result_that_is_broken_is_run_again(tmp_path: Path) -> None:
     study = load_study(study_file(tmp_path))
     directory = StudyDirectory(tmp_path / "out", study)
     file = tmp_path / "out" / "runs" / f"{study.runs[0].key}.json"
-    for content in ("{", "[]", json.dumps({"status": "failed", "message": "no"})):
-        file.write_text(content, encoding="utf-8")
-        assert len(directory.missing()) == 4
-    file.write_text(json.dumps({"status": "complete", "metrics": {}}), encoding="utf-8")
+    whole = complete({"mean_speed_mps": 20.0, "ending": "time", "minimum_gap_m": None})
+    file.write_text(json.dumps(whole), encoding="utf-8")
     assert len(directory.missing()) == 3
+    for damage in (
+        "{",
+        "null",
+        "[]",
+        "[" * 100_000,
+        json.dumps({"status": "failed", "message": "no"}),
+        *(json.dumps({**whole, "metrics": metrics}) for metrics in ({}, [], "x", {"a": True}, {"a": {"b": 1}})),
+        json.dumps({**whole, "metrics": {"a": math.nan}}),
+        json.dumps({**whole, "profiles": {**whole["profiles"], "road": {"place_m": [1.0]}}}),
+        json.dumps({key: value for key, value in whole.items() if key != "profiles"}),
+    ):
+        file.write_text(damage, encoding="utf-8")
+        assert len(directory.missing()) == 4, damage[:80]
+        assert directory.rows()[0]["status"] in ("missing", "failed")
+
+
+@pytest.mark.parametrize(
+    "damage", ["[]", "null", "{", '{"versions": 5}', '{"versions": {}, "files": {}, "cells": [1]}']
+)
+def test_a_damaged_description_is_one_error(tmp_path: Path, damage: str) -> None:
+    study = load_study(study_file(tmp_path))
+    StudyDirectory(tmp_path / "out", study)
+    (tmp_path / "out" / "study.json").write_text(damage, encoding="utf-8")
+    with pytest.raises(InputError, match=r"study\.json: not the description of a study; choose another directory"):
+        StudyDirectory(tmp_path / "out", study)
 
 
 def test_what_is_believed_without_a_camera_is_no_metric(tmp_path: Path) -> None:
@@ -179,7 +209,7 @@ def test_what_is_believed_without_a_camera_is_no_metric(tmp_path: Path) -> None:
     assert not study.runs[0].scenario.estimators
     directory = StudyDirectory(tmp_path / "out", study)
     metrics = {"belief_median_error_percent": 691.0, "mean_speed_mps": 20.0}
-    result = {"status": "complete", "metrics": metrics}
+    result = complete(metrics)
     (tmp_path / "out" / "runs" / f"{study.runs[0].key}.json").write_text(json.dumps(result), encoding="utf-8")
     row = directory.rows()[0]
     assert (row["belief_median_error_percent"], row["mean_speed_mps"]) == (None, 20.0)

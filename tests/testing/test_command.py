@@ -91,7 +91,8 @@ def test_a_run_that_goes_wrong_is_told_with_its_place(
     wanted = ["--case", "visibility=70 m", "--set", "advice={method: 'mine:Broken', informed_by: truth}"]
     done = command("test", str(file), *wanted, "--no-evidence", cwd=file.parent)
     assert done.returncode == 1
-    assert "the run went wrong: visibility=70 m: RuntimeError: no advice (mine.py:4)" in done.stdout
+    told = f"adviser 'mine:Broken': advise() failed: RuntimeError: no advice, at {file.parent / 'mine.py'}:4"
+    assert f"the run went wrong: visibility=70 m: {told}" in done.stdout
     assert "1 error; 1 run of 1 file" in done.stdout
 
 

@@ -42,7 +42,7 @@ class Pretending:
             visibility, light, duration = (float(run.levels[n].split()[0]) for n in ("visibility", "light", "duration"))
             self.ran.append(",".join(run.levels.values()))
             verdict = "failed" if self.fails(visibility, light, duration, run.seed) else "passed"
-            write_json(result_file(folder, run), {**complete(verdict), "metrics": {}})
+            write_json(result_file(folder, run), {**complete(verdict), "duration_s": 0.0})
             watch(run, None)
 
 

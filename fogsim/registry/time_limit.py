@@ -1,0 +1,53 @@
+"""A time limit for one call of a user's method."""
+
+import contextlib
+import faulthandler
+import signal
+import threading
+from collections.abc import Iterator
+from types import FrameType
+
+from fogsim.errors import InputError
+
+
+class TimeLimitError(BaseException):
+    """A call took too long; no `except Exception` of the code that is called stops it."""
+
+
+_GRACE = 5.0
+"""Time after a limit at which a process ends that compiled code keeps from raising an error [s]."""
+
+
+@contextlib.contextmanager
+def time_limit(seconds: float) -> Iterator[None]:
+    """Raise an error within a block that takes longer; where compiled code keeps it from being raised, end the process.
+
+    Raises
+    ------
+    TimeLimitError
+        When the time is over, and again each time it is over once more.
+    InputError
+        Outside the main thread, which alone can be interrupted.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        raise InputError("a time limit for methods needs the main thread of Python; run without one, or run there")
+
+    def give_up(_: int, __: FrameType | None) -> None:
+        raise TimeLimitError(f"took longer than {seconds:g} s")
+
+    before = signal.signal(signal.SIGALRM, give_up)
+    faulthandler.dump_traceback_later(seconds + _GRACE, exit=True, file=2)
+    signal.setitimer(signal.ITIMER_REAL, seconds, seconds)
+    try:
+        yield
+    except KeyboardInterrupt:
+        # Its own alarm, by which a lost signal comes again, goes on.
+        raise
+    except BaseException:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        raise
+    else:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+    finally:
+        faulthandler.cancel_dump_traceback_later()
+        signal.signal(signal.SIGALRM, before)

@@ -143,7 +143,7 @@ class Registry(Mapping[str, T]):
             needed = " and ".join(f"{wanted.replace('|', '() or ')}()" for wanted in lacking)
             raise InputError(f"{self.kind} {name!r} must have a method {needed}")
         methods = tuple(one for wanted in self._methods for one in wanted.split("|"))
-        made: Any = guarded(cls, f"{self.kind} {name!r}", methods, time_limit)
+        made: Any = guarded(cls, f"{self.kind} {name!r}", methods, time_limit)  # type: ignore[arg-type] # it is hashable
         try:
             inspect.signature(made, eval_str=True)
         except Exception as error:

@@ -30,8 +30,9 @@ def guarded(cls: type, who: str, methods: tuple[str, ...], limit: float | None =
         Longest time that one call may take [s]; None for any.
     """
     guard = functools.partial(_guarded_call, file=_source(cls), limit=limit)
-    makes_itself = cls.__init__ is object.__init__ and cls.__new__ is not object.__new__
-    constructor = "__new__" if makes_itself else "__init__"
+    # A named tuple, say, is made by __new__ and inherits an __init__ that takes no arguments.
+    own = [name for name in ("__init__", "__new__") if getattr(cls, name) is not getattr(object, name)]
+    constructor = own[0] if own else "__init__"
     body: dict[str, Any] = {"__module__": cls.__module__, "__qualname__": cls.__qualname__, "__doc__": cls.__doc__}
     body[constructor] = guard(getattr(cls, constructor), f"{who}: its constructor")
     for name in dir(cls):

@@ -142,7 +142,7 @@ def place_of(name: str, folder: Path) -> str:
 @pytest.mark.parametrize("name", MISBEHAVING)
 def test_a_run_of_a_method_that_misbehaves_has_failed(folder: Path, command: Command, name: str) -> None:
     (folder / "short.fog.yaml").write_text(SCENARIO.replace("NAME", f"'mine:{name}'"))
-    told = f"estimator 'mine:{name}': " + f"{MISBEHAVING[name]} {place_of(name, folder)}"
+    told = f"{MISBEHAVING[name]} {place_of(name, folder)}"
     done = command("run", "short.fog.yaml", "--out", "out", "--no-video", "--no-report", cwd=folder)
     assert done.returncode == 1
     assert told in done.stderr.replace("\n", "")

@@ -1,8 +1,8 @@
 """Search for input that ends in anything but a result or one clear error: `python tools/fuzz.py --minutes 10`.
 
-Hypothesis changes valid files, of the repository and of its own, in ways that people and attackers do. Each entry point reads
-what comes out, in a process of its own with limits on time and memory. An input that ends in another error than FogSim's, in
-a crash or in silence is shrunk and kept in the corpus, which is tried first in each search, and by `tests/faults`.
+Hypothesis edits valid files as people and attackers do. Each entry point reads the results in a process of its own,
+with limits on time and memory. An input that ends in another error than FogSim's, in a crash or a hang is shrunk and
+kept in the corpus, which is tried first in each search, and by `tests/faults/test_fuzz_corpus.py`.
 """
 
 import argparse
@@ -96,8 +96,8 @@ pitch_deg: 2.0
 response: gamma
 """
 SIGNS = b"""<additional>
-<poi id="s" type="fogsim.sign.speed_limit" x="100" y="3" angle="90"><param key="value" value="100"/><param key="diameter"
-value="0.6"/></poi><poly id="w" type="building" shape="0,0 5,0 5,5" layer="1"/></additional>
+<poi id="s" type="fogsim.sign.speed_limit" x="100" y="3" angle="90"><param key="value" value="100"/>
+<param key="diameter" value="0.6"/></poi><poly id="w" type="building" shape="0,0 5,0 5,5" layer="1"/></additional>
 """
 GPX = b"""<gpx version="1.1"><trk><trkseg><trkpt lat="50.0" lon="8.0"><time>2026-01-01T00:00:00Z</time></trkpt>
 <trkpt lat="50.001" lon="8.0"><time>2026-01-01T00:00:05Z</time></trkpt></trkseg></trk></gpx>
@@ -129,8 +129,9 @@ class Mine:
 from fogsim import Estimate
 """
 MODULE_TOKENS = [
-    b"sys.exit(0)", b"raise BaseException", b"raise KeyError('x')", b"1 / 0", b"None", b"return", b"observation.image[:] = 0",
-    b"import nothing", b"yield 1", b"lambda: 0", b"object()", b"float('nan')", b"self.update(observation)", b"@property\n",
+    b"sys.exit(0)", b"raise BaseException", b"raise KeyError('x')", b"1 / 0", b"None", b"return", b"import nothing",
+    b"observation.image[:] = 0", b"yield 1", b"lambda: 0", b"object()", b"float('nan')", b"self.update(observation)",
+    b"@property\n",
 ]  # fmt: skip
 
 
@@ -225,11 +226,12 @@ def _use_module(path: Path) -> None:
 
 
 HOSTILE = [
-    b"", b"nan", b".nan", b"-inf", b".inf", b"1e400", b"1e308", b"-1", b"0", b"1e-320", b"9" * 400, b"true", b"null", b"~",
-    b"[]", b"{}", b"[" * 3000, b"<a>" * 3000, b"{a: " * 300, b"x" * 70_000, b"\x1b[31m", b"\0", b"\n", b"a\xffb", "é𝕏".encode(),
-    b":100:", b"[red]", b"../../../etc/passwd", b"/dev/zero", b"os:system", b"*a", b"&a [*a]", b"!!python/name:os.system",
-    b'<!DOCTYPE a [<!ENTITY e "x">]>', b'encoding="klingon"', b'encoding="utf-16"', b"ego", b"60 m", b"-1 s", b"1e300 s",
-    b"$undefined", b"${1 / 0}", b"2026-02-30T25:61:00", b"' '", b"\xef\xbb\xbf", b"%s", b"\\", b"'", b'"', b"<", b"]]>",
+    b"", b"nan", b".nan", b"-inf", b".inf", b"1e400", b"1e308", b"-1", b"0", b"1e-320", b"9" * 400, b"true", b"null",
+    b"~", b"[]", b"{}", b"[" * 3000, b"<a>" * 3000, b"{a: " * 300, b"x" * 70_000, b"\x1b[31m", b"\0", b"\n", b"a\xffb",
+    "é𝕏".encode(), b":100:", b"[red]", b"../../../etc/passwd", b"/dev/zero", b"os:system", b"*a", b"&a [*a]",
+    b"!!python/name:os.system", b'<!DOCTYPE a [<!ENTITY e "x">]>', b'encoding="klingon"', b'encoding="utf-16"', b"ego",
+    b"60 m", b"-1 s", b"1e300 s", b"$undefined", b"${1 / 0}", b"2026-02-30T25:61:00", b"' '", b"\xef\xbb\xbf", b"%s",
+    b"\\", b"'", b'"', b"<", b"]]>",
 ]  # fmt: skip
 """What is put in place of a word, a number or a text."""
 
@@ -391,7 +393,7 @@ def main(arguments: Sequence[str]) -> int:
     names = chosen.only or list(entries())
     until, tried, turn = time.monotonic() + 60.0 * chosen.minutes, dict.fromkeys(names, 0), 0
 
-    def search(worker: int) -> None:
+    def search(_: int) -> None:
         nonlocal turn
         while time.monotonic() < until:
             number, turn = turn, turn + 1

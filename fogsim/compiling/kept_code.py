@@ -1,4 +1,4 @@
-"""numba's files of compiled kernels, with a checksum: a damaged file counts as missing, so its kernel compiles again."""
+"""numba's files of compiled kernels, with a checksum: a damaged file counts as missing."""
 
 import contextlib
 import io

@@ -7,6 +7,7 @@ from typing import Any
 
 from fogsim.errors import InputError, shown
 from fogsim.files.atomic import partial_path, write_json
+from fogsim.files.output_targets import refuse_unwritable_folder
 from fogsim.recorders.manifest import versions
 from fogsim.study.engine import result_file
 from fogsim.study.execution import Value
@@ -41,8 +42,7 @@ class StudyDirectory:
     def __init__(self, path: Path, study: Study) -> None:
         self._study = study
         self.path, self.results = path, path / "runs"
-        if path.exists() and not path.is_dir():
-            raise InputError(f"--out {path} is a file; give the name of a directory")
+        refuse_unwritable_folder(path)
         described = {"study": study.name, **study.description()}
         manifest = path / "study.json"
         if manifest.exists():

@@ -9,6 +9,7 @@ from pathlib import Path
 from fogsim.errors import InputError
 from fogsim.expectations import FindingVerdict
 from fogsim.files.atomic import partial_path, write_json
+from fogsim.files.output_targets import refuse_unwritable_folder
 from fogsim.files.writer_lock import WriterLock
 from fogsim.recorders.manifest import versions
 from fogsim.study.engine import Engine
@@ -136,8 +137,7 @@ def run_tests(
 
 def _begin(out: Path, resume: bool) -> Path:
     """Make the directory, and leave in it what counts."""
-    if out.exists() and not out.is_dir():
-        raise InputError(f"--out {out} is a file; give the name of a directory")
+    refuse_unwritable_folder(out)
     session = out / _SESSION
     if out.is_dir() and not session.exists() and set(out.iterdir()) - {partial_path(session)}:
         raise InputError(f"--out {out} holds something else than tests; choose another directory")

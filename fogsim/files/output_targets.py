@@ -7,7 +7,7 @@ import itertools
 import os
 import stat
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from fogsim.errors import InputError, shown
@@ -46,7 +46,7 @@ def refuse_unwritable(
         If it cannot be written, or must not be; the message names the option and the file.
     """
     named = f"{option} {path}".lstrip()
-    try:
+    with _one_error(named):
         if is_stream(path):
             _refuse_unwritable_stream(path, named, seeks)
             return
@@ -61,10 +61,6 @@ def refuse_unwritable(
             if not os.access(final, os.W_OK):
                 raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         _refuse_unmakeable(partial_path(path), named, makes_folder)
-    except OSError as error:
-        raise InputError(f"{named}: cannot be written: {error.strerror}") from error
-    except ValueError as error:  # a NUL in the name
-        raise error if isinstance(error, InputError) else InputError(f"{shown(named)}: {error}") from None
 
 
 def refuse_unwritable_folder(path: Path, option: str = "--out") -> None:
@@ -76,14 +72,10 @@ def refuse_unwritable_folder(path: Path, option: str = "--out") -> None:
         If it is a file, or cannot be made or written; the message names the option and the folder.
     """
     named = f"{option} {path}"
-    try:
+    with _one_error(named):
         if os.path.lexists(path) and not path.is_dir():
             raise InputError(f"{named} is not a folder; give the name of a folder")
         _refuse_unmakeable(path / "file", named, makes_folder=True)
-    except OSError as error:
-        raise InputError(f"{named}: cannot be written: {error.strerror}") from error
-    except ValueError as error:
-        raise error if isinstance(error, InputError) else InputError(f"{shown(named)}: {error}") from None
 
 
 def refuse_clashes(files: Mapping[str, Path], folders: Mapping[str, Path]) -> None:
@@ -100,10 +92,23 @@ def refuse_clashes(files: Mapping[str, Path], folders: Mapping[str, Path]) -> No
         If two are the same, or one is a file where another needs a folder.
     """
     named = {option: path for option, path in files.items() if not is_stream(path)}
-    for (option, file), (other, path) in itertools.permutations((named | folders).items(), 2):
+    for (option, file), (other, path) in itertools.permutations({**named, **folders}.items(), 2):
         place = Path(os.path.realpath(path))
         if option in named and Path(os.path.realpath(file)) in (place, *place.parents):
             raise InputError(f"{option} {file} is in the way of {other} {path}; give another name")
+
+
+@contextlib.contextmanager
+def _one_error(named: str) -> Iterator[None]:
+    """Tell what the operating system refuses as an InputError."""
+    try:
+        yield
+    except InputError:
+        raise
+    except OSError as error:
+        raise InputError(f"{named}: cannot be written: {error.strerror}") from error
+    except ValueError as error:  # a NUL in the name
+        raise InputError(f"{shown(named)}: {error}") from None
 
 
 def _refuse_unwritable_stream(path: Path, named: str, seeks: bool) -> None:

@@ -16,6 +16,7 @@ from fogsim.files.cache_entries import keep_newest, read_entry, replace_file, wr
 from fogsim.files.generated_files import kept_text, write_generated
 from fogsim.traffic.road import map_cache, network
 from fogsim.traffic.road.network import read_net
+from fogsim.traffic.road.road_map import RoadMap
 
 GRID = Path(__file__).resolve().parents[1] / "data" / "grid" / "grid.net.xml"
 TEXTS = {"road.net.xml": "<net/>\n" * 40, "road.rou.xml": "<routes/>\n"}
@@ -52,7 +53,7 @@ DAMAGES: Mapping[str, Callable[[Path], object]] = {
     "longer": lambda file: file.write_bytes(file.read_bytes() + b"x"),
     "one bit": flip,
     "missing": lambda file: file.unlink(),
-    "a folder": replace_by(lambda file: (file.mkdir(), (file / "inside").touch())),
+    "a folder": replace_by(lambda file: (file / "inside").mkdir(parents=True)),
     "a pipe": replace_by(os.mkfifo),
     "a link to nowhere": replace_by(lambda file: file.symlink_to("nowhere")),
 }
@@ -97,8 +98,13 @@ def _kept(folder: Path, _: pytest.MonkeyPatch) -> Used:
 
 def _map(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Used:
     parsed, parse = list[Path](), network._parsed
+
+    def count(path: Path) -> RoadMap:
+        parsed.append(path)
+        return parse(path)
+
     monkeypatch.setattr(map_cache, "_WORTHWHILE", 0)
-    monkeypatch.setattr(network, "_parsed", lambda path: (parsed.append(path), parse(path))[1])
+    monkeypatch.setattr(network, "_parsed", count)
 
     def use() -> tuple[object, int]:
         lanes = read_net(GRID).lanes

@@ -26,6 +26,7 @@ import numba
 from numba.core.types.misc import unliteral
 
 from fogsim.compiling import begin_economy, prepare_economy
+from fogsim.compiling.kept_code import KeptCode
 from fogsim.compiling.shipped_code import ShippedCache, shipped_cache, why_not_taken
 
 prepare_economy()
@@ -203,7 +204,7 @@ def kernel(function: F) -> F:
     try:
         shipped = shipped_cache(plain)
         compiled: Any = numba.njit(cache=True, **options)(function)
-        _forgive_outdated_index(compiled)
+        KeptCode.take_over(compiled._cache)
     except RuntimeError:
         # numba found no place for its cache
         compiled = numba.njit(cache=False, **options)(function)
@@ -224,22 +225,6 @@ def _without_literals(get_call_template: Callable[..., Any]) -> Callable[..., An
         return get_call_template([unliteral(a) for a in arguments], {k: unliteral(a) for k, a in keywords.items()})
 
     return get
-
-
-def _forgive_outdated_index(compiled: Any) -> None:
-    """Let numba compile again, instead of failing, where an older version's file names types that are gone."""
-    file: Any = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
-    load = getattr(file, "_load_index", None)
-    if load is None:
-        return
-
-    def load_index() -> Any:
-        try:
-            return load()
-        except (AttributeError, ImportError):
-            return {}
-
-    file._load_index = load_index
 
 
 def _look_elsewhere(compiled: Any) -> None:

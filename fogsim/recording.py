@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError, MethodError, RecorderError
-from fogsim.files.atomic import refuse_existing
+from fogsim.files.output_targets import refuse_unwritable
 from fogsim.interruption import Interruption
 from fogsim.loop import run, warn_of_unplayed
 from fogsim.metrics import MetricsOfRun, RunMetrics, RunSummary, TrafficRunMetrics
@@ -356,9 +356,9 @@ def record_signs(scenario: Scenario, out: Path, *, overwrite: bool = False) -> S
     Raises
     ------
     InputError
-        If the network, or a sign of the additional files, cannot be read, or the file is there.
+        If the network, or a sign of the additional files, cannot be read, or the file is there or cannot be written.
     """
-    refuse_existing(out, overwrite)
+    refuse_unwritable(out, "--out", overwrite=overwrite, makes_folder=True)
     setup = build.traffic_setup(scenario)
     net_file, additional = setup.net, setup.additional
     if net_file is None and setup.config is not None:

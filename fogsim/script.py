@@ -15,7 +15,8 @@ import yaml
 from fogsim.conditions import Condition
 from fogsim.conditions.terms import SignalTerm, all_of, any_of, condition, held, negated, signal
 from fogsim.errors import InputError, suggest
-from fogsim.files.atomic import refuse_existing, refuse_missing_folder, write_text
+from fogsim.files.atomic import write_text
+from fogsim.files.output_targets import refuse_unwritable
 from fogsim.scenario import Scenario, load_scenario
 from fogsim.scenario.camera_schema import CalibrationErrors, CameraSection, Exposure
 from fogsim.scenario.expect.schema import Expectation
@@ -163,10 +164,9 @@ def write(
     Raises
     ------
     InputError
-        If it is there already, or what would stand in it does not fit; nothing is written then.
+        If it is there already or cannot be written, or what would stand in it does not fit; nothing is written then.
     """
-    refuse_existing(path, overwrite)
-    refuse_missing_folder(path)
+    refuse_unwritable(path, overwrite=overwrite)
     text = to_yaml(scenario, vary, verdict, path.parent)
     trial = path.with_name(f".{path.name}")
     try:

@@ -9,7 +9,6 @@ from rich.table import Table
 
 from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
 from fogsim.cli.progress import progress_bar
-from fogsim.errors import InputError
 from fogsim.interruption import interruptible
 
 if TYPE_CHECKING:
@@ -35,13 +34,11 @@ def calibrate_signs_command(
 ) -> None:
     """From how far signs are detected in fog: the operating range that belaroussi2015 turns into a visibility."""
     from fogsim.files.atomic import write_bytes
+    from fogsim.files.output_targets import refuse_unwritable
     from fogsim.offline.camera_file import load_camera
     from fogsim.reproduce.sign_calibration import measure_operating_range
 
-    if out.exists() and not overwrite:
-        raise InputError(f"--out {out} is there already; --overwrite replaces it")
-    if not out.parent.is_dir():
-        raise InputError(f"--out {out}: there is no folder {out.parent}")
+    refuse_unwritable(out, "--out", overwrite=overwrite, read=[camera])
     known, done = load_camera(camera), 0
     with progress_bar(stderr) as progress:
         task = progress.add_task("signs: a first run compiles for some seconds", total=approaches)
@@ -88,13 +85,11 @@ def calibrate_halos_command(
 ) -> None:
     """How steeply light falls off about lamps in clear air and in fog: below which Br50 gallen2014 sees fog."""
     from fogsim.files.atomic import write_bytes
+    from fogsim.files.output_targets import refuse_unwritable
     from fogsim.offline.camera_file import load_camera
     from fogsim.reproduce.night.halo_calibration import measure_halo_threshold
 
-    if out.exists() and not overwrite:
-        raise InputError(f"--out {out} is there already; --overwrite replaces it")
-    if not out.parent.is_dir():
-        raise InputError(f"--out {out}: there is no folder {out.parent}")
+    refuse_unwritable(out, "--out", overwrite=overwrite, read=[camera])
     known, done = load_camera(camera), 0
     with progress_bar(stderr) as progress:
         task = progress.add_task("halos: a first run compiles for some seconds", total=scenes)
@@ -149,14 +144,12 @@ def calibrate_veil_command(
     )
     from fogsim.estimators.night.reference_file import references_as_bytes
     from fogsim.files.atomic import write_bytes
+    from fogsim.files.output_targets import refuse_unwritable
     from fogsim.lighting import LampMount
     from fogsim.offline.camera_file import load_camera
     from fogsim.offline.lamp_file import load_lamps
 
-    if out.exists() and not overwrite:
-        raise InputError(f"--out {out} is there already; --overwrite replaces it")
-    if not out.parent.is_dir():
-        raise InputError(f"--out {out}: there is no folder {out.parent}")
+    refuse_unwritable(out, "--out", overwrite=overwrite, read=[camera, *([lamps] if lamps else [])])
     known, mount = load_camera(camera), LampMount() if lamps is None else load_lamps(lamps)
     sets = [lamps_named(one) for one in lit or ["low_beam", "high_beam", "low_beam+front_fog"]]
     visibilities = PUBLISHED_VISIBILITIES if published else LOG_SPACED_VISIBILITIES

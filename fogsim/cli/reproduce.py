@@ -10,7 +10,7 @@ from rich.table import Table
 
 from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
 from fogsim.cli.progress import progress_bar
-from fogsim.errors import InputError, UnknownNameError
+from fogsim.errors import UnknownNameError
 from fogsim.interruption import interruptible
 
 if TYPE_CHECKING:
@@ -33,13 +33,17 @@ def reproduce_command(
     as_json: Annotated[bool, typer.Option("--json", help="Flat records, one a line, in place of the tables.")] = False,
 ) -> None:
     """Run a paper's evaluation again on FogSim's frames or traffic; its figures stand beside ours."""
+    from fogsim.files.output_targets import refuse_unwritable, refuse_unwritable_folder
     from fogsim.reproduce import REPRODUCTIONS
 
     if paper != ALL and paper not in REPRODUCTIONS:
         raise UnknownNameError("paper", paper, [*REPRODUCTIONS, ALL])
-    if out is not None and out.exists() and not out.is_dir():
-        raise InputError(f"--out {out} is no folder")
-    for name in REPRODUCTIONS if paper == ALL else (paper,):
+    papers = REPRODUCTIONS if paper == ALL else (paper,)
+    if out is not None:
+        refuse_unwritable_folder(out)
+        for name in papers:
+            refuse_unwritable(_picture_path(out, name), "--out", makes_folder=True)
+    for name in papers:
         done = _evaluated(name, REPRODUCTIONS[name])
         _show(done, as_json=as_json)
         if out is not None:
@@ -86,10 +90,14 @@ def _show(done: "Reproduction", *, as_json: bool) -> None:
         stdout.print(f"- {escape(note)}", soft_wrap=True)
 
 
+def _picture_path(folder: Path, paper: str) -> Path:
+    return folder / f"{paper}.png"
+
+
 def _save(done: "Reproduction", folder: Path) -> None:
     from fogsim.offline.image_files import write_image
 
     folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"{done.paper}.png"
+    path = _picture_path(folder, done.paper)
     write_image(path, done.picture[:, :, ::-1])
     stderr.print(f"picture: {escape(path)}", soft_wrap=True)

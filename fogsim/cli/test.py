@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -44,12 +44,15 @@ def check_command(
     method_timeout: MethodTimeout = None,
 ) -> None:
     """Run scenario files with `expect:`, and exit with 0 (passed), 1 (not), 2 (bad input) or 5 (no tests)."""
+    from fogsim.testing import find_files
     from fogsim.testing.junit import write_junit
     from fogsim.testing.page import PageContent, write_page
     from fogsim.testing.wording import totals_text
 
     begun, chosen = time.monotonic(), with_timeout(settings, method_timeout)
-    tests = _asked_for(files or ["."], keywords, case, chosen, out if of_last else None)
+    found = find_files(files or ["."])
+    _refuse_outputs(found, out, {"--junit": junit, "--html": html})
+    tests = _asked_for(found, keywords, case, chosen, out if of_last else None)
     number = processes or os.cpu_count() or 1
     try:
         outcomes = _run(tests, out, number, resume=resume, exit_first=exit_first)
@@ -77,13 +80,23 @@ def check_command(
         raise typer.Exit(FAILED)
 
 
+def _refuse_outputs(read: Sequence[Path], out: Path, pages: Mapping[str, Path | None]) -> None:
+    """Refuse before the first run what could not be written after the last."""
+    from fogsim.files.output_targets import refuse_clashes, refuse_unwritable, refuse_unwritable_folder
+
+    refuse_unwritable_folder(out)
+    named = {option: path for option, path in pages.items() if path is not None}
+    for option, path in named.items():
+        refuse_unwritable(path, option, read=read, makes_folder=True)
+    refuse_clashes(named, {"--out": out})
+
+
 def _asked_for(
-    files: Sequence[str], keywords: str | None, case: str, settings: Sequence[str], failed_in: Path | None
+    found: Sequence[Path], keywords: str | None, case: str, settings: Sequence[str], failed_in: Path | None
 ) -> "list[FogTest]":
-    from fogsim.testing import collect, find_files, last_failed, only_cases, parse_keywords
+    from fogsim.testing import collect, last_failed, only_cases, parse_keywords
 
     asked = None if keywords is None else parse_keywords(keywords)
-    found = find_files(files)
     tests = collect(found, settings, case, asked, CodeNotice())
     noted = {} if failed_in is None else last_failed(failed_in)
     # As of pytest: where nothing has failed, all is run.

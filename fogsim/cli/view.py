@@ -34,8 +34,7 @@ def view_command(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it is there already.")] = False,
 ) -> None:
     """Open the world around the ego, in clear air, in pyrender's viewer, or write a picture of it."""
-    from fogsim.files.atomic import refuse_existing, refuse_missing_folder
-    from fogsim.offline.image_files import write_image
+    from fogsim.offline.image_files import refuse_unwritable_image, write_image
     from fogsim.render import to_pyrender
     from fogsim.render.viewer import first_picture, open_viewer, require_display
 
@@ -44,8 +43,7 @@ def view_command(
     if out is None:
         require_display()
     else:
-        refuse_existing(out, overwrite)
-        refuse_missing_folder(out, "--out")
+        refuse_unwritable_image(out, "--out", overwrite=overwrite)
     around = _surrounding(loaded, at, seed)
     nodes = to_pyrender(
         around.scene,

@@ -8,13 +8,16 @@ import functools
 import platform
 from dataclasses import dataclass
 from pathlib import Path
-from pickle import UnpicklingError, load
+from pickle import loads
 from types import FunctionType
 from typing import Any, cast
 
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
 import numba
 from numba.core import caching, config
+
+from fogsim.compiling.kept_code import KeptCode
+from fogsim.files.cache_entries import read_entry
 
 PACKAGE = Path(__file__).parents[1]
 FOLDER = PACKAGE / "_kernels"
@@ -96,16 +99,13 @@ class ShippedCache(caching.Cache):  # type: ignore[misc] # numba is untyped
 
     _impl_class = _Files
 
+    def __init__(self, py_func: FunctionType) -> None:
+        super().__init__(py_func)
+        KeptCode.take_over(self)
+
     def is_there(self) -> bool:
         """Whether anything of it did."""
         return Path(self._cache_file._index_path).exists()
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Load what was compiled for types of arguments; None if there is no such, or it cannot be read here."""
-        try:
-            return super().load_overload(sig, target_context)
-        except (OSError, EOFError, AttributeError, ImportError, UnpicklingError):
-            return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep it as it came."""
@@ -135,11 +135,10 @@ def why_not_taken() -> str | None:
         return None
     if usable_kind() is None:
         return f"those that came with it are for {KINDS[platform.machine()].name}"
-    try:
-        with index.open("rb") as file:
-            version = load(file)  # noqa: S301 - it came as all of the installation did
-    except (OSError, EOFError, UnpicklingError):
+    content = read_entry(index)
+    if content is None:
         return "those that came with it cannot be read"
+    version = loads(content)  # noqa: S301 - it came as all of the installation did
     if version != numba.__version__:
         return f"those that came with it are of numba {version}, and here is {numba.__version__}"
     return None

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from fogsim.dataset.encoding import png
 from fogsim.errors import InputError
-from fogsim.files.atomic import partial_path, write_bytes, write_json
+from fogsim.files.atomic import PARTIAL_SUFFIX, write_bytes, write_json
+from fogsim.files.output_targets import refuse_unwritable_folder
 from fogsim.files.writer_lock import LOCK_NAME, WriterLock
 
 IDENTITY = "dataset.json"
@@ -43,25 +44,18 @@ class DatasetDirectory:
 
     def __init__(self, path: Path, identity: Mapping[str, Any]) -> None:
         self.path = Path(path)
-        if self.path.exists() and not self.path.is_dir():
-            raise InputError(f"a data set needs a directory, but {self.path} is a file")
-        self._make()
+        refuse_unwritable_folder(self.path)
+        self.path.mkdir(parents=True, exist_ok=True)
         self._lock = WriterLock(self.path)
         try:
             self._check(dict(identity))
             # What is ours is told before anything is written.
             write_json(self.path / IDENTITY, identity)
-            self._make(*LAYERS, _RECORDS)
+            for folder in (*LAYERS, _RECORDS):
+                (self.path / folder).mkdir(exist_ok=True)
         except BaseException:
             self._lock.release()
             raise
-
-    def _make(self, *folders: str) -> None:
-        try:
-            for folder in folders or (".",):
-                (self.path / folder).mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"cannot make the directory {self.path} for the data set: {error.strerror}") from error
 
     def close(self) -> None:
         """Let others write."""
@@ -78,7 +72,7 @@ class DatasetDirectory:
     def _check(self, identity: dict[str, Any]) -> None:
         if not (self.path / IDENTITY).is_file():
             there = sorted(p.name for p in self.path.iterdir())
-            strangers = [name for name in there if name not in (LOCK_NAME, partial_path(Path(IDENTITY)).name)]
+            strangers = [name for name in there if name not in (LOCK_NAME, IDENTITY + PARTIAL_SUFFIX)]
             if strangers:
                 raise InputError(
                     f"{self.path} holds files that are no data set of FogSim's ({strangers[0]}, …); "

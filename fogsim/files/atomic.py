@@ -1,9 +1,18 @@
-"""Writing files so that none is ever half written under its final name, and none is replaced unasked."""
+"""Writing files so that none is ever half written under its final name.
+
+A link is followed, so that its target is written and the link stays. Pipes and devices are never replaced: they get the
+content as it comes.
+"""
 
 import contextlib
+import errno
 import json
+import os
+import stat
+import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import BinaryIO
 
 from fogsim.errors import InputError
 
@@ -13,27 +22,112 @@ PARTIAL_SUFFIX = ".part"
 _LEAST_RESERVE = 2**18
 """Room that a reserve keeps in any case [bytes]."""
 
+_MOST_LINKS = 40
+"""Links that Linux follows in one path."""
+
+
+def final_path(path: Path) -> Path:
+    """The file that a path stands for: links are followed, also to a file that does not exist yet.
+
+    Raises
+    ------
+    OSError
+        If the links lead to one another.
+    """
+    if not path.is_symlink():
+        return path
+    final = Path(os.path.realpath(path))
+    if final.is_symlink():
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
+    return final
+
 
 def partial_path(path: Path) -> Path:
-    """Where a file is written until it is whole: its name with ``.part`` behind it.
-
-    Parameters
-    ----------
-    path : Path
-        The final name.
-    """
-    return path.with_name(path.name + PARTIAL_SUFFIX)
+    """Where a file is written until it is whole: its name, or that of its link's target, with ``.part`` behind it."""
+    final = final_path(path)
+    return final.with_name(final.name + PARTIAL_SUFFIX)
 
 
 def publish(path: Path) -> None:
-    """Give a file that is whole its final name, in place of one that is there, in one move.
+    """Give a file that is whole its final name; a file that it replaces passes on its permissions.
 
-    Parameters
-    ----------
-    path : Path
-        The final name.
+    Raises
+    ------
+    InputError
+        If a pipe, a device or a folder has that name.
     """
-    partial_path(path).replace(path)
+    part, final = partial_path(path), final_path(path)
+    with contextlib.suppress(FileNotFoundError):
+        replaced = final.stat()
+        if not stat.S_ISREG(replaced.st_mode):
+            raise InputError(f"{path} is not a regular file, and is not replaced")
+        # Who may not give files away keeps the new one.
+        with contextlib.suppress(PermissionError):
+            os.chown(part, replaced.st_uid, replaced.st_gid)
+        part.chmod(stat.S_IMODE(replaced.st_mode))
+    part.replace(final)
+
+
+def open_descriptor(path: Path) -> int | None:
+    """Number of the file, open in this process, that a path stands for, as /dev/stdout does; None for other paths."""
+    for _ in range(_MOST_LINKS):
+        # On Linux /dev/fd is a link to the former.
+        folders = (os.path.realpath("/proc/self/fd"), "/dev/fd")
+        if path.name.isdecimal() and os.path.realpath(path.parent) in folders:
+            return int(path.name)
+        if not path.is_symlink():
+            break
+        path = path.parent / path.readlink()
+    return None
+
+
+def is_stream(path: Path) -> bool:
+    """Whether what is written to a path goes through it: a pipe, a terminal, another device, /dev/stdout."""
+    if open_descriptor(path) is not None:
+        return True
+    try:
+        mode = path.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+
+
+@contextlib.contextmanager
+def whole_file(path: Path) -> Iterator[BinaryIO]:
+    """A file open for writing; it gets its name when the block ends, and leaves nothing if an error ends it.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written; the message names the file.
+    """
+    if is_stream(path):
+        with naming(path), _opened_stream(path) as file:
+            yield file
+        return
+    part = partial_path(path)
+    try:
+        with naming(part):
+            # It may be a link.
+            part.unlink(missing_ok=True)
+            with part.open("wb") as file:
+                yield file
+            publish(path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            part.unlink()
+        raise
+
+
+def _opened_stream(path: Path) -> BinaryIO:
+    descriptor = open_descriptor(path)
+    if descriptor is None:
+        return path.open("wb")
+    # The file that stdout is redirected to would be cut off if it were opened by its name.
+    for printed in (sys.stdout, sys.stderr):
+        if printed is not None:
+            printed.flush()
+    return os.fdopen(os.dup(descriptor), "wb")
 
 
 @contextlib.contextmanager
@@ -73,14 +167,8 @@ def write_bytes(path: Path, data: bytes) -> None:
     OSError
         If it cannot be written; the message names the file.
     """
-    part = partial_path(path)
-    try:
-        with naming(part):
-            part.write_bytes(data)
-            publish(path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
+    with whole_file(path) as file:
+        file.write(data)
 
 
 def write_text(path: Path, text: str) -> None:
@@ -152,45 +240,3 @@ class Reserve:
     def release(self) -> None:
         """Give the room back; twice does nothing."""
         self._path.unlink(missing_ok=True)
-
-
-def refuse_existing(path: Path, overwrite: bool, option: str = "--out") -> None:
-    """Refuse to write a file that is there already, or whose name is a folder's.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    overwrite : bool
-        True where a file may be replaced.
-    option : str
-        The option that names it.
-
-    Raises
-    ------
-    InputError
-        If it is there and must not be replaced, or is a folder.
-    """
-    if path.is_dir():
-        raise InputError(f"{option} {path} is a folder; give the name of a file")
-    if path.exists() and not overwrite:
-        raise InputError(f"{option} {path} is there already; give another name, or replace it with --overwrite")
-
-
-def refuse_missing_folder(path: Path, option: str = "") -> None:
-    """Refuse to write a file into a folder that is not there.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    option : str
-        The option that names it, if one does.
-
-    Raises
-    ------
-    InputError
-        If there is no such folder.
-    """
-    if not path.parent.is_dir():
-        raise InputError(f"{option} {path}: there is no folder {path.parent}".lstrip())

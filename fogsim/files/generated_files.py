@@ -1,20 +1,20 @@
 """Files that FogSim writes for SUMO, in folders named after their content in the user's cache directory."""
 
-import contextlib
 import hashlib
 import os
-import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from fogsim.errors import InputError
+from fogsim.files.cache_entries import keep_newest, read_entry, replace_file, write_entry
+from fogsim.files.readers import read_bytes
 from fogsim.files.user_cache import VARIABLE, cache_directory
 
-_MOST_FOLDERS = 200  # of generated files; the oldest go
+_MOST_KEPT = 200  # of each kind; the oldest go
 
 
 def write_generated(kind: str, texts: Mapping[str, str]) -> Path:
-    """Write files, unless the same ones are there already.
+    """Write files, unless they are in the cache with the same content.
 
     Parameters
     ----------
@@ -36,27 +36,30 @@ def write_generated(kind: str, texts: Mapping[str, str]) -> Path:
     digest = hashlib.sha256("\0".join(texts.values()).encode()).hexdigest()[:24]
     folder = cache_directory() / kind / digest
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        if folder.is_file():
+            folder.unlink()
         for name, text in texts.items():
-            place = folder / name
-            if place.is_file():
-                os.utime(folder)
-                continue
-            # Several processes may do so at once.
-            part = place.with_name(f"{name}.{os.getpid()}.part")
-            part.write_text(text, encoding="utf-8")
-            part.replace(place)
+            if not _holds(folder / name, text.encode()):
+                replace_file(folder / name, text.encode())
+        os.utime(folder)
     except OSError as error:
         raise InputError(
             f"the files of a road cannot be written into {folder}: {error.strerror}; name another folder "
             f"in the environment variable {VARIABLE}"
         ) from error
-    _leave_out_old(folder.parent)
+    keep_newest(folder.parent, _MOST_KEPT)
     return folder
 
 
+def _holds(path: Path, content: bytes) -> bool:
+    try:
+        return read_bytes(path, len(content)) == content
+    except InputError:
+        return False
+
+
 def kept_text(kind: str, source: Path, recipe: bytes, make: Callable[[], str]) -> str:
-    """Text that is made of a file, and kept for the next time that a file with the same content comes.
+    """Text made from a file, kept for the next time that a file with the same content comes.
 
     Parameters
     ----------
@@ -65,7 +68,7 @@ def kept_text(kind: str, source: Path, recipe: bytes, make: Callable[[], str]) -
     source : Path
         The file.
     recipe : bytes
-        What it is made by: another recipe makes another text.
+        Identifies how it is made: another recipe makes another text.
     make : callable
         Makes the text.
 
@@ -76,24 +79,13 @@ def kept_text(kind: str, source: Path, recipe: bytes, make: Callable[[], str]) -
     """
     try:
         digest = hashlib.sha256(b"\0".join([recipe, source.read_bytes()])).hexdigest()[:24]
-        place = cache_directory() / kind / digest
-        if place.is_file():
-            return place.read_text(encoding="utf-8")
+        path = cache_directory() / kind / digest
+        kept = read_entry(path)
+        if kept is not None:
+            return kept.decode()
         text = make()
-        place.parent.mkdir(parents=True, exist_ok=True)
-        part = place.with_name(f"{place.name}.{os.getpid()}.part")
-        part.write_text(text, encoding="utf-8")
-        part.replace(place)
+        write_entry(path, text.encode())
     except OSError as error:
         raise InputError(f"{source}: what is made of it cannot be kept: {error.strerror}") from error
+    keep_newest(path.parent, _MOST_KEPT)
     return text
-
-
-def _leave_out_old(parent: Path) -> None:
-    with contextlib.suppress(OSError):
-        for old in sorted(_folders(parent), key=lambda path: path.stat().st_mtime)[:-_MOST_FOLDERS]:
-            shutil.rmtree(old, ignore_errors=True)
-
-
-def _folders(parent: Path) -> Iterator[Path]:
-    return (path for path in parent.iterdir() if path.is_dir())

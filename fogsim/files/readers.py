@@ -24,9 +24,13 @@ def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
         # Opening a pipe would otherwise wait for a writer.
         descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
         with open(descriptor, "rb") as file:  # noqa: PTH123 - a descriptor has no Path
-            if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            found = os.fstat(descriptor)
+            if not stat.S_ISREG(found.st_mode):
                 raise InputError(f"{path}: cannot be read: not a regular file")
-            content = file.read(most + 1)
+            # Asking for `most` at once would allocate it.
+            content = file.read(min(found.st_size, most) + 1)
+            if len(content) > found.st_size:  # files in /proc have no size
+                content += file.read(most + 1 - len(content))
     except ValueError as error:  # a NUL in the name
         raise error if isinstance(error, InputError) else InputError(f"{shown(str(path))}: {error}") from None
     except OSError as error:

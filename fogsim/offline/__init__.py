@@ -1,6 +1,6 @@
 """Visibility from a person's own images and videos: what ``fogsim estimate`` does."""
 
-from fogsim.offline.camera_file import camera_text, load_calibration, refuse_existing, write_camera
+from fogsim.offline.camera_file import camera_text, load_calibration, write_camera
 from fogsim.offline.estimation import FrameEstimates, chosen_methods, estimate_images, estimates_of
 from fogsim.offline.guess import CameraGuess, guess_camera
 from fogsim.offline.input_paths import find_source
@@ -32,7 +32,6 @@ __all__ = [
     "guess_camera",
     "load_calibration",
     "record_lines",
-    "refuse_existing",
     "straightened",
     "summary_rows",
     "table_heading",

@@ -8,7 +8,8 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationError
 
 from fogsim.errors import InputError
-from fogsim.files import atomic
+from fogsim.files.atomic import write_text
+from fogsim.files.output_targets import refuse_unwritable
 from fogsim.offline.guess import CameraGuess
 from fogsim.scenario.document import read_document
 from fogsim.scenario.mistakes import mistake_lines
@@ -219,25 +220,6 @@ def camera_text(guess: CameraGuess) -> str:
     return "".join(lines)
 
 
-def refuse_existing(path: Path, *, overwrite: bool) -> None:
-    """Refuse a camera file that is there already or whose folder is not.
-
-    Parameters
-    ----------
-    path : Path
-        The camera file.
-    overwrite : bool
-        True where a file may be replaced.
-
-    Raises
-    ------
-    InputError
-        If it must not or cannot be written.
-    """
-    atomic.refuse_existing(path, overwrite, "--camera")
-    atomic.refuse_missing_folder(path, "--camera")
-
-
 def write_camera(path: Path, guess: CameraGuess, *, overwrite: bool = False) -> None:
     """Write a guessed calibration as a camera file, whole or not at all.
 
@@ -253,7 +235,7 @@ def write_camera(path: Path, guess: CameraGuess, *, overwrite: bool = False) -> 
     Raises
     ------
     InputError
-        If it is there already and not to be replaced, or its folder is not there.
+        If it is there already and not to be replaced, or cannot be written.
     """
-    refuse_existing(path, overwrite=overwrite)
-    atomic.write_text(path, camera_text(guess))
+    refuse_unwritable(path, "--camera", overwrite=overwrite)
+    write_text(path, camera_text(guess))

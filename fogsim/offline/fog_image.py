@@ -6,8 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
-from fogsim.files.atomic import refuse_existing
-from fogsim.offline.image_files import DepthMap, Pixels, read_distance, read_image, write_image
+from fogsim.offline.image_files import (
+    DepthMap,
+    Pixels,
+    read_distance,
+    read_image,
+    refuse_unwritable_image,
+    write_image,
+)
 from fogsim.offline.layered_fog import FogLayer, elevation_sines
 from fogsim.offline.road_plane import RoadPlane
 from fogsim.units import extinction_from_visibility
@@ -193,7 +199,8 @@ def fog_file(
     InputError
         If anything does not fit, or there is a file `out` that must not be replaced.
     """
-    refuse_out(out, (image, depth.path) if isinstance(depth, DepthMap) else (image,), overwrite)
+    read = (image, depth.path) if isinstance(depth, DepthMap) else (image,)
+    refuse_unwritable_image(out, "--out", overwrite=overwrite, read=read)
     pixels = read_image(image)
     refuse_other_size(image, (pixels.shape[1], pixels.shape[0]), camera)
     if isinstance(depth, DepthMap):
@@ -207,28 +214,6 @@ def fog_file(
         air = given_airlight(airlight, colours, pixels, camera)
     write_image(out, fog_image(pixels, distance, visibility, camera, air, layer, sines))
     return air[::-1]
-
-
-def refuse_out(out: Path, read: tuple[Path, ...], overwrite: bool) -> None:
-    """Refuse to write over what is read, or unasked over what is there.
-
-    Parameters
-    ----------
-    out : Path
-        The file to be written.
-    read : tuple of Path
-        The files that are read.
-    overwrite : bool
-        True to replace a file that is there.
-
-    Raises
-    ------
-    InputError
-        If it must not be written.
-    """
-    if out.exists() and any(given.exists() and out.samefile(given) for given in read):
-        raise InputError(f"--out {out} would replace what is read; give another name")
-    refuse_existing(out, overwrite)
 
 
 def refuse_other_size(path: Path, size: tuple[int, int], camera: Camera) -> None:

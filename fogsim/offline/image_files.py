@@ -4,6 +4,7 @@ import io
 import math
 import warnings
 import zipfile
+from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,7 +14,8 @@ from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 from fogsim.errors import InputError, UnknownNameError
-from fogsim.files.atomic import refuse_missing_folder, write_bytes
+from fogsim.files.atomic import write_bytes
+from fogsim.files.output_targets import refuse_unwritable
 from fogsim.values import Camera
 
 DEPTH_KINDS = ("planar", "range")
@@ -169,6 +171,17 @@ def _refuse_impossible(path: Path, depth: NDArray[np.float64]) -> None:
         )
 
 
+def refuse_unwritable_image(
+    path: Path, option: str = "", *, overwrite: bool = True, read: Iterable[Path] = (), makes_folder: bool = False
+) -> None:
+    """Refuse a file as `refuse_unwritable` does, and one whose ending is no image's."""
+    ending = path.suffix.lower()
+    if not ending or not cv2.haveImageWriter(f"image{ending}"):
+        named = f"{option} {path}".lstrip()
+        raise InputError(f"{named}: no image can be written with the ending {ending!r}; allowed: .png, .tif, .jpg, …")
+    refuse_unwritable(path, option, overwrite=overwrite, read=read, makes_folder=makes_folder)
+
+
 def write_image(path: Path, image: Pixels) -> None:
     """Write an image, whole or not at all; the ending of the name says how.
 
@@ -182,14 +195,12 @@ def write_image(path: Path, image: Pixels) -> None:
     Raises
     ------
     InputError
-        If images are not written with that ending or that bit depth, or the folder is not there.
+        If images are not written with that ending or that bit depth, or the file cannot be written.
     """
+    refuse_unwritable_image(path)
     ending = path.suffix.lower()
-    if not ending or not cv2.haveImageWriter(f"image{ending}"):
-        raise InputError(f"{path}: no image can be written with the ending {ending!r}; allowed: .png, .tif, .jpg, …")
     if image.dtype == np.uint16 and ending not in {".png", ".tif", ".tiff"}:
         raise InputError(f"{path}: an image of 16 bits is written as .png or .tif, not {ending}")
-    refuse_missing_folder(path)
     written, data = cv2.imencode(ending, image)
     if not written:
         raise InputError(f"{path}: this image cannot be written as {ending}")

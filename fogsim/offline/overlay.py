@@ -1,5 +1,6 @@
 """An image with what the methods found in it drawn over it; a video of such images, or a picture of a single one."""
 
+import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,7 +12,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from fogsim.errors import InputError
-from fogsim.files.atomic import partial_path, publish, refuse_existing, refuse_missing_folder
+from fogsim.files.atomic import write_bytes
+from fogsim.files.output_targets import refuse_unwritable
 from fogsim.offline.estimation import FrameEstimates
 from fogsim.offline.image_files import Pixels
 from fogsim.offline.results import denser_text, interval_text, metres
@@ -182,8 +184,7 @@ class OverlayFile:
     Raises
     ------
     InputError
-        If the ending is another or does not suit the source, the folder is not there, the file is there and not to be
-        replaced, or it is one of those that are read.
+        If the ending is another or does not suit the source, or the file cannot be written or must not be replaced.
     """
 
     def __init__(
@@ -194,7 +195,7 @@ class OverlayFile:
         self._overlay = Overlay(camera, methods)
         self._video = VideoWriter(path, source.period, LOOKED_AT)
         self._format = PICTURE_FORMATS.get(path.suffix.lower())
-        self._written = False
+        self._picture = b""
 
     def add(self, result: FrameEstimates) -> None:
         """Add an image with its estimates.
@@ -210,8 +211,9 @@ class OverlayFile:
         if self._format is None:
             self._video.write(np.asarray(drawn))
             return
-        drawn.save(partial_path(self._path), self._format)
-        self._written = True
+        content = io.BytesIO()
+        drawn.save(content, self._format)
+        self._picture = content.getvalue()
 
     def __enter__(self) -> Self:
         return self
@@ -221,12 +223,8 @@ class OverlayFile:
     ) -> None:
         if self._format is None:
             self._video.__exit__(kind, error, trace)
-            return
-        try:
-            if kind is None and self._written:
-                publish(self._path)
-        finally:
-            partial_path(self._path).unlink(missing_ok=True)
+        elif kind is None and self._picture:
+            write_bytes(self._path, self._picture)
 
 
 def _check(path: Path, source: Source, overwrite: bool) -> None:
@@ -237,7 +235,4 @@ def _check(path: Path, source: Source, overwrite: bool) -> None:
         )
     if ending != ".mp4" and (source.count > 1 or source.temporal):
         raise InputError(f"--overlay {path}: a picture holds one image, and this is {source.description}: use .mp4")
-    refuse_missing_folder(path, "--overlay")
-    if any(one.exists() and path.exists() and path.samefile(one) for one in source.paths):
-        raise InputError(f"--overlay {path} would replace what is read; give another name")
-    refuse_existing(path, overwrite, "--overlay")
+    refuse_unwritable(path, "--overlay", overwrite=overwrite, read=source.paths, seeks=ending == ".mp4")

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
-from fogsim.files.atomic import refuse_missing_folder
+from fogsim.files.output_targets import refuse_unwritable_folder
 from fogsim.offline.estimation import estimates_of
-from fogsim.offline.fog_image import refuse_out
-from fogsim.offline.image_files import Pixels, write_image
+from fogsim.offline.image_files import Pixels, refuse_unwritable_image, write_image
 from fogsim.offline.source import Picture, Source
 from fogsim.offline.video_file import VideoWriter, refuse_unfit_video
 from fogsim.restoration import METHODS, MOST_GAIN, restore_contrast
@@ -214,11 +213,13 @@ def restore_files(
         If a file must not or cannot be written, or anything does not fit.
     """
     targets = _targets(source.paths, out)
+    is_folder = len(targets) > 1
+    if is_folder:
+        refuse_unwritable_folder(out)
     for target in targets:
-        refuse_out(target, source.paths, overwrite)
-    if len(targets) > 1:
-        refuse_missing_folder(out, "--out")
-        out.mkdir(exist_ok=True)
+        refuse_unwritable_image(target, "--out", overwrite=overwrite, read=source.paths, makes_folder=is_folder)
+    if is_folder:
+        out.mkdir(parents=True, exist_ok=True)
     for target, one in zip(targets, restored_images(source, camera, wish), strict=True):
         if one.image is not None:
             # Stored with blue first.
@@ -232,13 +233,10 @@ def _targets(paths: tuple[Path, ...], out: Path) -> tuple[Path, ...]:
     Raises
     ------
     InputError
-        If two would go to the same file, or several into what is no folder.
+        If two would go to the same file.
     """
     if len(paths) == 1:
-        refuse_missing_folder(out, "--out")
         return (out,)
-    if out.is_file():
-        raise InputError(f"--out {out} is a file; {len(paths)} images go into a folder")
     names = [path.name for path in paths]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:

@@ -5,8 +5,8 @@ from types import TracebackType
 from typing import Self
 
 from fogsim.errors import InputError
-from fogsim.files.atomic import partial_path, publish, refuse_missing_folder
-from fogsim.offline.fog_image import refuse_out
+from fogsim.files.atomic import partial_path, publish
+from fogsim.files.output_targets import refuse_unwritable
 from fogsim.offline.image_files import Pixels
 from fogsim.recorders.video import Encoder, encoder_command
 from fogsim.values import Camera
@@ -85,8 +85,7 @@ def refuse_unfit_video(out: Path, read: tuple[Path, ...], camera: Camera, *, kin
     """
     if out.suffix.lower() != ".mp4":
         raise InputError(f"--out {out}: a {kind} video is written as .mp4, got {out.suffix or 'no ending'}")
-    refuse_missing_folder(out, "--out")
-    refuse_out(out, read, overwrite)
+    refuse_unwritable(out, "--out", overwrite=overwrite, read=read, seeks=True)
     if camera.width % 2 or camera.height % 2:
         raise InputError(
             f"{read[0]}: frames of {camera.width} × {camera.height} pixels cannot be written as .mp4, which wants "

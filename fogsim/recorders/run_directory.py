@@ -8,6 +8,7 @@ from typing import Any, Self
 
 from fogsim.errors import InputError
 from fogsim.files.atomic import Reserve, partial_path, write_json
+from fogsim.files.output_targets import refuse_unwritable_folder
 from fogsim.files.readers import read_json
 from fogsim.files.writer_lock import WriterLock, WritingProcess
 from fogsim.recorders.manifest import Status
@@ -67,8 +68,9 @@ class RunDirectory:
 
     def __init__(self, path: Path, overwrite: bool = False) -> None:
         self.path = Path(path)
+        refuse_unwritable_folder(self.path)
         self._made = [folder for folder in (self.path, *self.path.parents) if not folder.exists()]
-        self._make()
+        self.path.mkdir(parents=True, exist_ok=True)
         try:
             self._lock = WriterLock(self.path)
             try:
@@ -79,14 +81,6 @@ class RunDirectory:
         except BaseException:
             self._unmake()
             raise
-
-    def _make(self) -> None:
-        try:
-            self.path.mkdir(parents=True, exist_ok=True)
-        except FileExistsError:
-            raise InputError(f"results need a directory, but {self.path} is a file") from None
-        except OSError as error:
-            raise InputError(f"cannot make the directory {self.path} for the results: {error.strerror}") from error
 
     def _unmake(self) -> None:
         """Remove the directories that were made, as far as nothing is in them."""

@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from fogsim.files.atomic import naming, partial_path, publish
+from fogsim.files.atomic import whole_file
 from fogsim.files.row_log import RowLog, row_batches, row_schema
 from fogsim.recorders.protocol import Derived
 from fogsim.recorders.run_directory import LOG_SUFFIX
@@ -255,22 +255,16 @@ def write_trajectory_table(path: Path, log: Path, complete: bool) -> None:
     OSError
         If the file cannot be written; the message names it.
     """
-    schema, part = row_schema(log), partial_path(path)
+    schema = row_schema(log)
     plain = schema.remove_metadata()
-    try:
-        with (
-            naming(part),
-            part.open("wb") as file,
-            # As of ``steps.parquet``: without a stored schema readers take the metadata from the end of the file.
-            pq.ParquetWriter(file, plain, compression="zstd", store_schema=False) as writer,
-        ):
-            for group in _row_groups(log):
-                writer.write_table(group.replace_schema_metadata(None), row_group_size=len(group))
-            writer.add_key_value_metadata({"fogsim.complete": "true" if complete else "false", **schema.metadata})
-        publish(path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
+    with (
+        whole_file(path) as file,
+        # As of ``steps.parquet``: without a stored schema readers take the metadata from the end of the file.
+        pq.ParquetWriter(file, plain, compression="zstd", store_schema=False) as writer,
+    ):
+        for group in _row_groups(log):
+            writer.write_table(group.replace_schema_metadata(None), row_group_size=len(group))
+        writer.add_key_value_metadata({"fogsim.complete": "true" if complete else "false", **schema.metadata})
 
 
 def _row_groups(log: Path) -> Iterator[Any]:

@@ -5,7 +5,8 @@ import shutil
 from pathlib import Path
 
 from fogsim.errors import InputError, shown
-from fogsim.files.atomic import write_json
+from fogsim.files.atomic import write_json, write_text
+from fogsim.files.output_targets import refuse_unwritable_folder
 from fogsim.registry.user_code import import_nothing
 from fogsim.scenario.json_schema import scenario_json_schema
 from fogsim.scenario.loading import SCENARIO_FILE, load_scenario, scenario_file
@@ -42,10 +43,12 @@ def begin_scenario(name: str, source: str, parent: Path) -> tuple[Path, ...]:
     Raises
     ------
     InputError
-        If the name is none for a scenario, or stands for something that is there already, or the source is wrong.
+        If the name is none for a scenario, or stands for something that is there already, or the source is wrong,
+        or the folder cannot be made.
     """
     if not re.fullmatch(r"[A-Za-z0-9_.-]{1,100}", name) or set(name) == {"."}:
         raise InputError(f"a scenario's name has letters, digits, '_', '.' and '-', up to 100; got {shown(name)}")
+    refuse_unwritable_folder(parent, "--in")
     old, text = load_scenario(source, may_import=import_nothing), scenario_file(source).read_text(encoding="utf-8")
     folder = parent / name
     if folder.exists():
@@ -53,16 +56,20 @@ def begin_scenario(name: str, source: str, parent: Path) -> tuple[Path, ...]:
     traffic = old.traffic
     beside = [path for path in (traffic.config, traffic.net, *traffic.routes, *traffic.additional) if path is not None]
     outside = [path for path in beside if path.is_absolute() or ".." in path.parts]
-    folder.mkdir(parents=True)
-    made = [folder / SCENARIO_FILE]
-    for path in beside:
-        if path not in outside:
-            (folder / path).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(old.directory / path, folder / path)
-            made.append(folder / path)
     for path in outside:
         text = text.replace(str(path), str((old.directory / path).resolve()))
     head = _HEAD.format(source=source, folder=folder, schema=SCHEMA_FILE)
-    made[0].write_text(head + _NAME_KEY.sub(f"name: {name}", text, count=1), encoding="utf-8")
-    write_json(folder / SCHEMA_FILE, scenario_json_schema())
+    made = [folder / SCENARIO_FILE]
+    folder.mkdir(parents=True)
+    try:
+        for path in beside:
+            if path not in outside:
+                (folder / path).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(old.directory / path, folder / path)
+                made.append(folder / path)
+        write_text(made[0], head + _NAME_KEY.sub(f"name: {name}", text, count=1))
+        write_json(folder / SCHEMA_FILE, scenario_json_schema())
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
     return (*made, folder / SCHEMA_FILE)

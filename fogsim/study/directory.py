@@ -8,6 +8,7 @@ from pydantic import BaseModel, ValidationError
 
 from fogsim.errors import InputError, shown
 from fogsim.files.atomic import partial_path, write_json
+from fogsim.files.output_targets import refuse_unwritable_folder
 from fogsim.files.readers import read_json
 from fogsim.recorders.manifest import versions
 from fogsim.study.engine import result_file
@@ -51,8 +52,7 @@ class StudyDirectory:
     def __init__(self, path: Path, study: Study) -> None:
         self._study = study
         self.path, self.results = path, path / "runs"
-        if path.exists() and not path.is_dir():
-            raise InputError(f"--out {path} is a file; give the name of a directory")
+        refuse_unwritable_folder(path)
         described = {"study": study.name, **study.description()}
         manifest = path / "study.json"
         if manifest.exists():

@@ -10,6 +10,7 @@ from pydantic import BaseModel, Field, ValidationError
 from fogsim.errors import InputError
 from fogsim.expectations import FindingVerdict
 from fogsim.files.atomic import partial_path, write_json
+from fogsim.files.output_targets import refuse_unwritable_folder
 from fogsim.files.readers import read_json
 from fogsim.files.writer_lock import WriterLock
 from fogsim.recorders.manifest import versions
@@ -138,8 +139,7 @@ def run_tests(
 
 def _begin(out: Path, resume: bool) -> Path:
     """Make the directory, and leave in it what counts."""
-    if out.exists() and not out.is_dir():
-        raise InputError(f"--out {out} is a file; give the name of a directory")
+    refuse_unwritable_folder(out)
     session = out / _SESSION
     if out.is_dir() and not session.exists() and set(out.iterdir()) - {partial_path(session)}:
         raise InputError(f"--out {out} holds something else than tests; choose another directory")

@@ -44,7 +44,7 @@ def test_references_are_written_for_each_set_of_lamps(folder: Path) -> None:
     assert {one.lamps for one in read} == {Lamp.LOW_BEAM}
     assert all(one.veil[0].max() > one.veil[-1].max() == 0.0 for one in read)
     code, told = calibrate("--out", "veil.npz")
-    assert "--overwrite replaces it" in told
+    assert "replace it with --overwrite" in told
     assert code != 0
 
 

@@ -14,6 +14,7 @@ import pytest
 
 from fogsim.compiling import shipped_code
 from fogsim.compiling.shipped_code import KINDS, compiled_for, usable_kind, why_not_taken
+from fogsim.files.cache_entries import write_entry
 
 SOURCE = """
 from fogsim.jit import kernel
@@ -134,10 +135,9 @@ def test_it_is_said_why_what_came_is_not_taken(monkeypatch: pytest.MonkeyPatch, 
     monkeypatch.setattr(shipped_code, "usable_kind", lambda: KINDS[platform.machine()])
     assert why_not_taken() is None
     index = tmp_path / "part" / "doubling.twice-1.nbi"
-    index.parent.mkdir()
-    index.write_bytes(pickle.dumps(numba.__version__))
+    write_entry(index, pickle.dumps(numba.__version__))
     assert why_not_taken() is None
-    index.write_bytes(pickle.dumps("0.1"))
+    write_entry(index, pickle.dumps("0.1"))
     assert why_not_taken() == f"those that came with it are of numba 0.1, and here is {numba.__version__}"
     index.write_bytes(b"")
     assert why_not_taken() == "those that came with it cannot be read"

@@ -182,7 +182,7 @@ def test_foreign_files_and_impossible_numbers_are_refused(tmp_path: Path) -> Non
     (tmp_path / "thesis.tex").write_text("mine", encoding="utf-8")
     with pytest.raises(InputError, match=r"no data set of FogSim's \(thesis\.tex"):
         fogsim.write_dataset(small(), tmp_path, 1)
-    with pytest.raises(InputError, match=r"needs a directory, but .*thesis\.tex is a file"):
+    with pytest.raises(InputError, match=r"--out .*thesis\.tex is not a folder"):
         fogsim.write_dataset(small(), tmp_path / "thesis.tex", 1)
     for wrong in ({"frames": 0}, {"frames": 1, "every": 0}, {"frames": 1, "seed": -1}):
         with pytest.raises(InputError, match="must be at least"):

@@ -1,4 +1,3 @@
-import errno
 import json
 from pathlib import Path
 
@@ -81,24 +80,6 @@ def test_what_is_in_the_way_of_results_is_refused_before_a_run(tmp_path: Path, n
     with pytest.raises(InputError, match=f"{name} is in the way"):
         RunDirectory(tmp_path, overwrite=True)
     assert [file.name for file in tmp_path.iterdir()] == [name]
-
-
-def test_a_file_in_its_place_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "out").write_text("")
-    with pytest.raises(InputError, match="is a file"):
-        RunDirectory(tmp_path / "out")
-    with pytest.raises(InputError, match="cannot make the directory"):
-        RunDirectory(tmp_path / "out" / "deeper")
-
-
-def test_a_place_that_may_not_be_written_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*_: object, **__: object) -> None:
-        raise PermissionError(errno.EACCES, "Permission denied")
-
-    # Root may write everywhere, so the system's refusal is played.
-    monkeypatch.setattr(Path, "mkdir", refuse)
-    with pytest.raises(InputError, match=r"cannot make the directory .*: Permission denied"):
-        RunDirectory(tmp_path / "out")
 
 
 def test_a_folder_left_when_all_results_were_in_their_places_is_cleared_away(tmp_path: Path) -> None:

@@ -81,5 +81,5 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "letter.txt").write_text("dear")
     with pytest.raises(InputError, match="holds something else than tests"):
         run_tests([made_up_test(["a"])], tmp_path, MadeUpEngine({}))
-    with pytest.raises(InputError, match="is a file"):
+    with pytest.raises(InputError, match="is not a folder"):
         run_tests([made_up_test(["a"])], tmp_path / "letter.txt", MadeUpEngine({}))

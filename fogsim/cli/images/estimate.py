@@ -204,9 +204,10 @@ def _guess(
     field_of_view: float | None,
     horizon_row: float | None,
 ) -> None:
-    from fogsim.offline import camera_text, guess_camera, refuse_existing, write_camera
+    from fogsim.files.output_targets import refuse_unwritable
+    from fogsim.offline import camera_text, guess_camera, write_camera
 
-    refuse_existing(camera_file, overwrite=overwrite)
+    refuse_unwritable(camera_file, "--camera", overwrite=overwrite, read=source.paths)
     guess = guess_camera(
         source,
         mount_height=mount_height,

@@ -1,14 +1,14 @@
 """Maps of large networks, kept in the user's cache directory, so that a city is parsed once.
 
 A file of the cache is named after the content of the network's file and the version of what made the map, down to its
-source, so that no other version reads it. It holds arrays of numbers and texts only. What is damaged, or cannot be
-read or written, is as if it were not there.
+source, so that no other version reads it. It holds arrays of numbers and texts only. A damaged or unreadable file
+counts as missing; where none can be written, each process parses again.
 """
 
 import contextlib
 import functools
 import hashlib
-import os
+import io
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.files.cache_entries import keep_newest, read_entry, write_entry
 from fogsim.files.user_cache import cache_directory
 from fogsim.traffic.road.road_map import RoadMap, edge_ranges
 from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, Sign, SignalHead
@@ -55,7 +56,10 @@ def cached_map(net: Path) -> RoadMap | None:
         The network's file.
     """
     try:
-        with _place(net).open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+        kept = read_entry(_place(net))
+        if kept is None:
+            return None
+        with np.load(io.BytesIO(kept), allow_pickle=False) as arrays:
             return _map_of(arrays)
     except _UNREADABLE:
         return None
@@ -83,18 +87,10 @@ def keep_map(net: Path, roads: RoadMap) -> None:
         Its map.
     """
     with contextlib.suppress(OSError):
-        place = _place(net)
-        place.parent.mkdir(parents=True, exist_ok=True)
-        # Several processes may do so at once.
-        part = place.with_name(f"{place.stem}.{os.getpid()}.part")
-        try:
-            with part.open("wb") as file:
-                np.savez(file, allow_pickle=False, **_arrays_of(roads))
-            part.replace(place)
-        finally:
-            part.unlink(missing_ok=True)
-        for old in sorted(place.parent.glob("*.npz"), key=lambda path: path.stat().st_mtime)[:-_MOST_FILES]:
-            old.unlink(missing_ok=True)
+        place, content = _place(net), io.BytesIO()
+        np.savez(content, allow_pickle=False, **_arrays_of(roads))
+        write_entry(place, content.getvalue())
+        keep_newest(place.parent, _MOST_FILES)
 
 
 def _place(net: Path) -> Path:

@@ -4,13 +4,15 @@ import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Annotated, Any, Protocol, runtime_checkable
 
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
+from fogsim.parameters import Range, checked_parameters
+from fogsim.randomness import Seed
 from fogsim_envs.baselines import Info, Policy, baseline
 
 RESAMPLES = 2000
@@ -119,12 +121,13 @@ class Evaluation:
         return json.dumps(asdict(self))
 
 
+@checked_parameters
 def evaluate(
     policy: Policy | Predictor | str,
     env_id: Any = "fogsim/FogAdvisory-v1",
-    seeds: Iterable[int] = range(50),
+    seeds: Iterable[Seed] = range(50),
     *,
-    discount: float = 1.0,
+    discount: Annotated[float, Range(0.0, 1.0)] = 1.0,
     **arguments: Any,
 ) -> Evaluation:
     """Run a policy once for each seed.
@@ -153,8 +156,8 @@ def evaluate(
     numbers = tuple(seeds)
     if not numbers:
         raise InputError("seeds: expected at least one")
-    if not 0.0 < discount <= 1.0:
-        raise InputError(f"discount: expected a number in 0 … 1 and not 0, got {discount!r}")
+    if discount == 0.0:
+        raise InputError("discount: expected more than 0, got 0")
     if not isinstance(env_id, str):
         return summarise([_episode_of(policy, env_id, seed, discount) for seed in numbers])
     env = _made(env_id, {"split": "test", **arguments})

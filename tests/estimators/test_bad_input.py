@@ -199,14 +199,14 @@ def test_a_calibration_that_is_no_number_cannot_be_made(key, value):
 
 GREY = np.full((ROWS, COLS), 90, np.uint8)
 WRONG_IMAGES = {
-    "none": (None, "numpy array of uint8, got NoneType"),
-    "a list": ([[1, 2], [3, 4]], "numpy array of uint8, got list"),
-    "floats": (GREY / 255.0, "must have dtype uint8.*got float64"),
-    "NaN": (np.full((ROWS, COLS), np.nan), "must have dtype uint8.*got float64"),
-    "truth values": (GREY > 3, "must have dtype uint8.*got bool"),
-    "int64": (GREY.astype(np.int64), "must have dtype uint8.*got int64"),
+    "none": (None, "an array of uint8 or an array of uint16, got None"),
+    "a list": ([[1, 2], [3, 4]], r"an array of uint8 .*, got \[\[1, 2\], \[3, 4\]\]"),
+    "floats": (GREY / 255.0, r"an array of uint8 .*, got an array of float64, shape \(240, 320\)"),
+    "NaN": (np.full((ROWS, COLS), np.nan), "an array of uint8 .*, got an array of float64"),
+    "truth values": (GREY > 3, "an array of uint8 .*, got an array of bool"),
+    "int64": (GREY.astype(np.int64), "an array of uint8 .*, got an array of int64"),
     "16 bits": (GREY.astype(np.uint16), "8 bits must have dtype uint8.*got uint16"),
-    "objects": (GREY.astype(object), "must have dtype uint8.*got object"),
+    "objects": (GREY.astype(object), "an array of uint8 .*, got an array of object"),
     "empty": (np.zeros((0, 0), np.uint8), "0×0 pixels.*told as 320×240"),
     "one row": (GREY[0], r"shape \(rows, cols\) or \(rows, cols, 3\), got \(320,\)"),
     "two channels": (np.dstack([GREY] * 2), r"got \(240, 320, 2\)"),

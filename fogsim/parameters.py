@@ -21,6 +21,8 @@ C = TypeVar("C", bound=Callable[..., Any])
 Check = Callable[[Any], str | None]
 """From a value to what it had to be; None if it is."""
 
+_Checks = tuple[list[tuple[str, Check | None]], dict[str, Check | None]]
+
 _NOTHING = object()
 """What fits no annotation that is checked: its check tells what is expected."""
 
@@ -75,11 +77,15 @@ def checked_parameters(target: C) -> C:
     """
     call: Callable[..., Any] = target.__init__ if isinstance(target, type) else target  # type: ignore[misc]
     who = target.__name__ if isinstance(target, type) else f"{target.__name__}()"
-    signature = inspect.signature(call, eval_str=True)
-    by_place, by_name = _argument_checks(signature)
+
+    @functools.cache
+    def checks() -> _Checks:
+        # Not before the first call: annotations may name what is defined further down.
+        return _argument_checks(inspect.signature(call, eval_str=True))
 
     @functools.wraps(call)
     def checked(*arguments: Any, **options: Any) -> Any:
+        by_place, by_name = checks()
         for (name, check), value in zip(by_place, arguments, strict=False):
             if check is not None and (expected := check(value)) is not None:
                 raise InputError(f"{who}: {name} must be {expected}, got {_given(value)}")
@@ -90,7 +96,7 @@ def checked_parameters(target: C) -> C:
         try:
             return call(*arguments, **options)
         except TypeError:
-            mistake = _call_mistake(signature, arguments, options)
+            mistake = _call_mistake(inspect.signature(call), arguments, options)
             if mistake is None:
                 raise
         raise InputError(f"{who}: {mistake}")
@@ -106,7 +112,7 @@ def _given(value: object) -> str:
     return f"an array of {value.dtype}, shape {value.shape}" if isinstance(value, np.ndarray) else shown(value)
 
 
-def _argument_checks(signature: inspect.Signature) -> tuple[list[tuple[str, Check | None]], dict[str, Check | None]]:
+def _argument_checks(signature: inspect.Signature) -> _Checks:
     """Checks of a signature's positional arguments, in their order, and of all its named ones."""
     checks = {
         name: check_of(one.annotation, classes=True)

@@ -16,6 +16,7 @@ from fogsim.conditions import Condition
 from fogsim.conditions.terms import SignalTerm, all_of, any_of, condition, held, negated, signal
 from fogsim.errors import InputError, suggest
 from fogsim.files.atomic import refuse_existing, refuse_missing_folder, write_text
+from fogsim.parameters import checked_parameters
 from fogsim.scenario import Scenario, load_scenario
 from fogsim.scenario.camera_schema import CalibrationErrors, CameraSection, Exposure
 from fogsim.scenario.expect.schema import Expectation
@@ -98,6 +99,7 @@ def varied(values: object, *keys: str) -> Varied:
     return Varied(values, keys)
 
 
+@checked_parameters
 def to_yaml(
     scenario: Scenario,
     vary: Mapping[str, Varied] | None = None,
@@ -136,6 +138,7 @@ def to_yaml(
     return text
 
 
+@checked_parameters
 def write(
     scenario: Scenario,
     path: Path,

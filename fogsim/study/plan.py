@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 
 from fogsim.errors import InputError, suggest
+from fogsim.parameters import checked_parameters
 from fogsim.scenario import Scenario, build, load_scenario, override, resolved, scenario_from_config
 from fogsim.scenario.document import Document, read_document
 from fogsim.scenario.mistakes import mistake_lines
@@ -216,6 +217,7 @@ def _digest(path: Path, _: int) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()[:20]
 
 
+@checked_parameters
 def load_study(name_or_path: str | Path) -> Study:
     """Read a study file and check every scenario of its grid, before anything is run.
 

@@ -111,8 +111,9 @@ class AttachedTraffic(SumoTraffic):
         command : Command
             Advised speeds and lamps.
         """
-        # The owner may have taken a vehicle away since the look.
+        # The owner may have taken a vehicle away since the look, or loaded another simulation.
         with self._attached.translated_errors():
+            self._running.mark.check()
             self._running.roster.check_count()
         super().obey(command)
 
@@ -127,8 +128,8 @@ class AttachedTraffic(SumoTraffic):
     def release(self) -> None:
         """Give every vehicle back what was changed about it."""
         with self._attached.translated_errors():
-            # In a simulation that was loaded since, others bear the same names.
-            if self._api.simulation.getTime() >= self._running.roster.time:
+            # In a simulation that was loaded since, other vehicles have the same names.
+            if self._running.mark.is_there():
                 self._release()
 
 

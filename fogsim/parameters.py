@@ -332,18 +332,23 @@ def _number_check(usual: type, kind: type, interval: Range, expected: str) -> Ch
 
 def _class_check(annotation: Any, origin: Any, parts: tuple[Any, ...]) -> Check | None:
     """Check of an array, mapping, callable, path or instance; None where the annotation is none of these."""
-    if origin is np.ndarray:
-        return _array_check(get_args(parts[1])[0])
-    if origin in (Mapping, dict):
-        return _mapping_check(*(check_of(part, classes=True) for part in parts))
     kind = origin if isinstance(origin, type) else annotation
-    if kind in _ANYTHING or not isinstance(kind, type) or getattr(kind, "_is_protocol", False):
+    if kind in _ANYTHING or not isinstance(kind, type):
         return None
-    if kind is Callable:
-        return lambda value: None if callable(value) else "callable"
-    if kind is Path:
-        return _instance_check((os.PathLike,), "a path")
-    return _instance_check((kind,), f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}")
+    named = f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}"
+    check = _instance_check((kind,), named)
+    if kind is np.ndarray and parts:
+        check = _array_check(get_args(parts[1])[0])
+    elif kind in (Mapping, dict) and parts:
+        check = _mapping_check(*(check_of(part, classes=True) for part in parts))
+    elif kind is Callable:
+        check = _instance_check((kind,), "callable")
+    elif kind is Path:
+        check = _instance_check((os.PathLike,), "a path")
+    elif getattr(kind, "_is_protocol", False):
+        wanted = [name for one in kind.__mro__[:-1] for name in vars(one) if not name.startswith("_")]
+        return lambda value: None if all(hasattr(value, name) for name in wanted) else named
+    return check
 
 
 def _instance_check(kinds: tuple[type, ...], expected: str) -> Check:

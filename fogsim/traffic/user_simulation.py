@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Sequence
 from dataclasses import replace
 
-from fogsim.errors import InputError, SimulationError
+from fogsim.errors import InputError, SimulationError, shown
 from fogsim.traffic.setup import TrafficSetup
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.traffic.sumo.link import Api, translated_errors
@@ -34,7 +34,7 @@ class AttachedLink:
 
     def __init__(self, api: Api) -> None:
         if not hasattr(api, "simulationStep"):
-            raise InputError(f"expected libsumo, traci or a connection of traci, got {api!r}")
+            raise InputError(f"expected libsumo, traci or a connection of traci, got {shown(api)}")
         self._api = api
         # A connection of traci does not say what it is; both modules do.
         inside = bool(getattr(api, "isLibsumo", bool)())

@@ -26,7 +26,9 @@ _Checks = tuple[list[tuple[str, Check | None]], dict[str, Check | None]]
 _NOTHING = object()
 """What fits no annotation that is checked: its check tells what is expected."""
 
-_ANYTHING = (inspect.Parameter.empty, Any, object)
+_ANYTHING: tuple[Any, ...] = (inspect.Parameter.empty, Any, object)
+
+_WORDS: Mapping[Any, str] = {Path: "a path", Callable: "callable", np.ndarray: "an array"}
 
 _COLLECTIONS: Mapping[Any, tuple[type, ...]] = {
     Sequence: (list, tuple),
@@ -277,21 +279,16 @@ def _tuple_check(checks: Sequence[Check | None]) -> Check:
 
 def _entries_check(entry: Check | None, kinds: tuple[type, ...], *, may_be_empty: bool) -> Check:
     def check(value: Any) -> str | None:
-        # A text is one value; what a generator gives is known only when it is used up.
-        fits = isinstance(value, kinds) and not isinstance(value, str | bytes | Mapping)
-        if fits and isinstance(value, list | tuple | np.ndarray):
-            if entry is None or (may_be_empty and not len(value)):
+        each = None
+        # A text is one value.
+        if isinstance(value, kinds) and not isinstance(value, str | bytes | Mapping):
+            # What a generator gives is known only when it is used up.
+            if entry is None or not isinstance(value, list | tuple | np.ndarray):
                 return None
-            wrong = None
-            for one in value:
-                wrong = entry(one)
-                if wrong is not None:
-                    break
-            if wrong is None and len(value):
+            each = next((wrong for wrong in map(entry, value) if wrong is not None), None)
+            if each is None and (may_be_empty or len(value)):
                 return None
-        elif fits:
-            return None
-        each = None if entry is None else entry(_NOTHING)
+        each = each or (entry(_NOTHING) if entry is not None else None)
         return "a list" if each is None else f"a list, each {each}"
 
     return check
@@ -318,37 +315,35 @@ def _plain_check(kind: object, interval: Range) -> Check | None:
     return None
 
 
-def _number_check(usual: type, kind: type, interval: Range, expected: str) -> Check:
+def _number_check(usual: Any, kind: Any, interval: Range, expected: str) -> Check:
     least, most, or_nan = interval.least, interval.most, interval.or_nan
 
     def check(value: Any) -> str | None:
         # Asking for the abstract class takes longer.
-        if type(value) is usual or (isinstance(value, kind) and not isinstance(value, bool)):
-            return None if least <= value <= most or (or_nan and math.isnan(value)) else expected
-        return expected
+        is_number = type(value) is usual or (isinstance(value, kind) and not isinstance(value, bool))
+        return None if is_number and (least <= value <= most or (or_nan and math.isnan(value))) else expected
 
     return check
 
 
 def _class_check(annotation: Any, origin: Any, parts: tuple[Any, ...]) -> Check | None:
     """Check of an array, mapping, callable, path or instance; None where the annotation is none of these."""
-    kind = origin if isinstance(origin, type) else annotation
+    kind: Any = origin if isinstance(origin, type) else annotation
     if kind in _ANYTHING or not isinstance(kind, type):
         return None
-    named = f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}"
-    check = _instance_check((kind,), named)
+    named = _WORDS.get(kind, f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}")
+    check = _instance_check((os.PathLike if kind is Path else kind,), named)
     if kind is np.ndarray and parts:
         check = _array_check(get_args(parts[1])[0])
     elif kind in (Mapping, dict) and parts:
         check = _mapping_check(*(check_of(part, classes=True) for part in parts))
-    elif kind is Callable:
-        check = _instance_check((kind,), "callable")
-    elif kind is Path:
-        check = _instance_check((os.PathLike,), "a path")
     elif getattr(kind, "_is_protocol", False):
-        wanted = [name for one in kind.__mro__[:-1] for name in vars(one) if not name.startswith("_")]
-        return lambda value: None if all(hasattr(value, name) for name in wanted) else named
+        check = _protocol_check([one for base in kind.__mro__[:-1] for one in vars(base) if one[0] != "_"], named)
     return check
+
+
+def _protocol_check(attributes: Sequence[str], expected: str) -> Check:
+    return lambda value: None if all(hasattr(value, name) for name in attributes) else expected
 
 
 def _instance_check(kinds: tuple[type, ...], expected: str) -> Check:
@@ -358,7 +353,7 @@ def _instance_check(kinds: tuple[type, ...], expected: str) -> Check:
 def _array_check(scalar: type[np.generic]) -> Check:
     # Any precision of floating point serves; whole numbers wrap.
     kind = np.floating if issubclass(scalar, np.floating) else scalar
-    expected = f"an array of {np.dtype(scalar)}" if isinstance(scalar, type) else "an array"
+    expected = f"an array of {np.dtype(scalar)}"
 
     def check(value: object) -> str | None:
         return None if isinstance(value, np.ndarray) and issubclass(value.dtype.type, kind) else expected

@@ -290,11 +290,11 @@ def test_an_odd_sign_is_refused_or_made_nothing_of(method, field, value, sequenc
 
 WRONG_TIMES = (
     (PERIOD, r"before that of an earlier one, 0\.8 s, got 0\.4 s; call reset\(\)"),
-    (math.nan, "finite number of seconds, got nan"),
-    (math.inf, "finite number of seconds, got inf"),
-    (-math.inf, "finite number of seconds, got -inf"),
-    (None, "finite number of seconds, got None"),
-    ("3", "finite number of seconds, got '3'"),
+    (math.nan, "time must be a number, finite, got nan"),
+    (math.inf, "time must be a number, finite, got inf"),
+    (-math.inf, "time must be a number, finite, got -inf"),
+    (None, "time must be a number, finite, got None"),
+    ("3", "time must be a number, finite, got '3'"),
 )
 
 

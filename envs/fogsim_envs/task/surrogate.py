@@ -97,7 +97,8 @@ class SurrogateTable:
         if not isinstance(written, dict):
             raise InputError(f"{path}: expected an object, got {shown(written)}")
         try:
-            return cls(**{name: np.array(one) if isinstance(one, list) else one for name, one in written.items()})
+            fields: dict[str, Any] = {n: np.array(one) if isinstance(one, list) else one for n, one in written.items()}
+            return cls(**fields)
         except ValueError as error:
             raise InputError(f"{path}: {error}") from error
 

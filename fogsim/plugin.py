@@ -192,7 +192,7 @@ class AttachedSession:
         Raises
         ------
         SimulationError
-            If the simulation is lost, or the session is closed.
+            If the simulation is lost or was loaded again, or the session is closed.
         MissingDependencyError
             If no renderer works here.
         """

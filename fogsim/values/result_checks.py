@@ -80,8 +80,8 @@ def checked_belief(method: str, value: object) -> Belief:
     for name in ("log_extinction", "probability"):
         array = getattr(belief, name)
         if not isinstance(array, np.ndarray) or array.ndim != 1 or array.dtype.kind != "f" or not len(array):
-            shown = f"shape {array.shape} of {array.dtype}" if isinstance(array, np.ndarray) else repr(array)
-            raise InputError(f"{who}: {name} must be an array (n,) of floats, got {shown}")
+            given = f"shape {array.shape} of {array.dtype}" if isinstance(array, np.ndarray) else shown(array)
+            raise InputError(f"{who}: {name} must be an array (n,) of floats, got {given}")
     cells, probability = belief.log_extinction, belief.probability
     if len(cells) != len(probability):
         raise InputError(

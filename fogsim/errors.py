@@ -53,11 +53,15 @@ class RecorderError(FogSimError, RuntimeError):
 
 
 class UnknownNameError(InputError):
-    """A name that a registry does not know; the message lists the known ones and the nearest."""
+    """A name that a registry does not know; the message lists the known ones and the nearest.
 
-    def __init__(self, kind: str, name: object, known: Iterable[str]) -> None:
-        names = sorted(known)
-        super().__init__(f"unknown {kind} {shown(name)}; {suggest(str(name), names)}")
+    With one argument, that is the message: so processes pass the error on.
+    """
+
+    def __init__(self, kind: object, name: object = None, known: Iterable[str] | None = None) -> None:
+        super().__init__(
+            kind if known is None else f"unknown {kind} {shown(name)}; {suggest(str(name), sorted(known))}"
+        )
 
 
 def suggest(name: str, known: Iterable[str]) -> str:
@@ -118,5 +122,8 @@ def shown(value: object) -> str:
         Anything.
     """
     text = repr(value)
+    if "\n" in text:
+        # Arrays are written in several lines.
+        text = " ".join(text.split())
     half = LONGEST_SHOWN // 2
     return text if len(text) <= LONGEST_SHOWN else f"{text[:half]} … {text[-half:]}"

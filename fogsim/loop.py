@@ -5,7 +5,7 @@ import warnings
 from collections.abc import Generator
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Annotated, Protocol, Self
 
 from fogsim.advised_driving import AdvisedDriving
 from fogsim.atmosphere import FogNow
@@ -13,7 +13,8 @@ from fogsim.ego.equipment import EgoEquipment
 from fogsim.ego.view_rendering import Surrounding
 from fogsim.errors import SimulationError, UnplayedWarning
 from fogsim.fleet import EquippedFleet, camera_messages
-from fogsim.randomness import spawn_streams
+from fogsim.parameters import Range, checked_parameters
+from fogsim.randomness import Seed, spawn_streams
 from fogsim.scenario import Scenario, build
 from fogsim.timeline import Timeline
 from fogsim.traffic import AnyTraffic, FogAccess, Traffic, libsumo_traffic
@@ -28,14 +29,18 @@ from fogsim.values import (
 )
 from fogsim.values.result_checks import checked_command
 
+Processes = Annotated[int, Range(0, 1000)]
+"""How many processes draw."""
 
+
+@checked_parameters
 def run(
     scenario: Scenario,
-    seed: int = 0,
+    seed: Seed = 0,
     traffic: Traffic | None = None,
     *,
     sumo_outputs: Path | None = None,
-    camera_processes: int = 0,
+    camera_processes: Processes = 0,
 ) -> Generator[Step, None, None]:
     """Run a scenario with its own advice and lighting policy.
 
@@ -201,6 +206,7 @@ def advance_traffic(traffic: AnyTraffic, fog: DriversFog, periods: build.Periods
         traffic.advance(command)
 
 
+@checked_parameters
 class ClosedLoop:
     """One ego vehicle in one simulation, from command to finished step.
 
@@ -226,7 +232,7 @@ class ClosedLoop:
         scenario: Scenario,
         traffic: Traffic | None = None,
         sumo_outputs: Path | None = None,
-        camera_processes: int = 0,
+        camera_processes: Processes = 0,
     ) -> None:
         build.check_ego(scenario, "the closed loop")
         self._scenario = scenario
@@ -240,7 +246,8 @@ class ClosedLoop:
         self._fog: FogField | None = None
         self._step: Step | None = None
 
-    def start(self, seed: int) -> Step:
+    @checked_parameters
+    def start(self, seed: Seed) -> Step:
         """Begin a run, or begin anew.
 
         Parameters

@@ -1,18 +1,41 @@
-"""Parameters of methods: types and ranges stand in the constructors' annotations and are checked at every call."""
+"""Arguments: types and ranges stand in the annotations of constructors and functions and are checked at every call."""
 
 import functools
 import inspect
+import math
+import os
 import sys
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from numbers import Integral, Real
+from pathlib import Path
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, TypeVar, Union, cast, get_args, get_origin
+
+import numpy as np
 
 from fogsim.errors import InputError, nearest, shown, suggest
 
-T = TypeVar("T")
+C = TypeVar("C", bound=Callable[..., Any])
+Check = Callable[[Any], str | None]
+"""From a value to what it had to be; None if it is."""
+
+_Checks = tuple[list[tuple[str, Check | None]], dict[str, Check | None]]
+
+_NOTHING = object()
+"""What fits no annotation that is checked: its check tells what is expected."""
+
+_ANYTHING: tuple[Any, ...] = (inspect.Parameter.empty, Any, object)
+
+_WORDS: Mapping[Any, str] = {Path: "a path", Callable: "callable", np.ndarray: "an array"}
+
+_COLLECTIONS: Mapping[Any, tuple[type, ...]] = {
+    Sequence: (list, tuple),
+    tuple: (list, tuple, np.ndarray),
+    Iterable: (Iterable,),
+}
+"""What is taken for each type of collection."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,42 +48,94 @@ class Range:
         The ends, in the unit.
     unit : str
         The unit, as it is to appear in messages; empty for a pure number.
+    or_nan : bool
+        Whether NaN, for an unknown value, is allowed too.
     """
 
     least: float = -sys.float_info.max
     most: float = sys.float_info.max
     unit: str = ""
-
-    def __contains__(self, value: Any) -> bool:
-        return bool(self.least <= value <= self.most)
+    or_nan: bool = False
 
     def __str__(self) -> str:
-        return f"{self.least:g} … {self.most:g} {self.unit}".rstrip()
+        ends = f"≥ {self.least:g}" if math.isinf(self.most) else f"{self.least:g} … {self.most:g}"
+        return f"{ends} {self.unit}".rstrip()
 
 
 FINITE = Range()
+NUMBER = Range(-math.inf, math.inf)
+NUMBER_OR_NAN = Range(-math.inf, math.inf, or_nan=True)
+
+_UNNAMED_RANGES = {FINITE: ", finite", NUMBER: "", NUMBER_OR_NAN: ""}
 
 
-def checked_parameters(cls: type[T]) -> type[T]:
-    """Class decorator: the constructor refuses arguments that its annotations do not allow.
+def checked_parameters(target: C) -> C:
+    """Decorator of a class or function: arguments that its annotations do not allow raise InputError.
 
-    Checked are ``float`` (finite, of any type of real number), ``int``, ``bool``, ``str``, ``Literal`` and the names of
-    a ``StrEnum``, with a `Range` in ``Annotated``, unions and sequences of them; arguments of other types are left to
-    the class. The constructor then raises InputError.
+    Checked are numbers (``float`` is finite unless a `Range` in ``Annotated`` allows more), ``bool``, ``str``,
+    ``Literal``, the names of a ``StrEnum``, arrays by their type, instances of classes, callables, and unions,
+    sequences, iterables, tuples and mappings of all these. An unknown, missing or surplus argument raises InputError
+    too.
     """
-    construct = cls.__init__
-    signature = inspect.signature(construct, eval_str=True)
+    call: Callable[..., Any] = target.__init__ if isinstance(target, type) else target  # type: ignore[misc]
+    who = target.__name__ if isinstance(target, type) else f"{target.__name__}()"
 
-    @functools.wraps(construct)
-    def checked(self: T, *arguments: Any, **options: Any) -> None:
-        for name, value in signature.bind(self, *arguments, **options).arguments.items():
-            expected = mismatch(signature.parameters[name].annotation, value)
-            if expected is not None:
-                raise InputError(f"{cls.__name__}: {name} must be {expected}, got {shown(value)}")
-        construct(self, *arguments, **options)
+    @functools.cache
+    def checks() -> _Checks:
+        # Not before the first call: annotations may name what is defined further down.
+        return _argument_checks(inspect.signature(call, eval_str=True))
 
-    type.__setattr__(cls, "__init__", checked)
-    return cls
+    @functools.wraps(call)
+    def checked(*arguments: Any, **options: Any) -> Any:
+        by_place, by_name = checks()
+        for (name, check), value in zip(by_place, arguments, strict=False):
+            if check is not None and (expected := check(value)) is not None:
+                raise InputError(f"{who}: {name} must be {expected}, got {_given(value)}")
+        for name, value in options.items():
+            check = by_name.get(name)
+            if check is not None and (expected := check(value)) is not None:
+                raise InputError(f"{who}: {name} must be {expected}, got {_given(value)}")
+        try:
+            return call(*arguments, **options)
+        except TypeError:
+            mistake = _call_mistake(inspect.signature(call), arguments, options)
+            if mistake is None:
+                raise
+        raise InputError(f"{who}: {mistake}")
+
+    if not isinstance(target, type):
+        return cast("C", checked)
+    type.__setattr__(target, "__init__", checked)
+    return target
+
+
+def _given(value: object) -> str:
+    """A value as messages repeat it; of an array, what it is an array of."""
+    return f"an array of {value.dtype}, shape {value.shape}" if isinstance(value, np.ndarray) else shown(value)
+
+
+def _argument_checks(signature: inspect.Signature) -> _Checks:
+    """Checks of a signature's positional arguments, in their order, and of all its named ones."""
+    checks = {
+        name: check_of(one.annotation, classes=True)
+        for name, one in signature.parameters.items()
+        if one.kind not in (one.VAR_POSITIONAL, one.VAR_KEYWORD)
+    }
+    positional = [name for name in checks if signature.parameters[name].kind is not inspect.Parameter.KEYWORD_ONLY]
+    return [(name, checks[name]) for name in positional], checks
+
+
+def _call_mistake(
+    signature: inspect.Signature, arguments: tuple[object, ...], options: Mapping[str, object]
+) -> str | None:
+    """Why a call does not fit a signature; None if it does."""
+    try:
+        signature.bind(*arguments, **options)
+    except TypeError as error:
+        known = [name for name in signature.parameters if name != "self"]
+        unknown = next((name for name in options if name not in known), None)
+        return str(error) if unknown is None else f"unknown parameter {unknown!r}; {suggest(unknown, known)}"
+    return None
 
 
 def accepted_parameters(factory: Callable[..., object], given_elsewhere: Collection[str] = ()) -> dict[str, Any]:
@@ -81,7 +156,11 @@ def accepted_parameters(factory: Callable[..., object], given_elsewhere: Collect
 
 
 def parameter_mistakes(
-    factory: Callable[..., object], given: Mapping[str, object], given_elsewhere: Collection[str] = ()
+    factory: Callable[..., object],
+    given: Mapping[str, object],
+    given_elsewhere: Collection[str] = (),
+    *,
+    classes: bool = False,
 ) -> Iterator[tuple[str, str]]:
     """Name and mistake of every parameter that does not fit a factory's signature.
 
@@ -93,13 +172,17 @@ def parameter_mistakes(
         Its parameters by name.
     given_elsewhere : collection of str
         Those that it is given by its caller, and that are none of the user's.
+    classes : bool
+        As of `check_of`.
     """
     known = accepted_parameters(factory, given_elsewhere)
     for name, value in given.items():
         if name not in known:
-            yield name, f"unknown parameter; {suggest(name, known)}"
-        elif (expected := mismatch(known[name].annotation, value)) is not None:
-            yield name, f"must be {expected}, got {shown(value)}"
+            yield name, f"unknown parameter; {suggest(str(name), known)}"
+            continue
+        check = check_of(known[name].annotation, classes=classes)
+        if check is not None and (expected := check(value)) is not None:
+            yield name, f"must be {expected}, got {_given(value)}"
     for name, parameter in known.items():
         if parameter.default is parameter.empty and name not in given:
             yield name, "this parameter is missing; it is required"
@@ -111,7 +194,7 @@ def mismatch(annotation: object, value: object) -> str | None:
     Parameters
     ----------
     annotation : object
-        Of a parameter: a type, a StrEnum, a union, a Literal, a Sequence of one of them, or Annotated with a `Range`.
+        Of a parameter; see `checked_parameters`. Classes are not checked: what a file gives may be converted.
     value : object
         What was given.
 
@@ -120,22 +203,95 @@ def mismatch(annotation: object, value: object) -> str | None:
     >>> mismatch(Annotated[float, Range(0.0, 1.0)], 7)
     'a number 0 … 1'
     """
+    check = check_of(annotation, classes=False)
+    return None if check is None else check(value)
+
+
+def check_of(annotation: Any, *, classes: bool) -> Check | None:
+    """Check by an annotation: from a value to what it had to be, or None if it is; None where nothing is checked.
+
+    Parameters
+    ----------
+    annotation : object
+        Of a parameter; see `checked_parameters`.
+    classes : bool
+        Whether instances of classes, arrays and callables are checked.
+    """
     origin, parts = get_origin(annotation), get_args(annotation)
+    check = _plain_check(annotation, FINITE)
     if origin in (Union, UnionType):
-        expected = [mismatch(part, value) for part in parts]
-        wrong = [one for one in expected if one is not None]
-        return None if len(wrong) < len(expected) else " or ".join(wrong)
-    if origin is Literal:
-        fits = any(type(value) is type(part) and value == part for part in parts)
-        return None if fits else " or ".join(map(repr, parts))
-    if origin is Sequence:
-        entries = value if isinstance(value, list | tuple) else ()
-        wrong = [one for one in (mismatch(parts[0], entry) for entry in entries or [object()]) if one is not None]
-        return f"a list, each {wrong[0]}" if wrong else None
-    if isinstance(annotation, type) and issubclass(annotation, StrEnum):
-        return _unknown_name(annotation, value)
-    interval = next((part for part in parts if isinstance(part, Range)), FINITE)
-    return _plain_mismatch(parts[0] if origin is Annotated else annotation, interval, value)
+        check = _union_check([check_of(part, classes=classes) for part in parts])
+    elif origin is Literal:
+        check = _literal_check(parts)
+    elif origin is Annotated:
+        interval = next((part for part in parts if isinstance(part, Range)), None)
+        check = check_of(parts[0], classes=classes) if interval is None else _plain_check(parts[0], interval)
+    elif origin is tuple and parts[-1] is not Ellipsis:
+        check = _tuple_check([check_of(part, classes=classes) for part in parts])
+    elif origin in _COLLECTIONS:
+        entry = check_of(parts[0], classes=classes)
+        check = _entries_check(entry, _COLLECTIONS[origin], may_be_empty=origin is not Sequence)
+    elif isinstance(annotation, type) and issubclass(annotation, StrEnum):
+        check = functools.partial(_unknown_name, annotation)
+    elif check is None and classes:
+        check = _class_check(annotation, origin, parts)
+    return check
+
+
+def _union_check(checks: Sequence[Check | None]) -> Check | None:
+    known = [check for check in checks if check is not None]
+    if len(known) < len(checks):
+        return None
+
+    def check(value: object) -> str | None:
+        expected = []
+        for one in known:
+            wrong = one(value)
+            if wrong is None:
+                return None
+            expected.append(wrong)
+        return " or ".join(expected)
+
+    return check
+
+
+def _literal_check(allowed: tuple[object, ...]) -> Check:
+    def check(value: object) -> str | None:
+        if any(type(value) is type(one) and value == one for one in allowed):
+            return None
+        near = nearest(value, [one for one in allowed if isinstance(one, str)]) if isinstance(value, str) else None
+        return " or ".join(map(repr, allowed)) + (f" (did you mean {near!r}?)" if near else "")
+
+    return check
+
+
+def _tuple_check(checks: Sequence[Check | None]) -> Check:
+    def check(value: object) -> str | None:
+        if isinstance(value, list | tuple | np.ndarray) and len(value) == len(checks):
+            wrong = [one(entry) for one, entry in zip(checks, value, strict=True) if one is not None]
+            if not any(wrong):
+                return None
+        first = None if checks[0] is None else checks[0](_NOTHING)
+        return f"{len(checks)} values" + ("" if first is None else f", each {first}")
+
+    return check
+
+
+def _entries_check(entry: Check | None, kinds: tuple[type, ...], *, may_be_empty: bool) -> Check:
+    def check(value: Any) -> str | None:
+        each = None
+        # A text is one value.
+        if isinstance(value, kinds) and not isinstance(value, str | bytes | Mapping):
+            # What a generator gives is known only when it is used up.
+            if entry is None or not isinstance(value, list | tuple | np.ndarray):
+                return None
+            each = next((wrong for wrong in map(entry, value) if wrong is not None), None)
+            if each is None and (may_be_empty or len(value)):
+                return None
+        each = each or (entry(_NOTHING) if entry is not None else None)
+        return "a list" if each is None else f"a list, each {each}"
+
+    return check
 
 
 def _unknown_name(names: type[StrEnum], value: object) -> str | None:
@@ -146,17 +302,73 @@ def _unknown_name(names: type[StrEnum], value: object) -> str | None:
     return f"one of {', '.join(known)}" + (f" (did you mean {near!r}?)" if near else "")
 
 
-def _plain_mismatch(kind: object, interval: Range, value: Any) -> str | None:
-    number = not isinstance(value, bool)
-    within = "" if interval is FINITE else f" {interval}"
+def _plain_check(kind: object, interval: Range) -> Check | None:
+    """Check of a number, truth value, text or None; None for any other type."""
+    within = _UNNAMED_RANGES.get(interval, f" {interval}")
     if kind is float:
-        return None if isinstance(value, Real) and number and value in interval else f"a number{within or ', finite'}"
+        return _number_check(float, Real, interval, f"a number{within}")
     if kind is int:
-        return None if isinstance(value, Integral) and number and value in interval else f"a whole number{within}"
-    if kind is bool:
-        return None if isinstance(value, bool) else "true or false"
-    if kind is str:
-        return None if isinstance(value, str) else "text"
-    if kind is NoneType:
-        return None if value is None else "nothing"
+        return _number_check(int, Integral, interval, f"a whole number{'' if interval is FINITE else within}")
+    for plain, expected in ((bool, "true or false"), (str, "text"), (NoneType, "nothing")):
+        if kind is plain:
+            return _instance_check((plain, np.bool_) if plain is bool else (plain,), expected)
     return None
+
+
+def _number_check(usual: Any, kind: Any, interval: Range, expected: str) -> Check:
+    least, most, or_nan = interval.least, interval.most, interval.or_nan
+
+    def check(value: Any) -> str | None:
+        # Asking for the abstract class takes longer.
+        is_number = type(value) is usual or (isinstance(value, kind) and not isinstance(value, bool))
+        return None if is_number and (least <= value <= most or (or_nan and math.isnan(value))) else expected
+
+    return check
+
+
+def _class_check(annotation: Any, origin: Any, parts: tuple[Any, ...]) -> Check | None:
+    """Check of an array, mapping, callable, path or instance; None where the annotation is none of these."""
+    kind: Any = origin if isinstance(origin, type) else annotation
+    if kind in _ANYTHING or not isinstance(kind, type):
+        return None
+    named = _WORDS.get(kind, f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}")
+    check = _instance_check((os.PathLike if kind is Path else kind,), named)
+    if kind is np.ndarray and parts:
+        check = _array_check(get_args(parts[1])[0])
+    elif kind in (Mapping, dict) and parts:
+        check = _mapping_check(*(check_of(part, classes=True) for part in parts))
+    elif getattr(kind, "_is_protocol", False):
+        check = _protocol_check([one for base in kind.__mro__[:-1] for one in vars(base) if one[0] != "_"], named)
+    return check
+
+
+def _protocol_check(attributes: Sequence[str], expected: str) -> Check:
+    return lambda value: None if all(hasattr(value, name) for name in attributes) else expected
+
+
+def _instance_check(kinds: tuple[type, ...], expected: str) -> Check:
+    return lambda value: None if isinstance(value, kinds) else expected
+
+
+def _array_check(scalar: type[np.generic]) -> Check:
+    # Any precision of floating point serves; whole numbers wrap.
+    kind = np.floating if issubclass(scalar, np.floating) else scalar
+    expected = f"an array of {np.dtype(scalar)}"
+
+    def check(value: object) -> str | None:
+        return None if isinstance(value, np.ndarray) and issubclass(value.dtype.type, kind) else expected
+
+    return check
+
+
+def _mapping_check(key: Check | None, entry: Check | None) -> Check:
+    def check(value: object) -> str | None:
+        if not isinstance(value, Mapping):
+            return "a mapping"
+        wrong_key = next((one for one in map(key, value) if one is not None), None) if key else None
+        wrong = next((one for one in map(entry, value.values()) if one is not None), None) if entry else None
+        if wrong_key is None and wrong is None:
+            return None
+        return f"a mapping, each key {wrong_key}" if wrong_key else f"a mapping, each value {wrong}"
+
+    return check

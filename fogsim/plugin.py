@@ -2,17 +2,19 @@
 
 import contextlib
 import dataclasses
+import math
 import warnings
 from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 from fogsim.advised_driving import AdvisedDriving
 from fogsim.ego.equipment import EgoEquipment
 from fogsim.errors import InputError, SimulationError, UnplayedWarning
 from fogsim.loop import DriversFog
-from fogsim.randomness import spawn_streams
+from fogsim.parameters import NUMBER, Range, checked_parameters
+from fogsim.randomness import Seed, spawn_streams
 from fogsim.scenario import Scenario, attached_scenario, build, override
 from fogsim.scenario.loading import clock_settings
 from fogsim.timeline import Timeline
@@ -25,13 +27,14 @@ DECISION_PERIOD = 0.5
 """Time between two decisions, as far as the simulation's step allows [s]."""
 
 
+@checked_parameters
 def connect(
     scenario: Scenario,
     host: str = "localhost",
-    port: int = 8813,
+    port: Annotated[int, Range(1, 65535)] = 8813,
     order: int | None = None,
-    retries: int = 40,
-    timeout: float = 60.0,
+    retries: Annotated[int, Range(0, math.inf)] = 40,
+    timeout: Annotated[float, NUMBER] = 60.0,
 ) -> Traffic:
     """Reach a SUMO or sumo-gui that the user has started with ``--remote-port``.
 
@@ -69,16 +72,17 @@ def connect(
     return traci_traffic(build.traffic_setup(here), TraciLink(host, port, order, retries, timeout))
 
 
+@checked_parameters
 def attach(
     api: Any,
     *,
     ego: str | None = None,
-    visibility: float | None = None,
+    visibility: Annotated[float, NUMBER] | None = None,
     scenario: Scenario | None = None,
     net: str | Path | None = None,
     settings: Iterable[str] = (),
     drivers: bool = True,
-    seed: int = 0,
+    seed: Seed = 0,
 ) -> "AttachedSession":
     """Attach an ego with a camera to a SUMO simulation that runs already.
 
@@ -188,7 +192,7 @@ class AttachedSession:
         Raises
         ------
         SimulationError
-            If the simulation is lost, or the session is closed.
+            If the simulation is lost or was loaded again, or the session is closed.
         MissingDependencyError
             If no renderer works here.
         """
@@ -227,6 +231,7 @@ class AttachedSession:
         self._times = (began, now)
         return clock_time(now - began)
 
+    @checked_parameters
     def advise(self, step: Step, command: Command | None = None) -> Command:
         """Put a command in force for the next simulation step; to be called before each of them.
 

@@ -1,8 +1,15 @@
 """Random numbers: one seed, spawned into named streams, so that one part's draws never shift another's."""
 
+import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+
+from fogsim.parameters import Range
+
+Seed = Annotated[int, Range(0, math.inf)]
+"""Seed of a run: any whole number that is not negative."""
 
 
 @dataclass(frozen=True, slots=True)

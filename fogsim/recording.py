@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from fogsim.errors import InputError, MethodError, RecorderError
 from fogsim.files.output_targets import refuse_unwritable
 from fogsim.interruption import Interruption
-from fogsim.loop import run, warn_of_unplayed
+from fogsim.loop import Processes, run, warn_of_unplayed
 from fogsim.metrics import MetricsOfRun, RunMetrics, RunSummary, TrafficRunMetrics
 from fogsim.metrics.road_speeds import RoadSpeeds
+from fogsim.parameters import checked_parameters
+from fogsim.randomness import Seed
 from fogsim.recorders import (
     RECORDERS,
     TRAFFIC_RECORDERS,
@@ -67,16 +69,17 @@ class RecordedRun:
     unplayed: Unplayed = NOTHING_UNPLAYED
 
 
+@checked_parameters
 def record_run(
     scenario: Scenario,
-    seed: int,
-    out: Path,
+    seed: Seed,
+    out: str | Path,
     *,
     overwrite: bool = False,
     recorders: Iterable[str] = USUAL_RECORDERS,
     command_line: Sequence[str] = (),
     watch: Callable[[Step], None] = lambda _: None,
-    camera_processes: int = 0,
+    camera_processes: Processes = 0,
 ) -> RecordedRun:
     """Run a scenario and write its results into a directory.
 
@@ -100,7 +103,7 @@ def record_run(
         From `load_scenario`; the step is its camera period [s], the run ends at its duration [s] or earlier.
     seed : int
         At least 0; the same scenario and seed give the same steps, bit for bit.
-    out : Path
+    out : str or Path
         Directory for the results; it is made with its parents where it is not there.
     overwrite : bool
         True to replace the results that are there, once the run is over; files that are not FogSim's stay.
@@ -135,8 +138,6 @@ def record_run(
         If a user's method fails; the message names it and the line of its code.
     FogSimError
         If a part of the loop cannot start or fails on the way.
-    ValueError, TypeError
-        If the seed is negative or no integer.
 
     Warns
     -----
@@ -159,13 +160,14 @@ def record_run(
             watch,
         )
 
-    return _record(of_ego, scenario, seed, out, overwrite, recorders, command_line)
+    return _record(of_ego, scenario, seed, Path(out), overwrite, recorders, command_line)
 
 
+@checked_parameters
 def record_traffic(
     scenario: Scenario,
-    seed: int,
-    out: Path,
+    seed: Seed,
+    out: str | Path,
     *,
     overwrite: bool = False,
     recorders: Iterable[str] = USUAL_TRAFFIC_RECORDERS,
@@ -182,7 +184,7 @@ def record_traffic(
         From `load_scenario`; its ``traffic.ego`` is none.
     seed : int
         As of `record_run`.
-    out : Path
+    out : str or Path
         As of `record_run`.
     overwrite : bool
         As of `record_run`.
@@ -202,8 +204,6 @@ def record_traffic(
     ------
     FogSimError
         As of `record_run`, or if the scenario has an ego.
-    ValueError, TypeError
-        If the seed is negative or no integer.
 
     Warns
     -----
@@ -221,7 +221,7 @@ def record_traffic(
             road,
         )
 
-    return _record(alone, scenario, seed, out, overwrite, recorders, command_line)
+    return _record(alone, scenario, seed, Path(out), overwrite, recorders, command_line)
 
 
 AnyStep = TypeVar("AnyStep", bound=TrafficStep)
@@ -341,14 +341,15 @@ def _information(what: _Recorded[AnyStep], scenario: Scenario, seed: int, direct
     )
 
 
-def record_signs(scenario: Scenario, out: Path, *, overwrite: bool = False) -> SignMap:
+@checked_parameters
+def record_signs(scenario: Scenario, out: str | Path, *, overwrite: bool = False) -> SignMap:
     """Write the sign map of a scenario as GeoJSON; no simulation is started.
 
     Parameters
     ----------
     scenario : Scenario
         The scenario.
-    out : Path
+    out : str or Path
         The file.
     overwrite : bool
         True to replace one that is there.
@@ -358,6 +359,7 @@ def record_signs(scenario: Scenario, out: Path, *, overwrite: bool = False) -> S
     InputError
         If the network, or a sign of the additional files, cannot be read, or the file is there or cannot be written.
     """
+    out = Path(out)
     refuse_unwritable(out, "--out", overwrite=overwrite, makes_folder=True)
     setup = build.traffic_setup(scenario)
     net_file, additional = setup.net, setup.additional

@@ -17,6 +17,7 @@ from fogsim.conditions.terms import SignalTerm, all_of, any_of, condition, held,
 from fogsim.errors import InputError, suggest
 from fogsim.files.atomic import write_text
 from fogsim.files.output_targets import refuse_unwritable
+from fogsim.parameters import checked_parameters
 from fogsim.scenario import Scenario, load_scenario
 from fogsim.scenario.camera_schema import CalibrationErrors, CameraSection, Exposure
 from fogsim.scenario.expect.schema import Expectation
@@ -99,6 +100,7 @@ def varied(values: object, *keys: str) -> Varied:
     return Varied(values, keys)
 
 
+@checked_parameters
 def to_yaml(
     scenario: Scenario,
     vary: Mapping[str, Varied] | None = None,
@@ -137,6 +139,7 @@ def to_yaml(
     return text
 
 
+@checked_parameters
 def write(
     scenario: Scenario,
     path: Path,

@@ -16,7 +16,8 @@ from fogsim.ego.fog_reports import FogReports
 from fogsim.ego.road_meters import RoadMeters
 from fogsim.errors import InputError, SimulationError, shown, suggest
 from fogsim.loop import DriversFog, advance_traffic, warn_of_unplayed
-from fogsim.randomness import spawn_streams
+from fogsim.parameters import checked_parameters
+from fogsim.randomness import Seed, spawn_streams
 from fogsim.road_advice import RoadAdvice
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.road_sections import DISPLAYS, EYES, stations
@@ -33,8 +34,9 @@ METER_SPACING = 100.0
 """Distance between visibility meters along a road [m]."""
 
 
+@checked_parameters
 def run_traffic(
-    scenario: Scenario, seed: int = 0, sumo_outputs: Path | None = None
+    scenario: Scenario, seed: Seed = 0, sumo_outputs: Path | None = None
 ) -> Generator[TrafficStep, None, None]:
     """Run a scenario without an ego (``traffic.ego: none``) with its own advice.
 
@@ -110,6 +112,7 @@ class MeteredAdvice:
         return dataclasses.replace(command, advice_reach=math.inf) if command.advice_reach else command
 
 
+@checked_parameters
 class TrafficRun:
     """The traffic of one simulation in fog, from command to finished step.
 
@@ -152,7 +155,8 @@ class TrafficRun:
         self._drivers_fog = DriversFog()
         self._step: TrafficStep | None = None
 
-    def start(self, seed: int) -> tuple[TrafficStep, float]:
+    @checked_parameters
+    def start(self, seed: Seed) -> tuple[TrafficStep, float]:
         """Begin a run, or begin anew.
 
         Parameters

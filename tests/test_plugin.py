@@ -219,7 +219,7 @@ def test_a_simulation_that_is_loaded_anew_is_another(libsumo: Any) -> None:
         session.observe()
     libsumo.load(ARGUMENTS)
     libsumo.simulationStep()
-    with pytest.raises(SimulationError, match=r"time went back from 2\.5 s to 0\.5 s: attach again"):
+    with pytest.raises(SimulationError, match="was loaded again while FogSim was using it: attach to it"):
         session.observe()
     session.close()
 

@@ -9,7 +9,7 @@ from early_motorway import EARLY
 from pyarrow import parquet
 
 import fogsim
-from fogsim.errors import FogSimError, RecorderError, SimulationError, UnknownNameError
+from fogsim.errors import FogSimError, InputError, RecorderError, SimulationError, UnknownNameError
 from fogsim.recorders import ReportRecorder
 from fogsim.recording import record_run, record_traffic
 from fogsim.scenario import Scenario
@@ -88,7 +88,7 @@ def test_a_recorder_that_cannot_begin_leaves_nothing(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("mistake", "kind"),
-    [({"seed": -1}, ValueError), ({"seed": 1.5}, TypeError), ({"recorders": ("table", "film")}, UnknownNameError)],
+    [({"seed": -1}, InputError), ({"seed": 1.5}, InputError), ({"recorders": ("table", "film")}, UnknownNameError)],
 )
 def test_mistakes_that_stop_a_run_before_its_first_step_leave_nothing(
     tmp_path: Path, mistake: dict[str, object], kind: type[Exception]

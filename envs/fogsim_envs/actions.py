@@ -1,12 +1,16 @@
-"""Actions as they come, taken as members of a space or refused by name."""
+"""Actions and options of `reset` as they come: taken as what they are to be, or refused by name."""
 
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from fogsim.errors import InputError
+from fogsim.errors import InputError, shown
+from fogsim.parameters import parameter_mistakes
+
+T = TypeVar("T")
 
 ActionSpace = spaces.Discrete | spaces.MultiDiscrete | spaces.Box
 
@@ -54,6 +58,28 @@ def checked_action(action: object, space: spaces.Space[Any], name: str) -> NDArr
     return given.astype(space.dtype)
 
 
+def checked_options(kind: Callable[..., T], given: Mapping[str, Any] | None) -> T:
+    """Options of ``reset`` as one value.
+
+    Parameters
+    ----------
+    kind : callable
+        Makes the value; its parameters are the options that are known.
+    given : mapping or None
+        What came.
+
+    Raises
+    ------
+    InputError
+        If an option is unknown or does not fit.
+    """
+    known = {} if given is None else given
+    mistakes = [f"options[{name!r}]: {mistake}" for name, mistake in parameter_mistakes(kind, known, classes=True)]
+    if mistakes:
+        raise InputError("reset(): " + "; ".join(mistakes))
+    return kind(**known)
+
+
 def _numbers(action: object) -> NDArray[Any] | None:
     """What came as an array; None if it does not hold numbers."""
     try:
@@ -85,4 +111,4 @@ def _limits(space: ActionSpace) -> tuple[NDArray[Any], NDArray[Any]]:
 
 
 def _refusal(action: object, space: spaces.Space[Any], name: str, why: str) -> InputError:
-    return InputError(f"action of {name}: no member of {space}: {why}; got {action!r}")
+    return InputError(f"action of {name}: no member of {space}: {why}; got {shown(action)}")

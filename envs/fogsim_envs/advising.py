@@ -1,7 +1,7 @@
 """What environments have in common in which the agent advises the ego's speed and chooses its lamps."""
 
-from collections.abc import Callable, Sequence
-from typing import Any, cast
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, NamedTuple, cast
 
 import gymnasium
 import numpy as np
@@ -10,15 +10,29 @@ from numpy.typing import NDArray
 
 from fogsim.advised_driving import spread_advice
 from fogsim.errors import InputError
+from fogsim.parameters import checked_parameters
+from fogsim.randomness import Seed
 from fogsim.scenario import Scenario, build
 from fogsim.values import Ending, Step
-from fogsim_envs.actions import checked_action
+from fogsim_envs.actions import checked_action, checked_options
 from fogsim_envs.hosting import Simulation
 from fogsim_envs.rendering import RENDER_MODES, StepRenderer, render_modes
 from fogsim_envs.rewards import RewardWeights, reward_terms
-from fogsim_envs.spaces import action_space, command_of, observation_space, observe
+from fogsim_envs.spaces import ImageSize, action_space, command_of, observation_space, observe
 
 Observation = dict[str, NDArray[Any]]
+
+
+class ResetOptions(NamedTuple):
+    """What `AdvisingEnv.reset` takes as ``options``.
+
+    Attributes
+    ----------
+    overrides : iterable of str
+        ``key.path=value`` each, for this episode.
+    """
+
+    overrides: Iterable[str] = ()
 
 
 class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
@@ -41,8 +55,8 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         load: Callable[[Sequence[str]], Scenario],
         begin: Callable[[Scenario, int], tuple[Simulation, Step]],
         *,
-        overrides: Sequence[str],
-        image_size: tuple[int, int] | None,
+        overrides: Iterable[str],
+        image_size: ImageSize | None,
         continuous: bool,
         reward_weights: RewardWeights | None,
         render_mode: str | None,
@@ -71,8 +85,9 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         rate = 1 / scenario.clocks.decision_period_s
         self.metadata = {**self.metadata, "render_modes": render_modes(), "render_fps": rate}
 
+    @checked_parameters
     def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+        self, *, seed: Seed | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin an episode; ``options={"overrides": ["fog.visibility_m=80"]}`` changes the scenario for it.
 
@@ -82,15 +97,20 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
             Seed of this and the following episodes; None goes on with the numbers of before.
         options : dict or None
             ``overrides``: a list of ``key.path=value``.
+
+        Raises
+        ------
+        InputError
+            If an argument or option is unknown or does not fit; the episode before is then left as it was.
         """
-        super().reset(seed=seed)
-        more = tuple((options or {}).get("overrides", ()))
+        more = tuple(checked_options(ResetOptions, options).overrides)
         scenario = self._load([*self._overrides, *more]) if more else self._scenario
         if build.camera(scenario) != build.camera(self._scenario):
             raise InputError("overrides of reset() must not change the camera: the observation space is fixed")
         if scenario != self._active:
-            self._end_simulation()
             self._act_in(scenario)
+            self._end_simulation()
+        super().reset(seed=None if seed is None else int(seed))
         run_seed = int(self.np_random.integers(2**31))
         if self._simulation is None:
             self._simulation, self._step = self._begin(scenario, run_seed)

@@ -1,15 +1,18 @@
 """The agent advises the ego's speed and chooses its lamps."""
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from fogsim.parameters import checked_parameters
 from fogsim.scenario import Scenario, load_scenario, override
 from fogsim_envs.advising import AdvisingEnv
-from fogsim_envs.hosting import TIMEOUT, begin, checked_timeout
+from fogsim_envs.hosting import TIMEOUT, Timeout, begin, checked_timeout
 from fogsim_envs.rewards import RewardWeights
+from fogsim_envs.spaces import ImageSize
 
 
+@checked_parameters
 class FogAdvisoryEnv(AdvisingEnv):
     """Advise a vehicle's speed and lamps in fog that only its camera can judge.
 
@@ -64,12 +67,12 @@ class FogAdvisoryEnv(AdvisingEnv):
         self,
         scenario: str | Path | Scenario = "motorway_fog_bank",
         *,
-        overrides: Sequence[str] = (),
-        image_size: tuple[int, int] | None = (160, 120),
+        overrides: Iterable[str] = (),
+        image_size: ImageSize | None = (160, 120),
         continuous: bool = False,
         reward_weights: RewardWeights | None = None,
         render_mode: str | None = None,
-        timeout: float = TIMEOUT,
+        timeout: Timeout = TIMEOUT,
     ) -> None:
         checked_timeout(timeout)
 

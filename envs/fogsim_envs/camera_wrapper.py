@@ -1,7 +1,7 @@
 """A camera in fog for any highway-env environment; the agent goes on driving by that environment's own actions."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import gymnasium
@@ -12,7 +12,8 @@ from gymnasium.utils import RecordConstructorArgs
 from fogsim.ego.equipment import EgoEquipment
 from fogsim.errors import InputError
 from fogsim.loop import DriversFog
-from fogsim.randomness import spawn_streams
+from fogsim.parameters import checked_parameters
+from fogsim.randomness import Seed, spawn_streams
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.loading import clock_settings
 from fogsim.traffic.highway import (
@@ -26,13 +27,13 @@ from fogsim.traffic.highway import (
 )
 from fogsim.traffic.setup import UNTOUCHED
 from fogsim.values import Command, FogField, RoadNetwork, SignMap, Step
-from fogsim_envs.highway import highway_config, highway_scenario
-from fogsim_envs.spaces import LAMP_MODES, observation_space, observe
+from fogsim_envs.highway import Visibility, highway_config, highway_scenario
+from fogsim_envs.spaces import LAMP_MODES, ImageSize, observation_space, observe
 
 _COMMAND = Command(lamps=LAMP_MODES[0])
 
 
-def _scenario(config: Mapping[str, Any], visibility: float, overrides: Sequence[str]) -> Scenario:
+def _scenario(config: Mapping[str, Any], visibility: float, overrides: Iterable[str]) -> Scenario:
     """Scenario whose camera takes a frame at the end of each of the environment's steps."""
     step = 1.0 / config["simulation_frequency"]
     period = step * max(1, config["simulation_frequency"] // config["policy_frequency"])
@@ -45,6 +46,7 @@ def _scenario(config: Mapping[str, Any], visibility: float, overrides: Sequence[
     return scenario
 
 
+@checked_parameters
 class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordConstructorArgs):
     """Add a fogged camera frame and what it tells of the fog to the observation of a highway-env environment.
 
@@ -77,9 +79,9 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
         self,
         env: gymnasium.Env[Any, Any],
         *,
-        visibility: float = 100.0,
-        overrides: Sequence[str] = (),
-        image_size: tuple[int, int] = (160, 120),
+        visibility: Visibility = 100.0,
+        overrides: Iterable[str] = (),
+        image_size: ImageSize = (160, 120),
         drivers: bool = True,
     ) -> None:
         RecordConstructorArgs.__init__(
@@ -104,8 +106,9 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
             {"camera": own["camera"], "state": own["state"], "highway": env.observation_space}
         )
 
+    @checked_parameters
     def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+        self, *, seed: Seed | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Reset the environment and put the camera into its controlled vehicle.
 

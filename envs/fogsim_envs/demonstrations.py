@@ -4,15 +4,20 @@ The data set is one of Minari (https://minari.farama.org), in Minari's own place
 """
 
 import argparse
-from typing import Any
+import math
+from typing import Annotated, Any
 
 import gymnasium
 
 from fogsim.errors import FogSimError, InputError, MissingDependencyError
+from fogsim.parameters import Range, checked_parameters
 from fogsim_envs.baselines import BASELINES, baseline
 
 
-def record_demonstrations(name: str, env_id: str, episodes: int, data_set: str, **arguments: Any) -> Any:
+@checked_parameters
+def record_demonstrations(
+    name: str, env_id: str, episodes: Annotated[int, Range(1, math.inf)], data_set: str, **arguments: Any
+) -> Any:
     """Run a baseline and keep its episodes.
 
     Parameters
@@ -43,8 +48,6 @@ def record_demonstrations(name: str, env_id: str, episodes: int, data_set: str, 
         If Minari is not installed.
     """
     minari = _import_minari()
-    if episodes < 1:
-        raise InputError(f"episodes: expected at least 1, got {episodes}")
     if data_set in minari.list_local_datasets():
         raise InputError(f"data set {data_set!r} is there already: choose another id, or minari delete {data_set}")
     env = minari.DataCollector(gymnasium.make(env_id, **arguments))

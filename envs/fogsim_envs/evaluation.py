@@ -2,15 +2,17 @@
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Annotated, Any, Protocol, runtime_checkable
 
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
+from fogsim.parameters import Range, checked_parameters
+from fogsim.randomness import Seed
 from fogsim_envs.baselines import Info, Policy, baseline
 
 RESAMPLES = 2000
@@ -28,6 +30,10 @@ class Predictor(Protocol):
         self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
     ) -> Any:
         """Choose an action; gives it and a state."""
+
+
+AnyPolicy = Policy | Predictor | Callable[..., Any] | str
+"""What `evaluate` takes as a policy."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,12 +125,13 @@ class Evaluation:
         return json.dumps(asdict(self))
 
 
+@checked_parameters
 def evaluate(
-    policy: Policy | Predictor | str,
+    policy: AnyPolicy,
     env_id: Any = "fogsim/FogAdvisory-v1",
-    seeds: Iterable[int] = range(50),
+    seeds: Iterable[Seed] = range(50),
     *,
-    discount: float = 1.0,
+    discount: Annotated[float, Range(0.0, 1.0)] = 1.0,
     **arguments: Any,
 ) -> Evaluation:
     """Run a policy once for each seed.
@@ -153,8 +160,8 @@ def evaluate(
     numbers = tuple(seeds)
     if not numbers:
         raise InputError("seeds: expected at least one")
-    if not 0.0 < discount <= 1.0:
-        raise InputError(f"discount: expected a number in 0 … 1 and not 0, got {discount!r}")
+    if discount == 0.0:
+        raise InputError("discount: expected more than 0, got 0")
     if not isinstance(env_id, str):
         return summarise([_episode_of(policy, env_id, seed, discount) for seed in numbers])
     env = _made(env_id, {"split": "test", **arguments})
@@ -173,7 +180,7 @@ def _made(env_id: str, arguments: Mapping[str, Any]) -> Any:
     return parallel_env(**arguments)
 
 
-def _episode_of(policy: Policy | Predictor | str, env: Any, seed: int, discount: float) -> EpisodeResult:
+def _episode_of(policy: AnyPolicy, env: Any, seed: int, discount: float) -> EpisodeResult:
     if isinstance(env, gymnasium.Env):
         return _episode(env, _policy(policy, env.action_space), seed, discount)
     return _parallel_episode(env, policy, seed, discount)
@@ -243,7 +250,7 @@ class _Plain:
         return np.asarray(self._function(observation, info))
 
 
-def _policy(policy: Policy | Predictor | str, action_space: gymnasium.Space[Any]) -> Policy:
+def _policy(policy: AnyPolicy, action_space: gymnasium.Space[Any]) -> Policy:
     if isinstance(policy, str):
         return baseline(policy, action_space)
     if isinstance(policy, Predictor):
@@ -285,7 +292,7 @@ def _episode(env: gymnasium.Env[Any, Any], policy: Policy, seed: int, discount: 
     return sums.result(seed, info, info.get("fault") == "ego")
 
 
-def _parallel_episode(env: Any, policy: Policy | Predictor | str, seed: int, discount: float) -> EpisodeResult:
+def _parallel_episode(env: Any, policy: AnyPolicy, seed: int, discount: float) -> EpisodeResult:
     """One episode of several agents who are paid the same."""
     policies = {agent: _policy(policy, env.action_space(agent)) for agent in env.possible_agents}
     for number, one in enumerate(policies.values()):

@@ -1,28 +1,34 @@
 """The agent advises the ego of a highway-env environment."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any
+from typing import Annotated, Any
 
 import gymnasium
 
-from fogsim.errors import InputError
+from fogsim.errors import InputError, shown
 from fogsim.loop import ClosedLoop
+from fogsim.parameters import Range, checked_parameters, mismatch
 from fogsim.scenario import Scenario, attached_scenario, build
 from fogsim.scenario.loading import clock_settings
 from fogsim.traffic.highway import EGO, HighwayTraffic, OtherRoadsError, is_highway_environment
 from fogsim.values import Command, Step
 from fogsim_envs.advising import AdvisingEnv
 from fogsim_envs.rewards import RewardWeights
+from fogsim_envs.spaces import ImageSize
 
 CAMERA_PERIOD, DECISION_PERIOD = 0.1, 0.5
 """Time between frames and between decisions, as far as highway-env's step allows [s]."""
+
+Visibility = Annotated[float, Range(1.0, math.inf, "m")]
+"""Meteorological visibility [m]."""
 
 END_MARGIN = 5.0
 """The ego has arrived when it is this near to the end of its last lane [m]."""
 
 
+@checked_parameters
 class FogHighwayEnv(AdvisingEnv):
     """Advise a vehicle's speed and lamps in fog, in the traffic of highway-env.
 
@@ -53,10 +59,10 @@ class FogHighwayEnv(AdvisingEnv):
         self,
         environment: str = "highway-v0",
         config: Mapping[str, Any] = MappingProxyType({}),
-        visibility: float = 100.0,
+        visibility: Visibility = 100.0,
         *,
-        overrides: Sequence[str] = (),
-        image_size: tuple[int, int] | None = (160, 120),
+        overrides: Iterable[str] = (),
+        image_size: ImageSize | None = (160, 120),
         continuous: bool = False,
         reward_weights: RewardWeights | None = None,
         render_mode: str | None = None,
@@ -150,11 +156,18 @@ def highway_environment(environment: str, config: Mapping[str, Any]) -> Any:
     InputError
         If it is none of highway-env's.
     """
-    made: Any = gymnasium.make(environment).unwrapped
+    try:
+        made: Any = gymnasium.make(environment).unwrapped
+    except gymnasium.error.Error as error:
+        raise InputError(f"environment must be an id of highway-env, such as 'highway-v0': {error}") from error
     if not is_highway_environment(made):
         raise InputError(f"environment must be an id of highway-env, such as 'highway-v0'; got {environment!r}")
     # Leaders across the joints of roads are seen too, unless the user says otherwise.
     made.configure({"neighbour_vehicles_connected_lanes": True, **config})
+    for name in ("simulation_frequency", "policy_frequency"):
+        expected = mismatch(Annotated[float, Range(0.1, 1000.0, "Hz")], made.config[name])
+        if expected is not None:
+            raise InputError(f"config[{name!r}] must be {expected}, got {shown(made.config[name])}")
     return made
 
 

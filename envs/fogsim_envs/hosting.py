@@ -4,21 +4,26 @@ libsumo holds one simulation in a process, but scripts hold several environments
 say. The first environment runs its simulation here; a further one runs it in a child process, and nobody notices.
 """
 
+import math
 import os
 import subprocess
 import sys
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
-from typing import Any, Protocol, cast
+from typing import Annotated, Any, Protocol, cast
 
 from fogsim.errors import InputError, SimulationError, SimulationRunningError
 from fogsim.loop import ClosedLoop
+from fogsim.parameters import Range
 from fogsim.scenario import Scenario
 from fogsim.traffic_run import TrafficRun
 from fogsim.values import Command, Step, TrafficStep
 
 TIMEOUT = 60.0
 """How long a child process may give no sign of life unless something else is asked for [s]."""
+
+Timeout = Annotated[float, Range(0.0, math.inf, "s")]
+"""Time that a child process may give no sign of life [s]; `checked_timeout` refuses 0."""
 
 _CLOSE_TIMEOUT = 10.0
 _LONGEST_TIMEOUT = 1e6

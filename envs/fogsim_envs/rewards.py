@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from fogsim.metrics import DEFAULT_STANDARD, SafetyStandard, stopping_sight_distance
+from fogsim.parameters import checked_parameters
 from fogsim.values import Lamp, Step
 
 COMFORTABLE_DECELERATION = 2.0
@@ -12,6 +13,7 @@ REAR_FOG_LAMP_VISIBILITY = 50.0
 """Rear fog lamps are lit below this visibility and not above [m] (German StVO § 17(3))."""
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class RewardWeights:
     """Weights of the reward's terms; each term is about 1 where it matters.

@@ -1,14 +1,19 @@
 """What agents see and what they may do: spaces, and the way from steps to observations and from actions to commands."""
 
 import math
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from fogsim.parameters import Range
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Camera, Command, Lamp, SpeedAdvice, Step
+
+_Side = Annotated[int, Range(16, 8192, "px")]
+ImageSize = tuple[_Side, _Side]
+"""Width and height of the camera, as far as scenarios allow [px]."""
 
 SIGN_SLOTS = 8
 SIGN_FEATURES = ("distance", "lateral", "value", "diameter")

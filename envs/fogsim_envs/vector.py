@@ -11,14 +11,15 @@ import multiprocessing
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import gymnasium
 from gymnasium.vector import AsyncVectorEnv
 from gymnasium.vector.async_vector_env import AsyncState
 
 from fogsim.errors import SimulationError
-from fogsim_envs.hosting import checked_timeout
+from fogsim.parameters import Range, checked_parameters
+from fogsim_envs.hosting import Timeout, checked_timeout
 
 TIMEOUT = 600.0
 """How long one step or reset of all may take unless something else is asked for [s]; the first may compile kernels."""
@@ -26,13 +27,14 @@ TIMEOUT = 600.0
 _CLOSE_TIMEOUT = 10.0
 
 
+@checked_parameters
 def make_vector(
     id: str = "fogsim/FogAdvisory-v0",  # noqa: A002 - as of `gymnasium.make_vec`
-    num_envs: int = 1,
-    timeout: float = TIMEOUT,
+    num_envs: Annotated[int, Range(1, 10_000)] = 1,
+    timeout: Timeout = TIMEOUT,
     *,
     wrappers: Sequence[Callable[[gymnasium.Env[Any, Any]], gymnasium.Env[Any, Any]]] = (),
-    context: str | None = None,
+    context: Literal["fork", "spawn", "forkserver"] | None = None,
     **kwargs: Any,
 ) -> AsyncVectorEnv:
     """Make a vector environment that tells of lost processes, unlike `gymnasium.make_vec` in its mode ``async``.

@@ -4,9 +4,18 @@ from dataclasses import dataclass
 
 from fogsim.conditions.parsing import parse_condition
 from fogsim.conditions.syntax import Condition
-from fogsim.errors import InputError
+from fogsim.errors import InputError, shown
+from fogsim.parameters import checked_parameters
 
 
+def _parsed(written: str | dict[str, object]) -> Condition:
+    try:
+        return parse_condition(written)
+    except ValueError as error:
+        raise InputError(f"condition {shown(written)}: {error}") from None
+
+
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class SignalTerm:
     """A signal of the run, of which conditions are made: ``signal("ego.ttc") >= "1.5 s"``.
@@ -127,10 +136,7 @@ def condition(text: str | SignalTerm) -> Condition:
     InputError
         If it is none.
     """
-    try:
-        return parse_condition(str(text))
-    except ValueError as error:
-        raise InputError(f"condition {str(text)!r}: {error}") from None
+    return _parsed(str(text))
 
 
 def all_of(*conditions: Condition) -> Condition:
@@ -141,7 +147,7 @@ def all_of(*conditions: Condition) -> Condition:
     *conditions : Condition
         At least one.
     """
-    return parse_condition({"all": [str(one) for one in conditions]})
+    return _parsed({"all": [str(one) for one in conditions]})
 
 
 def any_of(*conditions: Condition) -> Condition:
@@ -152,7 +158,7 @@ def any_of(*conditions: Condition) -> Condition:
     *conditions : Condition
         At least one.
     """
-    return parse_condition({"any": [str(one) for one in conditions]})
+    return _parsed({"any": [str(one) for one in conditions]})
 
 
 def negated(one: Condition) -> Condition:
@@ -163,7 +169,7 @@ def negated(one: Condition) -> Condition:
     one : Condition
         The condition.
     """
-    return parse_condition({"not": str(one)})
+    return _parsed({"not": str(one)})
 
 
 def held(one: Condition, time: str) -> Condition:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from fogsim.atmosphere import Air
 from fogsim.errors import InputError
 from fogsim.linear_algebra import matrix_product
+from fogsim.parameters import checked_parameters
 from fogsim.values import Step, Truth, View
 from fogsim.values.observation import sign_map_values
 from fogsim.values.pinhole import ray_from_pixel
@@ -56,6 +57,7 @@ def vehicle_class(body: str) -> SemanticClass:
     return _OF_TYPE.get(body, SemanticClass.OTHER_VEHICLE)
 
 
+@checked_parameters
 def depth(step: Step) -> NDArray[np.float32]:
     """Distance along the ray from the optical centre to what each pixel shows.
 
@@ -72,6 +74,7 @@ def depth(step: Step) -> NDArray[np.float32]:
     return step.view.distance
 
 
+@checked_parameters
 def transmission(step: Step) -> NDArray[np.float32]:
     """Share of the light of what each pixel shows that comes through the air, T = e^(−τ).
 
@@ -97,6 +100,7 @@ def transmission(step: Step) -> NDArray[np.float32]:
     return Air(truth.fog).transmittance(step.view, truth.camera, truth.pose)
 
 
+@checked_parameters
 def semantic_mask(step: Step) -> NDArray[np.uint8]:
     """Class of what each pixel shows.
 
@@ -117,6 +121,7 @@ def semantic_mask(step: Step) -> NDArray[np.uint8]:
     return np.asarray(table[step.view.instance])
 
 
+@checked_parameters
 def instance_mask(step: Step) -> NDArray[np.uint16]:
     """Object that each pixel belongs to.
 
@@ -146,6 +151,7 @@ def instance_mask(step: Step) -> NDArray[np.uint16]:
     return mask
 
 
+@checked_parameters
 def sign_picture(step: Step, instance: NDArray[np.uint16]) -> NDArray[np.uint8]:
     """The signs whose faces are in the frame and turned to it, coded as those of the map are in `Observation.sign_map`.
 

@@ -3,9 +3,11 @@
 import contextlib
 import dataclasses
 import itertools
+import math
 from collections.abc import Callable, Generator, Iterator
 from importlib.metadata import version
 from pathlib import Path
+from typing import Annotated
 
 from fogsim.advised_driving import AdvisedDriving
 from fogsim.dataset.annotations import coco, frame_record, object_records
@@ -16,8 +18,12 @@ from fogsim.dataset.inputs import identity
 from fogsim.errors import InputError
 from fogsim.interruption import Interruption
 from fogsim.loop import ClosedLoop
+from fogsim.parameters import Range, checked_parameters
+from fogsim.randomness import Seed
 from fogsim.scenario import Scenario, build
 from fogsim.values import Ending, Step
+
+Count = Annotated[int, Range(1, math.inf)]
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -42,13 +48,14 @@ class WrittenDataset:
     complete: bool
 
 
+@checked_parameters
 def write_dataset(
     scenario: Scenario,
     out: Path | str,
-    frames: int,
+    frames: Count,
     *,
-    seed: int = 0,
-    every: int = 1,
+    seed: Seed = 0,
+    every: Count = 1,
     watch: Callable[[int], None] = lambda _: None,
 ) -> WrittenDataset:
     """Write frames of a scenario with their ground truth, or continue where an earlier call stopped.
@@ -86,9 +93,6 @@ def write_dataset(
         If a part of the loop cannot start or fails.
     """
     build.check_frames(scenario, "a dataset")
-    for name, value, least in (("frames", frames, 1), ("every", every, 1), ("seed", seed, 0)):
-        if value < least:
-            raise InputError(f"{name} must be at least {least}, got {value}")
     with Interruption() as interruption, DatasetDirectory(Path(out), identity(scenario, seed, every)) as directory:
         if more := directory.beyond(frames):
             raise InputError(f"{directory.path} holds {more} frames already, more than the {frames} asked for")

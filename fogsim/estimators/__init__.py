@@ -21,29 +21,37 @@ from fogsim.estimators.protocol import Estimator
 from fogsim.estimators.signs.belaroussi2015 import Belaroussi2015
 from fogsim.estimators.signs.sign_contrast import SignContrast
 from fogsim.estimators.zhu2015 import Zhu2015
+from fogsim.parameters import checked_parameters
 from fogsim.registry import Registry
 from fogsim.values.camera import Camera
+
+
+def _refusing(estimator: type[Estimator]) -> type[Estimator]:
+    """An estimator whose `update` refuses what is not an `Observation`."""
+    estimator.update = checked_parameters(estimator.update)  # type: ignore[method-assign]
+    return estimator
+
 
 ESTIMATORS: Registry[Callable[..., Estimator]] = Registry(
     "estimator",
     {
-        "negru2013": Negru2013,
-        "zhu2015": Zhu2015,
-        "huang2015": Huang2015,
-        "huang2015_rough": Huang2015Rough,
-        "huang2015_lead": Huang2015Lead,
-        "belaroussi2015": Belaroussi2015,
-        "joint_road": JointRoad,
-        "lead_contrast": LeadContrast,
-        "sign_contrast": SignContrast,
-        "gallen2014_veil": Gallen2014Veil,
-        "night_road": NightRoad,
-        "night_glow": NightGlow,
-        "hautiere2006_stereo": Hautiere2006Stereo,
-        "gallen2014": Gallen2014,
-        "gallen2014_halo": Gallen2014Halo,
-        "gabb2014": Gabb2014,
-        "scatterometer": Scatterometer,
+        "negru2013": _refusing(Negru2013),
+        "zhu2015": _refusing(Zhu2015),
+        "huang2015": _refusing(Huang2015),
+        "huang2015_rough": _refusing(Huang2015Rough),
+        "huang2015_lead": _refusing(Huang2015Lead),
+        "belaroussi2015": _refusing(Belaroussi2015),
+        "joint_road": _refusing(JointRoad),
+        "lead_contrast": _refusing(LeadContrast),
+        "sign_contrast": _refusing(SignContrast),
+        "gallen2014_veil": _refusing(Gallen2014Veil),
+        "night_road": _refusing(NightRoad),
+        "night_glow": _refusing(NightGlow),
+        "hautiere2006_stereo": _refusing(Hautiere2006Stereo),
+        "gallen2014": _refusing(Gallen2014),
+        "gallen2014_halo": _refusing(Gallen2014Halo),
+        "gabb2014": _refusing(Gabb2014),
+        "scatterometer": _refusing(Scatterometer),
     },
     group="fogsim.estimators",
     methods=("update", "reset"),
@@ -51,6 +59,7 @@ ESTIMATORS: Registry[Callable[..., Estimator]] = Registry(
 """Every estimator by name: called with a camera and keyword parameters it gives an `Estimator`."""
 
 
+@checked_parameters
 def make(name: str, camera: Camera, **options: object) -> Estimator:
     """Build an estimator.
 

@@ -87,6 +87,7 @@ class _Rows:
     pixels: Floats
 
 
+@checked_parameters
 def extinction_bound(camera: Camera, scene: FoggyRoad) -> float:
     """Least standard deviation of k that a method without bias can have of one picture (Cramér–Rao).
 

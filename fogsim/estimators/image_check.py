@@ -1,7 +1,6 @@
 """What estimators demand of observations."""
 
 import math
-from numbers import Real
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,15 +39,15 @@ class ObservationCheck:
         Raises
         ------
         InputError
-            If the frame's camera is not the assumed one, its time is not finite or before that of an earlier frame, or
-            its image is none of the camera (see `checked_image`). What is refused leaves no trace.
+            If the frame's camera is not the assumed one, its time is before that of an earlier frame, or its image is
+            none of the camera (see `checked_image`). What is refused leaves no trace.
         """
         frame = observation.frame
         if not isinstance(frame, Frame):
             return checked_image(frame, self._camera)
         if frame.camera != self._camera:
             raise InputError(f"the frame's camera must be the told one, {self._camera}, got {frame.camera}")
-        image, time = checked_image(frame.image, self._camera), _checked_time(frame.time)
+        image, time = checked_image(frame.image, self._camera), float(frame.time)
         if time < self._time:
             raise InputError(
                 f"the time of a frame must not be before that of an earlier one, {self._time:g} s, got {time:g} s; "
@@ -60,12 +59,6 @@ class ObservationCheck:
     def kernel_image(self, observation: Observation) -> NDArray[np.uint8] | NDArray[np.uint16]:
         """As `image_of`, for FogSim's own methods, whose kernels only read it."""
         return for_kernels(self.image_of(observation))
-
-
-def _checked_time(time: object) -> float:
-    if isinstance(time, bool) or not isinstance(time, Real) or not math.isfinite(time):
-        raise InputError(f"the time of a frame must be a finite number of seconds, got {time!r}")
-    return float(time)
 
 
 def checked_image(image: object, camera: Camera) -> NDArray[np.uint8] | NDArray[np.uint16]:

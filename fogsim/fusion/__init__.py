@@ -8,6 +8,7 @@ from fogsim.fusion.grid_filter import GridFilter
 from fogsim.fusion.mixture_filter import MixtureFilter
 from fogsim.fusion.no_fusion import NoFusion
 from fogsim.fusion.protocol import Fusion, LocatedFusion, fuse
+from fogsim.parameters import checked_parameters
 from fogsim.registry import Registry
 
 FUSIONS: Registry[Callable[..., Fusion | LocatedFusion]] = Registry(
@@ -19,6 +20,7 @@ FUSIONS: Registry[Callable[..., Fusion | LocatedFusion]] = Registry(
 """Every fusion by name: called with keyword parameters it gives a `Fusion`."""
 
 
+@checked_parameters
 def make(name: str, **options: object) -> Fusion | LocatedFusion:
     """Build a fusion.
 

@@ -11,6 +11,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from fogsim.errors import InputError, UnknownNameError, nearest, shown, suggest
+from fogsim.parameters import checked_parameters
 from fogsim.registry.user_code import MayImport, import_anything
 from fogsim.scenario.document import Document, apply_overrides, read_scenario_document
 from fogsim.scenario.mistakes import mistake_lines
@@ -94,6 +95,7 @@ DAY = 86_400.0
 """Simulated time within which the ego of a simulation of the user's own must appear [s]."""
 
 
+@checked_parameters
 def load_scenario(
     name_or_path: str | Path,
     overrides: Iterable[str] = (),
@@ -251,6 +253,7 @@ def _bare(name: str, traffic: dict[str, Any]) -> dict[str, Any]:
     return {"name": re.sub(r"[^A-Za-z0-9_.-]", "_", name), "duration_s": LONG_RUN, "traffic": traffic}
 
 
+@checked_parameters
 def override(
     scenario: Scenario,
     overrides: Iterable[str],

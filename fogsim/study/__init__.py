@@ -3,9 +3,11 @@
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import Annotated
 
 from fogsim.errors import InputError
 from fogsim.files.writer_lock import WriterLock
+from fogsim.parameters import Range, checked_parameters
 from fogsim.study.comparison import Difference
 from fogsim.study.directory import StudyDirectory
 from fogsim.study.engine import Engine
@@ -39,11 +41,12 @@ def _unwatched(_: int, __: str | None) -> None:
     """Show nothing."""
 
 
+@checked_parameters
 def run_study(
     study: Study,
     out: Path,
     *,
-    processes: int | None = None,
+    processes: Annotated[int, Range(1, 10_000)] | None = None,
     engine: Engine | None = None,
     watch: Watch = _unwatched,
 ) -> list[Row]:

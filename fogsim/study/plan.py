@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 
 from fogsim.errors import InputError, suggest
+from fogsim.parameters import checked_parameters
 from fogsim.registry.user_code import MayImport, import_anything
 from fogsim.scenario import Scenario, build, load_scenario, override, resolved, scenario_from_config
 from fogsim.scenario.document import Document, read_document
@@ -217,6 +218,7 @@ def _digest(path: Path, _: int) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()[:20]
 
 
+@checked_parameters
 def load_study(
     name_or_path: str | Path, settings: Sequence[str] = (), may_import: MayImport = import_anything
 ) -> Study:

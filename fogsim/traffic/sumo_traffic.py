@@ -19,7 +19,7 @@ from fogsim.traffic.road.road_map import RoadMap
 from fogsim.traffic.road.signs import sign_map
 from fogsim.traffic.road.structures import mentions_structures, structures
 from fogsim.traffic.setup import TrafficSetup
-from fogsim.traffic.sumo.claims import new_session
+from fogsim.traffic.sumo.claims import LoadMark, new_session
 from fogsim.traffic.sumo.command_line import command_line
 from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
 from fogsim.traffic.sumo.lane_keeping import LaneKeeping
@@ -70,6 +70,7 @@ class _Run:
     script: Script
     actions: ScriptedActions
     session: str
+    mark: LoadMark
     persons: PersonReader
     perception: DriversPerception | None = None
     drivers: SumoDesiredSpeeds | None = None
@@ -152,6 +153,7 @@ class SumoTraffic:
             script=script,
             actions=ScriptedActions(api, speeds, script.lamps, changes, session),
             session=session,
+            mark=LoadMark(api, session),
             persons=PersonReader(api, self._link.shared),
         )
         self._signals = None
@@ -341,6 +343,7 @@ class SumoTraffic:
             run.drivers.update(command)
 
     def _read_step(self, run: _Run) -> None:
+        run.mark.check()
         run.collisions.add(run.reader.collisions())
         run.roster.update()
         if self._link.shared:

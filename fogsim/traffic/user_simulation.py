@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Sequence
 from dataclasses import replace
 
-from fogsim.errors import InputError, SimulationError
+from fogsim.errors import InputError, SimulationError, shown
 from fogsim.traffic.setup import TrafficSetup
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.traffic.sumo.link import Api, translated_errors
@@ -34,7 +34,7 @@ class AttachedLink:
 
     def __init__(self, api: Api) -> None:
         if not hasattr(api, "simulationStep"):
-            raise InputError(f"expected libsumo, traci or a connection of traci, got {api!r}")
+            raise InputError(f"expected libsumo, traci or a connection of traci, got {shown(api)}")
         self._api = api
         # A connection of traci does not say what it is; both modules do.
         inside = bool(getattr(api, "isLibsumo", bool)())
@@ -111,8 +111,9 @@ class AttachedTraffic(SumoTraffic):
         command : Command
             Advised speeds and lamps.
         """
-        # The owner may have taken a vehicle away since the look.
+        # The owner may have taken a vehicle away since the look, or loaded another simulation.
         with self._attached.translated_errors():
+            self._running.mark.check()
             self._running.roster.check_count()
         super().obey(command)
 
@@ -127,8 +128,8 @@ class AttachedTraffic(SumoTraffic):
     def release(self) -> None:
         """Give every vehicle back what was changed about it."""
         with self._attached.translated_errors():
-            # In a simulation that was loaded since, others bear the same names.
-            if self._api.simulation.getTime() >= self._running.roster.time:
+            # In a simulation that was loaded since, other vehicles have the same names.
+            if self._running.mark.is_there():
                 self._release()
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from numbers import Real
 
-from fogsim.errors import InputError, suggest
+from fogsim.errors import InputError, shown, suggest
 
 BIT_DEPTHS = (8, 10, 12)
 """Bit depths that a camera can have."""
@@ -87,18 +87,20 @@ class Camera:
         self._check_kinds()
         for name in ("width", "height"):
             if not (_whole(getattr(self, name)) and getattr(self, name) >= 1):
-                raise InputError(f"camera {name} must be a whole number of pixels ≥ 1, got {getattr(self, name)!r}")
+                raise InputError(
+                    f"camera {name} must be a whole number of pixels ≥ 1, got {shown(getattr(self, name))}"
+                )
         for name in ("focal_length", "mount_height"):
             if not (_finite(getattr(self, name)) and getattr(self, name) > 0):
-                raise InputError(f"camera {name} must be positive and finite, got {getattr(self, name)!r}")
+                raise InputError(f"camera {name} must be positive and finite, got {shown(getattr(self, name))}")
         if not (_finite(self.pitch) and abs(self.pitch) < math.pi / 2):
-            raise InputError(f"camera pitch must lie within ±π/2 rad, got {self.pitch!r}")
+            raise InputError(f"camera pitch must lie within ±π/2 rad, got {shown(self.pitch)}")
         if not (_finite(self.roll) and abs(self.roll) <= math.pi):
-            raise InputError(f"camera roll must lie within ±π rad, got {self.roll!r}")
+            raise InputError(f"camera roll must lie within ±π rad, got {shown(self.roll)}")
         if not (_whole(self.bits) and self.bits in BIT_DEPTHS):
-            raise InputError(f"camera bits must be 8, 10 or 12, got {self.bits!r}")
+            raise InputError(f"camera bits must be 8, 10 or 12, got {shown(self.bits)}")
         if not (_finite(self.black_level) and 0 <= self.black_level <= MOST_BLACK):
-            raise InputError(f"camera black_level must lie in 0 … {MOST_BLACK:g}, got {self.black_level!r}")
+            raise InputError(f"camera black_level must lie in 0 … {MOST_BLACK:g}, got {shown(self.black_level)}")
         for name in ("width", "height", "bits"):
             object.__setattr__(self, name, int(getattr(self, name)))
 
@@ -108,14 +110,14 @@ class Camera:
             object.__setattr__(self, "response", Response(self.response))
         except ValueError:
             raise InputError(
-                f"camera response: {suggest(str(self.response), Response)}, got {self.response!r}"
+                f"camera response: {suggest(str(self.response), Response)}, got {shown(self.response)}"
             ) from None
         try:
             u0, v0 = self.principal_point
         except (TypeError, ValueError):
             u0 = v0 = math.nan
         if not (_finite(u0) and _finite(v0)):
-            raise InputError(f"camera principal_point must be two finite numbers, got {self.principal_point!r}")
+            raise InputError(f"camera principal_point must be two finite numbers, got {shown(self.principal_point)}")
         object.__setattr__(self, "principal_point", (float(u0), float(v0)))
 
     @property

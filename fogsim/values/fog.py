@@ -3,9 +3,10 @@
 import itertools
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from fogsim.errors import InputError
+from fogsim.parameters import NUMBER, checked_parameters
 
 GROUND_ALBEDO = 0.1
 """Albedo of the land around where nothing is said of it [-]: in visible light, grass and asphalt have about as much."""
@@ -28,6 +29,7 @@ AIRLIGHT_SHARE = airlight_share()
 """Airlight over that of a white horizontal diffuser where nothing is said of the land around [-]."""
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class FogBank:
     """A stretch of fog across the road: a slab in the world with soft edges, unlimited sideways.
@@ -69,6 +71,7 @@ class FogBank:
             raise InputError(f"a fog bank's edge must be positive and not longer than the bank, got {self.edge!r} m")
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class FogShelter:
     """A tunnel, into which fog does not get.
@@ -89,6 +92,7 @@ class FogShelter:
     reach: float
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class FogPatches:
     """Random thick and thin places: the extinction times a log-normal factor of mean 1.
@@ -131,6 +135,7 @@ class FogPatches:
             raise InputError(f"the strength of fog patches must lie within 0 … 2, got {self.strength!r}")
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class FogChange:
     """The fog at one time; between two of them it changes linearly, before the first and after the last not at all.
@@ -147,10 +152,11 @@ class FogChange:
 
     time: float
     density: float
-    base: float
-    top: float
+    base: Annotated[float, NUMBER]
+    top: Annotated[float, NUMBER]
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class FogField:
     """Extinction coefficient and airlight in space and time.
@@ -206,11 +212,11 @@ class FogField:
     extinction: float
     airlight: tuple[float, float, float]
     banks: tuple[FogBank, ...] = ()
-    top: float = math.inf
+    top: Annotated[float, NUMBER] = math.inf
     top_edge: float = 0.0
-    base: float = -math.inf
+    base: Annotated[float, NUMBER] = -math.inf
     base_edge: float = 0.0
-    scale_height: float = math.inf
+    scale_height: Annotated[float, NUMBER] = math.inf
     ground: float = 0.0
     patches: FogPatches | None = None
     wind: tuple[float, float] = (0.0, 0.0)

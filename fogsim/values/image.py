@@ -7,6 +7,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.parameters import checked_parameters
 from fogsim.values.camera import Camera
 
 T = TypeVar("T")
@@ -37,6 +38,7 @@ class View:
     lamp_response: NDArray[np.float32] | None = None
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class Frame:
     """An image and the calibration that its vehicle assumes.

@@ -3,11 +3,13 @@
 import math
 import zlib
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
+from fogsim.parameters import NUMBER_OR_NAN, checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.image import Frame, read_only
 from fogsim.values.light import Lamp
@@ -15,10 +17,14 @@ from fogsim.values.light import Lamp
 SIGN_MAP_REACH, SIGN_MAP_SIZE = 255.0, 2.0
 """Distance at which a sign's distance is 1 in the picture of the map, and size at which its size is 255 [m]."""
 
+Measured = Annotated[float, NUMBER_OR_NAN]
+"""What a sensor or a map tells; each method sees for itself whether it can use infinity or NaN."""
+
 FROM_ABOVE = (64, 64)
 """Rows and columns of the map from above: 4 m and 1 m each, the vehicle below the middle of the last row."""
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class LeadMeasurement:
     """A radar-like measurement of the vehicle ahead.
@@ -31,10 +37,11 @@ class LeadMeasurement:
         Lead's speed minus own speed, with sensor noise [m/s].
     """
 
-    distance: float
-    relative_speed: float
+    distance: Measured
+    relative_speed: Measured
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class SignSighting:
     """A traffic sign that the map says lies ahead.
@@ -46,7 +53,7 @@ class SignSighting:
     kind : str
         Sign code ("speed_limit", …).
     value : float
-        What it says, for a speed limit the speed [m/s].
+        What it says, for a speed limit the speed [m/s]; NaN where the map does not tell.
     distance : float
         Distance ahead along the vehicle's heading [m].
     lateral : float
@@ -61,14 +68,15 @@ class SignSighting:
 
     sign_id: str
     kind: str
-    value: float
-    distance: float
-    lateral: float
-    diameter: float
-    height: float = 2.2
-    facing: float = 0.0
+    value: Measured
+    distance: Measured
+    lateral: Measured
+    diameter: Measured
+    height: Measured = 2.2
+    facing: Measured = 0.0
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class LightMeasurement:
     """What the light sensor behind the windscreen tells: how bright the sky is, and whether others' lamps are ahead.
@@ -83,11 +91,12 @@ class LightMeasurement:
         Whether tail lamps are ahead.
     """
 
-    illuminance: float
+    illuminance: Measured
     oncoming: bool = False
     preceding: bool = False
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class FogReport:
     """One measurement of the fog by another vehicle or by a sensor beside the road.
@@ -110,12 +119,13 @@ class FogReport:
 
     source: str
     number: int
-    place: float
-    time: float
-    extinction: float
-    relative_deviation: float
+    place: Measured
+    time: Measured
+    extinction: Measured
+    relative_deviation: Measured
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class SecondView:
     """The picture of a second camera to the right of the first, as its calibration has it: alike and parallel.
@@ -129,13 +139,14 @@ class SecondView:
     """
 
     image: NDArray[np.uint8] | NDArray[np.uint16]
-    baseline: float
+    baseline: Measured
 
     def __post_init__(self) -> None:
         """Keep a read-only view of the image."""
         object.__setattr__(self, "image", read_only(self.image))
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class Observation:
     """What one vehicle has at one instant.
@@ -165,15 +176,15 @@ class Observation:
     """
 
     frame: Frame | NDArray[np.uint8] | NDArray[np.uint16]
-    speed: float = 0.0
+    speed: Measured = 0.0
     lead: LeadMeasurement | None = None
     signs: tuple[SignSighting, ...] = ()
-    camera_setback: float = 0.0
+    camera_setback: Measured = 0.0
     lamps: Lamp | None = None
     light: LightMeasurement | None = None
     reports: tuple[FogReport, ...] = ()
     right: SecondView | None = None
-    scattering: float | None = None
+    scattering: Measured | None = None
 
     def __post_init__(self) -> None:
         """Keep a read-only view of a bare array."""

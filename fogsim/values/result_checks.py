@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.errors import InputError
+from fogsim.errors import InputError, shown
 from fogsim.jit import kernel
 from fogsim.values import (
     Belief,
@@ -49,11 +49,11 @@ def checked_estimate(method: str, value: object) -> Estimate:
     who = f"estimator {method!r}: update()"
     estimate = _of_type(who, value, Estimate)
     if estimate.method != method:
-        raise InputError(f"{who}: method must be its name in the registry, {method!r}; got {estimate.method!r}")
+        raise InputError(f"{who}: method must be its name in the registry, {method!r}; got {shown(estimate.method)}")
     if estimate.valid not in (True, False):
-        raise InputError(f"{who}: valid must be True or False, got {estimate.valid!r}")
+        raise InputError(f"{who}: valid must be True or False, got {shown(estimate.valid)}")
     if not isinstance(estimate.diagnostics, Mapping):
-        raise InputError(f"{who}: diagnostics must be a mapping, got {estimate.diagnostics!r}")
+        raise InputError(f"{who}: diagnostics must be a mapping, got {shown(estimate.diagnostics)}")
     if estimate.valid:
         _check_number(who, "extinction", estimate.extinction, " [1/m]; say Estimate.invalid where it cannot tell")
         _check_number(who, "standard_deviation", estimate.standard_deviation, " [1/m]")
@@ -80,8 +80,8 @@ def checked_belief(method: str, value: object) -> Belief:
     for name in ("log_extinction", "probability"):
         array = getattr(belief, name)
         if not isinstance(array, np.ndarray) or array.ndim != 1 or array.dtype.kind != "f" or not len(array):
-            shown = f"shape {array.shape} of {array.dtype}" if isinstance(array, np.ndarray) else repr(array)
-            raise InputError(f"{who}: {name} must be an array (n,) of floats, got {shown}")
+            given = f"shape {array.shape} of {array.dtype}" if isinstance(array, np.ndarray) else shown(array)
+            raise InputError(f"{who}: {name} must be an array (n,) of floats, got {given}")
     cells, probability = belief.log_extinction, belief.probability
     if len(cells) != len(probability):
         raise InputError(
@@ -90,7 +90,7 @@ def checked_belief(method: str, value: object) -> Belief:
     # Copies are of one type, for which the kernel is compiled.
     is_ascending, least, total = distribution_of(np.array(cells, float), np.array(probability, float))
     if not (is_ascending and math.isfinite(cells[0]) and math.isfinite(cells[-1])):
-        raise InputError(f"{who}: log_extinction must be finite and ascending, got {cells!r}")
+        raise InputError(f"{who}: log_extinction must be finite and ascending, got {shown(cells)}")
     if not (least >= 0.0 and abs(total - 1.0) <= _SUM_TOLERANCE):
         raise InputError(
             f"{who}: probability must be at least 0 and add up to 1, got from {least:.6g} on and a sum of {total:.6g}"
@@ -133,7 +133,7 @@ def checked_advice(method: str, value: object) -> SpeedAdvice:
     advice = _of_type(who, value, SpeedAdvice)
     _check_speed(who, "speed", advice.speed)
     if advice.raise_since is not None and not (_is_number(advice.raise_since) and math.isfinite(advice.raise_since)):
-        raise InputError(f"{who}: raise_since must be a finite time [s] or None, got {advice.raise_since!r}")
+        raise InputError(f"{who}: raise_since must be a finite time [s] or None, got {shown(advice.raise_since)}")
     return advice
 
 
@@ -203,16 +203,20 @@ def checked_command(value: object) -> Command:
     _of_type("the command's advice", command.advice, SpeedAdvice)
     _of_type("the command's lamps", command.lamps, Lamp)
     _check_speed("the command", "advice.speed", command.advice.speed)
+    _check_kind("the command", "lamps_of", command.lamps_of, Mapping, "a mapping from vehicle ids to lamps")
     for vehicle, lit in command.lamps_of.items():
         _of_type(f"the command's lamps_of[{vehicle!r}]", lit, Lamp)
+    _check_kind(
+        "the command", "advised_speeds", command.advised_speeds, Mapping, "a mapping from vehicle ids to speeds"
+    )
     for vehicle, speed in command.advised_speeds.items():
         _check_speed("the command", f"advised_speeds[{vehicle!r}]", speed)
     if not (_is_number(command.advice_reach) and command.advice_reach >= 0.0):
-        raise InputError(f"the command: advice_reach must be at least 0 [m], got {command.advice_reach!r}")
+        raise InputError(f"the command: advice_reach must be at least 0 [m], got {shown(command.advice_reach)}")
     if command.control is not None:
         control = _of_type("the command's control", command.control, EgoControl)
         if not (_is_number(control.acceleration) and math.isfinite(control.acceleration)):
-            raise InputError(f"the command: control.acceleration must be finite, got {control.acceleration!r}")
+            raise InputError(f"the command: control.acceleration must be finite, got {shown(control.acceleration)}")
         _check_kind("the command", "control.lanes", control.lanes, int, "a whole number of lanes to the left")
     _check_kind("the command", "stretches", command.stretches, tuple, "a tuple of StretchAdvice")
     for place, advice in enumerate(command.stretches):
@@ -226,9 +230,13 @@ def _check_stretch_advice(who: str, value: object) -> None:
     _check_kind(who, "display", advice.display, Display, "a fogsim.values.Display")
     stretch = _of_type(f"{who}.stretch", advice.stretch, Stretch)
     if not (_is_number(stretch.start) and math.isfinite(stretch.start) and stretch.start >= 0.0):
-        raise InputError(f"{who}: stretch.start must be a finite position of at least 0 [m], got {stretch.start!r}")
+        raise InputError(
+            f"{who}: stretch.start must be a finite position of at least 0 [m], got {shown(stretch.start)}"
+        )
     if not (_is_number(stretch.end) and stretch.end > stretch.start):
-        raise InputError(f"{who}: stretch.end must lie behind its start at {stretch.start!r} [m], got {stretch.end!r}")
+        raise InputError(
+            f"{who}: stretch.end must lie behind its start at {stretch.start!r} [m], got {shown(stretch.end)}"
+        )
     _check_kind(who, "stretch.edges", stretch.edges, tuple, "a tuple of ids of edges, empty for the ego's route")
     for edge in stretch.edges:
         _check_kind(who, "stretch.edges", edge, str, "a tuple of ids of edges")
@@ -236,7 +244,7 @@ def _check_stretch_advice(who: str, value: object) -> None:
 
 def _check_kind(who: str, field: str, value: object, kind: type, expected: str) -> None:
     if not isinstance(value, kind):
-        raise InputError(f"{who}: {field} must be {expected}; got {value!r}")
+        raise InputError(f"{who}: {field} must be {expected}; got {shown(value)}")
 
 
 def checked_values(metric: str, value: object) -> Mapping[str, Any]:
@@ -256,7 +264,7 @@ def checked_values(metric: str, value: object) -> Mapping[str, Any]:
     """
     who = f"metric {metric!r}: result()"
     if not isinstance(value, Mapping):
-        raise InputError(f"{who} must return a mapping of keys to values, got {value!r}")
+        raise InputError(f"{who} must return a mapping of keys to values, got {shown(value)}")
     for key, entry in value.items():
         _check_entry(who, key, entry)
     return value
@@ -280,27 +288,27 @@ def checked_recorder(name: str, value: T) -> T:
     missing = [f"{method}()" for method in ("record", "close") if not callable(getattr(value, method, None))]
     if missing:
         raise InputError(
-            f"recorder {name!r}: its factory must return an object with {' and '.join(missing)}; got {value!r}"
+            f"recorder {name!r}: its factory must return an object with {' and '.join(missing)}; got {shown(value)}"
         )
     return value
 
 
 def _check_entry(who: str, key: object, entry: object) -> None:
     if not isinstance(key, str):
-        raise InputError(f"{who}: keys must be words, got {key!r}")
+        raise InputError(f"{who}: keys must be words, got {shown(key)}")
     if isinstance(entry, Mapping):
         for inner, value in entry.items():
             _check_entry(who, f"{key}.{inner}", value)
     elif isinstance(entry, float | int):
         if not math.isfinite(entry):
-            raise InputError(f"{who}: {key} must be a finite number, or None where it is undefined; got {entry!r}")
+            raise InputError(f"{who}: {key} must be a finite number, or None where it is undefined; got {shown(entry)}")
     elif entry is not None and not isinstance(entry, str):
-        raise InputError(f"{who}: {key} must be None, a word, a finite number or a mapping of such; got {entry!r}")
+        raise InputError(f"{who}: {key} must be None, a word, a finite number or a mapping of such; got {shown(entry)}")
 
 
 def _of_type(who: str, value: object, kind: type[T]) -> T:
     if not isinstance(value, kind):
-        raise InputError(f"{who} must be of type fogsim.values.{kind.__name__}, got {value!r}")
+        raise InputError(f"{who} must be of type fogsim.values.{kind.__name__}, got {shown(value)}")
     return value
 
 
@@ -310,9 +318,9 @@ def _is_number(value: object) -> bool:
 
 def _check_number(who: str, field: str, value: float, hint: str) -> None:
     if not (_is_number(value) and math.isfinite(value) and value >= 0.0):
-        raise InputError(f"{who}: {field} must be a finite number of at least 0{hint}; got {value!r}")
+        raise InputError(f"{who}: {field} must be a finite number of at least 0{hint}; got {shown(value)}")
 
 
 def _check_speed(who: str, field: str, speed: float) -> None:
     if not (_is_number(speed) and speed >= 0.0):
-        raise InputError(f"{who}: {field} must be at least 0 [m/s], or inf for no advice; got {speed!r}")
+        raise InputError(f"{who}: {field} must be at least 0 [m/s], or inf for no advice; got {shown(speed)}")

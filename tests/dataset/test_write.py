@@ -185,7 +185,7 @@ def test_foreign_files_and_impossible_numbers_are_refused(tmp_path: Path) -> Non
     with pytest.raises(InputError, match=r"--out .*thesis\.tex is not a folder"):
         fogsim.write_dataset(small(), tmp_path / "thesis.tex", 1)
     for wrong in ({"frames": 0}, {"frames": 1, "every": 0}, {"frames": 1, "seed": -1}):
-        with pytest.raises(InputError, match="must be at least"):
+        with pytest.raises(InputError, match="must be a whole number ≥ "):
             fogsim.write_dataset(small(), tmp_path / "new", **wrong)
     assert not (tmp_path / "new").exists()
     assert (tmp_path / "thesis.tex").read_text(encoding="utf-8") == "mine"

@@ -165,7 +165,7 @@ def test_vector_environments(make: Callable[..., Any]) -> None:
 def test_bad_arguments() -> None:
     with pytest.raises(InputError, match="id of highway-env"):
         gymnasium.make(ID, environment="CartPole-v1")
-    with pytest.raises(InputError, match="visibility_m"):
+    with pytest.raises(InputError, match="visibility must be a number ≥ 1 m"):
         gymnasium.make(ID, visibility=-1.0)
     with pytest.raises(InputError, match=r"traffic\.ego: .*highway-env's own here.*got 'veh0'"):
         gymnasium.make(ID, overrides=["traffic.ego=veh0"])

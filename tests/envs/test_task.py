@@ -119,9 +119,9 @@ def test_what_the_caller_fixes(fast: gymnasium.Env[Any, Any]) -> None:
     ("options", "message"),
     [
         ({"visibilty": 60}, "did you mean 'visibility'"),
-        ({"visibility": -5}, "at least 1 m"),
-        ({"visibility": True}, "at least 1 m"),
-        ({"overrides": "fog.visibility_m=70"}, "expected a list"),
+        ({"visibility": -5}, "a number ≥ 1 m"),
+        ({"visibility": True}, "a number ≥ 1 m"),
+        ({"overrides": "fog.visibility_m=70"}, "must be a list"),
         ({"driver": "reckless"}, "unknown driver"),
         ({"episode": {"fog": 1}}, r"info\['episode'\]"),
     ],
@@ -144,7 +144,7 @@ def test_splits_share_no_seed() -> None:
 @pytest.mark.parametrize(("distribution", "drawn"), [(None, 5), (ScenarioDistribution(), 5), ([MOTORWAY], 1)])
 def test_fog_is_drawn_unless_scenarios_bring_their_own(distribution: Any, drawn: int) -> None:
     source, rng = EpisodeSource(None, distribution, None, (), "train"), np.random.default_rng(0)
-    fogs = {repr(source.draw(rng, EpisodeChoice.of(None))[1].scenario.fog) for _ in range(5)}
+    fogs = {repr(source.draw(rng, EpisodeChoice())[1].scenario.fog) for _ in range(5)}
     assert len(fogs) == drawn
 
 
@@ -184,7 +184,7 @@ def test_a_night_that_may_come_is_prepared(light: dict[str, float], prepared: bo
     ("make", "message"),
     [
         (lambda: FogDistribution(visibility=(100.0, 50.0)), "FogDistribution.visibility"),
-        (lambda: FogDistribution(clear_share=1.5), "FogDistribution.clear_share"),
+        (lambda: FogDistribution(clear_share=1.5), "FogDistribution: clear_share"),
         (lambda: ScenarioDistribution(light={"noon": 1.0}), "unknown name 'noon'"),
         (lambda: ScenarioDistribution(scripts={"lead": 0.0}), "not all 0"),
         (lambda: ScenarioDistribution(lanes=()), "at least one"),

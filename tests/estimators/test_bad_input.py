@@ -199,14 +199,14 @@ def test_a_calibration_that_is_no_number_cannot_be_made(key, value):
 
 GREY = np.full((ROWS, COLS), 90, np.uint8)
 WRONG_IMAGES = {
-    "none": (None, "numpy array of uint8, got NoneType"),
-    "a list": ([[1, 2], [3, 4]], "numpy array of uint8, got list"),
-    "floats": (GREY / 255.0, "must have dtype uint8.*got float64"),
-    "NaN": (np.full((ROWS, COLS), np.nan), "must have dtype uint8.*got float64"),
-    "truth values": (GREY > 3, "must have dtype uint8.*got bool"),
-    "int64": (GREY.astype(np.int64), "must have dtype uint8.*got int64"),
+    "none": (None, "an array of uint8 or an array of uint16, got None"),
+    "a list": ([[1, 2], [3, 4]], r"an array of uint8 .*, got \[\[1, 2\], \[3, 4\]\]"),
+    "floats": (GREY / 255.0, r"an array of uint8 .*, got an array of float64, shape \(240, 320\)"),
+    "NaN": (np.full((ROWS, COLS), np.nan), "an array of uint8 .*, got an array of float64"),
+    "truth values": (GREY > 3, "an array of uint8 .*, got an array of bool"),
+    "int64": (GREY.astype(np.int64), "an array of uint8 .*, got an array of int64"),
     "16 bits": (GREY.astype(np.uint16), "8 bits must have dtype uint8.*got uint16"),
-    "objects": (GREY.astype(object), "must have dtype uint8.*got object"),
+    "objects": (GREY.astype(object), "an array of uint8 .*, got an array of object"),
     "empty": (np.zeros((0, 0), np.uint8), "0×0 pixels.*told as 320×240"),
     "one row": (GREY[0], r"shape \(rows, cols\) or \(rows, cols, 3\), got \(320,\)"),
     "two channels": (np.dstack([GREY] * 2), r"got \(240, 320, 2\)"),
@@ -290,11 +290,11 @@ def test_an_odd_sign_is_refused_or_made_nothing_of(method, field, value, sequenc
 
 WRONG_TIMES = (
     (PERIOD, r"before that of an earlier one, 0\.8 s, got 0\.4 s; call reset\(\)"),
-    (math.nan, "finite number of seconds, got nan"),
-    (math.inf, "finite number of seconds, got inf"),
-    (-math.inf, "finite number of seconds, got -inf"),
-    (None, "finite number of seconds, got None"),
-    ("3", "finite number of seconds, got '3'"),
+    (math.nan, "time must be a number, finite, got nan"),
+    (math.inf, "time must be a number, finite, got inf"),
+    (-math.inf, "time must be a number, finite, got -inf"),
+    (None, "time must be a number, finite, got None"),
+    ("3", "time must be a number, finite, got '3'"),
 )
 
 

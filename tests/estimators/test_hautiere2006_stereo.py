@@ -88,7 +88,7 @@ def test_bad_pairs_are_refused():
     left, right = pair(100.0)
     with pytest.raises(InputError, match="640×480"):
         seen(left, right[:, 1:])
-    with pytest.raises(InputError, match="dtype uint8"):
+    with pytest.raises(InputError, match="image must be an array of uint8"):
         seen(left, right.astype(float))
     for baseline in (0.0, -1.0, math.nan, math.inf):
         with pytest.raises(InputError, match="baseline"):

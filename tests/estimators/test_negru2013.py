@@ -237,7 +237,7 @@ def test_nothing_odd_gets_out_of_random_pictures(seed):
         (np.zeros((480, 640), np.float32), "float32"),
         (np.zeros((480, 640, 4), np.uint8), r"\(480, 640, 4\)"),
         (np.zeros(480, np.uint8), r"\(480,\)"),
-        ([[0]], "list"),
+        ([[0]], r"frame must be .*, got \[\[0\]\]"),
     ],
 )
 def test_what_is_no_image_of_the_camera_is_an_error(road, image, message):

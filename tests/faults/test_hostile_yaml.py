@@ -146,7 +146,7 @@ def test_hostile_overrides_end_in_one_message(override: str, told: str) -> None:
 
 
 def test_overrides_are_a_list() -> None:
-    with pytest.raises(InputError, match=r"overrides must be a list of key\.path=value each, got the text 'fog.vis"):
+    with pytest.raises(InputError, match=r"overrides must be a list, each text, got 'fog\.vis"):
         load_scenario("motorway_fog_bank", "fog.visibility_m=80")
 
 

@@ -108,21 +108,21 @@ def test_directories_of_something_else_are_left_alone(tmp_path: Path) -> None:
     study = load_study(study_file(tmp_path))
     with pytest.raises(InputError, match="something else than a study"):
         StudyDirectory(tmp_path, study)
-    with pytest.raises(InputError, match="is a file"):
+    with pytest.raises(InputError, match="is not a folder; give the name of a folder"):
         StudyDirectory(study_file(tmp_path), study)
 
 
 def full_disk(monkeypatch: pytest.MonkeyPatch, ending: str) -> None:
     """No room for files of this ending."""
-    write = Path.write_bytes
+    opened = Path.open
 
-    def refuse(path: Path, data: bytes) -> int:
-        if path.name.endswith(f"{ending}.part"):
+    def refuse(path: Path, mode: str = "r", *about: Any, **more: Any) -> Any:
+        if path.name.endswith(f"{ending}.part") and "w" in mode:
             path.touch()
             raise OSError(errno.ENOSPC, "No space left on device")
-        return write(path, data)
+        return opened(path, mode, *about, **more)
 
-    monkeypatch.setattr(Path, "write_bytes", refuse)
+    monkeypatch.setattr(Path, "open", refuse)
 
 
 @pytest.mark.parametrize("ending", ["study.json", "0.json", "parquet", "study.csv", "comparison.csv", "svg", "html"])

@@ -2,7 +2,7 @@
 
 import functools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +12,12 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError, MissingDependencyError
+from fogsim.parameters import checked_parameters
+from fogsim.randomness import Seed
 from fogsim.road_advice import RoadAdvice, stretch_advices
 from fogsim.scenario import Scenario, build, load_scenario, override
 from fogsim.values import Command, Display, Ending, TrafficStep
-from fogsim_envs.actions import checked_action
+from fogsim_envs.actions import checked_action, checked_options
 from fogsim_envs.corridor.loops import InductionLoops
 from fogsim_envs.corridor.observation import (
     SHOWN_SPEEDS,
@@ -27,7 +29,7 @@ from fogsim_envs.corridor.observation import (
 )
 from fogsim_envs.corridor.rewards import CorridorReward, CorridorWeights
 from fogsim_envs.corridor.road import SignedRoad, signed_road
-from fogsim_envs.hosting import TIMEOUT, TrafficSimulation, begin_traffic, checked_timeout
+from fogsim_envs.hosting import TIMEOUT, Timeout, TrafficSimulation, begin_traffic, checked_timeout
 from fogsim_envs.task.episodes import FogDistribution
 from fogsim_envs.task.sampling import EpisodeChoice, EpisodeSource
 
@@ -46,6 +48,7 @@ DEMANDS = (600.0, 1200.0, 1800.0, 2400.0)
 """Demand of the default task, each as likely [1/h]."""
 
 
+@checked_parameters
 class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not typed
     """Show speeds on the message signs of a motorway in fog, a sign an agent; a ``pettingzoo.ParallelEnv``.
 
@@ -104,9 +107,9 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
         *,
         fog_distribution: FogDistribution | None = None,
         split: str = "train",
-        overrides: Sequence[str] = (),
+        overrides: Iterable[str] = (),
         reward_weights: CorridorWeights | None = None,
-        timeout: float = TIMEOUT,
+        timeout: Timeout = TIMEOUT,
     ) -> None:
         checked_timeout(timeout)
         self._timeout, self._weights = timeout, reward_weights or CorridorWeights()
@@ -144,8 +147,9 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
         """
         return self._action_spaces[agent]
 
+    @checked_parameters
     def reset(
-        self, seed: int | None = None, options: Mapping[str, Any] | None = None
+        self, seed: Seed | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[dict[str, NDArray[np.float32]], dict[str, dict[str, Any]]]:
         """Begin an episode.
 
@@ -161,14 +165,14 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
         InputError
             If an option is unknown or does not fit, or the scenario has another number of signs.
         """
-        if seed is not None:
-            self._rng = np.random.default_rng(seed)
         known = {name: value for name, value in (options or {}).items() if name != "options"}
         if "driver" in known:
             raise InputError("options['driver']: is the ego's, and the road has none; it is drivers.speed_choice here")
-        run_seed, drawn = self._source.draw(self._rng, EpisodeChoice.of(known))
+        choice = checked_options(EpisodeChoice, known)
+        rng = self._rng if seed is None else np.random.default_rng(seed)
+        run_seed, drawn = self._source.draw(rng, choice)
         scenario = drawn.scenario
-        self._road = self._checked_road(scenario)
+        self._road, self._rng = self._checked_road(scenario), rng
         self._simulation, self._step = begin_traffic(self._simulation, scenario, run_seed, self._timeout)
         self._loops = InductionLoops(
             loop_places(self._road.starts, self._road.length), self._road.axis, scenario.traffic.along
@@ -193,6 +197,7 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
             )
         return road
 
+    @checked_parameters
     def step(
         self, actions: Mapping[str, Any]
     ) -> tuple[
@@ -219,7 +224,9 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
         if not self.agents:
             raise gymnasium.error.ResetNeeded("the episode is over or none has begun: call reset() before step()")
         if set(actions) != set(self.agents):
-            raise InputError(f"actions: expected one for each of {', '.join(self.agents)}, got {', '.join(actions)}")
+            raise InputError(
+                f"actions: expected one for each of {', '.join(self.agents)}, got {', '.join(map(str, actions))}"
+            )
         levels = [int(checked_action(actions[agent], self._action_spaces[agent], agent)) for agent in self.agents]
         self._shown = tuple(SHOWN_SPEEDS[level] for level in levels)
         terms = self._move()

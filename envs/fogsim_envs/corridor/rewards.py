@@ -7,6 +7,7 @@ import numpy as np
 from fogsim.kinematics import stopping_sight_distance
 from fogsim.metrics import DEFAULT_STANDARD, SafetyStandard, time_to_collision
 from fogsim.metrics.following import find_following
+from fogsim.parameters import checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import TrafficStep
 
@@ -16,6 +17,7 @@ _CLEAR = 1e-6
 """Extinction coefficient of air in which everybody sees far enough [1/m]."""
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class CorridorWeights:
     """Weights of the terms, in points.

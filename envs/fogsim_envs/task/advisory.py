@@ -1,7 +1,7 @@
 """The agent advises the ego's speed and chooses its lamps, in another fog, traffic and light each episode."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import gymnasium
@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from fogsim.advised_driving import AdvisedDriving, spread_advice
 from fogsim.ego.view_rendering import prepare_lamplight
 from fogsim.errors import InputError, UnknownNameError
+from fogsim.parameters import checked_parameters
+from fogsim.randomness import Seed
 from fogsim.scenario import Scenario, build
 from fogsim.values import Command, Ending, Step
-from fogsim_envs.actions import checked_action
-from fogsim_envs.hosting import TIMEOUT, Simulation, begin, begin_anew, checked_timeout
+from fogsim_envs.actions import checked_action, checked_options
+from fogsim_envs.hosting import TIMEOUT, Simulation, Timeout, begin, begin_anew, checked_timeout
 from fogsim_envs.rendering import RENDER_MODES, StepRenderer, render_modes
-from fogsim_envs.spaces import action_space, command_of
+from fogsim_envs.spaces import ImageSize, action_space, command_of
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
 from fogsim_envs.task.observation import task_observation, task_space
 from fogsim_envs.task.own_driver import OwnDriver
@@ -25,6 +27,7 @@ from fogsim_envs.task.rewards import TaskWeights, Way, fault, strikes, task_term
 from fogsim_envs.task.sampling import AnyScenario, EpisodeChoice, EpisodeSource
 
 
+@checked_parameters
 class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
     """Advise a vehicle's speed and lamps in fog that only its camera can judge, another one each episode.
 
@@ -104,12 +107,12 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         fog_distribution: FogDistribution | None = None,
         split: str = "train",
         observation: str = "dict",
-        overrides: Sequence[str] = (),
-        image_size: tuple[int, int] | None = (160, 120),
+        overrides: Iterable[str] = (),
+        image_size: ImageSize | None = (160, 120),
         continuous: bool = False,
         reward_weights: TaskWeights | None = None,
         render_mode: str | None = None,
-        timeout: float = TIMEOUT,
+        timeout: Timeout = TIMEOUT,
     ) -> None:
         checked_timeout(timeout)
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
@@ -135,7 +138,8 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         modes = [mode for mode in self.metadata["render_modes"] if mode in render_modes()]
         self.metadata = {"render_modes": modes, "render_fps": 1 / first.clocks.decision_period_s}
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+    @checked_parameters
+    def reset(self, *, seed: Seed | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin an episode.
 
         Parameters
@@ -152,8 +156,9 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         InputError
             If an option is unknown or does not fit.
         """
-        super().reset(seed=seed)
-        run_seed, drawn = self._source.draw(self.np_random, EpisodeChoice.of(options))
+        choice = checked_options(EpisodeChoice, options)
+        super().reset(seed=None if seed is None else int(seed))
+        run_seed, drawn = self._source.draw(self.np_random, choice)
         scenario = drawn.scenario
         self._check_camera(scenario)
         self._step = self._completed(self._begin(scenario, run_seed))

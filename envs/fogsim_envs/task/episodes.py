@@ -5,11 +5,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from fogsim.errors import InputError
+from fogsim.errors import InputError, UnknownNameError
+from fogsim.parameters import Range, checked_parameters
 from fogsim.traffic import SPEED_CHOICES
 
 _LIGHT = {"day": (2000.0, 40_000.0), "dusk": (10.0, 2000.0), "night": (0.1, 0.3)}
@@ -27,6 +28,10 @@ _SCRIPTS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 """Who is about the ego, by name. Actors are few, so that networks and route files are written once."""
 
 
+_Share = Annotated[float, Range(0.0, 1.0)]
+
+
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class Episode:
     """One episode, as far as it was drawn.
@@ -48,6 +53,10 @@ class Episode:
     light: str = ""
     script: str = ""
 
+    def __post_init__(self) -> None:
+        """Refuse a driver that is not known."""
+        check_driver(self.driver)
+
     def as_info(self) -> dict[str, Any]:
         """Plain data for ``info["episode"]``."""
         return {
@@ -58,6 +67,24 @@ class Episode:
         }
 
 
+def check_driver(driver: str) -> None:
+    """Refuse a driver of the ego that is not known.
+
+    Parameters
+    ----------
+    driver : str
+        How fast it goes in fog without advice.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such driver.
+    """
+    if driver not in SPEED_CHOICES:
+        raise UnknownNameError("driver", driver, SPEED_CHOICES)
+
+
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class FogDistribution:
     """Which fog there may be along the ego's way.
@@ -90,22 +117,20 @@ class FogDistribution:
     """
 
     visibility: tuple[float, float] = (25.0, 1000.0)
-    clear_share: float = 0.1
-    even_share: float = 0.25
+    clear_share: _Share = 0.1
+    even_share: _Share = 0.25
     bank_length: tuple[float, float] = (300.0, 1500.0)
     bank_edge: tuple[float, float] = (30.0, 300.0)
     outside_visibility: tuple[float, float] = (200.0, 2000.0)
     ahead: tuple[float, float] = (300.0, 800.0)
     reach: float = 2500.0
-    patchy_share: float = 0.25
+    patchy_share: _Share = 0.25
 
     def __post_init__(self) -> None:
         for name in ("ahead", "visibility", "bank_length", "bank_edge", "outside_visibility"):
             _check_range(f"FogDistribution.{name}", getattr(self, name), 1.0)
         if self.ahead[1] > self.reach:
             raise InputError(f"FogDistribution.reach: expected at least ahead, {self.ahead!r}, got {self.reach!r}")
-        for name in ("clear_share", "even_share", "patchy_share"):
-            _check_share(f"FogDistribution.{name}", getattr(self, name))
 
     def draw(self, rng: np.random.Generator, visibility: float | None = None) -> dict[str, Any]:
         """Fog of an episode, as a scenario's block ``fog``.
@@ -174,6 +199,7 @@ def _placed(
     return placed
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class ScenarioDistribution:
     """Which traffic, light, script and vehicle there may be.
@@ -202,9 +228,9 @@ class ScenarioDistribution:
         If a name is unknown or a weight or number cannot be.
     """
 
-    lanes: tuple[int, ...] = (2, 3)
-    demand: tuple[float, ...] = (300.0, 900.0, 1500.0, 2100.0)
-    truck_shares: tuple[float, ...] = (0.1, 0.25)
+    lanes: tuple[Annotated[int, Range(1, 6)], ...] = (2, 3)
+    demand: tuple[Annotated[float, Range(0.0, math.inf, "/h")], ...] = (300.0, 900.0, 1500.0, 2100.0)
+    truck_shares: tuple[_Share, ...] = (0.1, 0.25)
     light: Mapping[str, float] = field(default_factory=lambda: {"day": 0.5, "dusk": 0.2, "night": 0.3})
     scripts: Mapping[str, float] = field(
         default_factory=lambda: {
@@ -284,11 +310,6 @@ def _check_range(name: str, limits: Sequence[float], least: float) -> None:
     low, high = limits
     if not (least <= low <= high and math.isfinite(high)):
         raise InputError(f"{name}: expected two numbers, {least:g} ≤ lower ≤ upper, got {tuple(limits)!r}")
-
-
-def _check_share(name: str, share: float) -> None:
-    if not 0.0 <= share <= 1.0:
-        raise InputError(f"{name}: expected a share in 0 … 1, got {share!r}")
 
 
 def _check_weights(name: str, weights: Mapping[str, float], known: Sequence[str]) -> None:

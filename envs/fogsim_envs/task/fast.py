@@ -1,7 +1,7 @@
 """The task of `fogsim_envs.task.advisory` without frames: estimates are drawn as they were measured to err."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere import extinction
 from fogsim.fusion import fuse
+from fogsim.parameters import checked_parameters
 from fogsim.recorders import FramePanel, draw_view_from_above
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.section import Method
 from fogsim.values import Step
-from fogsim_envs.hosting import TIMEOUT
+from fogsim_envs.hosting import TIMEOUT, Timeout
 from fogsim_envs.rendering import RENDER_MODES, StepRenderer
 from fogsim_envs.task.advisory import FogAdvisoryV1Env
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
@@ -32,6 +33,7 @@ FAST_FOG = FogDistribution(ahead=(400.0, 400.0), reach=1500.0)
 FAST_SCENARIO = ScenarioDistribution(demand=(200.0, 500.0, 800.0, 1200.0))
 
 
+@checked_parameters
 class FogAdvisoryFastEnv(FogAdvisoryV1Env):
     """Advise a vehicle's speed and lamps in fog, without frames: for fast learning.
 
@@ -63,15 +65,15 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
         scenario_distribution: ScenarioDistribution | Sequence[str | Path | Scenario] | None = None,
         fog_distribution: FogDistribution | None = None,
         split: str = "train",
-        overrides: Sequence[str] = (),
+        overrides: Iterable[str] = (),
         continuous: bool = False,
         reward_weights: TaskWeights | None = None,
         render_mode: str | None = None,
-        surrogate: Path | None = None,
-        timeout: float = TIMEOUT,
+        surrogate: str | Path | None = None,
+        timeout: Timeout = TIMEOUT,
     ) -> None:
         is_own = is_own_motorway(scenario, scenario_distribution)
-        table = SurrogateTable.load() if surrogate is None else SurrogateTable.load(surrogate)
+        table = SurrogateTable.load() if surrogate is None else SurrogateTable.load(Path(surrogate))
         self._surrogate = EstimatorSurrogate(table)
         super().__init__(
             scenario,

@@ -3,12 +3,14 @@
 import dataclasses
 import json
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any
 
 import numpy as np
 
 from fogsim.errors import InputError
+from fogsim.parameters import NUMBER, checked_parameters
+from fogsim.randomness import Seed
 from fogsim.scenario import Scenario
 from fogsim.traffic.highway import LEAD
 from fogsim.values import Ending, Step
@@ -20,6 +22,7 @@ from fogsim_envs.highway import (
     one_frame_clocks,
 )
 from fogsim_envs.hosting import TIMEOUT
+from fogsim_envs.spaces import ImageSize
 from fogsim_envs.task.advisory import FogAdvisoryV1Env
 from fogsim_envs.task.episodes import Episode, FogDistribution, ScenarioDistribution
 from fogsim_envs.task.rewards import TaskWeights
@@ -66,6 +69,7 @@ class HighwayDistribution(ScenarioDistribution):
         return Episode((*settings, f"traffic.events={json.dumps([brake])}"), drawn.driver, drawn.light, drawn.script)
 
 
+@checked_parameters
 class FogHighwayV1Env(FogAdvisoryV1Env):
     """Advise a vehicle's speed and lamps in fog, in the traffic of highway-env, in another fog each episode.
 
@@ -101,13 +105,13 @@ class FogHighwayV1Env(FogAdvisoryV1Env):
         environment: str = "highway-fast-v0",
         config: Mapping[str, Any] | None = None,
         *,
-        way: float = WAY,
+        way: Annotated[float, NUMBER] = WAY,
         scenario_distribution: HighwayDistribution | None = None,
         fog_distribution: FogDistribution = HIGHWAY_FOG,
         split: str = "train",
         observation: str = "dict",
-        overrides: Sequence[str] = (),
-        image_size: tuple[int, int] | None = (160, 120),
+        overrides: Iterable[str] = (),
+        image_size: ImageSize | None = (160, 120),
         continuous: bool = False,
         reward_weights: TaskWeights | None = None,
         render_mode: str | None = None,
@@ -131,7 +135,8 @@ class FogHighwayV1Env(FogAdvisoryV1Env):
             timeout=TIMEOUT,
         )
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+    @checked_parameters
+    def reset(self, *, seed: Seed | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin an episode; see `FogAdvisoryV1Env.reset`, but for ``scenario``, which there is none to choose from.
 
         Parameters

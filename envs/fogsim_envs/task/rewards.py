@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from fogsim.kinematics import stopping_sight_distance
 from fogsim.metrics import DEFAULT_STANDARD, SafetyStandard
+from fogsim.parameters import checked_parameters
 from fogsim.values import Ending, Lamp, Step
 
 COMFORTABLE_DECELERATION = 2.0
@@ -17,6 +18,7 @@ FRONT_FOG_LAMP_VISIBILITY = 100.0
 """Front fog lamps are lit below this visibility and not above [m] (Highway Code, rules 226 and 236)."""
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class TaskWeights:
     """Weights of the terms, in points: a drive at the limit all the way with nothing amiss is worth 40.

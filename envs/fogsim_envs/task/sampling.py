@@ -1,17 +1,19 @@
 """Draws episodes: from distributions, or as the caller of ``reset`` fixes them."""
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from fogsim.errors import InputError, UnknownNameError
+from fogsim.errors import InputError, UnknownNameError, shown
+from fogsim.parameters import Range
 from fogsim.scenario import Scenario, load_scenario, override
-from fogsim.traffic import SPEED_CHOICES
 from fogsim.units import DAY_ILLUMINANCE
-from fogsim_envs.task.episodes import Episode, FogDistribution, ScenarioDistribution, fog_setting
+from fogsim_envs.task.episodes import Episode, FogDistribution, ScenarioDistribution, check_driver, fog_setting
 
 MOTORWAY = Path(__file__).with_name("motorway.yaml")
 """The road of the default task."""
@@ -25,8 +27,9 @@ AnyScenario = str | Path | Scenario | Callable[[Sequence[str]], Scenario]
 _KEPT_SCENARIOS = 8
 
 
-class EpisodeChoice(NamedTuple):
-    """What of an episode is not to be drawn.
+@dataclass(frozen=True, slots=True)
+class EpisodeChoice:
+    """What of an episode is not to be drawn: the options of ``reset``.
 
     Attributes
     ----------
@@ -34,48 +37,42 @@ class EpisodeChoice(NamedTuple):
         The scenario.
     visibility : float or None
         Visibility where the fog is densest [m].
-    overrides : tuple of str
+    overrides : iterable of str
         ``key.path=value`` each, after all others.
     driver : str or None
         The ego's own driver.
-    episode : Episode or None
-        All that is drawn.
+    episode : Episode or mapping or None
+        All that is drawn, or its `Episode.as_info`.
+
+    Raises
+    ------
+    InputError
+        If the driver is unknown or the episode is none.
     """
 
     scenario: AnyScenario | None = None
-    visibility: float | None = None
-    overrides: tuple[str, ...] = ()
+    visibility: Annotated[float, Range(1.0, math.inf, "m")] | None = None
+    overrides: Iterable[str] = ()
     driver: str | None = None
-    episode: Episode | None = None
+    episode: Episode | Mapping[str, Any] | None = None
 
-    @classmethod
-    def of(cls, options: Mapping[str, Any] | None) -> "EpisodeChoice":
-        """Read the options of ``reset``.
+    def __post_init__(self) -> None:
+        """Refuse a driver or an episode that cannot be."""
+        if self.driver is not None:
+            check_driver(self.driver)
+        _ = self.told_episode
 
-        Parameters
-        ----------
-        options : mapping or None
-            Options by the names of the attributes.
-
-        Raises
-        ------
-        InputError
-            If one is unknown or does not fit.
-        """
-        given = dict(options or {})
-        for name in given:
-            if name not in cls._fields:
-                raise UnknownNameError("option of reset()", name, cls._fields)
-        overrides = given.get("overrides", ())
-        if isinstance(overrides, str) or not all(isinstance(one, str) for one in overrides):
-            raise InputError(f"options['overrides']: expected a list of 'key.path=value', got {overrides!r}")
-        return cls(
-            given.get("scenario"),
-            _checked_visibility(given.get("visibility")),
-            tuple(overrides),
-            _checked_driver(given.get("driver")),
-            _told_episode(given.get("episode")),
-        )
+    @property
+    def told_episode(self) -> Episode | None:
+        """The episode that is given."""
+        if not isinstance(self.episode, Mapping):
+            return self.episode
+        keys = {one.name for one in fields(Episode)}
+        if set(self.episode) != keys:
+            raise InputError(
+                f"options['episode']: expected info['episode'], with {sorted(keys)}, got {shown(self.episode)}"
+            )
+        return Episode(**self.episode)
 
 
 class Drawn(NamedTuple):
@@ -176,7 +173,7 @@ class EpisodeSource:
         seed = 2 * number + self._split
         own = np.random.default_rng(seed)
         named = self._scenarios[int(own.integers(len(self._scenarios)))]
-        episode = choice.episode or self._episode(own, choice.visibility)
+        episode = choice.told_episode or self._episode(own, choice.visibility)
         if choice.driver is not None:
             episode = Episode(episode.settings, choice.driver, episode.light, episode.script)
         settings = [*episode.settings, *self._overrides]
@@ -208,26 +205,3 @@ def _several(scenarios: object) -> tuple[AnyScenario, ...]:
     raise InputError(
         f"scenario_distribution: expected a ScenarioDistribution, or a sequence of scenarios, got {scenarios!r}"
     )
-
-
-def _checked_visibility(visibility: object) -> float | None:
-    if visibility is None:
-        return None
-    if isinstance(visibility, bool) or not isinstance(visibility, (int, float)) or not visibility >= 1.0:
-        raise InputError(f"options['visibility']: expected a visibility of at least 1 m, or inf, got {visibility!r}")
-    return float(visibility)
-
-
-def _checked_driver(driver: object) -> str | None:
-    if driver is not None and driver not in SPEED_CHOICES:
-        raise UnknownNameError("driver", driver, SPEED_CHOICES)
-    return None if driver is None else str(driver)
-
-
-def _told_episode(told: object) -> Episode | None:
-    if told is None or isinstance(told, Episode):
-        return told
-    keys = {"settings", "driver", "light", "script"}
-    if not isinstance(told, Mapping) or set(told) != keys:
-        raise InputError(f"options['episode']: expected what info['episode'] told, with {sorted(keys)}, got {told!r}")
-    return Episode(tuple(told["settings"]), str(told["driver"]), str(told["light"]), str(told["script"]))

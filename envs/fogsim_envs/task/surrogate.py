@@ -15,6 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.errors import InputError, shown
+from fogsim.files.readers import read_json
+from fogsim.parameters import checked_parameters
 from fogsim.units import visibility_from_extinction
 from fogsim.values import Estimate
 
@@ -39,6 +42,7 @@ def light_class(illuminance: float) -> int:
     return 0 if illuminance >= _DAY else 1 if illuminance >= _DUSK else 2
 
 
+@checked_parameters
 @dataclass(frozen=True, slots=True)
 class SurrogateTable:
     """How an estimator was measured to err, by light (rows) and visibility ahead (columns).
@@ -83,12 +87,30 @@ class SurrogateTable:
         ----------
         path : Path
             File from `as_json`.
+
+        Raises
+        ------
+        InputError
+            If it is no such file.
         """
-        written: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        fields: dict[str, Any] = {
-            name: np.array(value) if isinstance(value, list) else value for name, value in written.items()
-        }
-        return cls(**fields)
+        written = read_json(path)
+        if not isinstance(written, dict):
+            raise InputError(f"{path}: expected an object, got {shown(written)}")
+        try:
+            fields: dict[str, Any] = {n: np.array(one) if isinstance(one, list) else one for n, one in written.items()}
+            return cls(**fields)
+        except ValueError as error:
+            raise InputError(f"{path}: {error}") from error
+
+    def __post_init__(self) -> None:
+        """Refuse arrays whose shapes do not fit together."""
+        shape = len(LIGHTS), len(self.edges) - 1
+        for name in ("stays_valid", "becomes_valid", "none_seen", "error", "deviation", "none_deviation"):
+            found: Table = getattr(self, name)
+            if found.shape[:2] != shape or found.ndim > 3:
+                raise InputError(
+                    f"SurrogateTable: {name} must have the shape {shape} or {shape} and quantiles, got {found.shape}"
+                )
 
     def as_json(self) -> str:
         """The table as JSON, its numbers with four digits after the point."""

@@ -6,11 +6,13 @@ and it ends with the vehicle.
 """
 
 import json
+import secrets
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from fogsim.traffic.sumo.link import Api, vehicle_getter
+from fogsim.errors import SimulationError
+from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
 
 SOLE_SESSION = "1"
 """Name of a session that has its simulation for itself."""
@@ -142,6 +144,40 @@ def new_session(api: Api) -> str:
     number = int(api.simulation.getParameter("", _SESSIONS) or 0) + 1
     api.simulation.setParameter("", _SESSIONS, str(number))
     return str(number)
+
+
+class LoadMark:
+    """A mark of one session in a simulation, which SUMO forgets when another simulation is loaded in its place.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    session : str
+        Name of the session.
+    """
+
+    def __init__(self, api: Api, session: str) -> None:
+        self._read = getter(api, "simulation", "getParameter")
+        self._key, self._value = f"fogsim.mark.{session}", secrets.token_hex(8)
+        api.simulation.setParameter("", self._key, self._value)
+
+    def is_there(self) -> bool:
+        """Whether the simulation is still the one that was marked."""
+        return bool(self._read("", self._key) == self._value)
+
+    def check(self) -> None:
+        """Refuse another simulation.
+
+        Raises
+        ------
+        SimulationError
+            If another simulation was loaded.
+        """
+        if not self.is_there():
+            raise SimulationError(
+                "the simulation was loaded again while FogSim was using it: attach to it, or start the run, again"
+            )
 
 
 class SessionValues(Generic[_Value]):

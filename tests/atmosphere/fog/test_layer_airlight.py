@@ -190,7 +190,7 @@ def test_transmittance_is_that_of_koschmieder() -> None:
     ("wrong", "told"),
     [
         ({"ground_albedo": 1.2}, "albedo of the ground must lie within 0 … 1, got 1.2"),
-        ({"ground_albedo": math.nan}, "albedo of the ground must lie within 0 … 1, got nan"),
+        ({"ground_albedo": math.nan}, "ground_albedo must be a number, finite or nothing, got nan"),
         ({"ground_albedo": RHO, "top": math.inf}, "even layer of fog on flat land, not with no top"),
         ({"ground_albedo": RHO, "banks": (FogBank((0, 0), (1, 0), 0, 50, 10, 0.1),)}, "not with banks"),
         ({"ground_albedo": RHO, "patches": FogPatches(20, 5, 0.3)}, "not with patches"),

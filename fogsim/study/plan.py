@@ -5,7 +5,7 @@ import hashlib
 import itertools
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -220,7 +220,7 @@ def _digest(path: Path, _: int) -> str:
 
 @checked_parameters
 def load_study(
-    name_or_path: str | Path, settings: Sequence[str] = (), may_import: MayImport = import_anything
+    name_or_path: str | Path, settings: Iterable[str] = (), may_import: MayImport = import_anything
 ) -> Study:
     """Read a study file and check every scenario of its grid, before anything is run.
 
@@ -228,7 +228,7 @@ def load_study(
     ----------
     name_or_path : str or Path
         The file, or the name of a study that comes with FogSim (`fogsim.study.shipped_studies`).
-    settings : sequence of str
+    settings : iterable of str
         ``key.path=value`` each, put in place of the scenario's in every run, after those of the file.
     may_import : callable
         As of `load_scenario`.

@@ -17,12 +17,12 @@ from fogsim.cli.doctor import doctor_command
 from fogsim.cli.images.estimate import estimate_command
 from fogsim.cli.images.fog import fog_command
 from fogsim.cli.images.restore import restore_command
+from fogsim.cli.option_values import check_values
 from fogsim.cli.printing import BAD_INPUT, print_error, print_remarks, stdout
 from fogsim.cli.recover import recover_command
 from fogsim.cli.reproduce import reproduce_command
 from fogsim.cli.run import run_command
-from fogsim.cli.scenarios import list_command, validate_command
-from fogsim.cli.signs import signs_command
+from fogsim.cli.scenarios import list_command, signs_command, validate_command
 from fogsim.cli.starting import new_command, schema_command
 from fogsim.cli.study import study_command
 from fogsim.cli.test import check_command
@@ -74,6 +74,7 @@ app.add_typer(calibrate, name="calibrate")
 app.command("reproduce")(reproduce_command)
 app.command("compile")(compile_command)
 app.command("doctor")(doctor_command)
+check_values(app)
 
 
 def main() -> None:

@@ -17,6 +17,7 @@ mount_height_m: 1.3
 pitch_deg: 0
 response: srgb
 """
+FULL = "error: the operating system refused: [Errno 28] No space left on device"
 ESTIMATE = "-m fogsim estimate photo.png --camera camera.yaml --method negru2013 --json"
 
 
@@ -44,7 +45,7 @@ def run_in_shell(command: str, folder: Path) -> tuple[int, str, str]:
         (
             "-m fogsim --version >/dev/full",
             2,
-            "error: the operating system refused: [Errno 28] No space left on device",
+            FULL,
         ),
     ],
 )
@@ -65,7 +66,8 @@ from fogsim.files.standard_streams import open_standard_streams
 open_standard_streams()
 print("lost", flush=True)
 sys.stdin.read(), sys.stderr.write("lost")
-open("file", "w").write(json.dumps([os.open(".", os.O_RDONLY), subprocess.call("echo lost; echo lost >&2", shell=True)]))
+child = subprocess.call("echo lost; echo lost >&2", shell=True)
+open("file", "w").write(json.dumps([os.open(".", os.O_RDONLY), child]))
 """
 
 

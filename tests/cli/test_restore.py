@@ -113,9 +113,9 @@ def test_a_video_in_which_no_fog_is_found_leaves_nothing(folder: Path, foggy: np
     [
         (("nofog.png", *FOG), "nofog.png: there is no such file"),
         (("fog.png", *FOG, "--method", "plannar"), "did you mean 'planar'"),
-        (("fog.png", *WITH_CAMERA, "--visibility", "0"), "expected a number from 0.1 to inf"),
+        (("fog.png", *WITH_CAMERA, "--visibility", "0"), "--visibility: expected a number from"),
         (("fog.png", *FOG, "--method", "dark_channel"), "--visibility goes with planar"),
-        (("fog.png", *FOG, "--most-gain", "0"), "expected a number from 1 to 1000"),
+        (("fog.png", *FOG, "--most-gain", "0"), "--most-gain: expected a number from"),
         (("fog.png", *FOG, "--airlight", "white"), "--airlight: expected a pixel value"),
         (("fog.png", *FOG, "--out", "fog.png", "--overwrite"), "would replace what is read"),
         (("fog.png", *FOG, "--out", "no/out.png"), "there is no folder no"),

@@ -135,7 +135,8 @@ def test_the_end_of_a_video_that_is_cut_off_is_told(fogsim, folder: Path) -> Non
     read = len(records) - 1
     assert 5 < read < 55
     told = f"cut.mp4: the video is cut off or damaged: {read} of 60 frames could be read"
-    assert records[-1] == {"frame": read, "error": told}
+    assert records[-1]["frame"] == read
+    assert records[-1]["error"].startswith(told)
     assert told in err
 
 

@@ -148,7 +148,9 @@ def _numbers(path: Path) -> NDArray[np.float64]:
         raise InputError(f"{path}: cannot be read as an array of numbers: {reason}") from error
     if not isinstance(loaded, np.ndarray) or loaded.dtype.kind not in "fiu":
         raise InputError(f"{path}: expected an array of numbers, got {getattr(loaded, 'dtype', type(loaded).__name__)}")
-    return np.asarray(loaded.squeeze(), dtype=np.float64)
+    while loaded.ndim > 2 and 1 in loaded.shape:
+        loaded = loaded.squeeze(loaded.shape.index(1))
+    return np.asarray(loaded, dtype=np.float64)
 
 
 def _steps(path: Path, scale: float | None) -> NDArray[np.float64]:

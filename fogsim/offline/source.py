@@ -244,8 +244,8 @@ class VideoFile:
         if failed or said or is_short:
             frames = f"{read} of {self.count} frames" if is_short else f"{read} frames"
             reason = f" ({_ADDRESS.sub('', said[0])})" if said else ""
-            told = f"{self.path}: the video is cut off or damaged: {frames} could be read{reason}"
-            yield Picture(read, read * self.period, None, told)
+            message = f"{self.path}: the video is cut off or damaged: {frames} could be read{reason}"
+            yield Picture(read, read * self.period, None, message)
 
 
 def _number(text: str) -> float:

@@ -13,6 +13,7 @@ from multiprocessing.connection import Connection
 from typing import Annotated, Any, Protocol, cast
 
 from fogsim.errors import InputError, SimulationError, SimulationRunningError
+from fogsim.files.standard_streams import open_standard_streams
 from fogsim.loop import ClosedLoop
 from fogsim.parameters import Range
 from fogsim.scenario import Scenario
@@ -184,6 +185,7 @@ class _Host:
         self._open()
 
     def _open(self) -> None:
+        open_standard_streams()
         ours, theirs = Pipe()
         self._connection: Connection[Any, Any] = ours
         # A fresh interpreter, not a fork (which a GL context does not survive) and not multiprocessing's spawn (which

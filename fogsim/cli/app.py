@@ -1,6 +1,8 @@
 """``fogsim …``: the commands put together; errors that a user can mend, signals and exit codes."""
 
 import contextlib
+import errno
+import os
 import sys
 import warnings
 from typing import Annotated
@@ -15,12 +17,12 @@ from fogsim.cli.doctor import doctor_command
 from fogsim.cli.images.estimate import estimate_command
 from fogsim.cli.images.fog import fog_command
 from fogsim.cli.images.restore import restore_command
+from fogsim.cli.option_values import check_values
 from fogsim.cli.printing import BAD_INPUT, FAILED, print_error, print_remarks, stdout
 from fogsim.cli.recover import recover_command
 from fogsim.cli.reproduce import reproduce_command
 from fogsim.cli.run import run_command
-from fogsim.cli.scenarios import list_command, validate_command
-from fogsim.cli.signs import signs_command
+from fogsim.cli.scenarios import list_command, signs_command, validate_command
 from fogsim.cli.starting import new_command, schema_command
 from fogsim.cli.study import study_command
 from fogsim.cli.test import check_command
@@ -72,6 +74,7 @@ app.add_typer(calibrate, name="calibrate")
 app.command("reproduce")(reproduce_command)
 app.command("compile")(compile_command)
 app.command("doctor")(doctor_command)
+check_values(app)
 
 
 def main() -> None:
@@ -96,17 +99,31 @@ def main() -> None:
 
 def _run_app() -> object:
     """Run the command that was given, and return what it exits with."""
+    code: object = 0
     try:
         with warnings.catch_warnings():
             # Without the place in the code that Python adds.
             warnings.showwarning = lambda message, *_, **__: print_remarks("warning", (message,), in_one_line=False)
             app()
     except SystemExit as end:
-        return end.code
+        code = end.code
     except FogSimError as error:
         print_error(error)
-        return FAILED if isinstance(error, MethodError) else BAD_INPUT
+        code = FAILED if isinstance(error, MethodError) else BAD_INPUT
     except OSError as error:
         print_error(f"the operating system refused: {error}")
-        return BAD_INPUT
-    return 0
+        code = BAD_INPUT
+    return code if _flush_stdout() else code or BAD_INPUT
+
+
+def _flush_stdout() -> bool:
+    """Write what is left in the buffer of stdout, and report whether it could be written."""
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        if error.errno != errno.EPIPE:
+            print_error(f"stdout: cannot be written: {error.strerror}")
+        # Python would try again when it ends, and print a traceback.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return False
+    return True

@@ -27,7 +27,7 @@ def calibrate_signs_command(
     camera: Annotated[Path, typer.Option(help="Camera file (docs/how_to/own_camera.md), of images that are straight.")],
     sign_diameter: Annotated[float, typer.Option(help="Size of the signs in m.", min=0.1, max=5.0)] = 0.9,
     out: Annotated[Path, typer.Option(help="File of the calibration.")] = Path("signs_range.json"),
-    approaches: Annotated[int, typer.Option(help="Signs that are driven up to in each fog.", min=4)] = 24,
+    approaches: Annotated[int, typer.Option(help="Signs that are driven up to in each fog.", min=4, max=100_000)] = 24,
     seed: Annotated[int, typer.Option(help="Of places, errors and noise.", min=0)] = 0,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it is there already.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the calibration in place of the table.")] = False,
@@ -75,7 +75,9 @@ def calibrate_signs_command(
 def calibrate_halos_command(
     camera: Annotated[Path, typer.Option(help="Camera file (docs/how_to/own_camera.md), of images that are straight.")],
     out: Annotated[Path, typer.Option(help="File of the calibration.")] = Path("halos.json"),
-    scenes: Annotated[int, typer.Option(help="Scenes that are drawn, each in clear air and in fog.", min=4)] = 80,
+    scenes: Annotated[
+        int, typer.Option(help="Scenes that are drawn, each in clear air and in fog.", min=4, max=100_000)
+    ] = 80,
     lens_glare: Annotated[
         float, typer.Option(help="Share of lamps' light that the lens scatters.", min=0.0, max=1.0)
     ] = 0.01,

@@ -19,12 +19,12 @@ from fogsim.cli.scenario_options import (
 
 def dataset_command(
     out: Annotated[Path, typer.Option(help="Directory; one that was interrupted is continued.")],
-    frames: Annotated[int, typer.Option(help="How many frames.")],
+    frames: Annotated[int, typer.Option(min=1, max=1_000_000, help="How many frames.")],
     scenario: ScenarioName = None,
     sumocfg: SumoConfiguration = None,
     ego: EgoId = None,
-    seed: Annotated[int, typer.Option(help="Seed of the first run; further runs have the next ones.")] = 0,
-    every: Annotated[int, typer.Option(help="Take one frame of so many.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the first run; further runs have the next ones.")] = 0,
+    every: Annotated[int, typer.Option(min=1, max=1_000_000, help="Take one frame of so many.")] = 1,
     visibility: HomogeneousVisibility = None,
     settings: Settings = None,
 ) -> None:

@@ -3,6 +3,7 @@
 Results go to stdout, all else to stderr.
 """
 
+import contextlib
 from collections.abc import Iterable
 
 from rich.console import Console
@@ -61,7 +62,9 @@ def print_error(error: object) -> None:
     error : object
         The error, or its message.
     """
-    stderr.print(f"[bold red]error:[/] {escape(error)}", soft_wrap=True)
+    # The exit code counts, also where stderr takes no line.
+    with contextlib.suppress(OSError):
+        stderr.print(f"[bold red]error:[/] {escape(error)}", soft_wrap=True)
 
 
 def print_remarks(label: str, remarks: Iterable[object], *, in_one_line: bool = True) -> None:

@@ -68,7 +68,8 @@ def run_command(
     ego: EgoId = None,
     visibility: HomogeneousVisibility = None,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="The same seed gives the same run, bit for bit. [0, or the case's]")
+        int | None,
+        typer.Option(min=0, help="The same seed gives the same run, bit for bit. [0, or the case's]"),
     ] = None,
     case: CaseValues = "",
     out: Annotated[
@@ -95,7 +96,7 @@ def run_command(
     camera_processes: Annotated[
         int | None,
         typer.Option(
-            min=0, help="Processes that draw for equipped vehicles beside the ego. [one less than processors]"
+            min=0, max=1024, help="Processes that draw for equipped vehicles beside the ego. [one less than processors]"
         ),
     ] = None,
     method_timeout: MethodTimeout = None,

@@ -1,6 +1,7 @@
 """Arguments and options that several commands share, and the scenario that they stand for."""
 
 import json
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -20,7 +21,7 @@ ScenarioName = Annotated[str | None, typer.Argument(help=SCENARIO_HELP)]
 SumoConfiguration = Annotated[Path | None, typer.Option(help="A SUMO configuration, in place of a scenario.")]
 EgoId = Annotated[str | None, typer.Option(help="Id of the vehicle that is the ego; none for traffic alone.")]
 HomogeneousVisibility = Annotated[
-    float | None, typer.Option(help="Meteorological visibility of homogeneous fog in metres.", min=1.0)
+    float | None, typer.Option(help="Meteorological visibility of homogeneous fog in metres.", min=1.0, max=math.inf)
 ]
 Settings = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY.PATH=VALUE", help="Put a value in place of the file's.")

@@ -1,12 +1,13 @@
-"""``fogsim list`` and ``fogsim validate``: which scenarios and methods there are, and what is wrong with a file."""
+"""``fogsim list``, ``validate`` and ``signs``: scenarios and methods, mistakes in a file, and the signs of a world."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.table import Table
 
 from fogsim.cli.printing import BAD_INPUT, escape, print_error, stdout
-from fogsim.cli.scenario_options import CodeNotice
+from fogsim.cli.scenario_options import SCENARIO_HELP, CodeNotice, Settings
 from fogsim.errors import FogSimError
 
 
@@ -59,3 +60,19 @@ def validate_command(
             stdout.print(f"[green]fine:[/] {escape(file)} ({escape(cases[0][1].name)}{number})", soft_wrap=True)
     if bad:
         raise typer.Exit(BAD_INPUT)
+
+
+def signs_command(
+    scenario: Annotated[str, typer.Argument(help=SCENARIO_HELP)],
+    out: Annotated[Path, typer.Option(help="GeoJSON file.")] = Path("signs.geojson"),
+    settings: Settings = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it is there already.")] = False,
+) -> None:
+    """Write the signs of a scenario's road network, additional files and OpenDRIVE signals as GeoJSON."""
+    from fogsim.recording import record_signs
+    from fogsim.registry.user_code import import_nothing
+    from fogsim.scenario import load_scenario
+
+    loaded = load_scenario(scenario, settings or (), may_import=import_nothing)
+    signs = record_signs(loaded, out, overwrite=overwrite).signs
+    stdout.print(f"{len(signs)} sign{'' if len(signs) == 1 else 's'}: {escape(out)}", soft_wrap=True)

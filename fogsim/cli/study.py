@@ -25,7 +25,7 @@ def study_command(
         Path | None, typer.Option(help="Directory; one that was interrupted is continued. [runs/STUDY]")
     ] = None,
     processes: Annotated[
-        int | None, typer.Option("-j", "--processes", min=1, help="Runs at once. [one a core]")
+        int | None, typer.Option("-j", "--processes", min=1, max=1024, help="Runs at once. [one a core]")
     ] = None,
     engine: Annotated[
         EngineName, typer.Option(help="What runs the runs: processes of this machine, or a Ray cluster.")

@@ -27,7 +27,7 @@ def check_command(
     files: Annotated[list[str] | None, typer.Argument(help="Files, folders or scenarios. [the current folder]")] = None,
     out: Annotated[Path, typer.Option(help="Directory of what came of them.")] = Path("runs/tests"),
     processes: Annotated[
-        int | None, typer.Option("-j", "--processes", min=1, help="Runs at once. [one a core]")
+        int | None, typer.Option("-j", "--processes", min=1, max=1024, help="Runs at once. [one a core]")
     ] = None,
     junit: Annotated[Path | None, typer.Option(help="Write JUnit's XML, for CI servers, to this file.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a page with plots and videos to this file.")] = None,

@@ -27,7 +27,7 @@ def view_command(
     sumocfg: SumoConfiguration = None,
     ego: EgoId = None,
     visibility: HomogeneousVisibility = None,
-    at: Annotated[float, typer.Option(min=0.0, help="Instant of the run [s].")] = 0.0,
+    at: Annotated[float, typer.Option(min=0.0, max=1e6, help="Instant of the run [s].")] = 0.0,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Write what the window would show to this image instead.")] = None,
     settings: Settings = None,

@@ -4,15 +4,17 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, NonNegativeInt, PositiveInt, ValidationError
 
 from fogsim.dataset.encoding import png
-from fogsim.errors import InputError
-from fogsim.files.atomic import PARTIAL_SUFFIX, write_bytes, write_json
+from fogsim.errors import InputError, shown
+from fogsim.files.atomic import write_bytes, write_json
 from fogsim.files.output_targets import refuse_unwritable_folder
+from fogsim.files.readers import read_bytes, read_json
 from fogsim.files.writer_lock import LOCK_NAME, WriterLock
 
 IDENTITY = "dataset.json"
@@ -21,6 +23,23 @@ LAYERS = ("frames", "depth", "instance", "semantic", "transmission", "sign_map",
 """Folders of the images."""
 
 _RECORDS = "records"
+
+
+class _ImageEntry(BaseModel, strict=True):
+    """What continuing a data set, or a reader of its COCO file, needs of a frame's entry."""
+
+    width: PositiveInt
+    height: PositiveInt
+    run: NonNegativeInt
+    seed: NonNegativeInt
+    step: NonNegativeInt
+
+
+class _Record(BaseModel, strict=True):
+    """File of one frame."""
+
+    image: _ImageEntry
+    annotations: list[dict[str, Any]]
 
 
 class DatasetDirectory:
@@ -72,17 +91,17 @@ class DatasetDirectory:
     def _check(self, identity: dict[str, Any]) -> None:
         if not (self.path / IDENTITY).is_file():
             there = sorted(p.name for p in self.path.iterdir())
-            strangers = [name for name in there if name not in (LOCK_NAME, IDENTITY + PARTIAL_SUFFIX)]
+            begun = partial_path(self.path / IDENTITY).name
+            strangers = [name for name in there if name not in (LOCK_NAME, begun)]
             if strangers:
                 raise InputError(
                     f"{self.path} holds files that are no data set of FogSim's ({strangers[0]}, …); "
                     "choose another directory with --out"
                 )
             return
-        try:
-            there = json.loads((self.path / IDENTITY).read_text(encoding="utf-8"))
-        except ValueError as error:
-            raise InputError(f"{self.path / IDENTITY} cannot be read: {error}") from error
+        there = read_json(self.path / IDENTITY)
+        if not isinstance(there, dict):
+            raise InputError(f"{self.path / IDENTITY}: expected what a data set was made from, got {shown(there)}")
         unlike = _differences(there, json.loads(json.dumps(identity)))
         if unlike:
             raise InputError(
@@ -91,15 +110,8 @@ class DatasetDirectory:
             )
 
     def has(self, number: int) -> bool:
-        """Tell whether a frame is there with all its files.
-
-        Parameters
-        ----------
-        number : int
-            Its place in the data set, from 0.
-        """
-        files = [*(self._layer(layer, number) for layer in LAYERS), self._record(number)]
-        return all(file.is_file() for file in files)
+        """Whether a frame has all its files and a record that is whole; otherwise it is made again."""
+        return all(self._layer(layer, number).is_file() for layer in LAYERS) and self._found(number) is not None
 
     def beyond(self, frames: int) -> int:
         """How many frames there are in all, where they are more than these; else 0.
@@ -109,7 +121,7 @@ class DatasetDirectory:
         frames : int
             How many are wanted.
         """
-        numbers = [int(p.stem) for p in (self.path / _RECORDS).glob("*.json")]
+        numbers = [int(p.stem) for p in (self.path / _RECORDS).glob("[0-9]*.json") if p.stem.isdecimal()]
         return len(numbers) if any(number >= frames for number in numbers) else 0
 
     def write(
@@ -133,33 +145,39 @@ class DatasetDirectory:
         """
         for layer in LAYERS:
             path, data = self._layer(layer, number), png(layers[layer])
-            if path.exists() and path.read_bytes() != data:
+            if path.exists() and read_bytes(path) != data:
                 raise InputError(
                     f"{path} is there and is not what this data set has there; move it away to have it made again"
                 )
             write_bytes(path, data)
-        names = {_key(layer): self._layer(layer, number).relative_to(self.path).as_posix() for layer in LAYERS}
-        write_json(self._record(number), {**record, "image": {**names, **record["image"]}})
+        write_json(self._record(number), {**record, "image": {**self._names(number), **record["image"]}})
 
     def record(self, number: int) -> dict[str, Any]:
-        """Record of a frame that is there.
-
-        Parameters
-        ----------
-        number : int
-            Its place in the data set, from 0.
+        """Record of a frame that `has` reports.
 
         Raises
         ------
         InputError
-            If it cannot be read.
+            If it has been damaged since.
         """
-        path = self._record(number)
-        try:
-            found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        except ValueError as error:
-            raise InputError(f"{path} cannot be read: {error}; remove it to have its frame made again") from error
+        found = self._found(number)
+        if found is None:
+            raise InputError(f"{self._record(number)}: damaged; the same command makes its frame again")
         return found
+
+    def _found(self, number: int) -> dict[str, Any] | None:
+        """Record of a frame; None if there is none, or it is damaged."""
+        try:
+            found = read_json(self._record(number))
+            entry = _Record.model_validate(found).image
+        except (InputError, ValidationError):
+            return None
+        is_own = found["image"].items() >= self._names(number).items() and entry.run <= number
+        return cast("dict[str, Any]", found) if is_own else None
+
+    def _names(self, number: int) -> dict[str, str]:
+        """Files of a frame, as its record has them."""
+        return {_key(layer): self._layer(layer, number).relative_to(self.path).as_posix() for layer in LAYERS}
 
     def write_annotations(self, annotations: Mapping[str, Any]) -> None:
         """Write the COCO file, in place of one that is there.

@@ -1,5 +1,6 @@
 """Ground truth as PNG files: what their values mean, and how to read them back."""
 
+import contextlib
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import FogSimError, InputError
+from fogsim.files.readers import read_bytes
 
 DEPTH_UNIT = 0.01
 """Distance that one step of a depth image stands for [m]."""
@@ -113,8 +115,10 @@ def read_png(path: Path) -> NDArray[np.uint8] | NDArray[np.uint16]:
     InputError
         If it is no PNG file that can be read.
     """
-    data = np.frombuffer(Path(path).read_bytes(), np.uint8)
-    image: NDArray[Any] | None = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+    data = np.frombuffer(read_bytes(Path(path)), np.uint8)
+    image: NDArray[Any] | None = None
+    with contextlib.suppress(cv2.error, MemoryError):  # of a header that announces more pixels than OpenCV reads
+        image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
     if image is None:
         raise InputError(f"{path} is no image that can be read")
     return image if image.ndim == 2 else np.ascontiguousarray(image[..., ::-1])

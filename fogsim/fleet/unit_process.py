@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from multiprocessing.connection import Connection
 
 from fogsim.errors import SimulationError
+from fogsim.files.standard_streams import open_standard_streams
 from fogsim.fleet.on_board_unit import Instant, Lookout, UnitPool
 from fogsim.scenario import Scenario
 from fogsim.values import EquippedVehicle, RoadNetwork, SignMap
@@ -40,6 +41,7 @@ class UnitProcess:
             See there.
         """
         if self._process is None:
+            open_standard_streams()
             # None of this process's simulation, threads and contexts in it.
             context = multiprocessing.get_context("forkserver")
             self._link, theirs = context.Pipe()

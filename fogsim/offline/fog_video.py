@@ -60,21 +60,26 @@ def fog_video(
     Raises
     ------
     InputError
-        If anything does not fit, the video is cut off, or there is a file `out` that must not be replaced.
+        If anything does not fit, there is a file `out` that must not be replaced, or, when `out` is written, the video
+        is cut off or damaged.
     """
     camera = road.calibration.camera
     refuse_unfit_video(out, video.paths, camera, kind="fogged", overwrite=overwrite)
     refuse_other_size(video.path, video.size, camera)
     distance, sines = road.distance(), road.sines()
     air: NDArray[np.float64] | None = None
+    damage = ""
     with VideoWriter(out, video.period) as writer:
         for picture in video.pictures():
             if picture.image is None:
-                raise InputError(picture.error)
+                damage = picture.error
+                continue
             if air is None:
                 air = _airlight(picture.image, distance, camera, airlight, layer)
             writer.write(fog_image(picture.image, distance, visibility, camera, air, layer, sines))
             yield air
+    if damage:
+        raise InputError(f"{damage}; {out} has what could be read")
 
 
 def _airlight(

@@ -137,8 +137,9 @@ def _check_values(mount_height: float | None, field_of_view: float | None) -> No
 def _spread(source: Source) -> Iterator[Pixels]:
     """Images of one size, spread over the source."""
     every = max(1, math.ceil(source.count / MOST_IMAGES))
-    size, name = None, None
+    size, name, reason = None, None, ""
     for index, picture in enumerate(source.pictures()):
+        reason = reason or picture.error
         if index % every or picture.image is None:
             continue
         if size is None:
@@ -146,7 +147,7 @@ def _spread(source: Source) -> Iterator[Pixels]:
         _refuse_other_size(picture, picture.image, size, name)
         yield picture.image
     if size is None:
-        raise InputError("none of the images can be read")
+        raise InputError(f"none of the images can be read: {reason}")
 
 
 def _refuse_other_size(picture: Picture, image: Pixels, size: tuple[int, ...], name: str | int | None) -> None:

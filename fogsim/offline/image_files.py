@@ -16,6 +16,7 @@ from PIL import Image, UnidentifiedImageError
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.files.atomic import write_bytes
 from fogsim.files.output_targets import refuse_unwritable
+from fogsim.files.readers import read_bytes
 from fogsim.values import Camera
 
 DEPTH_KINDS = ("planar", "range")
@@ -23,6 +24,9 @@ DEPTH_KINDS = ("planar", "range")
 
 CHECKED_FORMATS = ("JPEG", "PNG", "BMP", "PPM")
 """Pillow's names of formats of which OpenCV may show as much as there is of a file."""
+
+MOST_BYTES = 2**31
+"""Largest file of an image or a depth map [bytes]."""
 
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -48,17 +52,14 @@ def read_image(path: Path) -> Pixels:
 
 
 def _decoded(path: Path) -> NDArray[np.generic]:
-    try:
-        data = np.fromfile(path, dtype=np.uint8)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
-    if not data.size:
+    data = read_bytes(path, MOST_BYTES)
+    if not data:
         raise InputError(f"{path}: the file is empty")
-    _refuse_damaged(path, data.tobytes())
+    _refuse_damaged(path, data)
     # OpenCV would print lines of its own about what is told below.
     level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
-        image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     except (cv2.error, MemoryError):
         image = None
     finally:
@@ -141,15 +142,17 @@ def read_distance(depth_map: DepthMap, camera: Camera) -> NDArray[np.float64]:
 
 def _numbers(path: Path) -> NDArray[np.float64]:
     try:
-        # A file of our own: numpy leaves one open where an archive is none.
-        with path.open("rb") as file:
-            loaded = np.load(file, allow_pickle=False)
-    except (OSError, ValueError, EOFError, MemoryError, zipfile.BadZipFile) as error:
-        reason = (getattr(error, "strerror", None) or str(error) or "too little memory").splitlines()[0]
+        loaded = np.load(io.BytesIO(read_bytes(path, MOST_BYTES)), allow_pickle=False)
+    except InputError:
+        raise
+    except (ValueError, EOFError, MemoryError, zipfile.BadZipFile) as error:
+        reason = (str(error) or "too little memory").splitlines()[0]
         raise InputError(f"{path}: cannot be read as an array of numbers: {reason}") from error
     if not isinstance(loaded, np.ndarray) or loaded.dtype.kind not in "fiu":
         raise InputError(f"{path}: expected an array of numbers, got {getattr(loaded, 'dtype', type(loaded).__name__)}")
-    return np.asarray(loaded.squeeze(), dtype=np.float64)
+    while loaded.ndim > 2 and 1 in loaded.shape:
+        loaded = loaded.squeeze(loaded.shape.index(1))
+    return np.asarray(loaded, dtype=np.float64)
 
 
 def _steps(path: Path, scale: float | None) -> NDArray[np.float64]:

@@ -272,15 +272,16 @@ def restore_video(
     Raises
     ------
     InputError
-        If anything does not fit, the video is cut off, or fog is found in no frame.
+        If anything does not fit, fog is found in no frame, or, when `out` is written, the video is cut off or damaged.
     """
     refuse_unfit_video(out, source.paths, camera, kind="restored", overwrite=overwrite)
-    found, reason = False, ""
+    found, reason, damage = False, "", ""
     with VideoWriter(out, source.period) as writer:
         for one in restored_images(source, camera, wish):
             seen = one.picture.image
             if seen is None:
-                raise InputError(one.picture.error)
+                damage = one.picture.error
+                continue
             as_it_was = np.concatenate([seen, seen], axis=1) if wish.beside else seen
             writer.write(as_it_was if one.image is None else one.image)
             found, reason = found or one.image is not None, reason or one.reason
@@ -289,3 +290,5 @@ def restore_video(
             raise InputError(
                 f"{source.paths[0]}: {reason}, nor in any other frame; --visibility restores it all the same"
             )
+    if damage:
+        raise InputError(f"{damage}; {out} has what could be read")

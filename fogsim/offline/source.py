@@ -2,6 +2,7 @@
 
 import re
 import subprocess
+import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -122,8 +123,18 @@ def _red_first(stored: Pixels) -> Pixels:
 
 _DURATION = re.compile(r"Duration: (\d+):(\d+):(\d+(?:\.\d+)?)")
 _RATE = re.compile(r"Video:.*?(\d+(?:\.\d+)?k?) (?:fps|tbr)")
+_ADDRESS = re.compile(r" @ 0x[0-9a-f]+")
 MOST_MISSING = 0.5
 """Time by which a whole video's pictures may end before its header says, as where its sound lasts longer [s]."""
+
+MOST_SAID = 100_000
+"""Bytes of ffmpeg's messages that are read."""
+
+CONTAINERS = "mov,matroska,avi,mpeg,mpegvideo,mpegts,asf,flv,m4v,h264,hevc"
+"""ffmpeg's names of the formats that are read: none that opens further files or addresses, such as a playlist."""
+
+MOST_PIXELS = 16_384**2 // 2
+"""Most pixels of a frame [px]."""
 
 _HEADER_LINES = 3  # P6, size, largest value: https://netpbm.sourceforge.net/doc/ppm.html as ffmpeg writes it
 
@@ -168,6 +179,9 @@ class VideoFile:
         InputError
             If it cannot be read as one, or has no frames.
         """
+        # ffmpeg would wait for a writer of a pipe.
+        if not path.is_file():
+            raise InputError(f"{path}: cannot be read: not a regular file")
         done = subprocess.run(  # noqa: S603 - imageio's own ffmpeg with arguments made here
             _command(path, "-frames:v", "1"), stdin=subprocess.DEVNULL, capture_output=True, check=False
         )
@@ -203,24 +217,35 @@ class VideoFile:
         return (self.path,)
 
     def pictures(self) -> Iterator[Picture]:
-        """Read the frames; where the file is damaged, ffmpeg mends or leaves out what it can.
+        """Read the frames; where the file is damaged, ffmpeg conceals or leaves out what it cannot decode.
 
-        Of one that ends before its time the last has no image, and how many frames are missing as its ``error``.
+        After the frames of a damaged video, or of one that ends before its time, comes a picture without image, whose
+        ``error`` has the number of frames that were read and what ffmpeg said first.
         """
         read = 0
-        with subprocess.Popen(  # noqa: S603 - imageio's own ffmpeg with arguments made here
-            _command(self.path), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
-        ) as process:
+        # A file, not a pipe, which could fill up while frames are read.
+        with (
+            tempfile.TemporaryFile() as complaints,
+            subprocess.Popen(  # noqa: S603 - imageio's own ffmpeg with arguments made here
+                _command(self.path, log="error"), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=complaints
+            ) as process,
+        ):
             assert process.stdout is not None  # noqa: S101 - it was opened as a pipe
             try:
                 for image in _frames(process.stdout):
                     yield Picture(read, read * self.period, image)
                     read += 1
+                failed = process.wait() != 0
             finally:
                 process.kill()
-        if self.duration and self.count - read > max(MOST_MISSING / self.period, 2):
-            told = f"{self.path}: the video is cut off or damaged: {read} of {self.count} frames could be read"
-            yield Picture(read, read * self.period, None, told)
+            complaints.seek(0)
+            said = complaints.read(MOST_SAID).decode(errors="replace").splitlines()
+        is_short = bool(self.duration) and self.count - read > max(MOST_MISSING / self.period, 2)
+        if failed or said or is_short:
+            frames = f"{read} of {self.count} frames" if is_short else f"{read} frames"
+            reason = f" ({_ADDRESS.sub('', said[0])})" if said else ""
+            message = f"{self.path}: the video is cut off or damaged: {frames} could be read{reason}"
+            yield Picture(read, read * self.period, None, message)
 
 
 def _number(text: str) -> float:
@@ -228,13 +253,16 @@ def _number(text: str) -> float:
     return 1000.0 * float(text[:-1]) if text.endswith("k") else float(text)
 
 
-def _command(path: Path, *limits: str) -> list[str]:
+def _command(path: Path, *limits: str, log: str = "info") -> list[str]:
     """Command line of a decoder that writes frames as PPM images, one behind the other."""
-    source = ["-i", f"file:{path}", "-map", "0:v:0", *limits]
+    allowed = ["-protocol_whitelist", "file", "-format_whitelist", CONTAINERS, "-max_pixels", str(MOST_PIXELS)]
+    source = [*allowed, "-i", f"file:{path}", "-map", "0:v:0", *limits]
     return [
         ffmpeg_program(),
         "-hide_banner",
         "-nostdin",
+        "-loglevel",
+        log,
         *source,
         "-f",
         "image2pipe",

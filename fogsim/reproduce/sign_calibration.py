@@ -70,6 +70,11 @@ def measure_operating_range(
     found: dict[float, list[_Approach]] = {v: [] for v in fogs}
     part, noise = _cropped(camera), PoseNoise()
     reach = min(max(80.0, 1.3 * fogs[-1]), 0.25 * camera.focal_length * diameter)
+    if reach - _NEAREST < step:
+        raise InputError(
+            f"a camera with a focal length of {camera.focal_length:g} px shows a sign of {diameter:g} m on too few "
+            "pixels to detect it: expected a longer focal length or a larger sign"
+        )
     for number in range(approaches):
         rng = np.random.default_rng((seed, number))
         sign = sign_beside("s", KINDS[number % len(KINDS)], reach, diameter, rng)

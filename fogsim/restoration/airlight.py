@@ -39,7 +39,8 @@ def horizon_airlight(pixels: Pixels, camera: Camera, full: int) -> Light:
     """
     rows = pixels.shape[0]
     bottom = round(min(max(camera.horizon_row, BAND * rows), rows))
-    light = _blocks(pixels[max(bottom - round(BAND * rows), 0) : max(bottom, 1)], camera, full)
+    band = max(round(BAND * rows), 1)
+    light = _blocks(pixels[max(bottom - band, 0) : max(bottom, 1)], camera, full)
     brightness = _luminance(light)
     brightest = light[brightness >= np.quantile(brightness, 1.0 - BRIGHTEST)]
     return np.asarray(np.maximum(np.median(brightest, axis=0), DARKEST), np.float64)

@@ -194,7 +194,8 @@ def restored_pixels(
 def _value(light: Any, scale: Any, values: Pixels) -> Any:
     """Pixel value of light."""
     place = light * scale + np.float32(0.5)
-    return values[np.int64(min(max(place, np.float32(0.0)), np.float32(len(values) - 1)))]
+    # The bound stands first: it, and not NaN, is what a comparison with NaN gives.
+    return values[np.int64(min(np.float32(len(values) - 1), max(np.float32(0.0), place)))]
 
 
 @kernel

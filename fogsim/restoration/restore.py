@@ -17,6 +17,12 @@ MOST_GAIN = 5.0
 """Most by which light, and with it noise, is amplified if nothing else is asked for [-]; chosen on pool 0 of
 benchmarks/restoration.py: more shows vehicles farther away, and more that is none."""
 
+LARGEST_GAIN = 1000.0
+"""Largest bound of the gain [-]; from 255 on, a single step of 8 bits spans the whole range."""
+
+LEAST_LIGHT = 1e-12
+"""Least light that an airlight can have, relative to full scale [-]; no pixel value but black has less."""
+
 
 def restore_contrast(
     image: Pixels,
@@ -43,7 +49,7 @@ def restore_contrast(
     method : str
         A name in `fogsim.restoration.METHODS`.
     most_gain : float
-        Most by which light is amplified, at least 1 [-].
+        Most by which light is amplified, 1 … 1000 [-].
     tone_map : bool
         Make the result to be looked at; else its light is that of the scene, at the picture's exposure.
 
@@ -59,8 +65,8 @@ def restore_contrast(
     """
     chosen = METHODS.find(method)
     pixels, full = _checked(image, camera)
-    if not (most_gain >= 1.0 and math.isfinite(most_gain)):
-        raise InputError(f"most_gain must be a finite number of at least 1, got {most_gain!r}")
+    if not 1.0 <= most_gain <= LARGEST_GAIN:
+        raise InputError(f"most_gain must lie within 1 … {LARGEST_GAIN:g}, got {most_gain!r}")
     if extinction is not None and not (extinction >= 0.0 and math.isfinite(extinction)):
         raise InputError(f"extinction must be a finite number of 1/m, at least 0, got {extinction!r}")
     light = _airlight(pixels, camera, full, airlight, chosen)
@@ -102,7 +108,7 @@ def _airlight(
     if values.shape not in ((1,), (channels,)):
         raise InputError(f"airlight must be one pixel value or {channels}, got {values.size}")
     light = exposure_of(values / full, camera.response, camera.black_level)
-    if not ((light > 0.0).all() and (values <= full).all()):
+    if not ((light >= LEAST_LIGHT).all() and (values <= full).all()):
         told = ", ".join(f"{value:g}" for value in values)
         raise InputError(
             f"airlight must be brighter than black and at most {full:g}, the largest pixel value, got {told}"

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fogsim.files.atomic import write_json
+from fogsim.files.standard_streams import open_standard_streams
 from fogsim.scenario import Scenario
 from fogsim.study.engine import PROCESS_DIED, RunWatch, result_file
 from fogsim.study.execution import failure, run_to_file
@@ -104,6 +105,7 @@ def _submitted(pool: ProcessPoolExecutor, work: Work, run: StudyRun, result: Pat
 def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
     # One SUMO a process, and none of this process's threads or contexts in it: all are forked from a process that has
     # imported what they need and done nothing else.
+    open_standard_streams()
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["fogsim.study.execution"])
     pool = ProcessPoolExecutor(processes, mp_context=context, initializer=_leave_signals_to_parent)

@@ -174,7 +174,7 @@ def test_a_guessed_camera_is_written_and_good_to_use(estimate, folder: Path) -> 
         (("drive", "--camera", "camera.yaml", "--guess-camera", "--mount-height", "1.4"), "is there already"),
         (("drive", "--camera", "new.yaml", "--guess-camera"), "needs --mount-height"),
         (("drive", "--camera", "camera.yaml", "--overlay", "a.avi"), "ends in .mp4"),
-        (("drive", "--camera", "camera.yaml", "--rate", "-1"), "--rate must be"),
+        (("drive", "--camera", "camera.yaml", "--rate", "-1"), "--rate"),
         (("drive", "--camera", "aside.yaml"), "aside.yaml:8: yaw_deg must lie within -29.0 … 28.9"),
         (
             ("drive", "--camera", "new.yaml", "--guess-camera", "--mount-height", "1.4", "--horizon-row", "99999"),

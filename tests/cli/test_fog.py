@@ -63,8 +63,8 @@ def test_a_file_that_is_there_is_replaced_only_when_it_is_asked_for(folder: Path
     [
         (("--visibility", "80"), "--depth-kind is missing"),
         (("--visibility", "80", "--depth-kind", "rnage"), "did you mean 'range'"),
-        (("--visibility", "nan", "--depth-kind", "range"), "--visibility must be"),
-        (("--visibility", "80", "--depth-kind", "range", "--airlight", "white"), "--airlight white"),
+        (("--visibility", "nan", "--depth-kind", "range"), "--visibility: expected a number from"),
+        (("--visibility", "80", "--depth-kind", "range", "--airlight", "white"), "--airlight: expected a pixel value"),
         (("--visibility", "80", "--depth-kind", "range", "--depth", "none.npy"), "none.npy: cannot be read"),
         (
             ("--visibility", "80", "--depth-kind", "range", "--road-plane"),
@@ -72,7 +72,7 @@ def test_a_file_that_is_there_is_replaced_only_when_it_is_asked_for(folder: Path
         ),
         (
             ("--visibility", "80", "--depth-kind", "range", "--ground-albedo", "2"),
-            "--ground-albedo must lie within 0 … 1",
+            "--ground-albedo: expected a number from",
         ),
         (
             ("--visibility", "80", "--depth-kind", "range", "--layer-height", "9"),

@@ -182,7 +182,7 @@ GREY = np.zeros((120, 160), np.uint8)
         (GREY, {"extinction": -1.0}, r"extinction must be a finite number .* got -1.0"),
         (GREY, {"extinction": math.nan}, r"extinction must be"),
         (GREY, {"extinction": K, "method": "planer"}, r"did you mean 'planar'"),
-        (GREY, {"extinction": K, "most_gain": 0.5}, r"most_gain must be .* at least 1, got 0.5"),
+        (GREY, {"extinction": K, "most_gain": 0.5}, r"most_gain must lie within 1 … 1000, got 0.5"),
         (GREY, {"extinction": K, "airlight": (1.0, 2.0, 3.0)}, r"airlight must be one pixel value or 1, got 3"),
         (GREY, {"extinction": K, "airlight": (300.0,)}, r"airlight must be brighter than black and at most 255"),
         (GREY, {"extinction": K, "airlight": (math.nan,)}, r"airlight must be brighter"),

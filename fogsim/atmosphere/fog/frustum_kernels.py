@@ -213,7 +213,7 @@ def fog_rows_by_grid(
         down = (np.float32(v) - rows[upper]) / (rows[upper + 1] - rows[upper])
         interpolate_rows(depth[upper], depth[upper + 1], down, above)
         for u in range(columns):
-            reach[u] = min(distance[v, u], np.float32(ENDLESS))
+            reach[u] = max(np.float32(0.0), min(np.float32(ENDLESS), distance[v, u]))
             place[u] = np.int32(reach[u] / (reach[u] + fold) * np.float32(bins))
         for u in range(columns):
             n = interval[place[u]]

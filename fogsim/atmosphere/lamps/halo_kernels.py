@@ -120,13 +120,13 @@ def _place_about(
     ux, uy, uz = np.float32(ay * bz - az * by), np.float32(az * bx - ax * bz), np.float32(ax * by - ay * bx)
     quarter = np.float32(SIDES / 4)
     for p in range(place.shape[0]):
-        square = max(_TWO - _TWO * (x[p] * lx + y[p] * ly + z[p] * lz), _ZERO)
+        square = max(_ZERO, _TWO - _TWO * (x[p] * lx + y[p] * ly + z[p] * lz))
         place[p] = square / (square + _FOLD) * _LAST_WIDE
         right, above = x[p] * rx + y[p] * ry + z[p] * rz, x[p] * ux + y[p] * uy + z[p] * uz
         # An angle about the lamp without trigonometry: the share of a quarter turn by |above| / (|right| + |above|).
         bend = abs(above) / (abs(right) + abs(above) + _LEAST)
         half = bend if right >= _ZERO else _TWO - bend
-        turn[p] = min((half if above >= _ZERO else _FOUR - half) * quarter, _LAST_SIDE)
+        turn[p] = min(_LAST_SIDE, (half if above >= _ZERO else _FOUR - half) * quarter)
 
 
 @kernel
@@ -328,7 +328,7 @@ def add_glow_cores(
             height, start = np.float32((v - v0) ** 2), np.float32(first - u0)
             for n in range(size):
                 across = start + np.float32(np.int32(n))
-                place[n] = min(np.sqrt(height + across * across) * scale, last)
+                place[n] = min(last, np.sqrt(height + across * across) * scale)
             for n in range(size):
                 entry = np.uint32(place[n])
                 place[n] = profile[entry] + (profile[entry + _NEXT] - profile[entry]) * (place[n] - np.float32(entry))

@@ -248,7 +248,7 @@ def merge_lamps(
 @kernel
 def _glow(chord: float, line: NDArray[np.float64], fold: float) -> float:
     """Glow at a chord, from its values times chord."""
-    place = min(chord / (chord + fold) * (line.shape[0] - 1) * ((1.98 + fold) / 1.98), line.shape[0] - 1.001)
+    place = min(line.shape[0] - 1.001, chord / (chord + fold) * (line.shape[0] - 1) * ((1.98 + fold) / 1.98))
     c = int(place)
     return float((line[c] + (line[c + 1] - line[c]) * (place - c)) / chord)
 
@@ -294,7 +294,7 @@ def _row_of(depth: float, log_depth: NDArray[np.float64]) -> tuple[int, float, f
     place = (math.log(max(depth, 1e-9)) - log_depth[0]) / step
     # Below the table glow is proportional to optical depth.
     factor = math.exp(min(place, 0.0) * step)
-    place = min(max(place, 0.0), log_depth.shape[0] - 1.001)
+    place = min(log_depth.shape[0] - 1.001, max(0.0, place))
     return int(place), place - int(place), factor
 
 
@@ -373,7 +373,7 @@ def core_profiles(
         angle = pixel * max(lamp[AHEAD], BEHIND) ** 1.5
         flat = lamp[PIXELS] * angle**2 / math.pi + (0.5 * angle) ** 2
         chord = math.sqrt(flat)
-        place = min(chord / (chord + fold) * (line.shape[0] - 1), line.shape[0] - 2.0)
+        place = min(line.shape[0] - 2.0, chord / (chord + fold) * (line.shape[0] - 1))
         peak = light[i, 0] * gain * max(lines[row, int(place)], lines[row + 1, int(place)]) / chord
         bright[i] = peak > faintest and lamp[AHEAD] > BEHIND
         if not bright[i]:

@@ -224,7 +224,7 @@ def _node_places(
 ) -> None:
     """Where between the nodes of their rays, of which `last` is the last, the things are that chosen pixels see."""
     for u in range(count):
-        node[u] = min(last * length[u] / (length[u] + fold), last - np.float32(1e-3))
+        node[u] = min(last - np.float32(1e-3), last * length[u] / (length[u] + fold))
 
 
 @kernel

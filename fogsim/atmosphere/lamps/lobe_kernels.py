@@ -51,7 +51,7 @@ class LampShapes(NamedTuple):
 def _place(angle: float, end: float, fold: float, count: int) -> tuple[int, float]:
     """Entry of a folded axis before an angle, and the share of the next one."""
     place = (angle / (abs(angle) + fold) * (end + fold) / end * 0.5 + 0.5) * (count - 1)
-    place = min(max(place, 0.0), count - 1.001)
+    place = min(count - 1.001, max(0.0, place))
     return int(place), place - int(place)
 
 

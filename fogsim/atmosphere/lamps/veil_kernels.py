@@ -78,11 +78,11 @@ class LitAir(NamedTuple):
 @kernel
 def _intensity(table: NDArray[np.float32], forward: float, right: float, up: float, blur: float) -> float:
     """Intensity toward a place ahead of a lamp, blurred by an angle [cd]."""
-    column = min((right / (FOLD * forward + abs(right)) + 1.0) * _HALF, _LAST_CELL)
-    row = min((up / (FOLD * forward + abs(up)) + 1.0) * _HALF, _LAST_CELL)
-    level = blur / FIRST_BLUR
+    column = min(_LAST_CELL, (right / (FOLD * forward + abs(right)) + 1.0) * _HALF)
+    row = min(_LAST_CELL, (up / (FOLD * forward + abs(up)) + 1.0) * _HALF)
+    level = max(0.0, blur / FIRST_BLUR)
     if level > 1.0:
-        level = min(1.0 + math.log2(level), _LAST_BLUR)
+        level = min(_LAST_BLUR, 1.0 + math.log2(level))
     i, j, n = int(row), int(column), int(level)
     down, aside, between = row - i, column - j, level - n
     total = 0.0
@@ -123,13 +123,13 @@ def add_scattered_light(
         ux, uy, uz = directions[m, 0], directions[m, 1], directions[m, 2]
         for n in range(at.shape[0]):
             forward = at[n] * ux - offset[0]
-            if forward <= 0.0:
+            if not forward > 0.0:
                 continue
             left, up = at[n] * uy - offset[1], at[n] * uz - offset[2]
             square = forward * forward + left * left + up * up
             s = math.sqrt(square)
             cosine = -(forward * ux + left * uy + up * uz) / s
-            place = min(math.sqrt(max(0.5 + 0.5 * cosine, 0.0)) * (PHASE_SIZE - 1), PHASE_SIZE - 1.001)
+            place = min(PHASE_SIZE - 1.001, math.sqrt(max(0.0, 0.5 + 0.5 * cosine)) * (PHASE_SIZE - 1))
             i = int(place)
             share = place - i
             # Seen from near, a lamp is a disc: its beam is blurred by the disc's angle.

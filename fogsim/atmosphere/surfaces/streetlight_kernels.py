@@ -107,7 +107,7 @@ def add_lamp_illuminance(
                     continue
                 way = math.sqrt(square + height**2)
                 cosine = height / way
-                place = min(cosine * (intensity.shape[0] - 1), last)
+                place = min(last, cosine * (intensity.shape[0] - 1))
                 n = int(place)
                 candela = intensity[n] + (intensity[n + 1] - intensity[n]) * (place - n)
                 edge = 1.0 - square / farthest**2

@@ -37,7 +37,9 @@ def estimate_command(
             "--sequence/--stills", help="Images follow one another, or each stands alone. Default: by their names."
         ),
     ] = None,
-    rate: Annotated[float | None, typer.Option(help="Images of a sequence in a second. Default: 10.")] = None,
+    rate: Annotated[
+        float | None, typer.Option(min=1e-6, max=1e6, help="Images of a sequence in a second. Default: 10.")
+    ] = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace an overlay or a guessed camera file.")
     ] = False,
@@ -45,7 +47,9 @@ def estimate_command(
     track: Annotated[
         Path | None, typer.Option(help="Where the camera was: .gpx, or .csv with time_s, latitude, longitude.")
     ] = None,
-    track_offset: Annotated[float, typer.Option(help="Seconds of the track at the first image.")] = 0.0,
+    track_offset: Annotated[
+        float, typer.Option(min=-1e9, max=1e9, help="Seconds of the track at the first image.")
+    ] = 0.0,
     night: Annotated[
         bool, typer.Option("--night", help="A drive by night: methods that read lamplight, unless some are named.")
     ] = False,
@@ -53,19 +57,24 @@ def estimate_command(
         str | None, typer.Option(help="Own lamps that are lit by night, such as low_beam+front_fog. Default: low_beam.")
     ] = None,
     setback: Annotated[
-        float | None, typer.Option(help="Metres from the front bumper back to the lens, by night. Default: 1.9.")
+        float | None,
+        typer.Option(min=0, max=10, help="Metres from the front bumper back to the lens, by night. Default: 1.9."),
     ] = None,
     veil: Annotated[Path | None, typer.Option(help="File of fogsim calibrate veil.")] = None,
     halos: Annotated[Path | None, typer.Option(help="File of fogsim calibrate halos.")] = None,
     guess_camera: Annotated[
         bool, typer.Option("--guess-camera", help="Write the camera file from the images, and stop.")
     ] = False,
-    mount_height: Annotated[float | None, typer.Option(help="For a guess: metres from the road to the lens.")] = None,
+    mount_height: Annotated[
+        float | None, typer.Option(min=0.1, max=20, help="For a guess: metres from the road to the lens.")
+    ] = None,
     field_of_view: Annotated[
-        float | None, typer.Option(help="For a guess: degrees from the image's left edge to its right.")
+        float | None,
+        typer.Option(min=1, max=170, help="For a guess: degrees from the image's left edge to its right."),
     ] = None,
     horizon_row: Annotated[
-        float | None, typer.Option(help="For a guess: row of the horizon, in place of the lines of the road.")
+        float | None,
+        typer.Option(min=0, max=1e6, help="For a guess: row of the horizon, in place of the lines of the road."),
     ] = None,
 ) -> None:
     """Estimate the visibility in your own images or video (docs/how_to/estimate.md)."""

@@ -1,11 +1,13 @@
 """``fogsim fog``: homogeneous fog on an image or a video from disk."""
 
 import contextlib
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from fogsim.cli.option_values import pixel_values
 from fogsim.cli.printing import escape, print_remarks, stderr, stdout
 from fogsim.cli.progress import progress_bar
 from fogsim.errors import InputError
@@ -23,7 +25,10 @@ def fog_command(
         Path,
         typer.Argument(metavar="IMAGE|VIDEO", help="Of 8 or 16 bits, grey or colour; with --road-plane also a video."),
     ],
-    visibility: Annotated[float, typer.Option(help="Meteorological visibility in metres; inf gives the image back.")],
+    visibility: Annotated[
+        float,
+        typer.Option(min=0.1, max=math.inf, help="Meteorological visibility in metres; inf gives the image back."),
+    ],
     out: Annotated[Path, typer.Option(help="The fogged image, or .mp4 for a video.")],
     depth: Annotated[
         Path | None, typer.Option(help="Its depth map: .npy in metres, or 16-bit PNG; 0 or inf is sky.")
@@ -41,21 +46,29 @@ def fog_command(
     airlight: Annotated[
         str | None, typer.Option(help="Its pixel value, or R,G,B; else the sky's median, or the brightest thousandth.")
     ] = None,
-    depth_scale: Annotated[float | None, typer.Option(help="Metres in one unit of DEPTH.")] = None,
+    depth_scale: Annotated[float | None, typer.Option(min=1e-9, max=1e6, help="Metres in one unit of DEPTH.")] = None,
     horizon_row: Annotated[
-        float | None, typer.Option(help="For --road-plane without a camera file: row of the horizon.")
+        float | None, typer.Option(min=0, max=1e6, help="For --road-plane without a camera file: row of the horizon.")
     ] = None,
-    focal_length: Annotated[float | None, typer.Option(help="The same: focal length in pixels.")] = None,
-    mount_height: Annotated[float | None, typer.Option(help="The same: metres from the road to the lens.")] = None,
+    focal_length: Annotated[
+        float | None, typer.Option(min=1, max=1e6, help="The same: focal length in pixels.")
+    ] = None,
+    mount_height: Annotated[
+        float | None, typer.Option(min=0.05, max=1000, help="The same: metres from the road to the lens.")
+    ] = None,
     ground_albedo: Annotated[
         float | None,
-        typer.Option(help="Of the land around, 0 to 1: airlight by elevation as photons have it, not an even one."),
+        typer.Option(
+            min=0, max=1, help="Of the land around, 0 to 1: airlight by elevation as photons have it, not an even one."
+        ),
     ] = None,
-    layer_height: Annotated[float | None, typer.Option(help="For --ground-albedo: metres of fog; else 250.")] = None,
+    layer_height: Annotated[
+        float | None, typer.Option(min=0.001, max=1e6, help="For --ground-albedo: metres of fog; else 250.")
+    ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it is there already.")] = False,
 ) -> None:
     """Put homogeneous fog on an image or video from disk: Koschmieder's law on light and slant range."""
-    light = None if airlight is None else _pixel_values(airlight)
+    light = None if airlight is None else pixel_values(airlight)
     layer = _layer(ground_albedo, layer_height)
     told = {"--horizon-row": horizon_row, "--focal-length": focal_length, "--mount-height": mount_height}
     if (depth is None) != road_plane:
@@ -164,11 +177,3 @@ def _fog_road(
         for _ in frames:
             progress.advance(task)
     return airlight
-
-
-def _pixel_values(text: str) -> tuple[float, ...]:
-    """Pixel value, or three with commas between them."""
-    try:
-        return tuple(float(part) for part in text.split(","))
-    except ValueError:
-        raise InputError(f"--airlight {text}: expected a pixel value, or red, green and blue as R,G,B") from None

@@ -1,15 +1,16 @@
 """``fogsim restore``: contrast that fog has taken from images and videos, restored."""
 
 import contextlib
+import math
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from fogsim.cli.option_values import pixel_values
 from fogsim.cli.printing import BAD_INPUT, escape, print_error, print_remarks, stderr, stdout
 from fogsim.cli.progress import progress_bar
-from fogsim.errors import InputError
 
 if TYPE_CHECKING:
     from fogsim.offline.restoration import RestorationWish, Restored
@@ -26,10 +27,11 @@ def restore_command(
     out: Annotated[Path, typer.Option(help="The restored image or .mp4; of several images the folder.")],
     method: Annotated[str, typer.Option(help="planar, dark_channel or tarel2009.")] = "planar",
     visibility: Annotated[
-        float | None, typer.Option(help="Meteorological visibility in metres; else joint_road estimates it.")
+        float | None,
+        typer.Option(min=0.1, max=math.inf, help="Meteorological visibility in metres; else joint_road estimates it."),
     ] = None,
     most_gain: Annotated[
-        float | None, typer.Option(help="Most by which light and noise are amplified; else 5.")
+        float | None, typer.Option(min=1, max=1000, help="Most by which light and noise are amplified; else 5.")
     ] = None,
     airlight: Annotated[
         str | None, typer.Option(metavar="R,G,B", help="Its pixel values; else those above the horizon.")
@@ -44,7 +46,7 @@ def restore_command(
     from fogsim.offline.source import ImageFiles
     from fogsim.restoration import MOST_GAIN
 
-    light = None if airlight is None else _pixel_values(airlight)
+    light = None if airlight is None else pixel_values(airlight)
     gain = MOST_GAIN if most_gain is None else most_gain
     wish = RestorationWish(method, visibility, gain, light, tone_map, beside)
     calibration = load_calibration(camera)
@@ -102,11 +104,3 @@ def _tell_lacking(lacking: "list[Restored]", files: bool) -> None:
         named = one.reason if one.picture.error else f"{one.picture.name}: {one.reason}"
         stderr.print(f"  {escape(named, in_one_line=True)}", soft_wrap=True)
     raise typer.Exit(BAD_INPUT)
-
-
-def _pixel_values(text: str) -> tuple[float, ...]:
-    """Pixel value, or three with commas between them."""
-    try:
-        return tuple(float(part) for part in text.split(","))
-    except ValueError:
-        raise InputError(f"--airlight {text}: expected a pixel value, or red, green and blue as R,G,B") from None

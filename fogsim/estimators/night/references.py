@@ -7,6 +7,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.errors import InputError
 from fogsim.values.camera import Camera
 from fogsim.values.light import Lamp
 
@@ -46,6 +47,11 @@ class VeilReferences:
 
     def __post_init__(self) -> None:
         """Compute how veil and road grow where the picture is shifted downward by a cell."""
+        if self.veil.shape[1:2] < (2,):
+            raise InputError(
+                f"expected a camera whose image has two rows of cells or more, got {self.camera.width} × "
+                f"{self.camera.height} px"
+            )
         slopes = tuple(-np.gradient(part, axis=1) for part in (self.veil, self.road))
         object.__setattr__(self, "slopes", slopes)
 

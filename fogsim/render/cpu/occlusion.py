@@ -104,5 +104,5 @@ def _pixels(
     """First of the columns or rows whose pixels' centres a box may cover, and the one after the last."""
     begin = np.ceil(low * (per_nearest if low < 0.0 else per_farthest) + principal)
     end = np.floor(high * (per_nearest if high > 0.0 else per_farthest) + principal) + 1.0
-    begin, end = min(max(begin, float(first)), float(after)), min(max(end, float(first)), float(after))
+    begin, end = min(float(after), max(float(first), begin)), min(float(after), max(float(first), end))
     return int(begin), int(end)

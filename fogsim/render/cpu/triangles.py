@@ -242,8 +242,8 @@ def set_up_boxes(kept: int, pinhole: Pinhole, size: tuple[int, int, int], work: 
             left, right = np.ceil(_least(a, b, c) - slack), np.floor(_greatest(a, b, c) + slack)
             a, b, c = corners[4, i], corners[4, j], corners[4, k]
             top, bottom = np.ceil(_least(a, b, c) - slack), np.floor(_greatest(a, b, c) + slack)
-        box[count, 0], box[count, 1] = np.int32(max(top, first_row)), np.int32(min(bottom, last_row))
-        box[count, 2], box[count, 3] = np.int32(max(left, 0.0)), np.int32(min(right, last_column))
+        box[count, 0], box[count, 1] = np.int32(max(first_row, top)), np.int32(min(last_row, bottom))
+        box[count, 2], box[count, 3] = np.int32(max(0.0, left)), np.int32(min(last_column, right))
         for row in range(3):
             points[count, row] = corners[row, i]
             points[count, 3 + row] = corners[row, j]

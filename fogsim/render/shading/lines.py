@@ -31,7 +31,7 @@ def columns_near(away: float, change: float, reach: float, size: int) -> tuple[i
     per_change = 1.0 / change
     middle, half = -away * per_change, reach * abs(per_change)
     end = size - 1.0
-    first, last = np.ceil(min(max(middle - half, 0.0), end + 1.0)), np.floor(min(max(middle + half, -1.0), end))
+    first, last = np.ceil(min(end + 1.0, max(0.0, middle - half))), np.floor(min(end, max(-1.0, middle + half)))
     return int(first), int(max(last + 1.0, first))
 
 

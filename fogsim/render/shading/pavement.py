@@ -96,7 +96,7 @@ def reflectance_at(by_sine: Wide, sine: float) -> float:
     sine : float
         Sine of the elevation.
     """
-    place = np.sqrt(min(max(sine, 0.0), 1.0)) * (len(by_sine) - 1)
+    place = np.sqrt(min(1.0, max(0.0, sine))) * (len(by_sine) - 1)
     low = min(int(place), len(by_sine) - 2)
     return float(by_sine[low] + (place - low) * (by_sine[low + 1] - by_sine[low]))
 
@@ -122,5 +122,5 @@ def mean_of_stretches(integral: Wide, along: float, extent: float) -> float:
 
 @kernel
 def _integral_at(integral: Wide, along: float) -> float:
-    low = min(int(along), PERIOD - 1)
+    low = min(int(max(0.0, along)), PERIOD - 1)
     return float(integral[low] + (along - low) * (integral[low + 1] - integral[low]))

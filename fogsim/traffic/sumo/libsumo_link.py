@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from types import ModuleType
 
 from fogsim.errors import MissingDependencyError, SimulationError, SimulationRunningError
+from fogsim.files.standard_streams import open_standard_streams
 from fogsim.traffic.sumo.link import Api, translated_errors
 from fogsim.traffic.sumo.output_folder import OutputFolder
 
@@ -135,6 +136,7 @@ class LibsumoLink:
 def captured_stderr() -> Iterator[list[str]]:
     """Collect what native code writes to the process's stderr; the list is filled on leaving."""
     lines: list[str] = []
+    open_standard_streams()
     sys.stderr.flush()
     saved = os.dup(2)
     with tempfile.TemporaryFile() as file:

@@ -188,8 +188,8 @@ def mean_transmittance(below: float, half: float, path: float, k: float) -> tupl
 @kernel
 def eye_level(k: float, eye: float, levels: int) -> tuple[int, float]:
     """Level of the optical heights of an eye below that of an extinction, and how far the latter is on to the next."""
-    at = math.log(max(k * eye, FIRST_DEPTH) / FIRST_DEPTH) / DEPTH_STEP
-    at = min(at, levels - 1.001)
+    at = math.log(max(FIRST_DEPTH, k * eye) / FIRST_DEPTH) / DEPTH_STEP
+    at = min(levels - 1.001, at)
     return int(at), at - int(at)
 
 

@@ -1,0 +1,111 @@
+"""What the options of all commands have in common: numbers lie within a range, and paths are not empty."""
+
+import math
+from collections.abc import Callable
+from inspect import signature
+from pathlib import Path
+from typing import Any, NoReturn, get_args
+
+import typer
+from typer.models import ArgumentInfo, OptionInfo
+
+from fogsim.cli.printing import BAD_INPUT, print_error
+from fogsim.errors import InputError, shown
+
+LARGEST = 2**63 - 1
+"""Bound of numbers whose option has none, as of seeds in scenario files."""
+
+
+def check_values(app: typer.Typer) -> None:
+    """Let every command refuse numbers outside ``min`` and ``max`` of their option, NaN among them, and empty paths.
+
+    An empty string, as from an unset variable of a shell, would otherwise be the current directory.
+    """
+    for command in app.registered_commands:
+        for parameter in signature(command.callback or check_values).parameters.values():
+            info = _info(parameter.annotation)
+            if info is not None and info.parser is None:
+                info.parser = _parser(_name(parameter.name, info), _flat(parameter.annotation), info)
+    for group in app.registered_groups:
+        if group.typer_instance is not None:
+            check_values(group.typer_instance)
+
+
+def _info(annotation: Any) -> OptionInfo | ArgumentInfo | None:
+    metadata = getattr(annotation, "__metadata__", ())
+    return next((one for one in metadata if isinstance(one, OptionInfo | ArgumentInfo)), None)
+
+
+def _name(parameter: str, info: OptionInfo | ArgumentInfo) -> str:
+    """Name of an option as users write it, or of an argument as in the help."""
+    if isinstance(info, ArgumentInfo):
+        return info.metavar or parameter.upper()
+    # typer holds the first name of an annotation as the default.
+    names = [one for one in (info.default, *(info.param_decls or ())) if str(one).startswith("--")]
+    return str(names[0]) if names else "--" + parameter.replace("_", "-")
+
+
+def _flat(annotation: Any) -> set[Any]:
+    """All types that an annotation is made of."""
+    return {annotation, *(inner for part in get_args(annotation) for inner in _flat(part))}
+
+
+def _parser(name: str, types: set[Any], info: OptionInfo | ArgumentInfo) -> Callable[[Any], Any] | None:
+    """Reader of a value; None where typer's own will do."""
+    if Path in types:
+        return _text_parser(Path, name, "a path")
+    if str in types and isinstance(info, ArgumentInfo):
+        return _text_parser(str, name, "a name or a path")
+    if int in types:
+        return _number_parser(int, name, info)
+    return _number_parser(float, name, info) if float in types else None
+
+
+def _text_parser(kind: type[Path] | type[str], name: str, expected: str) -> Callable[[Any], Any]:
+    def parse(given: Any) -> Any:
+        if given == "":
+            _refuse(name, expected, given)
+        return kind(given)
+
+    parse.__name__ = kind.__name__
+    return parse
+
+
+def _number_parser(kind: type[int] | type[float], name: str, info: OptionInfo | ArgumentInfo) -> Callable[[Any], float]:
+    least = -LARGEST if info.min is None else info.min
+    most = LARGEST if info.max is None else info.max
+    expected = f"a whole number from {least} to {most}" if kind is int else f"a number from {least:g} to {most:g}"
+
+    def parse(given: Any) -> float:
+        try:
+            value = kind(given)
+        except (ValueError, OverflowError):
+            _refuse(name, expected, given)
+        if not least <= value <= most:
+            _refuse(name, expected, given)
+        return value
+
+    parse.__name__ = kind.__name__
+    return parse
+
+
+def _refuse(name: str, expected: str, given: object) -> NoReturn:
+    print_error(f"{name}: expected {expected}, got {shown(given)}")
+    raise typer.Exit(BAD_INPUT)
+
+
+def pixel_values(text: str) -> tuple[float, ...]:
+    """Value of ``--airlight``: a pixel value, or three with commas between them.
+
+    Raises
+    ------
+    InputError
+        If it is something else.
+    """
+    try:
+        values = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        values = ()
+    if len(values) not in (1, 3) or not all(0 <= value < math.inf for value in values):
+        raise InputError(f"--airlight: expected a pixel value, or red, green and blue as R,G,B; got {shown(text)}")
+    return values

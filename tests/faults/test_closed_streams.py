@@ -1,0 +1,81 @@
+"""Commands without stdin, stdout or stderr, as daemons are started, and with streams that take nothing."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+CAMERA = """\
+width: 80
+height: 60
+focal_length_px: 70
+principal_point_px: [39.5, 29.5]
+mount_height_m: 1.3
+pitch_deg: 0
+response: srgb
+"""
+FULL = "error: the operating system refused: [Errno 28] No space left on device"
+ESTIMATE = "-m fogsim estimate photo.png --camera camera.yaml --method negru2013 --json"
+
+
+def run_in_shell(command: str, folder: Path) -> tuple[int, str, str]:
+    """Exit code of Python, stdout and stderr of a command line for bash."""
+    done = subprocess.run(
+        ["/bin/bash", "-c", f"{sys.executable} {command}; exit ${{PIPESTATUS[0]}}"],
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=200,
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("command", "code", "told"),
+    [
+        (f"{ESTIMATE} >&-", 0, ""),
+        (f"{ESTIMATE} <&- >&- 2>&-", 0, ""),
+        ("-m fogsim validate nowhere.yaml 2>/dev/full", 2, ""),
+        ("-m fogsim --help | head -c 0", 1, ""),
+        (
+            "-m fogsim --version >/dev/full",
+            2,
+            FULL,
+        ),
+    ],
+)
+def test_a_stream_that_is_closed_or_full_ends_in_no_traceback(
+    tmp_path: Path, command: str, code: int, told: str
+) -> None:
+    Image.new("RGB", (80, 60)).save(tmp_path / "photo.png")
+    (tmp_path / "camera.yaml").write_text(CAMERA, encoding="utf-8")
+    ended, _, said = run_in_shell(command, tmp_path)
+    # A kernel that is not in the cache yet is announced.
+    assert [line for line in said.splitlines() if not line.startswith("fogsim: comp")] == told.splitlines()
+    assert ended == code
+
+
+OPENED = """\
+import json, os, subprocess, sys
+from fogsim.files.standard_streams import open_standard_streams
+open_standard_streams()
+print("lost", flush=True)
+sys.stdin.read(), sys.stderr.write("lost")
+child = subprocess.call("echo lost; echo lost >&2", shell=True)
+open("file", "w").write(json.dumps([os.open(".", os.O_RDONLY), child]))
+"""
+
+
+@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
+def test_no_file_and_no_child_gets_the_number_of_a_stream(tmp_path: Path, closed: str) -> None:
+    (tmp_path / "opened.py").write_text(OPENED, encoding="utf-8")
+    code, _, said = run_in_shell(f"opened.py {closed}", tmp_path)
+    assert code == 0, said
+    number, child = json.loads((tmp_path / "file").read_text(encoding="utf-8"))
+    assert number > 2
+    assert child == 0

@@ -1,0 +1,137 @@
+"""Videos that are damaged, cut off, or none: what was read is kept, one line says where it ended, and the code is 2."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from fogsim.cli import app
+from fogsim.errors import InputError
+from fogsim.offline import find_source
+from fogsim.recorders.video import ffmpeg_program
+
+CAMERA = """\
+width: 80
+height: 60
+focal_length_px: 70
+principal_point_px: [39.5, 29.5]
+mount_height_m: 1.3
+pitch_deg: 0
+response: srgb
+"""
+VARIABLE_RATE = ("-vf", "select='not(eq(mod(n,5),2))'", "-fps_mode", "vfr")
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture(scope="module")
+def videos(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Whole, damaged and foreign files with the names of videos."""
+    folder = tmp_path_factory.mktemp("videos")
+    source = [ffmpeg_program(), "-loglevel", "error", "-f", "lavfi", "-i", "testsrc=size=80x60:rate=10:duration=3"]
+    for name, options in {"whole.mp4": (), "variable.mp4": VARIABLE_RATE, "whole.mkv": (), "whole.avi": ()}.items():
+        subprocess.run([*source, "-g", "5", *options, str(folder / name)], check=True)
+    for name in ("whole.mkv", "whole.avi"):
+        data = (folder / name).read_bytes()
+        (folder / name.replace("whole", "cut")).write_bytes(data[: len(data) // 2])
+    data = (folder / "whole.avi").read_bytes()
+    middle = len(data) // 2
+    (folder / "flipped.avi").write_bytes(data[:middle] + bytes(one ^ 0x5A for one in data[middle : middle + 60]))
+    (folder / "playlist.mp4").write_text("#EXTM3U\n#EXT-X-TARGETDURATION:9\n#EXTINF:9,\nwhole.mp4\n#EXT-X-ENDLIST\n")
+    (folder / "concat.mp4").write_text("ffconcat version 1.0\nfile whole.mp4\n")
+    (folder / "sdp.mp4").write_text("v=0\no=- 0 0 IN IP4 127.0.0.1\nc=IN IP4 127.0.0.1\nm=video 5004 RTP/AVP 96\n")
+    (folder / "empty.mp4").write_bytes(b"")
+    (folder / "camera.yaml").write_text(CAMERA)
+    return folder
+
+
+@pytest.fixture
+def fogsim(videos: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+    """Run a command in this process: gives exit code, stdout and stderr."""
+    monkeypatch.chdir(videos)
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["fogsim", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            app.main()
+        told = capsys.readouterr()
+        return int(ended.value.code or 0), told.out, told.err
+
+    return run
+
+
+@pytest.mark.parametrize(("name", "frames"), [("whole.mp4", 30), ("whole.mkv", 30), ("variable.mp4", 30)])
+def test_a_whole_video_has_no_warning(videos: Path, name: str, frames: int) -> None:
+    pictures = list(find_source(videos / name).pictures())
+    assert len(pictures) == frames
+    assert not any(picture.error for picture in pictures)
+
+
+@pytest.mark.parametrize("name", ["cut.mkv", "cut.avi", "flipped.avi"])
+def test_what_was_read_of_a_damaged_video_is_estimated(fogsim: Run, name: str) -> None:
+    code, out, err = fogsim("estimate", name, "--camera", "camera.yaml", "--method", "negru2013", "--json")
+    records = [json.loads(line) for line in out.splitlines()]
+    read = len(records) - 1
+    assert code == 2
+    assert read > 5
+    assert [record["frame"] for record in records] == list(range(read + 1))
+    assert f"{name}: the video is cut off or damaged: {read} " in err
+
+
+@pytest.mark.parametrize("command", ["fog", "restore"])
+def test_what_was_read_of_a_damaged_video_is_written(fogsim: Run, tmp_path: Path, command: str) -> None:
+    out = tmp_path / "out.mp4"
+    road = ("--road-plane",) if command == "fog" else ()
+    code, _, err = fogsim(command, "cut.mkv", "--camera", "camera.yaml", "--visibility", "60", "--out", str(out), *road)
+    assert code == 2
+    assert "cut.mkv: the video is cut off or damaged: " in err
+    assert f"{out} has what could be read" in err
+    written = list(find_source(out).pictures())
+    assert 5 < len(written) < 30
+    assert not written[-1].error
+
+
+@pytest.mark.parametrize("name", ["playlist.mp4", "concat.mp4", "sdp.mp4", "empty.mp4"])
+def test_a_file_that_names_other_files_or_addresses_is_no_video(
+    videos: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.chdir(videos)
+    with pytest.raises(InputError, match=f"^{name}: this is no video that can be read$"):
+        find_source(name)
+
+
+PLACES: dict[str, tuple[str, ...]] = {
+    "estimate an image": ("estimate", "pipe.png", "--camera", "camera.yaml"),
+    "estimate a video": ("estimate", "pipe.mp4", "--camera", "camera.yaml"),
+    "estimate by a camera": ("estimate", "photo.png", "--camera", "pipe.yaml"),
+    "restore": ("restore", "pipe.png", "--camera", "camera.yaml", "--visibility", "60", "--out", "out.png"),
+    "restore a video": ("restore", "pipe.mp4", "--camera", "camera.yaml", "--visibility", "60", "--out", "out.mp4"),
+    "fog": ("fog", "pipe.png", "--road-plane", "--camera", "camera.yaml", "--visibility", "60", "--out", "out.png"),
+    "fog by a depth map": (
+        *("fog", "photo.png", "--depth", "pipe.npy", "--depth-kind", "range", "--camera", "camera.yaml"),
+        *("--visibility", "60", "--out", "out.png"),
+    ),
+    "calibrate": ("calibrate", "signs", "--camera", "pipe.yaml"),
+    "guess": ("estimate", "pipe.png", "--guess-camera", "--mount-height", "1", "--camera", "new.yaml"),
+}
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.timeout(60)
+def test_a_pipe_is_refused_and_not_waited_for(
+    fogsim: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Image.fromarray(np.zeros((60, 80), np.uint8)).save("photo.png")
+    Path("camera.yaml").write_text(CAMERA)
+    for ending in ("png", "mp4", "yaml", "npy"):
+        os.mkfifo(f"pipe.{ending}")
+    code, _, err = fogsim(*PLACES[place])
+    assert code == 2
+    assert "regular file" in err
+    assert "Traceback" not in err

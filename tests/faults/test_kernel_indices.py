@@ -1,0 +1,58 @@
+"""Kernels make no index of NaN, of an infinite or of a huge number: what they read lies within their tables."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from fogsim.atmosphere.lamps import halo_lamps, lobe_kernels
+from fogsim.render.cpu import occlusion
+from fogsim.render.shading import lines, pavement
+from fogsim.restoration import light_kernels
+from fogsim.vision.strips import joint_kernels
+
+LEVELS = 10
+TABLE = np.linspace(0.0, 1.0, LEVELS)
+Places = Callable[[float], tuple[float, ...]]
+
+PLACES: dict[str, Places] = {
+    "level of an eye": lambda x: (joint_kernels.eye_level(x, 1.0, LEVELS)[0],),
+    "entry of a lamp's table": lambda x: (lobe_kernels._place(x, 1.0, 0.1, LEVELS)[0],),
+    "row of a glow's table": lambda x: (halo_lamps._row_of(x, TABLE)[0],),
+    "pixels of a box": lambda x: occlusion._pixels(x, x, 1.0, 1.0, 0.0, 0, LEVELS - 1),
+    "pixels of a line": lambda x: lines.columns_near(x, x, 1.0, LEVELS - 1),
+}
+"""What each kernel reads at, which must lie within 0 … LEVELS − 1."""
+
+VALUES: dict[str, Places] = {
+    "reflectance": lambda x: (pavement.reflectance_at(TABLE, x),),
+    "brightness": lambda x: (pavement.mean_of_stretches(np.zeros(pavement.PERIOD + 1), x, 1.0),),
+}
+"""What kernels read, which comes from within their tables where it is a number at all."""
+
+WRONG = [math.nan, math.inf, -math.inf, 1e40, -1e40]
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("wrong", WRONG)
+def test_a_place_is_within_the_table(place: str, wrong: float) -> None:
+    assert all(0 <= index < LEVELS for index in PLACES[place](wrong))
+
+
+@pytest.mark.parametrize("value", VALUES)
+@pytest.mark.parametrize("wrong", WRONG)
+def test_a_value_is_from_the_table(value: str, wrong: float) -> None:
+    assert all(math.isnan(read) or 0.0 <= read <= 1.0 for read in VALUES[value](wrong))
+
+
+@pytest.mark.parametrize("through", [0.0, math.nan, math.inf, 1e-38, -1.0])
+def test_restored_pixels_are_values_of_their_table(through: float) -> None:
+    nothing = np.empty((0, 0), np.float32)
+    smoothing = light_kernels.Smoothing(nothing, nothing, nothing, np.float32(0.0), np.float32(0.0))
+    pixels = np.arange(12, dtype=np.uint8).reshape(2, 2, 3)
+    tables = np.tile(np.linspace(0.0, 2.0, 256, dtype=np.float32), (3, 1))
+    scale, values = np.full(3, 9.0, np.float32), np.arange(7, 17, dtype=np.uint8)
+    transmission = np.full((2, 2), through, np.float32)
+    made = light_kernels.restored_pixels(pixels, tables, transmission, smoothing, scale, values)
+    assert ((made >= 7) & (made <= 16)).all()

@@ -12,7 +12,7 @@ from pydantic import BaseModel, NonNegativeInt, PositiveInt, ValidationError
 
 from fogsim.dataset.encoding import png
 from fogsim.errors import InputError, shown
-from fogsim.files.atomic import write_bytes, write_json
+from fogsim.files.atomic import partial_path, write_bytes, write_json
 from fogsim.files.output_targets import refuse_unwritable_folder
 from fogsim.files.readers import read_bytes, read_json
 from fogsim.files.writer_lock import LOCK_NAME, WriterLock

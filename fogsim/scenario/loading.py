@@ -17,7 +17,7 @@ from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.roads.departures import entering_vehicles
 from fogsim.scenario.roads.files import DemandError, traffic_files, with_way
 from fogsim.scenario.schema import Scenario
-from fogsim.scenario.sumo_check import demand_mistakes, option_lines, step_mistake
+from fogsim.scenario.sumo_check import demand_mistakes, option_lines, step_mistake, trigger_mistakes
 from fogsim.scenario.system_under_test import BLOCK, without_sut, without_sut_in_path
 from fogsim.scenario.traffic_schema import Traffic
 from fogsim.scenario.variation import KEYS, Case, Variation, chosen_cases, read_variation, with_case
@@ -344,7 +344,7 @@ def _checked_scenario(document: Document, folder: Path, named_files: bool, close
         mistakes.append(f"{document.where(key_path)}: {dotted(key_path)}: {uncountable}")
     if mistakes:
         raise InputError("\n".join(mistakes))
-    refused = option_lines(document, scenario, own_simulation=named_files)
+    refused = option_lines(document, scenario, own_simulation=named_files) or trigger_mistakes(document, scenario)
     if refused:
         raise InputError("\n".join(refused))
     _check_files(document, scenario)

@@ -10,6 +10,7 @@ from fogsim.metrics.run_metrics import RunMetrics, TrafficRunMetrics
 from fogsim.scenario.expect.conditions import refuse
 from fogsim.scenario.expect.schema import Expectation, metric_check
 from fogsim.scenario.plain_yaml import KeyPath
+from fogsim.units import clock_time
 
 if TYPE_CHECKING:
     from fogsim.scenario.schema import Scenario
@@ -44,7 +45,7 @@ def last_time(scenario: "Scenario") -> float:
         The scenario.
     """
     period = scenario.clocks.camera_period_s
-    return max(1, round(scenario.duration_s / period)) * period
+    return clock_time(max(1, round(scenario.duration_s / period)) * period)
 
 
 def run_content(scenario: "Scenario") -> RunContent:

@@ -15,6 +15,7 @@ from fogsim.expectations import Always, Clause, Eventually, Happened, MetricChec
 from fogsim.scenario.expect.conditions import WrittenCondition, refuse
 from fogsim.scenario.plain_yaml import KeyPath
 from fogsim.scenario.section import Flag, Id, Section, Time, Whole
+from fogsim.units import clock_time
 from fogsim.units.quantities import UNIT_OF_SUFFIX, is_quantity, parse_quantity
 
 _CLAUSES = ("always", "never", "eventually", "whenever", "happened", "metric")
@@ -146,7 +147,7 @@ class Expectation(Section):
         """
         begin, end = limits["time"]
         within = min(self.within_s or 0.0, end - begin)
-        until = {"eventually": within or end, "whenever": end - within}
+        until = {"eventually": within or end, "whenever": clock_time(end - within)}
         for key, condition in self.conditions():
             last = until.get(key, end)
             here = {**limits, "time": (begin, last)}

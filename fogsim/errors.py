@@ -141,3 +141,14 @@ def printable(text: str, *, in_one_line: bool = False) -> str:
         one if one.isprintable() or one in kept else one.encode("unicode_escape", "backslashreplace").decode("ascii")
         for one in text
     )
+
+
+def is_name(text: str) -> bool:
+    """Whether a text can name something in files, folders, pages and SUMO: visible, no ``<``, no blank at its ends.
+
+    Parameters
+    ----------
+    text : str
+        Any text.
+    """
+    return bool(text) and text.isprintable() and text == text.strip() and "<" not in text

@@ -30,7 +30,7 @@ def progress_bar(console: Console, *, stays: bool = False) -> Progress:
     columns = (
         BarColumn(bar_width=20),
         TaskProgressColumn(),
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         TimeRemainingColumn(),
         TextColumn("left"),
     )

@@ -47,7 +47,9 @@ def study_command(
     loaded = load_study(study)
     shape = " × ".join(f"{len(levels)} {name}" for name, levels in loaded.factors.items())
     cells = len({tuple(run.levels.values()) for run in loaded.runs})
-    stdout.print(f"{loaded.name}: {escape(shape)} × {len(loaded.runs) // cells} seeds = {len(loaded.runs)} runs")
+    stdout.print(
+        f"{escape(loaded.name)}: {escape(shape)} × {len(loaded.runs) // cells} seeds = {len(loaded.runs)} runs"
+    )
     if check:
         return
     directory = out or Path("runs", loaded.name)

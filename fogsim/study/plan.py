@@ -26,7 +26,7 @@ from fogsim.traffic.road.configuration import configured_demand, configured_file
 MOST_RUNS = 1_000_000
 """Most runs of a study."""
 
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+ -]{0,59}$")]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9]([A-Za-z0-9_.+ -]{0,58}[A-Za-z0-9_.+-])?$")]
 """Name of a factor or a level: it becomes a column or a legend."""
 
 RESERVED = frozenset({"run", "seed", "status", "message", "sumo_outputs"})

@@ -91,7 +91,10 @@ def nearest(name: str, known: Iterable[str]) -> str | None:
     known : iterable of str
         What is allowed.
     """
-    return next(iter(difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)), None)
+    names = list(known)
+    if name in names:
+        return name
+    return next(iter(difflib.get_close_matches(name, names, n=1, cutoff=0.5)), None)
 
 
 def nearest_of(name: str, known: Iterable[str], most: int) -> list[str]:

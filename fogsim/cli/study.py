@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from fogsim.cli.printing import BAD_INPUT, INTERRUPTED, escape, stderr, stdout
-from fogsim.cli.progress import STARTING, progress_bar
+from fogsim.cli.progress import STARTING, counting_bar, progress_bar
 from fogsim.errors import InputError
 
 
@@ -44,7 +44,8 @@ def study_command(
         raise InputError("--address is a Ray cluster's: give --engine ray with it")
     on_ray = engine is EngineName.RAY
     runner = {"engine": RayCluster(address, processes)} if on_ray else {"processes": processes}
-    loaded = load_study(study)
+    with counting_bar(stderr, "checking the scenario of each cell") as watch:
+        loaded = load_study(study, watch)
     shape = " × ".join(f"{len(levels)} {name}" for name, levels in loaded.factors.items())
     cells = len({tuple(run.levels.values()) for run in loaded.runs})
     stdout.print(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
-from fogsim.cli.progress import STARTING, progress_bar
+from fogsim.cli.progress import STARTING, counting_bar, progress_bar
 from fogsim.cli.scenario_options import CaseValues, Settings
 
 if TYPE_CHECKING:
@@ -86,7 +86,8 @@ def _asked_for(
 
     asked = None if keywords is None else parse_keywords(keywords)
     found = find_files(files)
-    tests = collect(found, settings, case, asked)
+    with counting_bar(stderr, "checking the scenario of each case") as watch:
+        tests = collect(found, settings, case, asked, watch)
     noted = {} if failed_in is None else last_failed(failed_in)
     # As of pytest: where nothing has failed, all is run.
     tests = only_cases(tests, noted) or tests

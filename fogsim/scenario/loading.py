@@ -3,7 +3,7 @@
 import json
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -117,8 +117,27 @@ def load_scenario(
     InputError
         If anything does not fit; one line for each mistake, with file, line, key path, value and what is allowed.
     """
+    return scenario_reader(name_or_path, others_add_vehicles=others_add_vehicles)(overrides)
+
+
+def scenario_reader(
+    name_or_path: str | Path, *, others_add_vehicles: bool = False
+) -> Callable[[Iterable[str]], Scenario]:
+    """Read a scenario file once, for scenarios that differ in their overrides.
+
+    Parameters
+    ----------
+    name_or_path, others_add_vehicles
+        As for `load_scenario`.
+
+    Returns
+    -------
+    callable
+        Makes a scenario of overrides, as `load_scenario` does.
+    """
     path = scenario_file(name_or_path)
-    return _checked(read_scenario_document(path), overrides, path.parent, closed_demand=not others_add_vehicles)
+    document = read_scenario_document(path)
+    return lambda overrides: _checked(document, overrides, path.parent, closed_demand=not others_add_vehicles)
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,8 +159,16 @@ class ScenarioCases:
     cases: tuple[tuple[Case, Scenario], ...]
 
 
+CountWatch = Callable[[int, int], None]
+"""Called with how many are done, and how many there are."""
+
+
 def load_cases(
-    name_or_path: str | Path, overrides: Iterable[str] = (), wanted: str = "", seed: int | None = None
+    name_or_path: str | Path,
+    overrides: Iterable[str] = (),
+    wanted: str = "",
+    seed: int | None = None,
+    watch: CountWatch | None = None,
 ) -> ScenarioCases:
     """Load and check the cases of a scenario file; one that varies nothing has one.
 
@@ -155,6 +182,8 @@ def load_cases(
         Which cases, ``name=value`` with commas between; empty for all.
     seed : int or None
         Seed of the runs; None for those of the cases.
+    watch : callable or None
+        Called after each case with the number of cases that are checked, and how many there are.
 
     Raises
     ------
@@ -166,13 +195,16 @@ def load_cases(
     variation = read_variation(document)
     checked: dict[str, Scenario] = {}
     cases = []
-    for case in chosen_cases(variation, wanted, path, seed):
+    chosen = chosen_cases(variation, wanted, path, seed)
+    for done, case in enumerate(chosen, 1):
         put = with_case(document, case)
         # What differs in its seed alone is the same scenario.
         key = json.dumps(put.data)
         if key not in checked:
             checked[key] = _checked_case(put, case, path.parent)
         cases.append((case, checked[key]))
+        if watch is not None:
+            watch(done, len(chosen))
     return ScenarioCases(document, variation, tuple(cases))
 
 

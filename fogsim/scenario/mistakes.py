@@ -77,7 +77,9 @@ def mistake_lines(
         Keys that the file may have in addition to those of its schema.
     """
     found = mistakes_in(model, error, document.data, beside)
-    told = [f"{document.where(path)}: {dotted(path) or 'scenario'}: {text}" for path, text in found[:MOST_TOLD]]
+    told = [
+        ": ".join((document.where(path), *([dotted(path)] if path else []), text)) for path, text in found[:MOST_TOLD]
+    ]
     if len(found) > MOST_TOLD:
         told.append(f"{document.path}: and {len(found) - MOST_TOLD} more mistakes")
     return "\n".join([*told, *further])

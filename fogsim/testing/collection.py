@@ -9,7 +9,7 @@ from pathlib import Path
 from fogsim.errors import InputError
 from fogsim.scenario import build, resolved
 from fogsim.scenario.document import read_scenario_document
-from fogsim.scenario.loading import SCENARIO_FILE, ScenarioCases, load_cases, scenario_file
+from fogsim.scenario.loading import SCENARIO_FILE, CountWatch, ScenarioCases, load_cases, scenario_file
 from fogsim.scenario.variation import NONE_FAILS, Verdict
 from fogsim.study.plan import StudyRun, file_digests
 from fogsim.testing.keywords import Keywords
@@ -80,7 +80,11 @@ def _is_hidden(path: Path) -> bool:
 
 
 def collect(
-    files: Sequence[Path], settings: Sequence[str] = (), case: str = "", keywords: Keywords | None = None
+    files: Sequence[Path],
+    settings: Sequence[str] = (),
+    case: str = "",
+    keywords: Keywords | None = None,
+    watch: CountWatch | None = None,
 ) -> list[FogTest]:
     """Tests of files; those of which nothing is asked for are left out.
 
@@ -94,6 +98,8 @@ def collect(
         Which cases, as ``--case`` has them; empty for all.
     keywords : Keywords or None
         Which expectations.
+    watch : callable or None
+        As for `load_cases`.
 
     Raises
     ------
@@ -103,7 +109,7 @@ def collect(
     tests, mistakes = [], []
     for file in files:
         try:
-            loaded = load_cases(file, settings, case)
+            loaded = load_cases(file, settings, case, watch=watch)
         except InputError as error:
             mistakes.append(str(error))
             continue

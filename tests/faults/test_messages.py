@@ -114,7 +114,11 @@ def _subjects(annotation: Any, put: Put) -> Iterator[Put]:
     for one in _alternatives(get_args(next(iter(_alternatives(annotation))))[1]):
         if isinstance(one, type) and issubclass(one, BaseModel):
             subject = SUBJECTS.get(one, "sensors.camera")
-            yield from _places(one, lambda value, subject=subject: put({subject: value}))
+
+            def inside(value: Any, subject: str = subject) -> Any:
+                return put({subject: value})
+
+            yield from _places(one, inside)
 
 
 def _is_own(path: tuple[str | int, ...], data: Any) -> bool:

@@ -8,6 +8,7 @@ import pytest
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.metrics import RunMetrics, TrafficRunMetrics
 from fogsim.scenario import loading
+from fogsim.scenario.document import read_scenario_document
 from fogsim.scenario.loading import catalogue
 from fogsim.scenario.variation import grid_mistake
 from fogsim.study import load_study
@@ -142,7 +143,7 @@ def test_a_grid_has_a_limit(number: int) -> None:
 
 
 def test_cells_are_counted_while_they_are_checked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    reading = MagicMock(wraps=loading.read_scenario_document)
+    reading = MagicMock(wraps=read_scenario_document)
     monkeypatch.setattr(loading, "read_scenario_document", reading)
     seen: list[tuple[int, int]] = []
     load_study(written(tmp_path), lambda done, total: seen.append((done, total)))

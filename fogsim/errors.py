@@ -11,6 +11,10 @@ LONGEST_SHOWN = 80
 class FogSimError(Exception):
     """Base of every error that a user can cause or mend; the command line prints it and exits with 2."""
 
+    def __str__(self) -> str:
+        """Give the message without raw control characters, whatever names and values it repeats."""
+        return printable(super().__str__())
+
 
 class InputError(FogSimError, ValueError):
     """A file, key or argument that does not fit; the message names it, its value and what is allowed."""
@@ -95,7 +99,10 @@ def nearest(name: str, known: Iterable[str]) -> str | None:
     known : iterable of str
         What is allowed.
     """
-    return next(iter(difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)), None)
+    names = list(known)
+    if name in names:
+        return name
+    return next(iter(difflib.get_close_matches(name, names, n=1, cutoff=0.5)), None)
 
 
 def nearest_of(name: str, known: Iterable[str], most: int) -> list[str]:
@@ -127,3 +134,35 @@ def shown(value: object) -> str:
         text = " ".join(text.split())
     half = LONGEST_SHOWN // 2
     return text if len(text) <= LONGEST_SHOWN else f"{text[:half]} … {text[-half:]}"
+
+
+def printable(text: str, *, in_one_line: bool = False) -> str:
+    r"""Escape characters that cannot be seen, as Python writes them.
+
+    Control characters would be obeyed by terminals, and bytes of names that are no text cannot be printed.
+
+    Parameters
+    ----------
+    text : str
+        Any text.
+    in_one_line : bool
+        Escape line breaks, too.
+    """
+    kept = "" if in_one_line else "\n"
+    if text.isprintable():
+        return text
+    return "".join(
+        one if one.isprintable() or one in kept else one.encode("unicode_escape", "backslashreplace").decode("ascii")
+        for one in text
+    )
+
+
+def is_name(text: str) -> bool:
+    """Whether a text can name something in files, folders, pages and SUMO: visible, no ``<``, no blank at its ends.
+
+    Parameters
+    ----------
+    text : str
+        Any text.
+    """
+    return bool(text) and text.isprintable() and text == text.strip() and "<" not in text

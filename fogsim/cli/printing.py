@@ -9,6 +9,8 @@ from collections.abc import Iterable
 from rich.console import Console
 from rich.markup import escape as escape_markup
 
+from fogsim.errors import printable
+
 FAILED = 1
 """Exit code if an expectation was not met, or a user's method failed."""
 
@@ -18,27 +20,8 @@ BAD_INPUT = 2
 INTERRUPTED = 130
 """Exit code after Ctrl-C."""
 
-stdout = Console(highlight=False)
-stderr = Console(stderr=True, highlight=False)
-
-
-def printable(text: str, *, in_one_line: bool = False) -> str:
-    r"""Escape, as Python writes it, what is no character to be seen.
-
-    Control characters would be obeyed by terminals, and bytes of names that are no text cannot be printed.
-
-    Parameters
-    ----------
-    text : str
-        Any text.
-    in_one_line : bool
-        Escape ends of lines, too.
-    """
-    kept = "" if in_one_line else "\n"
-    return "".join(
-        one if one.isprintable() or one in kept else one.encode("unicode_escape", "backslashreplace").decode("ascii")
-        for one in text
-    )
+stdout = Console(highlight=False, emoji=False)
+stderr = Console(stderr=True, highlight=False, emoji=False)
 
 
 def escape(text: object, *, in_one_line: bool = False) -> str:

@@ -1,6 +1,8 @@
 """The progress bars of all commands."""
 
+import contextlib
 import sys
+from collections.abc import Callable, Iterator
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
@@ -30,12 +32,28 @@ def progress_bar(console: Console, *, stays: bool = False) -> Progress:
     columns = (
         BarColumn(bar_width=20),
         TaskProgressColumn(),
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         TimeRemainingColumn(),
         TextColumn("left"),
     )
     hidden = not stays and not console.is_terminal
     return Progress(*columns, console=console, transient=not stays, redirect_stdout=to_terminal, disable=hidden)
+
+
+@contextlib.contextmanager
+def counting_bar(console: Console, description: str) -> Iterator[Callable[[int, int], None]]:
+    """Bar that is called with how many are done, and how many there are; nothing of it remains.
+
+    Parameters
+    ----------
+    console : Console
+        As for `progress_bar`.
+    description : str
+        What is counted.
+    """
+    with progress_bar(console) as progress:
+        task = progress.add_task(description, total=None)
+        yield lambda done, total: progress.update(task, completed=done, total=total)
 
 
 class SimulationProgress:

@@ -76,7 +76,7 @@ def _show(done: "Reproduction", *, as_json: bool) -> None:
             typer.echo(json.dumps(record, allow_nan=False))
         return
     # Files and pipes have no width that rows must be broken for.
-    wide = stdout if stdout.is_terminal else Console(highlight=False, width=_UNBROKEN)
+    wide = stdout if stdout.is_terminal else Console(highlight=False, emoji=False, width=_UNBROKEN)
     for shown in done.all_tables:
         heading, *rows = shown.rows
         table = Table(*map(escape, heading), box=None, pad_edge=False)

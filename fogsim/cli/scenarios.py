@@ -27,13 +27,14 @@ def list_command() -> None:
     table.add_column("description")
     for name in catalogue():
         scenario = load_scenario(name)
-        table.add_row(name, "test" if scenario.expect else "", scenario.description)
+        table.add_row(escape(name), "test" if scenario.expect else "", escape(scenario.description))
     stdout.print(table)
     stdout.print()
-    stdout.print(f"[bold]study[/]: {', '.join(shipped_studies())}")
+    stdout.print(f"[bold]study[/]: {escape(', '.join(shipped_studies()))}")
     for registry in (ESTIMATORS, FUSIONS, ADVISERS, LIGHTING_POLICIES, RENDERERS):
         # FogSim's own in their order, then what installed packages announce.
-        stdout.print(f"[bold]{registry.kind}[/]: {', '.join(dict.fromkeys((*registry, *registry.known)))}")
+        names = ", ".join(dict.fromkeys((*registry, *registry.known)))
+        stdout.print(f"[bold]{registry.kind}[/]: {escape(names)}")
 
 
 def validate_command(

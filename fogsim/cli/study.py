@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from fogsim.cli.printing import FAILED, INTERRUPTED, escape, stderr, stdout
-from fogsim.cli.progress import STARTING, progress_bar
+from fogsim.cli.progress import STARTING, counting_bar, progress_bar
 from fogsim.cli.scenario_options import CodeNotice, MethodTimeout, with_timeout
 from fogsim.errors import InputError
 
@@ -47,10 +47,14 @@ def study_command(
         raise InputError("--address is a Ray cluster's: give --engine ray with it")
     on_ray = engine is EngineName.RAY
     runner = {"engine": RayCluster(address, processes)} if on_ray else {"processes": processes}
-    loaded = load_study(study, with_timeout(None, method_timeout), import_nothing if check else CodeNotice())
+    may_import = import_nothing if check else CodeNotice()
+    with counting_bar(stderr, "checking the scenario of each cell") as watch:
+        loaded = load_study(study, with_timeout(None, method_timeout), may_import, watch)
     shape = " × ".join(f"{len(levels)} {name}" for name, levels in loaded.factors.items())
     cells = len({tuple(run.levels.values()) for run in loaded.runs})
-    stdout.print(f"{loaded.name}: {escape(shape)} × {len(loaded.runs) // cells} seeds = {len(loaded.runs)} runs")
+    stdout.print(
+        f"{escape(loaded.name)}: {escape(shape)} × {len(loaded.runs) // cells} seeds = {len(loaded.runs)} runs"
+    )
     if check:
         return
     directory = out or Path("runs", loaded.name)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from fogsim.cli.printing import FAILED, INTERRUPTED, escape, stderr, stdout
-from fogsim.cli.progress import STARTING, progress_bar
+from fogsim.cli.progress import STARTING, counting_bar, progress_bar
 from fogsim.cli.scenario_options import CaseValues, CodeNotice, MethodTimeout, Settings, with_timeout
 
 if TYPE_CHECKING:
@@ -97,7 +97,8 @@ def _asked_for(
     from fogsim.testing import collect, last_failed, only_cases, parse_keywords
 
     asked = None if keywords is None else parse_keywords(keywords)
-    tests = collect(found, settings, case, asked, CodeNotice())
+    with counting_bar(stderr, "checking the scenario of each case") as watch:
+        tests = collect(found, settings, case, asked, CodeNotice(), watch)
     noted = {} if failed_in is None else last_failed(failed_in)
     # As of pytest: where nothing has failed, all is run.
     tests = only_cases(tests, noted) or tests

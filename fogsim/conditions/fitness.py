@@ -5,9 +5,11 @@ from dataclasses import dataclass
 
 from fogsim.conditions.moment import EGO
 from fogsim.conditions.signal import Need, Place
-from fogsim.conditions.signals import SIGNALS
-from fogsim.conditions.syntax import Condition, Reference, signals_of
+from fogsim.conditions.signals import NO_LEADER, SIGNALS
+from fogsim.conditions.syntax import Comparison, Condition, Edge, Reference, Word, comparisons_of, signals_of
 from fogsim.errors import shown, suggest
+
+_LEADER = Reference("ego.leader")
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +69,21 @@ def vehicles_of(reference: Reference) -> tuple[str, ...]:
         The signal.
     """
     return _names(reference, Place.VEHICLE)
+
+
+def vehicles_in(condition: Condition) -> tuple[str, ...]:
+    """Vehicles that a condition names: those of its signals, and those that are compared with ``ego.leader``.
+
+    Parameters
+    ----------
+    condition : Condition
+        The condition.
+    """
+    named = [name for reference in signals_of(condition) for name in vehicles_of(reference)]
+    for one in comparisons_of(condition):
+        if one.left == _LEADER and isinstance(one, Comparison | Edge) and isinstance(one.right, Word):
+            named += [one.right.word] * (one.right.word != NO_LEADER)
+    return tuple(dict.fromkeys(named))
 
 
 def lights_of(condition: Condition) -> tuple[str, ...]:

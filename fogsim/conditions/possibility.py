@@ -4,8 +4,10 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
+from fogsim.conditions.fitness import vehicles_of
 from fogsim.conditions.logic import combined, compared
-from fogsim.conditions.signal import Kind, LanePlace, Signal, Value
+from fogsim.conditions.moment import EGO
+from fogsim.conditions.signal import Kind, LanePlace, Value
 from fogsim.conditions.signals import SIGNALS
 from fogsim.conditions.syntax import (
     Comparison,
@@ -19,7 +21,14 @@ from fogsim.conditions.syntax import (
     Word,
     comparisons_of,
     parts_of,
+    signals_of,
 )
+from fogsim.conditions.watching import shown_value
+
+Limits = Mapping[str, tuple[float, float]]
+"""Least and greatest value that signals, by their keys in `SIGNALS`, can have in one run, in SI units."""
+
+NO_LIMITS: Limits = {}
 
 MOST_CASES = 20_000
 """Cases that are gone through; a condition of more is held to be able to be true and false."""
@@ -28,19 +37,21 @@ _OTHER = "\0"
 """A word that stands for all that are not named."""
 
 
-def outcomes(condition: Condition) -> frozenset[bool]:
+def outcomes(condition: Condition, limits: Limits = NO_LIMITS) -> frozenset[bool]:
     """What a condition can be in some run: true, false or both.
 
-    Every signal takes each value that makes a difference to the condition; signals are held to be independent.
+    Every signal takes each value that makes a difference to the condition; signals are assumed to be independent.
 
     Parameters
     ----------
     condition : Condition
         The condition.
+    limits : mapping from str to (float, float)
+        Narrower ranges of signals in one run, for example of ``time``.
     """
     asked = comparisons_of(condition)
-    values = {signal: list(_values(signal, asked)) for signal in _measured(asked)}
-    free = {part: list(_free(part)) for part in parts_of(condition) if _is_free(part)}
+    values = {signal: list(_values(signal, asked, limits)) for signal in _measured(asked)}
+    free = {part: list(_free(part, limits)) for part in parts_of(condition) if _is_free(part)}
     sizes = [*(len(those) for those in values.values()), *(len(those) for those in free.values())]
     if math.prod(sizes) > MOST_CASES:
         return frozenset({True, False})
@@ -49,6 +60,49 @@ def outcomes(condition: Condition) -> frozenset[bool]:
         for case in itertools.product(*values.values())
         for known in itertools.product(*free.values())
     )
+
+
+def pointless_parts(condition: Condition, limits: Limits = NO_LIMITS, ego: str = EGO) -> Iterator[str]:
+    """Say which parts of a condition compare something with itself, or can never be true, and why.
+
+    Parameters
+    ----------
+    condition : Condition
+        The condition.
+    limits : mapping from str to (float, float)
+        As for `outcomes`.
+    ego : str
+        Id of the ego, which conditions may also call ``ego``.
+    """
+    for reference in signals_of(condition):
+        vehicles = [EGO if name == ego else name for name in vehicles_of(reference)]
+        if len(set(vehicles)) < len(vehicles):
+            yield f"{reference} names the same vehicle twice"
+    for part in parts_of(condition):
+        match part:
+            case Comparison(left, _, right) | Edge(left, _, right) if left == right:
+                yield f"{part} compares {left} with itself"
+            case Held(_, duration) if not 0.0 < duration.value < math.inf:
+                yield f"{part}: the time after 'for' must be longer than 0 s and finite"
+            case Held(_, duration) if duration.value > _range(_TIME, limits)[1]:
+                yield f"{part} is never true: {_range_text(_TIME, limits)}"
+            case Comparison() | Edge() if outcomes(part, limits) == {False}:
+                yield f"{part} is never true: {_range_text(part.left, limits)}"
+
+
+_TIME = Reference("time")
+
+
+def _range(reference: Reference, limits: Limits) -> tuple[float, float]:
+    """Least and greatest value of a signal in a run."""
+    signal = SIGNALS[reference.signal]
+    return limits.get(reference.signal, (signal.least, signal.most))
+
+
+def _range_text(reference: Reference, limits: Limits) -> str:
+    ends = zip(("at least", "at most"), _range(reference, limits), strict=True)
+    told = [f"{word} {shown_value(reference, end)}" for word, end in ends if math.isfinite(end)]
+    return f"{reference} is {' and '.join(told)}"
 
 
 def _measured(asked: Sequence[Comparison | Edge | Flag]) -> tuple[Reference, ...]:
@@ -61,16 +115,18 @@ def _is_free(part: Condition) -> bool:
     return isinstance(part, Edge | Held) or (isinstance(part, Comparison) and isinstance(part.right, Reference))
 
 
-def _free(part: Condition) -> Iterator[bool]:
+def _free(part: Condition, limits: Limits) -> Iterator[bool]:
     match part:
-        case Held(inner):
-            yield from outcomes(inner)
+        case Held(inner, duration):
+            yield from (False,) if duration.value > _range(_TIME, limits)[1] else outcomes(inner, limits)
         case Comparison(left, relation, right) if left == right:
             yield relation in ("<=", ">=", "==")
+        case Edge(left, _, right) if left == right:
+            yield False
         case Edge(left, how, Quantity(value)):
-            signal = SIGNALS[left.signal]
-            beyond = value > signal.most if how != "rises above" else value >= signal.most
-            below = value < signal.least if how != "falls below" else value <= signal.least
+            least, most = _range(left, limits)
+            beyond = value > most if how != "rises above" else value >= most
+            below = value < least if how != "falls below" else value <= least
             yield from (False,) if beyond or below else (False, True)
         case _:
             yield from (False, True)
@@ -90,9 +146,10 @@ def _plain(operand: Operand) -> Value:
     return operand.value if isinstance(operand, Quantity) else operand.word if isinstance(operand, Word) else None
 
 
-def _values(reference: Reference, asked: Sequence[Comparison | Edge | Flag]) -> Iterator[Value]:
+def _values(reference: Reference, asked: Sequence[Comparison | Edge | Flag], limits: Limits) -> Iterator[Value]:
     """Values of a signal that make all the differences that there are."""
     signal = SIGNALS[reference.signal]
+    least, most = _range(reference, limits)
     written = [_plain(one.right) for one in asked if isinstance(one, Comparison) and one.left == reference]
     numbers = sorted({one for one in written if isinstance(one, float)})
     words = [one for one in dict.fromkeys(written) if isinstance(one, str)]
@@ -100,10 +157,11 @@ def _values(reference: Reference, asked: Sequence[Comparison | Edge | Flag]) -> 
         case Kind.FLAG:
             yield from (True, False)
         case Kind.NUMBER:
-            yield from _numbers(signal, numbers)
+            yield from (value for value in _numbers(numbers, least, most) if least <= value <= most)
         case Kind.LANE:
-            most = int(max([*numbers, 0.0])) + 2
-            yield from (LanePlace(n, count) for n in range(most) for count in (n + 1, n + 2))
+            near = {0, 1, *(int(number) + step for number in numbers if math.isfinite(number) for step in (-1, 0, 1))}
+            lanes = [lane for lane in sorted(near) if least <= lane <= most]
+            yield from (LanePlace(lane, count) for lane in lanes for count in (lane + 1, lane + 2))
         case Kind.WORD:
             yield from words
             if not signal.words or len(words) < len(signal.words):
@@ -113,10 +171,8 @@ def _values(reference: Reference, asked: Sequence[Comparison | Edge | Flag]) -> 
             yield from (frozenset(itertools.compress(words, lit)) for lit in chosen)
 
 
-def _numbers(signal: Signal, thresholds: Sequence[float]) -> Iterator[float]:
+def _numbers(thresholds: Sequence[float], least: float, most: float) -> set[float]:
     """Each threshold, what lies between them and beyond, and the ends of the range."""
-    finite = [one for one in thresholds if math.isfinite(one)]
-    beyond = [finite[0] - 1.0, finite[-1] + 1.0] if finite else [0.0]
-    between = [0.5 * (one + other) for one, other in itertools.pairwise(finite)]
-    every = {*thresholds, *beyond, *between, signal.least, signal.most}
-    yield from (value for value in sorted(every) if signal.least <= value <= signal.most)
+    finite = sorted({one for one in (*thresholds, least, most) if math.isfinite(one)}) or [0.0]
+    between = {0.5 * (one + other) for one, other in itertools.pairwise(finite)}
+    return {*thresholds, *between, finite[0] - 1.0, finite[-1] + 1.0, least, most}

@@ -20,6 +20,9 @@ FASTEST = 500.0 / KMH_PER_MPS
 HARDEST = 100.0
 """No vehicle brakes or speeds up harder, in a collision neither [m/s²]."""
 
+NO_LEADER = "none"
+"""Value of ``ego.leader`` where no vehicle is ahead."""
+
 LAMP_WORDS = tuple(str(lamp.name).lower() for lamp in Lamp if lamp)
 """Lamps by their words."""
 
@@ -341,7 +344,7 @@ _OF_EGO = {
     ),
     "ego.leader": Signal(
         "id of the vehicle ahead; `none` without one",
-        _of_step(lambda s: "none" if s.leader is None else s.leader.vehicle_id),
+        _of_step(lambda s: NO_LEADER if s.leader is None else s.leader.vehicle_id),
         Kind.WORD,
         needs=_EGO,
     ),

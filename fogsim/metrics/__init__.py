@@ -2,7 +2,15 @@
 
 from fogsim.kinematics import stopping_sight_distance
 from fogsim.metrics.metric import JsonValue, Metric, Sample
-from fogsim.metrics.run_metrics import METRICS, MetricFactory, MetricsOfRun, RunMetrics, RunSummary, TrafficRunMetrics
+from fogsim.metrics.run_metrics import (
+    METRICS,
+    MetricFactory,
+    MetricsOfRun,
+    RunMetrics,
+    RunSummary,
+    TrafficRunMetrics,
+    metric_keys,
+)
 from fogsim.metrics.step_metrics import DEFAULT_STANDARD, step_metrics
 from fogsim.metrics.surrogate import (
     SafetyStandard,
@@ -28,6 +36,7 @@ __all__ = [
     "Sample",
     "TrafficRunMetrics",
     "deceleration_rate_to_avoid_crash",
+    "metric_keys",
     "modified_deceleration_rate_to_avoid_crash",
     "potential_collision_speed",
     "step_metrics",

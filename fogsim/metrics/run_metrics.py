@@ -268,6 +268,17 @@ class TrafficRunMetrics(MetricsOfRun[TrafficStep]):
         return RunSummary({**first, **found.values}, {**found.meanings, **meanings})
 
 
+def metric_keys() -> tuple[str, ...]:
+    """Keys of ``metrics.json`` that any run may have; `estimators` has a block for each method.
+
+    Returns
+    -------
+    tuple of str
+        Those of a run about an ego, and those of one without.
+    """
+    return tuple(dict.fromkeys((*RunMetrics().summary().meanings, *TrafficRunMetrics().summary().meanings)))
+
+
 def _elapsed(last: TrafficStep | None, step: TrafficStep) -> float | None:
     """Time since the step before [s]; None if it is the same."""
     if last is None:

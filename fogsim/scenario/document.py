@@ -24,13 +24,15 @@ homogeneous whatever kind the file has."""
 
 _FOREIGN, _TIMELINE = "scenario", "timeline"
 
+_SET = "--set "
+
 _LONGEST_SHOWN = 200
 """Most characters of an override that a message repeats."""
 
 
 def _shown_override(text: str) -> str:
     """An override as messages name it."""
-    return f"--set {text if text.isprintable() and len(text) <= _LONGEST_SHOWN else shown(text)}"
+    return f"{_SET}{text if text.isprintable() and len(text) <= _LONGEST_SHOWN else shown(text)}"
 
 
 def _override_path(text: str) -> KeyPath:
@@ -166,6 +168,15 @@ class Document:
             if origin is not None:
                 return origin
         return str(self.path)
+
+    def is_overridden(self, key_path: KeyPath) -> bool:
+        """Whether a key's value is that of an override."""
+        return self.where(key_path).startswith(_SET)
+
+    def is_written(self, key_path: KeyPath) -> bool:
+        """Whether a key stands in a file of FogSim's or an override, not in an OpenSCENARIO file or a program."""
+        origin = self.where(key_path)
+        return origin != str(self.path) and not is_openscenario(Path(origin.rpartition(":")[0]))
 
     def overridden(self, overrides: Iterable[str]) -> "Document":
         """Copy in which the keys that overrides set, and all below them, stand where the overrides do.

@@ -3,7 +3,7 @@
 import json
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.roads.departures import entering_vehicles
 from fogsim.scenario.roads.files import DemandError, traffic_files, with_way
 from fogsim.scenario.schema import Scenario
-from fogsim.scenario.sumo_check import demand_mistakes, option_lines, step_mistake
+from fogsim.scenario.sumo_check import demand_mistakes, option_lines, step_mistake, trigger_mistakes
 from fogsim.scenario.system_under_test import BLOCK, without_sut, without_sut_in_path
 from fogsim.scenario.traffic_schema import Traffic
 from fogsim.scenario.variation import KEYS, Case, Variation, chosen_cases, read_variation, with_case
@@ -127,9 +127,27 @@ def load_scenario(
     InputError
         If anything does not fit; one line for each mistake, with file, line, key path, value and what is allowed.
     """
+    return scenario_reader(name_or_path, others_add_vehicles=others_add_vehicles, may_import=may_import)(overrides)
+
+
+def scenario_reader(
+    name_or_path: str | Path, *, others_add_vehicles: bool = False, may_import: MayImport = import_anything
+) -> Callable[[Iterable[str]], Scenario]:
+    """Read a scenario file once, for scenarios that differ in their overrides.
+
+    Parameters
+    ----------
+    name_or_path, others_add_vehicles, may_import
+        As for `load_scenario`.
+
+    Returns
+    -------
+    callable
+        Makes a scenario of overrides, as `load_scenario` does.
+    """
     path = scenario_file(name_or_path)
-    context = _context(path.parent, may_import)
-    return _checked(read_scenario_document(path), overrides, context, closed_demand=not others_add_vehicles)
+    document, context = read_scenario_document(path), _context(path.parent, may_import)
+    return lambda overrides: _checked(document, overrides, context, closed_demand=not others_add_vehicles)
 
 
 def _context(folder: Path, may_import: MayImport = import_anything) -> dict[str, Any]:
@@ -156,11 +174,16 @@ class ScenarioCases:
     cases: tuple[tuple[Case, Scenario], ...]
 
 
+CountWatch = Callable[[int, int], None]
+"""Called with how many are done, and how many there are."""
+
+
 def load_cases(
     name_or_path: str | Path,
     overrides: Iterable[str] = (),
     wanted: str = "",
     seed: int | None = None,
+    watch: CountWatch | None = None,
     *,
     may_import: MayImport = import_anything,
 ) -> ScenarioCases:
@@ -176,6 +199,8 @@ def load_cases(
         Which cases, ``name=value`` with commas between; empty for all.
     seed : int or None
         Seed of the runs; None for those of the cases.
+    watch : callable or None
+        Called after each case with the number of cases that are checked, and how many there are.
     may_import : callable
         As of `load_scenario`.
 
@@ -189,13 +214,16 @@ def load_cases(
     variation = read_variation(document)
     checked: dict[str, Scenario] = {}
     cases = []
-    for case in chosen_cases(variation, wanted, path, seed):
+    chosen = chosen_cases(variation, wanted, path, seed)
+    for done, case in enumerate(chosen, 1):
         put = with_case(document, case)
         # What differs in its seed alone is the same scenario.
         key = json.dumps(put.data)
         if key not in checked:
             checked[key] = _checked_case(put, case, _context(path.parent, may_import))
         cases.append((case, checked[key]))
+        if watch is not None:
+            watch(done, len(chosen))
     return ScenarioCases(document, variation, tuple(cases))
 
 
@@ -383,7 +411,7 @@ def _checked_scenario(
         mistakes.append(f"{document.where(key_path)}: {dotted(key_path)}: {uncountable}")
     if mistakes:
         raise InputError("\n".join(mistakes))
-    refused = option_lines(document, scenario, own_simulation=named_files)
+    refused = option_lines(document, scenario, own_simulation=named_files) or trigger_mistakes(document, scenario)
     if refused:
         raise InputError("\n".join(refused))
     _check_files(document, scenario)

@@ -1,20 +1,19 @@
 """What the check of a file has found, in lines that name file, line, key, value and what is allowed."""
 
-from collections.abc import Sequence
-from typing import Any, get_args, get_origin
+import types
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from fogsim.errors import nearest, shown, suggest
+from fogsim.errors import nearest, printable, shown, suggest
 from fogsim.scenario.document import Document
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.section import MISTAKE
-from fogsim.scenario.sensors.faults import AnyFault
-from fogsim.scenario.traffic_schema import AnyEvent
 
 MOST_TOLD = 50
-"""Most mistakes of a file that are told one by one."""
+"""Most mistakes of a file that are listed one by one."""
 
 WORDED = {
     "model_type": "must be a block of keys",
@@ -25,6 +24,35 @@ WORDED = {
 }
 """Messages of pydantic in the words of a file's reader."""
 
+_INPUT = "input should be "
+
+_KEY = "[key]"
+"""How pydantic calls a key of a block by name that is not fit to be one."""
+
+
+class Mistake(NamedTuple):
+    """One mistake in a file.
+
+    Attributes
+    ----------
+    path : KeyPath
+        Where it is, in the file's own keys.
+    text : str
+        What is wrong, in one line.
+    """
+
+    path: KeyPath
+    text: str
+
+
+class _Found(NamedTuple):
+    """A mistake as pydantic reports it; its path in the file's own keys; whether it is that of one of several types."""
+
+    detail: ErrorDetails
+    path: KeyPath
+    is_of_union: bool
+    models: tuple[type[BaseModel], ...]
+
 
 def mistake_lines(
     document: Document,
@@ -33,9 +61,7 @@ def mistake_lines(
     further: Sequence[str] = (),
     beside: Sequence[str] = (),
 ) -> str:
-    """Every mistake in a line of its own, without those that are there for another's sake.
-
-    A list whose entries are wrong is not too short, and a key whose name is misspelt is not missing.
+    """Every mistake in a line of its own.
 
     Parameters
     ----------
@@ -48,50 +74,92 @@ def mistake_lines(
     further : sequence of str
         Lines about what else was found.
     beside : sequence of str
-        Keys that may stand in the file beside those of its schema.
+        Keys that the file may have in addition to those of its schema.
     """
-    details = error.errors(include_url=False)
-    blocks = {detail["loc"][:length] for detail in details for length in range(len(detail["loc"]))}
-    own = [detail for detail in details if detail["loc"] not in blocks]
-    unknown = [detail["loc"] for detail in own[:MOST_TOLD] if detail["type"] == "extra_forbidden"]
-    meant = {(*place[:-1], nearest(str(place[-1]), known_keys(model, place[:-1]))) for place in unknown}
+    found = mistakes_in(model, error, document.data, beside)
     told = [
-        _mistake_line(document, model, d, beside)
-        for d in own[:MOST_TOLD]
-        if d["type"] != "missing" or d["loc"] not in meant
+        ": ".join((document.where(path), *([dotted(path)] if path else []), text)) for path, text in found[:MOST_TOLD]
     ]
-    if len(own) > MOST_TOLD:
-        told.append(f"{document.path}: and {len(own) - MOST_TOLD} more mistakes")
+    if len(found) > MOST_TOLD:
+        told.append(f"{document.path}: and {len(found) - MOST_TOLD} more mistakes")
     return "\n".join([*told, *further])
 
 
-def _mistake_line(document: Document, model: type[BaseModel], detail: ErrorDetails, beside: Sequence[str]) -> str:
-    """One mistake in one line."""
-    location: KeyPath = tuple(detail["loc"])
-    key_path = _without_kinds(location)
-    where = f"{document.where(key_path)}: {dotted(key_path) or 'scenario'}"
-    if detail["type"] == "extra_forbidden":
-        known = [*known_keys(model, location[:-1]), *(beside if len(location) == 1 else ())]
-        return f"{where}: unknown key; {suggest(str(key_path[-1]), known)}"
-    if detail["type"] == "union_tag_invalid":
-        context = detail["ctx"]
-        allowed = [kind.strip(" '") for kind in str(context["expected_tags"]).split(",")]
-        key = _discriminator(context)
-        return f"{where}.{key}: unknown {key} {shown(context['tag'])}; {suggest(str(context['tag']), allowed)}"
-    if detail["type"] == "union_tag_not_found":
-        return f"{where}.{_discriminator(detail['ctx'])}: this key is missing; it is required"
-    if detail["type"] == "missing":
-        return f"{where}: this key is missing; it is required"
-    if detail["type"] == MISTAKE:
-        return f"{where}: {detail['msg']}"
-    message = WORDED.get(detail["type"], detail["msg"].removeprefix("Value error, "))
+def mistakes_in(schema: object, error: ValidationError, data: object, beside: Sequence[str] = ()) -> list[Mistake]:
+    """Every mistake once, without those that only follow from another.
+
+    A list whose entries are wrong is not too short, a key whose name is misspelt is not missing, and a value that fits
+    none of several types is one mistake.
+
+    Parameters
+    ----------
+    schema : type or annotation
+        What the data must be.
+    error : ValidationError
+        What was found.
+    data : object
+        What was checked.
+    beside : sequence of str
+        Keys that may stand at the top in addition to those of the schema.
+    """
+    details = error.errors(include_url=False)
+    blocks = {detail["loc"][:length] for detail in details for length in range(len(detail["loc"]))}
+    found = [_found(schema, detail, data) for detail in details if detail["loc"] not in blocks]
+    inside = {one.path[:length] for one in found for length in range(len(one.path))}
+    found = [one for one in found if not (one.is_of_union and one.path in inside)]
+    meant = {_meant(one) for one in found if one.detail["type"] == "extra_forbidden"}
+    by_path: dict[KeyPath, list[_Found]] = {}
+    for one in found:
+        if one.detail["type"] != "missing" or one.path not in meant:
+            # What fits none of several types is one mistake; other mistakes at one key are told apart.
+            at = (*one.path, *(() if one.is_of_union else (len(by_path),)))
+            by_path.setdefault(at, []).append(one)
+    return [Mistake(those[0].path, _text(those, beside)) for those in by_path.values()]
+
+
+def _found(schema: object, detail: ErrorDetails, data: object) -> _Found:
+    is_unknown = detail["type"] == "extra_forbidden"
+    path, allowed, is_of_union = _own_path(schema, detail["loc"][: -1 if is_unknown else None], data)
+    if is_unknown:
+        path = (*path, detail["loc"][-1])
+    if detail["type"].startswith("union_tag"):
+        path = (*path, _discriminator(detail["ctx"]))
+    return _Found(detail, path, is_of_union, tuple(one for one in allowed if _is_model(one)))
+
+
+def _meant(one: _Found) -> KeyPath:
+    """Path of the known key that is nearest to an unknown one."""
+    return (*one.path[:-1], nearest(str(one.path[-1]), _keys_of(one.models)) or "")
+
+
+def _text(those: Sequence[_Found], beside: Sequence[str]) -> str:
+    """Mistakes of one value in one line."""
+    one = those[0]
+    detail, context = one.detail, one.detail.get("ctx", {})
+    match detail["type"]:
+        case "extra_forbidden":
+            known = [*_keys_of(one.models), *(beside if len(one.path) == 1 else ())]
+            return f"unknown key; {suggest(str(one.path[-1]), known)}"
+        case "union_tag_invalid":
+            allowed = [kind.strip(" '") for kind in str(context["expected_tags"]).split(",")]
+            key, tag = one.path[-1], str(context["tag"])
+            return f"unknown {key} {shown(tag)}; {suggest(tag, allowed)}"
+        case "missing" | "union_tag_not_found":
+            return "this key is missing; it is required"
+        case kind if kind == MISTAKE:
+            return printable(detail["msg"], in_one_line=True)
+    messages = list(dict.fromkeys(map(_message, (each.detail for each in those))))
+    message = ", or ".join([messages[0], *(text.removeprefix(_INPUT) for text in messages[1:])])
     value = detail["input"]
     if isinstance(value, dict | BaseModel):
         # A message about a whole block names the values that it is about itself.
-        got = "; got a block of keys" if detail["type"].endswith("_type") else ""
-    else:
-        got = f"; got {shown(value)}"
-    return f"{where}: {message[0].lower()}{message[1:]}{got}"
+        return f"{message}; got a block of keys" if detail["type"].endswith("_type") else message
+    return f"{message}; got {shown(value)}"
+
+
+def _message(detail: ErrorDetails) -> str:
+    message = WORDED.get(detail["type"], detail["msg"].removeprefix("Value error, "))
+    return printable(f"{message[0].lower()}{message[1:]}", in_one_line=True)
 
 
 def _discriminator(context: dict[str, Any]) -> str:
@@ -99,52 +167,85 @@ def _discriminator(context: dict[str, Any]) -> str:
     return str(context["discriminator"]).strip("'")
 
 
-def _without_kinds(location: KeyPath) -> KeyPath:
-    """Key path of a mistake: pydantic puts the kind of a list's entry behind its place, where files have no key."""
-    kinds = _kinds()
-    return tuple(
-        key
-        for key, before in zip(location, (None, *location), strict=False)
-        if not (isinstance(before, int) and key in kinds)
-    )
+def _own_path(schema: object, location: Sequence[str | int], data: object) -> tuple[KeyPath, tuple[Any, ...], bool]:
+    """Path of a mistake in the file's own keys, types that the schema allows there, and whether one of several failed.
 
-
-def _kinds() -> dict[str, type[BaseModel]]:
-    """Models of list entries by their kind."""
-    return {
-        str(get_args(model.model_fields[key].annotation)[0]): model
-        for key, union in (("kind", AnyEvent), ("fault", AnyFault))
-        for model in get_args(get_args(union)[0])
-    }
-
-
-def known_keys(root: type[BaseModel], location: Sequence[str | int]) -> list[str]:
-    """Keys that a schema allows at a location.
+    pydantic puts what it tried into its locations, too: the type in a union, the tag of a block, ``[key]``.
 
     Parameters
     ----------
-    root : type
-        The schema.
+    schema : type or annotation
+        What the data must be.
     location : sequence of str or int
-        The location in it, as pydantic has it.
+        From pydantic.
+    data : object
+        What was checked.
     """
-    model: Any = root
-    is_name = False
-    for before, key in zip((None, *location), location, strict=False):
-        if isinstance(key, int) or is_name:
-            # A place in a list, or a name in a block of entries by name.
-            is_name = False
-            continue
-        if isinstance(before, int) and key in _kinds():
-            model = _kinds()[str(key)]
+    allowed: tuple[Any, ...] = tuple(_alternatives(schema))
+    path: list[str | int] = []
+    is_of_union = False
+    for key in location:
+        tagged: tuple[Any, ...] = tuple(one for one in allowed if _is_model(one) and key in _tags(one))
+        is_there = (isinstance(data, dict) and key in data) or (isinstance(data, list | tuple) and isinstance(key, int))
+        is_field = any(_is_model(one) and key in _fields(one) for one in allowed)
+        # Keys of a block by name that a validator has made are not in the file as such.
+        is_made = key != _KEY and allowed != () and all(get_origin(one) is dict for one in allowed)
+        if tagged and len(allowed) > 1:
+            allowed = tagged
+        elif is_there or is_field or is_made:
+            path.append(key)
+            allowed = tuple(inner for one in allowed for inner in _inside(one, key))
+            data = _value(data, key)
         else:
-            annotation = model.model_fields[key].annotation
-            model, is_name = _model_in(annotation), get_origin(annotation) is dict
-    return [field.alias or name for name, field in model.model_fields.items() if not field.exclude]
+            is_of_union |= key != _KEY
+    return tuple(path), allowed, is_of_union
 
 
-def _model_in(annotation: object) -> Any:
-    """First model class inside an annotation such as ``tuple[Bank, ...]``."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    return next((model for part in get_args(annotation) if (model := _model_in(part)) is not None), None)
+def _value(data: object, key: str | int) -> object:
+    if isinstance(data, dict):
+        return data.get(key)
+    return data[key] if isinstance(data, list | tuple) and isinstance(key, int) and key < len(data) else None
+
+
+def _alternatives(annotation: object) -> Iterator[Any]:
+    """Types of which a value may be one: ``X | None`` is ``X`` and ``None``."""
+    if get_origin(annotation) is Annotated:
+        yield from _alternatives(get_args(annotation)[0])
+    elif get_origin(annotation) in (Union, types.UnionType):
+        for part in get_args(annotation):
+            yield from _alternatives(part)
+    else:
+        yield annotation
+
+
+def _inside(annotation: Any, key: str | int) -> Iterator[Any]:
+    """Types that a value at a key of another may be."""
+    arguments = get_args(annotation)
+    if _is_model(annotation):
+        field = _fields(annotation).get(key)
+        yield from () if field is None else _alternatives(field)
+    elif get_origin(annotation) is dict:
+        yield from _alternatives(arguments[1])
+    elif get_origin(annotation) in (tuple, list) and isinstance(key, int):
+        is_fixed = get_origin(annotation) is tuple and arguments[-1] is not ...
+        yield from _alternatives(arguments[key if is_fixed and key < len(arguments) else 0])
+
+
+def _is_model(annotation: object) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
+
+
+def _fields(model: type[BaseModel]) -> dict[str | int, Any]:
+    """Types of a model's fields, by the keys that files have for them."""
+    named = model.model_fields.items()
+    return {field.alias or name: field.annotation for name, field in named if not field.exclude}
+
+
+def _tags(model: type[BaseModel]) -> tuple[str, ...]:
+    """Names by which pydantic tells a model in a union: its own, or its tags."""
+    literals = [annotation for annotation in _fields(model).values() if get_origin(annotation) is Literal]
+    return (model.__name__, *(tag for literal in literals for tag in get_args(literal)))
+
+
+def _keys_of(models: Sequence[type[BaseModel]]) -> list[str]:
+    return list(dict.fromkeys(str(key) for model in models for key in _fields(model)))

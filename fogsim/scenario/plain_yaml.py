@@ -6,7 +6,7 @@ from typing import Any
 import yaml
 from yaml.reader import ReaderError
 
-from fogsim.errors import shown
+from fogsim.errors import is_name, shown
 
 KeyPath = tuple[str | int, ...]
 
@@ -160,7 +160,7 @@ def _line(node: yaml.Node) -> int:
 
 
 def dotted(key_path: KeyPath) -> str:
-    """Key path as it is written after ``--set``; what cannot be printed is escaped, and what is long is cut.
+    """Key path as it is written after ``--set``; keys that are no names are quoted, and long ones cut.
 
     Parameters
     ----------
@@ -171,4 +171,4 @@ def dotted(key_path: KeyPath) -> str:
 
 
 def _readable(key: str) -> str:
-    return key if key.isprintable() and len(key) <= 60 else shown(key)
+    return key if is_name(key) and len(key) <= 60 else shown(key)

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, ValidationInfo
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from fogsim.errors import InputError
+from fogsim.errors import InputError, is_name
 from fogsim.parameters import parameter_mistakes
 from fogsim.registry import Registry
 from fogsim.units.quantities import is_quantity, parse_quantity
@@ -78,8 +78,27 @@ Luminance = Annotated[Number, Field(ge=1e-6, le=1e9)]
 Text = Annotated[str, Field(max_length=1000)]
 """Text of some lines."""
 
-Id = Annotated[str, Field(min_length=1, max_length=200)]
-"""Id of something in SUMO's files."""
+
+def _name(value: str) -> str:
+    if not is_name(value):
+        raise ValueError("a name has visible characters, no < and no blank at its ends")
+    return value
+
+
+Id = Annotated[str, Field(min_length=1, max_length=200), AfterValidator(_name)]
+"""Name of a vehicle, road or the like in SUMO's files."""
+
+_REFUSED_BY_SUMO = " |\\'\";,<>&"
+
+
+def _name_for_sumo(value: str) -> str:
+    if any(one in _REFUSED_BY_SUMO for one in value):
+        raise ValueError(f"a name in SUMO has no blank and none of {_REFUSED_BY_SUMO.strip()}")
+    return value
+
+
+NewId = Annotated[Id, AfterValidator(_name_for_sumo)]
+"""Name of a vehicle or person that FogSim writes into SUMO's files."""
 
 
 def _infinity(value: object) -> object:

@@ -4,14 +4,14 @@ import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from fogsim.conditions import EGO, lights_of
+from fogsim.conditions import EGO, Limits, lights_of
 from fogsim.errors import nearest, shown, suggest
 from fogsim.scenario.document import Document
-from fogsim.scenario.expect.checks import named_vehicles
+from fogsim.scenario.expect.checks import last_time, named_vehicles
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.roads.files import traffic_files
 from fogsim.scenario.schema import Clocks, Scenario
-from fogsim.scenario.timeline import departing_vehicles
+from fogsim.scenario.timeline import departing_vehicles, pointless_triggers
 from fogsim.scenario.timeline import named_vehicles as scripted_vehicles
 from fogsim.scenario.traffic_schema import ChangeLane
 from fogsim.traffic import (
@@ -27,6 +27,7 @@ from fogsim.traffic.sumo.loaded_files import CLOCK_TICK
 from fogsim.traffic.sumo.options import option_mistakes
 
 _ROUNDING = 1e-6  # of a tick: what writing a number in decimals may cost
+_LONGER, _ASIDE = 1.05, 50.0  # by which SUMO may count a route longer than its middle lanes are [-], [m]
 
 
 def step_mistake(clocks: Clocks) -> str | None:
@@ -79,6 +80,20 @@ def option_lines(document: Document, scenario: Scenario, *, own_simulation: bool
     return [f"{document.where((*at, name))}: {dotted((*at, name))}: {text}" for name, text in told.items()]
 
 
+def trigger_mistakes(document: Document, scenario: Scenario) -> list[str]:
+    """Say which triggers can never come, whatever the network is, each in one line.
+
+    Parameters
+    ----------
+    document : Document
+        Where its keys stand.
+    scenario : Scenario
+        The scenario.
+    """
+    found = pointless_triggers(document, scenario, {"time": (0.0, last_time(scenario))})
+    return [f"{document.where(at)}: {dotted(at)}: {text}" for at, text in found]
+
+
 MOST_SHOWN = 10
 """Most names that a message lists."""
 
@@ -114,7 +129,9 @@ def demand_mistakes(document: Document, scenario: Scenario) -> list[str]:
         told |= {at: text for at, text in unfit.items() if text}
         told |= _wide_changes(scenario, demand, edges)
         told |= _unknown_signals(scenario, edges)
-        told |= _unknown_edges(scenario, edges) or _places_aside(scenario, _way(scenario, demand), edges)
+        way = _way(scenario, demand)
+        told |= _unknown_edges(scenario, edges) or _places_aside(scenario, way, edges)
+        told |= _pointless(document, scenario, _limits(scenario, way, edges))
     return [f"{document.where(at)}: {dotted(at)}: {text}" for at, text in told.items()]
 
 
@@ -139,7 +156,7 @@ def _edges(scenario: Scenario, demand: Demand) -> NetEdges | None:
     """Edges of the network, if anything is to be said about them."""
     traffic, folder = scenario.traffic, scenario.directory
     changes = any(isinstance(event, ChangeLane) for event in traffic.events)
-    if not (demand.routes or changes or traffic.along or scenario.timeline):
+    if not (demand.routes or changes or traffic.along or scenario.timeline or scenario.expect or scenario.end_when):
         return None
     net = configured_files(folder / traffic.config)[0] if traffic.config else traffic_files(scenario).net or Path()
     return read_net_edges(net, _way(scenario, demand))
@@ -214,6 +231,23 @@ def _wide_changes(scenario: Scenario, demand: Demand, edges: NetEdges) -> dict[K
                 f"the widest road {where} has lanes 0 to {widest - 1}; got {event.lanes}"
             )
     return told
+
+
+def _limits(scenario: Scenario, way: tuple[str, ...], edges: NetEdges) -> Limits:
+    """Ranges of time, lanes and positions in a run."""
+    limits = {"time": (0.0, last_time(scenario)), "X.lane": (0.0, max(edges.lanes.values()) - 1.0)}
+    if way and all(edges.axes.get(edge) for edge in way):
+        length = edges.route_length(way)
+        limits["X.position"] = (-_ASIDE, _LONGER * length + _ASIDE)
+    return limits
+
+
+def _pointless(document: Document, scenario: Scenario, limits: Limits) -> dict[KeyPath, str]:
+    """Conditions that can never come, or decide nothing, on this network."""
+    told: dict[KeyPath, str] = {}
+    for name, expectation in scenario.expect.items():
+        told |= {("expect", name, key): text for key, text in expectation.pointless(limits, scenario.traffic.ego)}
+    return told | dict(pointless_triggers(document, scenario, limits))
 
 
 def _places_aside(scenario: Scenario, way: tuple[str, ...], edges: NetEdges) -> Mapping[KeyPath, str]:

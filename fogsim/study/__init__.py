@@ -17,7 +17,7 @@ from fogsim.study.pooled_profiles import pool_profiles
 from fogsim.study.ray_cluster import RayCluster
 from fogsim.study.report import write_report
 from fogsim.study.shipped import shipped_studies
-from fogsim.study.table import Row, write_table
+from fogsim.study.table import Row, check_factors, write_table
 
 __all__ = [
     "Difference",
@@ -76,7 +76,8 @@ def run_study(
     ------
     InputError
         If the directory holds something else, another study, or is written by another process; if both processes and
-        an engine are given; or if a Ray cluster does not answer or cannot run the study.
+        an engine are given; if a metric of your own has the name of a factor; or if a Ray cluster does not answer or
+        cannot run the study.
     MissingDependencyError
         If Ray is asked for and not installed.
     OSError
@@ -100,6 +101,7 @@ def run_study(
 
         engine.run(missing, directory.results, count)
         rows = directory.rows()
+        check_factors(rows, [run.levels for run in study.runs])
         write_table(rows, out)
         write_report(study, rows, pool_profiles(directory.profiles()), out)
     return rows

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from typing import Literal, NamedTuple
 
 from fogsim.errors import suggest
-from fogsim.metrics import DEFAULT_STANDARD, METRICS
+from fogsim.metrics import metric_keys
 
 METHODS_KEY = "estimators"
 """Key under which each estimator has metrics of its own, ``estimators.METHOD.KEY``."""
@@ -84,7 +84,7 @@ def unknown_metrics(names: Iterable[str]) -> list[str]:
     names : iterable of str
         What was chosen.
     """
-    known = [key for make in METRICS.values() for key in make(DEFAULT_STANDARD).meanings]
+    known = [key for key in metric_keys() if key != "ending"]
     return [
         f"unknown metric {name!r}; {suggest(name, known)}"
         for name in names

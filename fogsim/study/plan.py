@@ -5,34 +5,33 @@ import hashlib
 import itertools
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
-from fogsim.errors import InputError, suggest
+from fogsim.errors import InputError, shown, suggest
 from fogsim.parameters import checked_parameters
 from fogsim.registry.user_code import MayImport, import_anything
-from fogsim.scenario import Scenario, build, load_scenario, override, resolved, scenario_from_config
+from fogsim.scenario import Scenario, build, resolved, scenario_from_config
 from fogsim.scenario.document import Document, read_document
+from fogsim.scenario.expect.conditions import refuse
+from fogsim.scenario.loading import CountWatch, scenario_reader
 from fogsim.scenario.mistakes import mistake_lines
+from fogsim.scenario.plain_yaml import KeyPath
 from fogsim.scenario.schema import NO_RENDERER
 from fogsim.scenario.section import Id, Section, Seed, Share, Text
 from fogsim.scenario.traffic_alone import NO_EGO
+from fogsim.scenario.variation import grid_mistake
 from fogsim.study.main_metrics import unknown_metrics
 from fogsim.study.shipped import study_file
+from fogsim.study.table import column_mistake
 from fogsim.traffic.road.configuration import configured_demand, configured_files
 
-MOST_RUNS = 1_000_000
-"""Most runs of a study."""
-
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+ -]{0,59}$")]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9]([A-Za-z0-9_.+ -]{0,58}[A-Za-z0-9_.+-])?$")]
 """Name of a factor or a level: it becomes a column or a legend."""
-
-RESERVED = frozenset({"run", "seed", "status", "message", "sumo_outputs"})
-"""Columns of the table that no factor may be named like."""
 
 
 class StudyFile(Section):
@@ -72,40 +71,37 @@ class StudyFile(Section):
     """Half-width of an interval, as a share of the baseline's mean, for which the seeds needed are told."""
 
     @model_validator(mode="after")
-    def _known_metrics(self) -> Self:
-        wrong = unknown_metrics(self.metrics)
-        if wrong:
-            raise ValueError("\n".join(f"metrics: {line}" for line in wrong))
-        if len(set(self.metrics)) < len(self.metrics):
-            raise ValueError("metrics: a metric stands twice")
+    def _fits_together(self) -> Self:
+        refuse(self._mistakes())
         return self
 
-    @model_validator(mode="after")
-    def _one_source(self) -> Self:
+    def _mistakes(self) -> Iterator[tuple[KeyPath, str]]:
         if (self.scenario is None) == (self.sumocfg is None):
-            raise ValueError("give either scenario, or sumocfg, perhaps with ego")
-        if self.scenario is not None and self.ego is not None:
-            raise ValueError(
-                "ego: goes with sumocfg; a scenario names its own, which settings: [traffic.ego=ID] changes"
+            yield (), "give either scenario, or sumocfg, perhaps with ego"
+        elif self.scenario is not None and self.ego is not None:
+            yield (
+                ("ego",),
+                "goes with sumocfg; a scenario names its own, which settings: [traffic.ego=ID] changes",
             )
-        return self
+        yield from ((("metrics",), wrong) for wrong in unknown_metrics(self.metrics))
+        if len(set(self.metrics)) < len(self.metrics):
+            yield ("metrics",), "a metric is named twice"
+        if not isinstance(self.seeds, int) and len(set(self.seeds)) < len(self.seeds):
+            yield ("seeds",), "a seed is given twice"
+        yield from self._mistakes_of_factors()
 
-    @model_validator(mode="after")
-    def _known_levels(self) -> Self:
+    def _mistakes_of_factors(self) -> Iterator[tuple[KeyPath, str]]:
         for name, levels in self.factors.items():
-            if name in RESERVED:
-                raise ValueError(f"factors.{name}: the table has a column of that name; take another")
+            mistake = column_mistake(name)
+            if mistake is not None:
+                yield ("factors", name), mistake
             if not levels:
-                raise ValueError(f"factors.{name}: a factor needs at least one level")
+                yield ("factors", name), "a factor needs at least one level"
         for name, level in self.baseline.items():
             if name not in self.factors:
-                raise ValueError(f"baseline.{name}: unknown factor; {suggest(name, self.factors)}")
-            if level not in self.factors[name]:
-                raise ValueError(f"baseline.{name}: unknown level {level!r}; {suggest(level, self.factors[name])}")
-        seeds = self.seeds
-        if not isinstance(seeds, int) and len(set(seeds)) < len(seeds):
-            raise ValueError("seeds: a seed stands twice")
-        return self
+                yield ("baseline", name), f"unknown factor; {suggest(name, self.factors)}"
+            elif level not in self.factors[name]:
+                yield ("baseline", name), f"unknown level {shown(level)}; {suggest(level, self.factors[name])}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,12 +167,14 @@ class Study:
 
     def description(self) -> dict[str, Any]:
         """All that decides its runs, as JSON can hold it: each cell's scenario by its levels, and the seeds."""
-        cells = {_label(run.levels): resolved(run.scenario) for run in self.runs}
+        # Runs of a cell share one scenario, and differ in their seed.
+        of_cells = list({id(run.scenario): run for run in self.runs}.values())
+        cells = {_label(run.levels): resolved(run.scenario) for run in of_cells}
         seeds = list(dict.fromkeys(run.seed for run in self.runs))
         factors = {name: list(levels) for name, levels in self.factors.items()}
-        files = dict(item for run in self.runs for item in file_digests(run.scenario).items())
+        files = dict(item for run in of_cells for item in file_digests(run.scenario).items())
         told = {"factors": factors, "baseline": dict(self.baseline), "seeds": seeds, "files": files, "cells": cells}
-        methods = dict(item for run in self.runs for item in build.own_methods(run.scenario).items())
+        methods = dict(item for run in of_cells for item in build.own_methods(run.scenario).items())
         return {**told, "own_methods": methods} if methods else told
 
 
@@ -220,7 +218,10 @@ def _digest(path: Path, _: int) -> str:
 
 @checked_parameters
 def load_study(
-    name_or_path: str | Path, settings: Iterable[str] = (), may_import: MayImport = import_anything
+    name_or_path: str | Path,
+    settings: Iterable[str] = (),
+    may_import: MayImport = import_anything,
+    watch: CountWatch | None = None,
 ) -> Study:
     """Read a study file and check every scenario of its grid, before anything is run.
 
@@ -232,6 +233,8 @@ def load_study(
         ``key.path=value`` each, put in place of the scenario's in every run, after those of the file.
     may_import : callable
         As of `load_scenario`.
+    watch : callable or None
+        Called after each cell with the number of cells that are checked, and how many there are.
 
     Raises
     ------
@@ -245,18 +248,17 @@ def load_study(
         written = written.model_copy(update={"settings": (*written.settings, *settings)})
     except ValidationError as error:
         raise InputError(mistake_lines(document, StudyFile, error)) from error
-    seeds = tuple(range(written.seeds)) if isinstance(written.seeds, int) else written.seeds
-    grid = [dict(zip(written.factors, cell, strict=True)) for cell in itertools.product(*written.factors.values())]
-    if len(grid) * len(seeds) > MOST_RUNS:
-        raise InputError(f"{path}: {len(grid)} cells × {len(seeds)} seeds are more than {MOST_RUNS} runs")
-    runs = tuple(_runs(document, written, grid, seeds, may_import))
+    sizes = {name: len(levels) for name, levels in written.factors.items()}
+    mistake = grid_mistake({**sizes, "seeds": written.seeds if isinstance(written.seeds, int) else len(written.seeds)})
+    if mistake is not None:
+        raise InputError(f"{document.where(('factors',))}: factors: {mistake}")
     first, levels = next(iter(written.factors.items()))
     return Study(
         name=path.stem,
         factors={name: tuple(levels) for name, levels in written.factors.items()},
         baseline=written.baseline or {first: next(iter(levels))},
         confidence=written.confidence,
-        runs=runs,
+        runs=tuple(_runs(document, written, may_import, watch)),
         metrics=written.metrics,
         wanted_interval=written.wanted_interval,
         level_settings=written.factors,
@@ -265,38 +267,46 @@ def load_study(
 
 
 def _runs(
-    document: Document,
-    written: StudyFile,
-    grid: list[dict[str, str]],
-    seeds: tuple[int, ...],
-    may_import: MayImport,
+    document: Document, written: StudyFile, may_import: MayImport, watch: CountWatch | None
 ) -> Iterator[StudyRun]:
-    number = 0
-    for levels in grid:
-        scenario = _scenario(document, written, levels, may_import)
+    seeds = range(written.seeds) if isinstance(written.seeds, int) else written.seeds
+    load, number = _loader(document, written, may_import), itertools.count()
+    grid = list(itertools.product(*written.factors.values()))
+    for done, cell in enumerate(grid, 1):
+        levels = dict(zip(written.factors, cell, strict=True))
+        scenario = _scenario(document, written, levels, load)
         text = json.dumps([resolved(scenario), file_digests(scenario)], sort_keys=True)
         for seed in seeds:
             key = hashlib.sha256(f"{text} {seed}".encode()).hexdigest()[:20]
-            yield StudyRun(number, levels, seed, scenario, key)
-            number += 1
+            yield StudyRun(next(number), levels, seed, scenario, key)
+        if watch is not None:
+            watch(done, len(grid))
 
 
-def _scenario(document: Document, written: StudyFile, levels: Mapping[str, str], may_import: MayImport) -> Scenario:
+def _loader(document: Document, written: StudyFile, may_import: MayImport) -> Callable[[Sequence[str]], Scenario]:
+    """Makes scenarios of settings, from files that are read once."""
+    folder = document.path.parent
+    if written.sumocfg is not None:
+        config, ego = folder / written.sumocfg, written.ego or NO_EGO
+        return lambda settings: scenario_from_config(config, ego, settings, may_import=may_import)
+    name = str(written.scenario)
+    beside = folder / name
+    try:
+        return scenario_reader(beside if beside.exists() else name, may_import=may_import)
+    except InputError as error:
+        raise InputError(f"{document.where(('scenario',))}: scenario: {error}") from error
+
+
+def _scenario(
+    document: Document, written: StudyFile, levels: Mapping[str, str], load: Callable[[Sequence[str]], Scenario]
+) -> Scenario:
     settings = [*written.settings]
     for factor, level in levels.items():
         settings += written.factors[factor][level]
-    folder = document.path.parent
     try:
-        if written.sumocfg is not None:
-            scenario = scenario_from_config(
-                folder / written.sumocfg, written.ego or NO_EGO, settings, may_import=may_import
-            )
-        else:
-            name = str(written.scenario)
-            beside = folder / name
-            scenario = load_scenario(beside if beside.exists() else name, settings, may_import=may_import)
+        scenario = load(settings)
         if written.frames == "where_needed" and not needs_camera(scenario):
-            scenario = override(scenario, [f"renderer={NO_RENDERER}", "estimators=[]"], may_import=may_import)
+            scenario = load([*settings, f"renderer={NO_RENDERER}", "estimators=[]"])
     except InputError as error:
         raise InputError(f"{document.path}: {_label(levels)}: {error}") from error
     return scenario

@@ -8,7 +8,10 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from fogsim.errors import InputError
 from fogsim.files.atomic import write_bytes, write_text
+from fogsim.metrics import metric_keys
+from fogsim.study.main_metrics import METHODS_KEY
 from fogsim.study.run_file import Value
 
 Row = Mapping[str, Value]
@@ -24,6 +27,49 @@ def columns(rows: Sequence[Row]) -> list[str]:
         The table.
     """
     return list(dict.fromkeys(key for row in rows for key in row))
+
+
+FIXED_COLUMNS = frozenset({"run", "seed", "status", "message", "sumo_outputs"})
+"""Columns of every table, besides factors and metrics."""
+
+
+def column_mistake(factor: str) -> str | None:
+    """Say why the table can have no column for a factor of a name; None if it can.
+
+    Parameters
+    ----------
+    factor : str
+        Name of the factor.
+    """
+    if factor in FIXED_COLUMNS:
+        return "the table has a column of that name; choose another"
+    if factor in metric_keys() or factor.startswith(f"{METHODS_KEY}."):
+        return "a metric has that name; choose another"
+    return None
+
+
+def check_factors(rows: Sequence[Row], levels: Sequence[Mapping[str, str]]) -> None:
+    """Refuse a table in which a metric, perhaps of a user's own, has taken the column of a factor.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+        The table.
+    levels : sequence of mapping from str to str
+        Level of each factor in each row.
+
+    Raises
+    ------
+    InputError
+        If a column of a factor has something else than its levels.
+    """
+    for row, wanted in zip(rows, levels, strict=True):
+        for factor, level in wanted.items():
+            if row[factor] != level:
+                raise InputError(
+                    f"factors.{factor}: run {row['run']} has a metric of that name, which would take its column; "
+                    "rename the factor and give the same command again: finished runs are kept"
+                )
 
 
 def write_table(rows: Sequence[Row], folder: Path) -> None:

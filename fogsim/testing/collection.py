@@ -10,7 +10,7 @@ from fogsim.errors import InputError
 from fogsim.registry.user_code import MayImport, import_anything
 from fogsim.scenario import build, resolved
 from fogsim.scenario.document import read_scenario_document
-from fogsim.scenario.loading import SCENARIO_FILE, ScenarioCases, load_cases, scenario_file
+from fogsim.scenario.loading import SCENARIO_FILE, CountWatch, ScenarioCases, load_cases, scenario_file
 from fogsim.scenario.variation import NONE_FAILS, Verdict
 from fogsim.study.plan import StudyRun, file_digests
 from fogsim.testing.keywords import Keywords
@@ -86,6 +86,7 @@ def collect(
     case: str = "",
     keywords: Keywords | None = None,
     may_import: MayImport = import_anything,
+    watch: CountWatch | None = None,
 ) -> list[FogTest]:
     """Tests of files; those of which nothing is asked for are left out.
 
@@ -101,6 +102,8 @@ def collect(
         Which expectations.
     may_import : callable
         As of `load_scenario`.
+    watch : callable or None
+        As for `load_cases`.
 
     Raises
     ------
@@ -110,7 +113,7 @@ def collect(
     tests, mistakes = [], []
     for file in files:
         try:
-            loaded = load_cases(file, settings, case, may_import=may_import)
+            loaded = load_cases(file, settings, case, watch=watch, may_import=may_import)
         except InputError as error:
             mistakes.append(str(error))
             continue

@@ -3,7 +3,8 @@
 import pytest
 from rich.text import Text
 
-from fogsim.cli.printing import escape, printable
+from fogsim.cli.printing import escape
+from fogsim.errors import printable
 
 
 @pytest.mark.parametrize(

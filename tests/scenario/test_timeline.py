@@ -30,7 +30,7 @@ def mistake(entry: str, *settings: str) -> str:
         ("{lead: {speed: {to_kmh: 3, over_s: 1, rate_mps2: 2}}}", "do.lead.speed: give over_s, rate_mps2 or shape"),
         ("{lead: {stop: {}}}", "do.lead.stop: say where: position_m or after_m"),
         ("{lead: {lamps: {stopp: off}}}", "do.lead.lamps.stopp: unknown key; did you mean 'stop'"),
-        ("{lead: {follow: {headway: 1 s}}}", "do.lead.follow.vehicle: field required"),
+        ("{lead: {follow: {headway: 1 s}}}", "do.lead.follow.vehicle: this key is missing"),
         ("{lead: {speed: {to_kmh: 3, like: ego}}}", "do.lead.speed: say which speed: to_kmh or like"),
         ("{lead: {speed: {over: 3 s}}}", "do.lead.speed: say which speed: to_kmh or like"),
         ("{lead: {change_lane: {to: 1, to_lane_of: ego}}}", "do.lead.change_lane: say where: lanes"),

@@ -134,7 +134,7 @@ def test_a_seed_that_is_not_in_the_file_has_draws_of_its_own() -> None:
         ({"x": {"seeds": [1.5]}}, "vary.x.seeds: expected how many"),
         ({"x": "2 seeds", "y": "3 seeds"}, "vary.y: x has the seeds already"),
         ({"x y": [1]}, "letters, digits"),
-        ({"x": "400 seeds", "y": {"from": 1, "to": 400, "step": 1}}, "160000 cases are more than 100000"),
+        ({"x": "400 seeds", "y": {"from": 1, "to": 400, "step": 1}}, "160,000 runs; at most 100,000"),
     ],
 )
 def test_mistakes_are_told(vary: dict[str, Any], told: str) -> None:

@@ -1,11 +1,20 @@
+"""Study files: their grid, and what is refused with file, line and key."""
+
 from pathlib import Path
+from unittest.mock import MagicMock
 
 import pytest
 
 from fogsim.errors import InputError, UnknownNameError
+from fogsim.metrics import RunMetrics, TrafficRunMetrics
+from fogsim.scenario import loading
+from fogsim.scenario.document import read_scenario_document
 from fogsim.scenario.loading import catalogue
+from fogsim.scenario.variation import grid_mistake
 from fogsim.study import load_study
+from fogsim.study.execution import flat_metrics
 from fogsim.study.shipped import shipped_studies, study_file
+from fogsim.study.table import FIXED_COLUMNS, check_factors, column_mistake
 
 STUDY = """
 scenario: motorway_fog_bank
@@ -60,12 +69,12 @@ def test_a_scenario_beside_the_study_is_found(tmp_path: Path) -> None:
         (("factors:", "factor:"), r"mine\.yaml:4: factor: .*did you mean 'factors'"),
         (("advice=none", "advice=non"), r"policy=none, visibility=v60: .*unknown adviser 'non'; did you mean 'none'"),
         (("seeds: 3", "seeds: 0"), r"seeds"),
-        (("seeds: 3", "seeds: [1, 1]"), r"a seed stands twice"),
+        (("seeds: 3", "seeds: [1, 1]"), r"seeds: a seed is given twice"),
         (("seeds: 3", "seeds: []"), r"seeds"),
         (("seeds: 3", "baseline: {police: none}"), r"baseline\.police: unknown factor; did you mean 'policy'"),
         (("seeds: 3", "baseline: {policy: non}"), r"baseline\.policy: unknown level 'non'; did you mean 'none'"),
         (("seeds: 3", "metrics: [colisions]"), r"metrics: unknown metric 'colisions'; did you mean 'collisions'"),
-        (("seeds: 3", "metrics: [collisions, collisions]"), r"metrics: a metric stands twice"),
+        (("seeds: 3", "metrics: [collisions, collisions]"), r"metrics: a metric is named twice"),
         (("seeds: 3", "wanted_interval: 0"), r"wanted_interval"),
         (("  visibility:", "  seed:"), r"factors\.seed: the table has a column of that name"),
         (("scenario: motorway_fog_bank", "scenario: motorway"), r"unknown scenario 'motorway'"),
@@ -78,6 +87,68 @@ def test_a_scenario_beside_the_study_is_found(tmp_path: Path) -> None:
 def test_mistakes_are_named_with_their_place(tmp_path: Path, change: tuple[str, str], said: str) -> None:
     with pytest.raises(InputError, match=said):
         load_study(written(tmp_path, STUDY.replace(*change, 1)))
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *sorted(FIXED_COLUMNS),
+        "ending",
+        "duration_s",
+        "mean_speed_mps",
+        "traffic_delay_share",
+        "belief_median_error_percent",
+        "estimators.joint_road.valid_share",
+        "estimators.mine.anything",
+    ],
+)
+def test_a_factor_is_not_named_like_a_column_of_the_table(tmp_path: Path, name: str) -> None:
+    with pytest.raises(InputError, match=rf"mine\.yaml:8: factors\.{name}: .*; choose another$"):
+        load_study(written(tmp_path, STUDY.replace("visibility:\n", f"{name}:\n", 1)))
+
+
+def test_every_metric_of_a_run_is_a_name_that_no_factor_has() -> None:
+    for summary in (RunMetrics().summary(), TrafficRunMetrics().summary()):
+        assert all(column_mistake(name) for name in flat_metrics(summary.to_json()))
+
+
+def test_a_metric_of_a_users_own_does_not_take_the_column_of_a_factor() -> None:
+    levels = {"policy": "none"}
+    check_factors([{"run": 0, "policy": "none", "mine": 3.0}], [levels])
+    with pytest.raises(InputError, match=r"factors\.policy: run 0 has a metric of that name"):
+        check_factors([{"run": 0, "policy": 3.0}], [levels])
+
+
+@pytest.mark.parametrize(
+    ("seeds", "told"),
+    [
+        ("10", r"10 f0 × 10 f1 × 10 f2 × 10 f3 × 10 f4 × … are 10,000,000,000 runs; at most 100,000 are allowed"),
+        ("100000", r"are 100,000,000,000,000 runs; at most"),
+        ("1000000000", r"seeds: input should be less than or equal to 100000.*; got 1000000000"),
+        ("1e9", r"seeds: input should be a valid integer"),
+    ],
+)
+def test_a_grid_is_counted_before_it_is_built(tmp_path: Path, seeds: str, told: str) -> None:
+    levels = ", ".join(f"l{n}: []" for n in range(10))
+    factors = "\n".join(f"  f{n}: {{{levels}}}" for n in range(9))
+    with pytest.raises(InputError, match=told):
+        load_study(written(tmp_path, f"scenario: motorway_fog_bank\nfactors:\n{factors}\nseeds: {seeds}\n"))
+
+
+@pytest.mark.parametrize("number", [10**5, 10**5 + 1, 10**40])
+def test_a_grid_has_a_limit(number: int) -> None:
+    mistake = grid_mistake({"fog": number, "policy": 1})
+    assert (mistake is None) == (number == 10**5)
+    assert mistake is None or "100,000 are allowed" in mistake
+
+
+def test_cells_are_counted_while_they_are_checked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    reading = MagicMock(wraps=read_scenario_document)
+    monkeypatch.setattr(loading, "read_scenario_document", reading)
+    seen: list[tuple[int, int]] = []
+    load_study(written(tmp_path), lambda done, total: seen.append((done, total)))
+    assert seen == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    reading.assert_called_once()
 
 
 def test_an_empty_study_says_what_is_missing(tmp_path: Path) -> None:

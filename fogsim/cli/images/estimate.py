@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fogsim.cli.printing import BAD_INPUT, escape, print_error, print_remarks, printable, stderr
+from fogsim.cli.printing import BAD_INPUT, escape, print_error, print_remarks, stderr
 from fogsim.cli.progress import progress_bar
-from fogsim.errors import InputError
+from fogsim.errors import InputError, printable
 
 if TYPE_CHECKING:
     from fogsim.offline import FrameEstimates, NightDrive, OverlayFile, SignWatch, Source

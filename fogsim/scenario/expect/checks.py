@@ -3,13 +3,14 @@
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from fogsim.conditions import Need, RunContent, condition_mistakes, signals_of, vehicles_of
+from fogsim.conditions import Need, RunContent, condition_mistakes, vehicles_in
 from fogsim.errors import nearest_of, shown, suggest
 from fogsim.metrics.estimation import Errors
 from fogsim.metrics.run_metrics import RunMetrics, TrafficRunMetrics
 from fogsim.scenario.expect.conditions import refuse
 from fogsim.scenario.expect.schema import Expectation, metric_check
 from fogsim.scenario.plain_yaml import KeyPath
+from fogsim.units import clock_time
 
 if TYPE_CHECKING:
     from fogsim.scenario.schema import Scenario
@@ -31,8 +32,20 @@ def check_expectations(scenario: "Scenario") -> None:
     ValidationError
         If there are any.
     """
-    mistakes = expectation_mistakes(scenario.expect, run_content(scenario), scenario.duration_s)
+    mistakes = expectation_mistakes(scenario.expect, run_content(scenario), last_time(scenario), scenario.traffic.ego)
     refuse((("expect", *place), told) for place, told in mistakes)
+
+
+def last_time(scenario: "Scenario") -> float:
+    """Time of the last frame of a scenario's longest run [s].
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    """
+    period = scenario.clocks.camera_period_s
+    return clock_time(max(1, round(scenario.duration_s / period)) * period)
 
 
 def run_content(scenario: "Scenario") -> RunContent:
@@ -60,7 +73,7 @@ def run_content(scenario: "Scenario") -> RunContent:
 
 
 def expectation_mistakes(
-    expect: Mapping[str, Expectation], content: RunContent, duration: float
+    expect: Mapping[str, Expectation], content: RunContent, duration: float, ego: str
 ) -> Iterator[tuple[KeyPath, str]]:
     """Say what of some expectations a run could not tell.
 
@@ -71,11 +84,14 @@ def expectation_mistakes(
     content : RunContent
         What the run has.
     duration : float
-        Its longest time [s].
+        Time of its last frame [s].
+    ego : str
+        Id of its ego.
     """
     for name, expectation in expect.items():
         for key, condition in expectation.conditions():
             yield from (((name, key), told) for told in condition_mistakes(condition, content))
+        yield from (((name, key), told) for key, told in expectation.pointless({"time": (0.0, duration)}, ego))
         for key, time in (("within_s", expectation.within_s), ("for_at_least_s", expectation.for_at_least_s)):
             if time is not None and time > duration:
                 yield (name, key), f"this cannot be decided: the run lasts {duration:g} s; got {time:g} s"
@@ -109,5 +125,4 @@ def named_vehicles(expect: Mapping[str, Expectation]) -> Iterator[tuple[KeyPath,
     """
     for name, expectation in expect.items():
         for key, condition in expectation.conditions():
-            for reference in signals_of(condition):
-                yield from ((("expect", name, key), vehicle) for vehicle in vehicles_of(reference))
+            yield from ((("expect", name, key), vehicle) for vehicle in vehicles_in(condition))

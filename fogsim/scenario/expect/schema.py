@@ -7,13 +7,15 @@ from typing import Annotated, Self
 
 from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema, field_validator, model_validator
 
-from fogsim.conditions import Condition, mended, outcomes
+from fogsim.conditions import EGO, Condition, Limits, mended, outcomes, pointless_parts
+from fogsim.conditions.logic import compared
 from fogsim.conditions.parsing import OPERATORS
 from fogsim.errors import shown
 from fogsim.expectations import Always, Clause, Eventually, Happened, MetricCheck, Whenever
 from fogsim.scenario.expect.conditions import WrittenCondition, refuse
 from fogsim.scenario.plain_yaml import KeyPath
 from fogsim.scenario.section import Flag, Id, Section, Time, Whole
+from fogsim.units import clock_time
 from fogsim.units.quantities import UNIT_OF_SUFFIX, is_quantity, parse_quantity
 
 _CLAUSES = ("always", "never", "eventually", "whenever", "happened", "metric")
@@ -27,9 +29,26 @@ _GOES_WITH = {
     "at_least": ("whenever",),
 }
 
+_WANTED: Mapping[str, Mapping[str, bool]] = {
+    "always": {"cannot fail": True, "cannot pass": False},
+    "never": {"cannot fail": False, "cannot pass": True},
+    "eventually": {"cannot fail": True, "cannot pass": False},
+    "require": {"cannot fail": True, "cannot pass": False},
+    "whenever": {"would test nothing": False},
+    "while": {"would test nothing": False},
+}
+"""What it means for a clause if its condition can be nothing but true, or nothing but false."""
+
 _TIMES = re.compile(r"\s*(\d+)\s*times?\s*\Z")
 
 _METRIC = re.compile(r"\s*([A-Za-z_][\w.]*)\s*(<=|>=|==|!=|<|>)\s*(\S.*?)\s*\Z")
+
+
+_SHARE = (0.0, 1.0)
+"""Range of metrics whose keys end in ``_share``."""
+
+_RATIO = "traffic_delay_share"
+"""The one that may be greater: time lost in proportion to the time at free flow."""
 
 
 def _number_of_times(value: object) -> object:
@@ -115,20 +134,31 @@ class Expectation(Section):
             yield ("whenever",), "needs require: what must hold then"
         if self.throughout and not self.within_s:
             yield ("throughout",), "needs within: the time for which it must hold"
-        yield from self._without_outcome()
 
-    def _without_outcome(self) -> Iterator[tuple[KeyPath, str]]:
-        """Conditions that cannot be true, or cannot be false."""
-        for key, good in (("always", True), ("never", False), ("eventually", True), ("require", True)):
-            condition: Condition | None = getattr(self, key)
-            possible = frozenset({True, False}) if condition is None else outcomes(condition)
-            if possible == {good}:
-                yield (key,), f"this cannot fail: {condition} is {str(good).lower()} whatever comes"
-            elif possible == {not good}:
-                yield (key,), f"this cannot pass: {condition} is {str(not good).lower()} whatever comes"
-        for key, condition in (("whenever", self.whenever), ("while", self.during)):
-            if condition is not None and outcomes(condition) == {False}:
-                yield (key,), f"nothing would be tested: {condition} is never true"
+    def pointless(self, limits: Limits, ego: str = EGO) -> Iterator[tuple[str, str]]:
+        """Say by their keys which conditions cannot fail, cannot pass, or can never apply in a run.
+
+        Parameters
+        ----------
+        limits : mapping from str to (float, float)
+            Ranges of signals in the run, as for `outcomes`; ``time`` among them.
+        ego : str
+            Id of the ego.
+        """
+        begin, end = limits["time"]
+        within = min(self.within_s or 0.0, end - begin)
+        until = {"eventually": within or end, "whenever": clock_time(end - within)}
+        for key, condition in self.conditions():
+            last = until.get(key, end)
+            here = {**limits, "time": (begin, last)}
+            possible, reason = outcomes(condition, here), next(pointless_parts(condition, here, ego), None)
+            word = next((word for word, outcome in _WANTED[key].items() if possible == {outcome}), None)
+            if word is not None:
+                value = "true" if True in possible else "false"
+                limit = f" (within {within:g} s in a run of {end:g} s)" if last < end else ""
+                yield key, f"this {word}: {reason or f'{condition} is always {value}'}{limit}"
+            elif reason is not None:
+                yield key, reason
 
     def conditions(self) -> Iterator[tuple[str, Condition]]:
         """Its conditions, by their keys."""
@@ -180,7 +210,7 @@ def metric_check(name: str, written: str) -> MetricCheck:
     Raises
     ------
     ValueError
-        If it is something else.
+        If it is something else, or is met or missed by every value that the metric can have.
     """
     match = _METRIC.match(written)
     if match is None:
@@ -193,7 +223,13 @@ def metric_check(name: str, written: str) -> MetricCheck:
     unit = UNIT_OF_SUFFIX.get(key.rpartition("_")[2], "")
     has_unit = re.search(r"[^\W\d_]\s*\Z|[%°]\s*\Z", value) is not None and not value.endswith("inf")
     # A bare number counts in the unit at the end of the key.
-    return MetricCheck(name, key, relation, parse_quantity(value, unit if has_unit else ""))
+    number = parse_quantity(value, unit if has_unit else "")
+    possible = {compared(one, relation, number) for one in (*_SHARE, 0.5, min(max(number, 0.0), 1.0))}
+    if key.endswith("_share") and key != _RATIO and len(possible) == 1:
+        raise ValueError(
+            f"this cannot {'fail' if True in possible else 'pass'}: {key} is at least 0 % and at most 100 %"
+        )
+    return MetricCheck(name, key, relation, number)
 
 
 def clauses_of(expect: Mapping[str, Expectation]) -> tuple[Clause, ...]:

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, WrapValidator, field_validator, model_validator
 
 from fogsim.errors import UnknownNameError, suggest
-from fogsim.scenario.section import Distance, Flag, Id, Length, Number, Section, Share, SpeedKmh, Time, Whole
+from fogsim.scenario.section import Distance, Flag, Id, Length, NewId, Number, Section, Share, SpeedKmh, Time, Whole
 from fogsim.scenario.timeline.lamps import LampActions, lamp_mistake
 from fogsim.traffic.templates import RAMP, ROAD_TEMPLATES, VEHICLE_KINDS, measures
 from fogsim.units.quantities import is_quantity, parse_quantity
@@ -359,7 +359,7 @@ class ActorSection(Section):
         return self
 
 
-Actors = dict[Id, ActorSection]
+Actors = dict[NewId, ActorSection]
 
 
 def check_roads(written: Any) -> None:

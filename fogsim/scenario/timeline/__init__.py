@@ -12,7 +12,7 @@ from fogsim.scenario.timeline.actions import (
     told,
     vehicles_of,
 )
-from fogsim.scenario.timeline.checks import check_timeline, named_vehicles
+from fogsim.scenario.timeline.checks import check_timeline, named_vehicles, pointless_triggers
 from fogsim.scenario.timeline.schema import FogActions, LightActions, Timeline, TimelineEntry
 
 __all__ = [
@@ -29,6 +29,7 @@ __all__ = [
     "entry_name",
     "fog_reference",
     "named_vehicles",
+    "pointless_triggers",
     "scripted_fog",
     "told",
     "vehicles_of",

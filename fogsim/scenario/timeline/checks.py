@@ -4,9 +4,9 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from fogsim.conditions import EGO, condition_mistakes, signals_of
-from fogsim.conditions import vehicles_of as vehicles_of_signal
+from fogsim.conditions import EGO, Condition, Limits, condition_mistakes, pointless_parts, vehicles_in
 from fogsim.errors import suggest
+from fogsim.scenario.document import Document
 from fogsim.scenario.expect.checks import run_content
 from fogsim.scenario.expect.conditions import refuse
 from fogsim.scenario.plain_yaml import KeyPath
@@ -49,6 +49,31 @@ def check_timeline(scenario: "Scenario") -> None:
     if scenario.end_when is not None:
         told = condition_mistakes(scenario.end_when, run_content(scenario))
         refuse((("end_when",), one) for one in told)
+
+
+def pointless_triggers(document: Document, scenario: "Scenario", limits: Limits) -> Iterator[tuple[KeyPath, str]]:
+    """Say which triggers, and which ``end_when``, can never come as they are written.
+
+    Triggers of OpenSCENARIO files may: what was not played is reported at the end of the run. So may those that come
+    after a run's end that was moved by ``--set``.
+
+    Parameters
+    ----------
+    document : Document
+        Where keys stand.
+    scenario : Scenario
+        Its scenario.
+    limits : mapping from str to (float, float)
+        Ranges of signals in the run, as for `pointless_parts`; ``time`` among them.
+    """
+    if document.is_overridden(("duration_s",)):
+        limits = {key: ends for key, ends in limits.items() if key != "time"}
+    triggers: list[tuple[KeyPath, Condition | None]] = [(("end_when",), scenario.end_when)]
+    triggers += [(("timeline", number, "when"), entry.when) for number, entry in enumerate(scenario.timeline)]
+    for at, condition in triggers:
+        if condition is not None and document.is_written(at):
+            for told in pointless_parts(condition, limits, scenario.traffic.ego):
+                yield at, f"this can never come: {told}"
 
 
 def _mistakes(scenario: "Scenario") -> Iterator[tuple[KeyPath, str]]:
@@ -150,7 +175,6 @@ def named_vehicles(timeline: Sequence[TimelineEntry]) -> Iterator[tuple[KeyPath,
         for vehicle in vehicles_of(entry):
             if vehicle not in others:
                 yield ("timeline", number, "do", vehicle), vehicle
-        for reference in signals_of(entry.when):
-            for vehicle in vehicles_of_signal(reference):
-                if vehicle not in others:
-                    yield ("timeline", number, "when"), vehicle
+        for vehicle in vehicles_in(entry.when):
+            if vehicle not in others:
+                yield ("timeline", number, "when"), vehicle

@@ -14,10 +14,9 @@ from pydantic import (
 )
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from fogsim.errors import UnknownNameError, suggest
+from fogsim.errors import UnknownNameError
 from fogsim.scenario.expect.conditions import WrittenCondition
-from fogsim.scenario.mistakes import known_keys
-from fogsim.scenario.plain_yaml import KeyPath
+from fogsim.scenario.mistakes import mistakes_in
 from fogsim.scenario.section import (
     MISTAKE,
     Deceleration,
@@ -349,7 +348,12 @@ def _by_subject(written: object) -> object:
             try:
                 done[subject] += (_read(subject, block),)
             except ValidationError as error:
-                mistakes += [_placed(detail, at, subject) for detail in error.errors()]
+                mistakes += [
+                    InitErrorDetails(
+                        type=PydanticCustomError(MISTAKE, "{told}", {"told": text}), loc=(*at, *inner), input=0
+                    )
+                    for inner, text in mistakes_in(_schema_of(subject), error, block)
+                ]
     if mistakes:
         raise ValidationError.from_exception_data("do", mistakes)
     return done
@@ -379,20 +383,8 @@ def _read(subject: str, block: object) -> object:
     return read
 
 
-def _placed(detail: Any, at: KeyPath, subject: str) -> InitErrorDetails:
-    """A mistake inside a block at its place in the whole; it says all itself."""
-    inner: KeyPath = detail["loc"]
-    if subject.startswith(_SENSOR):
-        # What a fault is called stands in pydantic's place, and not in the file.
-        inner = inner[1:]
-    told, shown = detail["msg"].removeprefix("Value error, "), detail["input"]
-    if detail["type"] == "extra_forbidden":
-        kind = None if subject.startswith(_SENSOR) else _kind_of(subject)
-        told = "unknown key" + (f"; {suggest(str(inner[-1]), known_keys(kind, inner[:-1]))}" if kind else "")
-    elif detail["type"] not in ("missing", MISTAKE) and not isinstance(shown, dict | Section):
-        told = f"{told}; got {shown!r}"
-    custom = PydanticCustomError(MISTAKE, "{told}", {"told": f"{told[0].lower()}{told[1:]}"})
-    return InitErrorDetails(type=custom, loc=(*at, *inner), input=0)
+def _schema_of(subject: str) -> object:
+    return AnyFault if subject.startswith(_SENSOR) else _kind_of(subject)
 
 
 def _kind_of(subject: str) -> type[Section]:

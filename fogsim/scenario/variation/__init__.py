@@ -12,16 +12,19 @@ from fogsim.scenario.variation.cases import (
     value_text,
     with_case,
 )
+from fogsim.scenario.variation.grid import MOST_RUNS, grid_mistake
 from fogsim.scenario.variation.levels import number_with_unit
 
 __all__ = [
     "KEYS",
+    "MOST_RUNS",
     "NONE_FAILS",
     "Case",
     "Variation",
     "VariationKeys",
     "Verdict",
     "chosen_cases",
+    "grid_mistake",
     "number_with_unit",
     "read_variation",
     "value_text",

@@ -16,11 +16,9 @@ from fogsim.scenario.document import Document
 from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.section import Section, Share
+from fogsim.scenario.variation.grid import grid_mistake
 from fogsim.scenario.variation.levels import LevelsError, SeedLevels, Value, Values, parse_levels
 from fogsim.units.quantities import split_quantity
-
-MOST_CASES = 100_000
-"""Most cases of a file."""
 
 _PLACE = re.compile(r"\$(?:\$|\{([^{}]*)\}|([A-Za-z_][A-Za-z0-9_]*))")
 """Where a name stands: ``$name``, ``${name}``; ``$$`` is a plain ``$``."""
@@ -220,9 +218,9 @@ def _names(text: str) -> list[str]:
 
 def _grid(document: Document, varied: Mapping[str, Values]) -> tuple[Case, ...]:
     gridded = {name: values for name, values in varied.items() if not values.is_drawn}
-    number = math.prod(len(values) for values in gridded.values())
-    if number > MOST_CASES:
-        raise InputError(f"{document.where(('vary',))}: vary: {number} cases are more than {MOST_CASES}")
+    mistake = grid_mistake({name: len(values) for name, values in gridded.items()})
+    if mistake is not None:
+        raise InputError(f"{document.where(('vary',))}: vary: {mistake}")
     cells = itertools.product(*gridded.values())
     return tuple(_case(varied, dict(zip(gridded, cell, strict=True))) for cell in cells)
 

@@ -214,6 +214,8 @@ def _listed(written: list[object]) -> Levels:
     for place, one in enumerate(written):
         if not isinstance(one, str | int | float | bool):
             raise LevelsError(f"a value is a number, text, true or false; got {shown(one)}", place)
+        if isinstance(one, str) and not one.isprintable():
+            raise LevelsError(f"a text names its case and is one line of visible characters; got {shown(one)}", place)
     _refuse_repeated(written)
     return Levels(tuple(one for one in written if isinstance(one, str | int | float | bool)))
 

@@ -1,0 +1,27 @@
+"""How many runs a file may stand for."""
+
+import math
+from collections.abc import Mapping
+
+MOST_RUNS = 100_000
+"""Most runs of a study, and most cases of a scenario file."""
+
+_MOST_NAMED = 5
+_MOST_DIGITS = 15
+
+
+def grid_mistake(sizes: Mapping[str, int]) -> str | None:
+    """Say why a grid has too many runs, without building it; None if it has not.
+
+    Parameters
+    ----------
+    sizes : mapping from str to int
+        Number of levels of each factor, the seeds among them.
+    """
+    number = math.prod(sizes.values())
+    if number <= MOST_RUNS:
+        return None
+    named = [f"{size} {name}" for name, size in sizes.items() if size > 1]
+    factors = " × ".join([*named[:_MOST_NAMED], *(["…"] if len(named) > _MOST_NAMED else [])])
+    told = f"{number:,}" if number < 10**_MOST_DIGITS else f"more than 10^{_MOST_DIGITS}"
+    return f"{factors} are {told} runs; at most {MOST_RUNS:,} are allowed"

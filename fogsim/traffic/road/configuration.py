@@ -3,9 +3,13 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree import ElementTree as ET
+from xml.etree.ElementTree import Element
 
 from fogsim.errors import InputError
+from fogsim.files.xml_reader import read_tree
+
+ROOTS = ("configuration", "sumoConfiguration")
+"""Elements that a SUMO configuration begins with."""
 
 _NET = ("net-file", "net", "n")
 _ADDITIONAL = ("additional-files", "additional", "a")
@@ -152,20 +156,17 @@ def input_files(config: Path) -> tuple[Path, ...]:
     return _named(config, _root(config), (*_NET, *_ADDITIONAL, *_FURTHER))
 
 
-def _root(config: Path) -> ET.Element:
-    try:
-        return ET.parse(config).getroot()  # noqa: S314 - the user's own file; expat fetches nothing
-    except (OSError, ET.ParseError) as error:
-        raise InputError(f"{config}: not a SUMO configuration: {error}") from error
+def _root(config: Path) -> Element:
+    return read_tree(config, *ROOTS)
 
 
-def _values(root: ET.Element, options: tuple[str, ...]) -> Iterator[str]:
+def _values(root: Element, options: tuple[str, ...]) -> Iterator[str]:
     """Values of an option, which SUMO reads from either attribute, or from between the tags."""
     for element in root.iter():
         if element.tag in options:
             yield (element.get("value") or element.get("v") or element.text or "").strip()
 
 
-def _named(config: Path, root: ET.Element, options: tuple[str, ...]) -> tuple[Path, ...]:
+def _named(config: Path, root: Element, options: tuple[str, ...]) -> tuple[Path, ...]:
     names = [name.strip() for value in _values(root, options) for name in value.split(",")]
     return tuple(config.parent / name for name in names if name)

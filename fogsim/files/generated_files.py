@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from fogsim.errors import InputError
+from fogsim.files.readers import read_bytes
 from fogsim.files.user_cache import VARIABLE, cache_directory
 
 _MOST_FOLDERS = 200  # of generated files; the oldest go
@@ -75,7 +76,7 @@ def kept_text(kind: str, source: Path, recipe: bytes, make: Callable[[], str]) -
         If the file cannot be read, or nothing can be written; what `make` raises.
     """
     try:
-        digest = hashlib.sha256(b"\0".join([recipe, source.read_bytes()])).hexdigest()[:24]
+        digest = hashlib.sha256(b"\0".join([recipe, read_bytes(source)])).hexdigest()[:24]
         place = cache_directory() / kind / digest
         if place.is_file():
             return place.read_text(encoding="utf-8")

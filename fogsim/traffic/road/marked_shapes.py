@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fogsim.errors import InputError
+from fogsim.errors import InputError, shown
 from fogsim.files.readers import number_within
 from fogsim.files.xml_reader import XmlFile
 
@@ -46,7 +46,7 @@ class MarkedShape:
         if default is not None and key not in self.parameters:
             return default
         if key not in self.parameters:
-            raise InputError(f'{self.where} needs <param key="{key}" value="…"/>')
+            raise InputError(f'{self.where}: <param key="{key}" value="…"/> is missing')
         return number_within(self.where, key, self.parameters[key], least, most)
 
     def corners(self) -> list[list[float]]:
@@ -57,12 +57,12 @@ class MarkedShape:
         InputError
             If there are none.
         """
+        shape = self.attributes.get("shape", "")
         corners = [
-            [number_within(self.where, "shape", number) for number in corner.split(",")]
-            for corner in self.attributes.get("shape", "").split()
+            [number_within(self.where, "shape", number) for number in corner.split(",")] for corner in shape.split()
         ]
         if not corners or not all(2 <= len(corner) <= 3 for corner in corners):
-            raise InputError(f"{self.where} needs a shape of corners x,y or x,y,z")
+            raise InputError(f"{self.where}: expected a shape of corners x,y or x,y,z, got {shown(shape)}")
         return corners
 
 

@@ -10,7 +10,7 @@ import sumolib
 from fogsim.files.readers import FARTHEST, number_within
 from fogsim.traffic.road.limit_signs import SIGN_DIAMETER, SIGN_HEIGHT, SPEED_LIMIT
 from fogsim.traffic.road.marked_shapes import MarkedShape, marked_shapes
-from fogsim.traffic.road.opendrive import is_opendrive, opendrive_signs
+from fogsim.traffic.road.opendrive import FASTEST, is_opendrive, opendrive_signs
 from fogsim.traffic.road.road_map import RoadMap
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Sign, SignMap
@@ -23,8 +23,8 @@ LIMITS = frozenset((SPEED_LIMIT, "end_of_speed_limit", "variable_speed_limit"))
 GANTRY_HEIGHT = 6.2
 """Height of the middle of a face that hangs over a lane, above the road [m]: vehicles up to 4.5 m pass below."""
 
-FASTEST, DIAMETERS, HEIGHTS = 300.0, (0.05, 20.0), (0.0, 50.0)
-"""Highest speed on a sign [km/h]; sizes of signs, and heights of their middle above the road [m]."""
+DIAMETERS, HEIGHTS = (0.05, 20.0), (0.0, 50.0)
+"""Sizes of signs, and heights of their middle above the road [m]."""
 
 LonLat = tuple[float, float]
 
@@ -115,7 +115,7 @@ def _marked_sign(shape: MarkedShape, roads: _Roads) -> Sign:
     x, y = _middle(shape)
     heading = math.radians(90.0 - number_within(shape.where, "angle", shape.attributes.get("angle", "")))
     if shape.kind in LIMITS:
-        value = shape.parameter("value", 0.0, FASTEST) / KMH_PER_MPS
+        value = shape.parameter("value", 0.0, FASTEST * KMH_PER_MPS) / KMH_PER_MPS
     else:
         value = shape.parameter("value", -FARTHEST, FARTHEST, 0.0)
     diameter = shape.parameter("diameter", *DIAMETERS, SIGN_DIAMETER)

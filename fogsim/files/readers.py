@@ -97,17 +97,31 @@ def _refuse_constant(name: str) -> NoReturn:
 
 
 def number_within(where: str, name: str, value: object, least: float = -FARTHEST, most: float = FARTHEST) -> float:
-    """Number that a file holds, as a number or as text.
+    """The value, if it is a number from `least` to `most`.
 
     Raises
     ------
     InputError
-        If it is not a finite number from `least` to `most`.
+        If it is not; NaN is none.
+    """
+    if isinstance(value, int | float) and not isinstance(value, bool) and least <= value <= most:
+        return float(value)
+    place = f"{where}: " if where else ""
+    raise InputError(f"{place}{name} must be a number within {least:g} … {most:g}, got {shown(value)}")
+
+
+def number_in_text(where: str, name: str, text: str, least: float = -FARTHEST, most: float = FARTHEST) -> float:
+    """Number that a text holds.
+
+    Raises
+    ------
+    InputError
+        If it is not a number from `least` to `most`.
     """
     try:
-        number = float(value) if isinstance(value, str | int | float) and not isinstance(value, bool) else math.nan
-    except (ValueError, OverflowError):
+        number = float(text)
+    except ValueError:
         number = math.nan
     if not least <= number <= most:
-        raise InputError(f"{where}: {name} must be a number within {least:g} … {most:g}, got {shown(value)}")
+        number_within(where, name, text, least, most)
     return number

@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 
 from fogsim.errors import InputError, suggest
+from fogsim.files.readers import open_regular
 from fogsim.scenario import Scenario, build, load_scenario, override, resolved, scenario_from_config
 from fogsim.scenario.document import Document, read_document
 from fogsim.scenario.mistakes import mistake_lines
@@ -212,7 +213,7 @@ def file_digests(scenario: Scenario) -> dict[str, str]:
 @functools.lru_cache
 def _digest(path: Path, _: int) -> str:
     """Digest of a file's content, asked for anew when the file has been written anew."""
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()[:20]
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fogsim.errors import InputError, shown
-from fogsim.files.readers import number_within
+from fogsim.files.readers import number_in_text
 from fogsim.files.xml_reader import XmlFile
 
 _MOST_BYTES, _MOST_ELEMENTS = 2_000_000_000, 20_000_000
@@ -47,7 +47,7 @@ class MarkedShape:
             return default
         if key not in self.parameters:
             raise InputError(f'{self.where}: <param key="{key}" value="…"/> is missing')
-        return number_within(self.where, key, self.parameters[key], least, most)
+        return number_in_text(self.where, key, self.parameters[key], least, most)
 
     def corners(self) -> list[list[float]]:
         """Coordinates of its shape [m], two or three a corner.
@@ -59,7 +59,7 @@ class MarkedShape:
         """
         shape = self.attributes.get("shape", "")
         corners = [
-            [number_within(self.where, "shape", number) for number in corner.split(",")] for corner in shape.split()
+            [number_in_text(self.where, "shape", number) for number in corner.split(",")] for corner in shape.split()
         ]
         if not corners or not all(2 <= len(corner) <= 3 for corner in corners):
             raise InputError(f"{self.where}: expected a shape of corners x,y or x,y,z, got {shown(shape)}")

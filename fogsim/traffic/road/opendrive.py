@@ -7,7 +7,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from fogsim.errors import InputError
-from fogsim.files.readers import FARTHEST, number_within
+from fogsim.files.readers import FARTHEST, number_in_text, number_within
 from fogsim.files.xml_reader import read_tree
 from fogsim.traffic.road.plan_view import PlanView, plan_view
 from fogsim.units import KMH_PER_MPS
@@ -98,13 +98,13 @@ def read_opendrive(path: Path) -> Element:
     root = read_tree(path, "OpenDRIVE")
     for road in root.iter("road"):
         where = f"{path}: road {road.get('id', '?')!r}"
-        along = [number_within(where, "length", road.get("length", "0"), 0.0, LONGEST_ROAD)]
+        along = [number_in_text(where, "length", road.get("length", "0"), 0.0, LONGEST_ROAD)]
         for element in (one for section in road if section.tag in _SECTIONS for one in section.iter()):
             inside = f"{where}: <{element.tag}>"
             for key in _NUMBERS.intersection(element.attrib):
-                number_within(inside, key, element.attrib[key])
+                number_in_text(inside, key, element.attrib[key])
             if element.tag == "geometry":
-                along.append(number_within(inside, "length", element.get("length", "0"), 0.0, LONGEST_ROAD))
+                along.append(number_in_text(inside, "length", element.get("length", "0"), 0.0, LONGEST_ROAD))
         if sum(along[1:]) > LONGEST_ROAD:
             raise InputError(f"{where}: its geometry is {sum(along[1:]):g} m long; at most {LONGEST_ROAD:g} m are read")
     return root
@@ -129,7 +129,7 @@ def _road_signs(path: Path, element: Element, net_offset: tuple[float, float]) -
 
 def _sign(road: _Road, signal: Element, net_offset: tuple[float, float], left_hand: bool) -> Sign:
     where = f"{road.where}: signal {signal.get('id', '?')!r}"
-    s, t = (number_within(where, key, signal.get(key, "")) for key in "st")
+    s, t = (number_in_text(where, key, signal.get(key, "")) for key in "st")
     try:
         x, y, along = road.line.at(s)
     except ValueError as error:
@@ -169,4 +169,4 @@ def _meaning(where: str, signal: Element) -> tuple[str, float]:
 
 
 def _number(where: str, signal: Element, key: str, least: float = -FARTHEST) -> float:
-    return number_within(where, key, signal.get(key, "").strip() or "0", least)
+    return number_in_text(where, key, signal.get(key, "").strip() or "0", least)

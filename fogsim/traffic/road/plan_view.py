@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from fogsim.files.readers import number_within
+from fogsim.files.readers import number_in_text
 from fogsim.linear_algebra import matrix_product
 
 SPIRAL_NODES, SPIRAL_WEIGHTS = np.polynomial.legendre.leggauss(24)
@@ -203,4 +203,4 @@ def _numbers(element: Element, *keys: str) -> list[float]:
     missing = [key for key in keys if key not in element.attrib]
     if missing:
         raise ValueError(f"<{element.tag}> needs the attribute {missing[0]!r}")
-    return [number_within(f"<{element.tag}>", key, element.attrib[key]) for key in keys]
+    return [number_in_text(f"<{element.tag}>", key, element.attrib[key]) for key in keys]

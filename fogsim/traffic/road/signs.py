@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import sumolib
 
-from fogsim.files.readers import FARTHEST, number_within
+from fogsim.files.readers import FARTHEST, number_in_text
 from fogsim.traffic.road.limit_signs import SIGN_DIAMETER, SIGN_HEIGHT, SPEED_LIMIT
 from fogsim.traffic.road.marked_shapes import MarkedShape, marked_shapes
 from fogsim.traffic.road.opendrive import FASTEST, is_opendrive, opendrive_signs
@@ -113,7 +113,7 @@ class _Roads:
 
 def _marked_sign(shape: MarkedShape, roads: _Roads) -> Sign:
     x, y = _middle(shape)
-    heading = math.radians(90.0 - number_within(shape.where, "angle", shape.attributes.get("angle", "")))
+    heading = math.radians(90.0 - number_in_text(shape.where, "angle", shape.attributes.get("angle", "")))
     if shape.kind in LIMITS:
         value = shape.parameter("value", 0.0, FASTEST * KMH_PER_MPS) / KMH_PER_MPS
     else:
@@ -127,7 +127,7 @@ def _marked_sign(shape: MarkedShape, roads: _Roads) -> Sign:
 def _middle(shape: MarkedShape) -> tuple[float, float]:
     """Where a POI is, or the middle of a polygon's bounding box [m]."""
     if shape.tag == "poi":
-        x, y = (number_within(shape.where, key, shape.attributes.get(key, "")) for key in "xy")
+        x, y = (number_in_text(shape.where, key, shape.attributes.get(key, "")) for key in "xy")
         return x, y
     corners = np.array([corner[:2] for corner in shape.corners()])
     x, y = 0.5 * (corners.min(axis=0) + corners.max(axis=0))

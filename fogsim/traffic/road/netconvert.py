@@ -1,6 +1,7 @@
 """SUMO's netconvert, which makes networks of OpenDRIVE files: a program of its own, in the package eclipse-sumo."""
 
 import importlib.util
+import os
 import re
 import resource
 import shutil
@@ -87,7 +88,9 @@ def opendrive_net(path: Path) -> str:
         command += ["--no-turnarounds", "--precision", "3", "--xml-validation", "never"]
         told = _run(command, path, Path(folder))
         if told or not net.is_file():
-            raise InputError(f"{path}: no OpenDRIVE road network that SUMO's netconvert can read: {told}")
+            raise InputError(
+                f"{path}: no OpenDRIVE road network that SUMO's netconvert can read: {told or 'no output'}"
+            )
         # A comment at the top tells when it was made.
         return _COMMENT.sub("", read_text(net, _MOST_BYTES))
 
@@ -95,9 +98,15 @@ def opendrive_net(path: Path) -> str:
 def _run(command: list[str], path: Path, folder: Path) -> str:
     """Run netconvert with limited time, memory and output; what it reported if it failed."""
     messages = folder / "messages.txt"
-    with messages.open("wb") as sink, subprocess.Popen(command, stdout=sink, stderr=sink) as process:  # noqa: S603
-        resource.prlimit(process.pid, resource.RLIMIT_AS, (_MOST_MEMORY, _MOST_MEMORY))
-        resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (_MOST_BYTES, _MOST_BYTES))
+    # Its OpenBLAS would otherwise reserve address space for each processor.
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    with (
+        messages.open("wb") as sink,
+        subprocess.Popen(command, stdout=sink, stderr=sink, env=environment) as process,  # noqa: S603
+    ):
+        limits = ((resource.RLIMIT_AS, _MOST_MEMORY), (resource.RLIMIT_FSIZE, _MOST_BYTES), (resource.RLIMIT_CORE, 0))
+        for limit, most in limits:
+            resource.prlimit(process.pid, limit, (most, most))
         try:
             code = process.wait(_LONGEST_RUN)
         except subprocess.TimeoutExpired as error:
@@ -109,5 +118,5 @@ def _run(command: list[str], path: Path, folder: Path) -> str:
     with messages.open("rb") as file:
         file.seek(max(file.seek(0, 2) - _MOST_TOLD, 0))
         told = " ".join(file.read().decode(errors="replace").split())
-    limits = f"at most {_MOST_MEMORY >> 30} GiB of memory, {_MOST_BYTES >> 20} MiB of output"
-    return told if code > 0 and told else f"it ended with {code} ({limits}); {told}"
+    allowed = f"at most {_MOST_MEMORY >> 30} GiB of memory and {_MOST_BYTES >> 20} MiB of output"
+    return f"{told} (it ended with {code}; {allowed})".strip()

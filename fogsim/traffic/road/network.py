@@ -8,6 +8,7 @@ import sumolib
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
+from fogsim.files.readers import FARTHEST
 from fogsim.files.xml_reader import read_elements, root_tag
 from fogsim.garbage import no_garbage_collection
 from fogsim.traffic.road.map_cache import cached_map, compacted, is_worth_caching, keep_map
@@ -56,6 +57,10 @@ def _parsed(path: Path) -> RoadMap:
         raise InputError(f"{path}: not a SUMO network: {type(error).__name__}: {error}") from error
     if not found.edges:
         raise InputError(f"{path}: the SUMO network has no edges")
+    points = np.concatenate([np.zeros((0, 3)), *(lane.centreline for lane in found.lanes)])
+    if not (np.abs(points) <= FARTHEST).all():
+        lane_id = next(lane.lane_id for lane in found.lanes if not (np.abs(lane.centreline) <= FARTHEST).all())
+        raise InputError(f"{path}: lane {lane_id!r}: its shape must have coordinates within ±{FARTHEST:g} m")
     return found
 
 

@@ -6,13 +6,15 @@ from pathlib import Path
 import numpy as np
 
 from fogsim.errors import InputError, suggest
-from fogsim.files.readers import FARTHEST
 from fogsim.traffic.road.marked_shapes import MarkedShape, marked_shapes
 from fogsim.traffic.road.opendrive import is_opendrive
 from fogsim.values import Structure, StructureKind
 
 STRUCTURE_TYPE = "fogsim.structure."
 """Polygons of type ``fogsim.structure.KIND`` in an additional file are structures; their shape is their middle line."""
+
+WIDEST, HEIGHTS = 10_000.0, (-1000.0, 10_000.0)
+"""Greatest width of a structure, and heights of its bottom and top [m]."""
 
 
 def structures(additional: Iterable[Path]) -> tuple[Structure, ...]:
@@ -39,10 +41,8 @@ def _structure(shape: MarkedShape) -> Structure:
     if shape.kind not in kinds:
         raise InputError(f"{shape.where}: unknown kind of structure {shape.kind!r}; {suggest(shape.kind, kinds)}")
     line = np.array([[*corner, 0.0][:3] for corner in shape.corners()], np.float64)
-    width, bottom, top = (
-        shape.parameter(key, -FARTHEST, FARTHEST, default)
-        for key, default in (("width", None), ("bottom", 0.0), ("top", None))
-    )
+    width = shape.parameter("width", 0.0, WIDEST)
+    bottom, top = shape.parameter("bottom", *HEIGHTS, 0.0), shape.parameter("top", *HEIGHTS)
     line = line[[True, *np.any(line[1:] != line[:-1], axis=1)]]  # a repeated corner has no direction
     if len(line) < 2 or width <= 0.0 or top <= bottom:
         raise InputError(

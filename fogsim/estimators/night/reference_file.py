@@ -160,8 +160,11 @@ def _one(arrays: Mapping[str, NDArray[Any]], index: int) -> VeilReferences:
         or not (visibility[1:] > visibility[:-1]).all()
     ):
         raise InputError(f"expected visibilities above 0 that ascend, got {shown(visibility.tolist())}")
+    lamps = Lamp(head["lamps"])
+    if not lamps or int(lamps) & ~int(HEAD_LAMPS):
+        raise InputError(f"expected head lamps, got {shown(head['lamps'])}")
     setback = number_within("", "setback", head["setback"], 0.0)
-    return VeilReferences(camera, Lamp(head["lamps"]), str(head["droplets"]), setback, visibility, veil, road)
+    return VeilReferences(camera, lamps, str(head["droplets"]), setback, visibility, veil, road)
 
 
 def _numbers(array: NDArray[Any]) -> NDArray[np.float64]:

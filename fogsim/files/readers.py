@@ -4,8 +4,9 @@ import json
 import math
 import os
 import stat
+from io import BufferedReader
 from pathlib import Path
-from typing import IO, Any, NoReturn
+from typing import Any, NoReturn
 
 from fogsim.errors import InputError, shown
 
@@ -16,7 +17,7 @@ FARTHEST = 1e8
 """Largest number that a file can hold where nothing narrower is known: coordinates of UTM reach 1e7 m."""
 
 
-def open_regular(path: Path) -> IO[bytes]:
+def open_regular(path: Path) -> BufferedReader:
     """Open a regular file for reading.
 
     Raises

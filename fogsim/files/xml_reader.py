@@ -34,6 +34,7 @@ _HEAD = 2**12
 """The first chunk is smaller, for those who want to know the first element only [bytes]."""
 
 _MOST_BEFORE_ROOT = 2**20
+_MOST_SHOWN, _MOST_ROOTS_SHOWN = 80, 2  # characters of a tag in a message, and expected first elements
 _ENCODING = re.compile(rb"""(?:\xef\xbb\xbf)?<\?xml[^>]*?\sencoding\s*=\s*["']([^"'>]*)["']""")
 _BUILT_IN = frozenset(("utf-8", "utf-16", "iso-8859-1", "us-ascii"))
 _PROBE = rb"<a b='\u0041-1'/>"
@@ -159,7 +160,9 @@ class XmlFile:
             try:
                 reader.start(tag, attributes)
             except ValueError as error:
-                raise error if isinstance(error, InputError) else self._refusal(f"<{tag}>: {error}") from error
+                raise (
+                    error if isinstance(error, InputError) else self._refusal(f"<{tag[:_MOST_SHOWN]}>: {error}")
+                ) from error
 
         def end(tag: str) -> None:
             nonlocal depth
@@ -241,8 +244,8 @@ class _RootReader:
         if self.tag is None:
             self.tag = tag
             if self._roots and tag not in self._roots:
-                wanted = " or ".join(f"<{root}>" for root in self._roots)
-                raise InputError(f"{self._path}: expected {wanted} at its top, got <{tag}>")
+                wanted = " or ".join(f"<{root}>" for root in self._roots[:_MOST_ROOTS_SHOWN])
+                raise InputError(f"{self._path}: expected {wanted} at its top, got <{tag[:_MOST_SHOWN]}>")
 
     def end(self, tag: str) -> None:
         pass

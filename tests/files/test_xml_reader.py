@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from fogsim.errors import InputError
-from fogsim.files.xml_reader import open_unpacked, read_elements
+from fogsim.files.xml_reader import open_unpacked, read_elements, read_tree, root_tag
 
 TEXT = '<a x="1"><b/><c y="2"></c></a>'
 
@@ -44,3 +44,29 @@ def test_reading_ends_at_the_allowance_or_when_the_reader_is_done(tmp_path: Path
     assert read_elements(file, Tags("b"), 10**6) < 10**5
     with pytest.raises(InputError, match=r"none\.xml: cannot be read: No such file"):
         read_elements(tmp_path / "none.xml", Tags(), 100)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf8", "utf-16", "iso-8859-15", "windows-1252", "shift_jis", "gb18030"])
+def test_encodings_that_expat_does_not_know_are_read_alike(tmp_path: Path, encoding: str) -> None:
+    file, name = tmp_path / "file.xml", "東" if encoding in {"shift_jis", "gb18030"} else "Straße"
+    text = f'<?xml version="1.0" encoding="{encoding}"?>\n<a name="{name}">{"<b/>" * 50_000}{name}</a>'
+    file.write_bytes(text.encode(encoding))
+    root = read_tree(file, "a")
+    assert (root.get("name"), len(root), root[-1].tail) == (name, 50_000, name)
+
+
+def test_prefixes_of_tags_do_not_matter(tmp_path: Path) -> None:
+    file = tmp_path / "file.xml"
+    file.write_text('<g:gpx xmlns:g="urn:x"><g:trkpt lat="1"/></g:gpx>', encoding="utf-8")
+    assert [one.get("lat") for one in read_tree(file, "gpx").iter("trkpt")] == ["1"]
+
+
+def test_the_first_element_is_found_without_the_rest(tmp_path: Path) -> None:
+    file = tmp_path / "file.xml"
+    file.write_text(f"<!-- {' ' * 10_000} -->\n<net><edge></net", encoding="utf-8")
+    assert root_tag(file) == "net"
+    file.write_text(f"<net>{'<edge/>' * 10_000}<broken", encoding="utf-8")
+    assert root_tag(file, "net") == "net"
+    file.write_text(" " * 3_000_000, encoding="utf-8")
+    with pytest.raises(InputError, match="begins with more than"):
+        root_tag(file)

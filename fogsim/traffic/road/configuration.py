@@ -9,14 +9,17 @@ from fogsim.errors import InputError
 from fogsim.files.xml_reader import read_tree, root_tag
 from fogsim.traffic.road.opendrive import is_opendrive
 
-_DEMAND = ("routes", "additional", "additionals", "add", "shapes", "tlLogics", "trips", "vTypes")
+_DEMAND = tuple(
+    "routes additional additionals add trips vehicles persons vTypes stops shapes polygons pois tazs detectors "  # noqa: SIM905
+    "calibrators tlLogics".split()
+)
 ROOTS: Mapping[str, tuple[str, ...]] = {
     "config": ("configuration", "sumoConfiguration"),
     "net": ("net",),
     "routes": _DEMAND,
     "additional": _DEMAND,
 }
-"""First elements of SUMO's files by what they are, as its documentation and its tools write them."""
+"""First elements of SUMO's files, as its documentation and its tools write them; the usual ones come first."""
 
 _NET = ("net-file", "net", "n")
 _ADDITIONAL = ("additional-files", "additional", "a")
@@ -82,7 +85,7 @@ def check_configured_files(config: Path) -> None:
     root = _root(config)
     for kind, options in (("net", _NET), ("routes", _ROUTES), ("additional", _ADDITIONAL)):
         for path in _named(config, root, options):
-            if not set(str(path)).intersection("$; "):
+            if not set(str(path).removeprefix(str(config.parent))).intersection("$; "):
                 check_sumo_file(kind, path)
 
 

@@ -91,7 +91,7 @@ class _ShapeReader:
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
         if tag in {"poi", "poly"} and attributes.get("type", "").startswith(self._prefix):
-            where = f"{self._path}:{self.file.line}: {tag} {attributes.get('id', '')!r}"
+            where = f"{self._path}:{self.file.line}: {tag} {shown(attributes.get('id', ''))}"
             self._inside = MarkedShape(where, tag, attributes["type"].removeprefix(self._prefix), attributes)
             self.found.append(self._inside)
         elif tag == "param" and self._inside is not None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from fogsim.errors import InputError
+from fogsim.errors import InputError, shown
 from fogsim.files.readers import FARTHEST, number_in_text, number_within
 from fogsim.files.xml_reader import read_tree
 from fogsim.traffic.road.plan_view import PlanView, plan_view
@@ -97,12 +97,13 @@ def read_opendrive(path: Path) -> Element:
     """
     root = read_tree(path, "OpenDRIVE")
     for road in root.iter("road"):
-        where = f"{path}: road {road.get('id', '?')!r}"
+        where = f"{path}: road {shown(road.get('id', '?'))}"
         along = [number_in_text(where, "length", road.get("length", "0"), 0.0, LONGEST_ROAD)]
         for element in (one for section in road if section.tag in _SECTIONS for one in section.iter()):
             inside = f"{where}: <{element.tag}>"
-            for key in _NUMBERS.intersection(element.attrib):
-                number_in_text(inside, key, element.attrib[key])
+            for key, text in element.attrib.items():
+                if key in _NUMBERS:
+                    number_in_text(inside, key, text)
             if element.tag == "geometry":
                 along.append(number_in_text(inside, "length", element.get("length", "0"), 0.0, LONGEST_ROAD))
         if sum(along[1:]) > LONGEST_ROAD:
@@ -114,7 +115,7 @@ def _road_signs(path: Path, element: Element, net_offset: tuple[float, float]) -
     signals = [s for s in element.iterfind("signals/signal") if s.get("dynamic", "no") != "yes"]
     if not signals:
         return
-    where = f"{path}: road {element.get('id', '?')!r}"
+    where = f"{path}: road {shown(element.get('id', '?'))}"
     records = element.iterfind("elevationProfile/elevation")
     elevation = tuple(tuple(float(e.get(key, "0")) for key in ("s", "a", "b", "c", "d")) for e in records)
     try:
@@ -128,7 +129,7 @@ def _road_signs(path: Path, element: Element, net_offset: tuple[float, float]) -
 
 
 def _sign(road: _Road, signal: Element, net_offset: tuple[float, float], left_hand: bool) -> Sign:
-    where = f"{road.where}: signal {signal.get('id', '?')!r}"
+    where = f"{road.where}: signal {shown(signal.get('id', '?'))}"
     s, t = (number_in_text(where, key, signal.get(key, "")) for key in "st")
     try:
         x, y, along = road.line.at(s)

@@ -114,10 +114,10 @@ class XmlFile:
                     data = decoder.decode(chunk, not chunk).encode() if is_foreign else chunk
                     parser.Parse(data, not chunk)
                 except expat.ExpatError as error:
-                    reason = expat.errors.messages[error.code]
-                    is_unlike = reason == expat.errors.XML_ERROR_INCORRECT_ENCODING
-                    told = f"not text in the encoding {encoding}" if is_unlike else f"not XML: {reason}"
-                    raise self._refusal(told) from error
+                    message = expat.errors.messages[error.code]
+                    is_other = message == expat.errors.XML_ERROR_INCORRECT_ENCODING
+                    reason = f"not text in the encoding {encoding}" if is_other else f"not XML: {message}"
+                    raise self._refusal(reason) from error
                 except UnicodeError as error:
                     raise self._refusal(f"not text in the encoding {encoding}: {error}") from error
                 done, given = done + len(chunk), given + len(data)
@@ -159,10 +159,10 @@ class XmlFile:
                 raise self._refusal(f"an element has more than {MOST_ATTRIBUTES} attributes")
             try:
                 reader.start(tag, attributes)
+            except InputError:
+                raise
             except ValueError as error:
-                raise (
-                    error if isinstance(error, InputError) else self._refusal(f"<{tag[:_MOST_SHOWN]}>: {error}")
-                ) from error
+                raise self._refusal(f"<{tag[:_MOST_SHOWN]}>: {error}") from error
 
         def end(tag: str) -> None:
             nonlocal depth
@@ -191,8 +191,8 @@ class XmlFile:
                 raise self._refusal(f"cannot read the encoding {shown(name)}; write the file in UTF-8")
         return name
 
-    def _refusal(self, told: str) -> InputError:
-        return InputError(f"{self._path}:{self.line}: {told}")
+    def _refusal(self, reason: str) -> InputError:
+        return InputError(f"{self._path}:{self.line}: {reason}")
 
 
 def read_elements(path: Path, reader: ElementReader, most_bytes: int) -> int:

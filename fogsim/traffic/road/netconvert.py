@@ -21,7 +21,7 @@ _TYPES = ("driving", "entry", "exit", "onRamp", "offRamp", "mwyEntry", "mwyExit"
 
 _LONGEST_RUN = 300.0  # [s]
 _MOST_MEMORY, _MOST_BYTES = 4 * 2**30, 2**28  # of the program; of its network [bytes]
-_MOST_TOLD = 1000  # of its last messages [bytes]
+_MOST_SHOWN = 1000  # of its last messages [bytes]
 _COMMENT = re.compile(r"<!--.*?-->\s*", re.DOTALL)
 
 
@@ -86,10 +86,10 @@ def opendrive_net(path: Path) -> str:
         command = [program, "--opendrive-files", str(path.resolve()), "-o", str(net), "-t", str(types)]
         command += ["--output.original-names", "--offset.disable-normalization", "--opendrive.curve-resolution", "1"]
         command += ["--no-turnarounds", "--precision", "3", "--xml-validation", "never"]
-        told = _run(command, path, Path(folder))
-        if told or not net.is_file():
+        reported = _run(command, path, Path(folder))
+        if reported or not net.is_file():
             raise InputError(
-                f"{path}: no OpenDRIVE road network that SUMO's netconvert can read: {told or 'no output'}"
+                f"{path}: no OpenDRIVE road network that SUMO's netconvert can read: {reported or 'no output'}"
             )
         # A comment at the top tells when it was made.
         return _COMMENT.sub("", read_text(net, _MOST_BYTES))
@@ -116,7 +116,7 @@ def _run(command: list[str], path: Path, folder: Path) -> str:
     if not code:
         return ""
     with messages.open("rb") as file:
-        file.seek(max(file.seek(0, 2) - _MOST_TOLD, 0))
-        told = " ".join(file.read().decode(errors="replace").split())
+        file.seek(max(file.seek(0, 2) - _MOST_SHOWN, 0))
+        reported = " ".join(file.read().decode(errors="replace").split())
     allowed = f"at most {_MOST_MEMORY >> 30} GiB of memory and {_MOST_BYTES >> 20} MiB of output"
-    return f"{told} (it ended with {code}; {allowed})".strip()
+    return f"{reported} (it ended with {code}; {allowed})".strip()

@@ -176,6 +176,19 @@ def load_cases(
     return ScenarioCases(document, variation, tuple(cases))
 
 
+def check_configuration(config: Path) -> None:
+    """Check by its first element that a file is a SUMO configuration.
+
+    Raises
+    ------
+    InputError
+        If it is missing, with the nearest name in its folder, or another file.
+    """
+    if not _is_file(config):
+        raise InputError(_no_file(Document(config, {}, {}), config.parent, ("traffic", "config"), Path(config.name)))
+    check_sumo_file("config", config)
+
+
 def scenario_from_config(
     config: Path, ego: str, overrides: Iterable[str] = (), *, others_add_vehicles: bool = False
 ) -> Scenario:
@@ -197,7 +210,7 @@ def scenario_from_config(
     InputError
         If anything does not fit.
     """
-    check_sumo_file("config", config)
+    check_configuration(config)
     traffic = {"config": config.name, "ego": ego, "warm_up_limit_s": DAY}
     document = Document(config, _bare(config.stem, traffic), {})
     return _checked(document, overrides, config.parent, closed_demand=not others_add_vehicles)

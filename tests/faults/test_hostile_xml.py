@@ -231,7 +231,7 @@ def test_a_scenario_names_files_of_the_right_kinds(tmp_path: Path, file: str, co
 @pytest.mark.parametrize(
     ("content", "told"),
     [
-        (None, "^{0}: cannot be read: No such file"),
+        (None, "^{0}: traffic.config: there is no file .x.sumocfg. in "),
         ("<net/>", "^{0}: expected <configuration> or <sumoConfiguration> at its top, got <net>"),
         ('<configuration><net-file value="none.xml"/></configuration>', "none.xml: cannot be read: No such file"),
         ('<configuration><net-file value="x.sumocfg"/></configuration>', "x.sumocfg: expected <net> at its top"),

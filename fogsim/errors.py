@@ -128,7 +128,10 @@ def shown(value: object) -> str:
     value : object
         Anything.
     """
-    text = repr(value)
+    try:
+        text = repr(value)
+    except RecursionError:
+        text = f"a {type(value).__name__} that is nested too deeply"
     if "\n" in text:
         # Arrays are written in several lines.
         text = " ".join(text.split())

@@ -25,7 +25,7 @@ from fogsim.timeline import Timeline
 from fogsim.traffic import NetworkTraffic, libsumo_network_traffic
 from fogsim.traffic.road.configuration import configured_files
 from fogsim.traffic.road.network import read_net, route_axis
-from fogsim.traffic.road.structures import mentions_structures, structures
+from fogsim.traffic.road.structures import structures
 from fogsim.values import Begun, Command, Ending, NetworkSnapshot, TrafficStep, Truth
 from fogsim.values.belief import certain_belief
 from fogsim.values.result_checks import checked_advice, checked_command
@@ -146,7 +146,7 @@ class TrafficRun:
         # Fog without a road along which it lies has no heights either, so that its ground may be anywhere.
         axis, limits = _axis_along(along, net) if along and net is not None else (np.zeros((1, 3)), np.zeros(0))
         self._route = axis if along else None
-        self._fog = build.fog_field(scenario, axis, structures(path for path in files if mentions_structures(path)))
+        self._fog = build.fog_field(scenario, axis, structures(path for path in files if path.is_file()))
         self._fog_now, self._scenario, self._timeline = self._fog, scenario, Timeline(scenario)
         # A meter that stands for a whole network does not see single patches.
         self._sees_patches = bool(along)

@@ -108,12 +108,13 @@ def chosen_case(
         As of `chosen_scenario`, or if there is no such case, or it has another seed.
     """
     from fogsim.scenario import scenario_from_config
-    from fogsim.scenario.loading import load_cases
+    from fogsim.scenario.loading import check_configuration, load_cases
     from fogsim.scenario.variation import Case
 
     settings, may_import = settings or (), CodeNotice()
     fog = [] if visibility is None else [f"fog.visibility_m={visibility!r}"]
     if sumocfg is not None and name is None:
+        check_configuration(sumocfg)
         if ego is None:
             raise InputError(
                 f"--sumocfg {sumocfg}: --ego is missing: which vehicle is the ego? Traffic alone is for fogsim study"

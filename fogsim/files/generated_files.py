@@ -11,6 +11,7 @@ from fogsim.files.readers import read_bytes
 from fogsim.files.user_cache import VARIABLE, cache_directory
 
 _MOST_KEPT = 200  # of each kind; the oldest go
+_LARGEST_SOURCE = 2**29  # [bytes]
 
 
 def write_generated(kind: str, texts: Mapping[str, str]) -> Path:
@@ -78,7 +79,7 @@ def kept_text(kind: str, source: Path, recipe: bytes, make: Callable[[], str]) -
         If the file cannot be read, or nothing can be written; what `make` raises.
     """
     try:
-        digest = hashlib.sha256(b"\0".join([recipe, source.read_bytes()])).hexdigest()[:24]
+        digest = hashlib.sha256(b"\0".join([recipe, read_bytes(source, _LARGEST_SOURCE)])).hexdigest()[:24]
         path = cache_directory() / kind / digest
         kept = read_entry(path)
         if kept is not None:

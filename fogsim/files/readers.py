@@ -1,8 +1,10 @@
 """Reading files that someone else wrote: regular files only, of limited size, and one error for all that is wrong."""
 
 import json
+import math
 import os
 import stat
+from io import BufferedReader
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -11,6 +13,30 @@ from fogsim.errors import InputError, shown
 MOST_BYTES = 64 * 2**20
 """Largest file that is read whole, unless a reader has a limit of its own [bytes]."""
 
+FARTHEST = 1e8
+"""Largest number that a file can hold where nothing narrower is known: coordinates of UTM reach 1e7 m."""
+
+
+def open_regular(path: Path) -> BufferedReader:
+    """Open a regular file for reading.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it is a pipe, a device or a folder (they may never end).
+    """
+    try:
+        # Opening a pipe would otherwise wait for a writer.
+        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+        if stat.S_ISREG(os.fstat(descriptor).st_mode):
+            return open(descriptor, "rb")  # noqa: PTH123 - a descriptor has no Path; the caller closes it
+        os.close(descriptor)
+    except ValueError as error:  # a NUL in the name
+        raise InputError(f"{shown(str(path))}: {error}") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    raise InputError(f"{path}: cannot be read: not a regular file")
+
 
 def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
     """Content of a regular file of at most `most` bytes.
@@ -18,21 +44,15 @@ def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
     Raises
     ------
     InputError
-        If there is no such file, it is a pipe, a device or a folder (they may never end), or it is larger.
+        As `open_regular`, or if it is larger.
     """
     try:
-        # Opening a pipe would otherwise wait for a writer.
-        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
-        with open(descriptor, "rb") as file:  # noqa: PTH123 - a descriptor has no Path
-            found = os.fstat(descriptor)
-            if not stat.S_ISREG(found.st_mode):
-                raise InputError(f"{path}: cannot be read: not a regular file")
+        with open_regular(path) as file:
             # Asking for `most` at once would allocate it.
-            content = file.read(min(found.st_size, most) + 1)
-            if len(content) > found.st_size:  # files in /proc have no size
+            size = os.fstat(file.fileno()).st_size
+            content = file.read(min(size, most) + 1)
+            if len(content) > size:  # files in /proc have no size
                 content += file.read(most + 1 - len(content))
-    except ValueError as error:  # a NUL in the name
-        raise error if isinstance(error, InputError) else InputError(f"{shown(str(path))}: {error}") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     if len(content) > most:
@@ -79,3 +99,34 @@ def read_json(path: Path, most: int = MOST_BYTES) -> Any:
 
 def _refuse_constant(name: str) -> NoReturn:
     raise ValueError(f"{name} is not a number of JSON")
+
+
+def number_within(where: str, name: str, value: object, least: float = -FARTHEST, most: float = FARTHEST) -> float:
+    """The value, if it is a number from `least` to `most`.
+
+    Raises
+    ------
+    InputError
+        If it is not; NaN is none.
+    """
+    if isinstance(value, int | float) and not isinstance(value, bool) and least <= value <= most:
+        return float(value)
+    place = f"{where}: " if where else ""
+    raise InputError(f"{place}{name} must be a number within {least:g} … {most:g}, got {shown(value)}")
+
+
+def number_in_text(where: str, name: str, text: str, least: float = -FARTHEST, most: float = FARTHEST) -> float:
+    """Number that a text holds.
+
+    Raises
+    ------
+    InputError
+        If it is not a number from `least` to `most`.
+    """
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not least <= number <= most:
+        number_within(where, name, text, least, most)
+    return number

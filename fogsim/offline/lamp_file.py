@@ -6,6 +6,7 @@ from typing import Annotated
 from pydantic import Field, ValidationError
 
 from fogsim.errors import InputError
+from fogsim.files.readers import read_text
 from fogsim.lighting import LampMount
 from fogsim.lighting.beams import read_beam
 from fogsim.scenario.document import read_document
@@ -74,7 +75,4 @@ def load_lamps(path: Path) -> LampMount:
 
 
 def _beam(path: Path) -> Beam:
-    try:
-        return read_beam(path.read_text(encoding="utf-8"), str(path))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: no table of intensities can be read: {error}") from error
+    return read_beam(read_text(path), str(path))

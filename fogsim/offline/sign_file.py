@@ -1,6 +1,5 @@
 """A person's own map of signs: GeoJSON, points in WGS 84."""
 
-import json
 import math
 from collections import Counter
 from collections.abc import Mapping
@@ -8,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fogsim.errors import InputError
+from fogsim.errors import InputError, shown
+from fogsim.files.readers import number_within, read_json
 from fogsim.recorders.sign_map import NET
 from fogsim.scene import SIGN_KINDS
 from fogsim.units import KMH_PER_MPS
@@ -102,19 +102,14 @@ def load_sign_file(path: Path) -> SignFile:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    try:
-        told = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"--signs {path}: cannot be read: {error.strerror}") from error
-    except ValueError as error:
-        raise InputError(f"--signs {path}: expected GeoJSON: {error}") from error
+    told = read_json(path)
     if not isinstance(told, dict):
-        raise InputError(f"--signs {path}: expected a GeoJSON FeatureCollection, got {type(told).__name__}")
+        raise InputError(f"{path}: expected a GeoJSON FeatureCollection, got {type(told).__name__}")
     return told
 
 
 def _kind_of(told: Mapping[str, Any]) -> str:
-    return f"type {told['type']!r}" if "type" in told else "no type"
+    return f"type {shown(told['type'])}" if "type" in told else "no type"
 
 
 def _refuse_other_frames(path: Path, told: Mapping[str, Any]) -> None:
@@ -124,28 +119,32 @@ def _refuse_other_frames(path: Path, told: Mapping[str, Any]) -> None:
             f"{path}: its points are x and y of a SUMO network, which tells no projection; expected longitude and "
             "latitude, WGS 84"
         )
-    frame = told.get("crs")
-    name = str(frame.get("properties", {}).get("name", frame)) if isinstance(frame, dict) else str(frame or "CRS84")
-    if not name.endswith(WGS84):
-        raise InputError(f"{path}: the map is in {name}; expected longitude and latitude, WGS 84 (EPSG:4326)")
+    frame = told.get("crs") or "CRS84"
+    name = _block(_block(frame).get("properties")).get("name", frame)
+    if not isinstance(name, str) or not name.endswith(WGS84):
+        raise InputError(f"{path}: the map is in {shown(name)}; expected longitude and latitude, WGS 84 (EPSG:4326)")
+
+
+def _block(value: Any) -> dict[str, Any]:
+    return value if isinstance(value, dict) else {}
 
 
 def _is_point(feature: Any) -> bool:
-    geometry = feature.get("geometry") if isinstance(feature, dict) else None
-    return isinstance(geometry, dict) and geometry.get("type") == "Point"
+    return _block(_block(feature).get("geometry")).get("type") == "Point"
 
 
 def _sign(where: str, number: int, feature: Mapping[str, Any]) -> GeographicSign:
-    told = feature.get("properties")
-    told = told if isinstance(told, dict) else {}
-    kind = told.get("kind")
+    told = _block(feature.get("properties"))
+    kind, sign_id = told.get("kind"), feature.get("id", told.get("id", number))
     if not isinstance(kind, str) or not kind:
-        raise InputError(f'{where}: a sign needs a property "kind", as "speed_limit" or "stop", got {kind!r}')
+        raise InputError(f'{where}: a sign needs a property "kind", as "speed_limit" or "stop", got {shown(kind)}')
+    if not isinstance(sign_id, str | int | float):
+        raise InputError(f"{where}: expected text or a number for its id, got {shown(sign_id)}")
     longitude, latitude = _place(where, feature["geometry"].get("coordinates"))
-    heading = _number(where, told, "heading_deg", None, -360.0, 360.0)
+    heading = _number(where, told, "heading_deg", math.nan, -360.0, 360.0)
     limit = _number(where, told, "speed_limit_kmh", math.nan, 0.0, 300.0) / KMH_PER_MPS
     return GeographicSign(
-        str(feature.get("id", told.get("id", number))),
+        str(sign_id),
         kind,
         limit,
         math.radians(longitude),
@@ -158,9 +157,11 @@ def _sign(where: str, number: int, feature: Mapping[str, Any]) -> GeographicSign
 
 def _place(where: str, told: Any) -> tuple[float, float]:
     """Longitude and latitude [deg]."""
-    if not isinstance(told, list) or len(told) < 2 or not all(_is_number(one) for one in told[:2]):
-        raise InputError(f"{where}: expected coordinates [longitude, latitude], got {told!r}")
-    longitude, latitude = map(float, told[:2])
+    if not isinstance(told, list) or len(told) < 2:
+        raise InputError(f"{where}: expected coordinates [longitude, latitude], got {shown(told)}")
+    longitude, latitude = (
+        number_within(where, key, one) for key, one in zip(("longitude", "latitude"), told[:2], strict=True)
+    )
     if abs(longitude) > 180.0 or abs(latitude) > 90.0:
         raise InputError(
             f"{where}: expected longitude within ±180° and latitude within ±90° (WGS 84), got {told[:2]}: "
@@ -169,23 +170,15 @@ def _place(where: str, told: Any) -> tuple[float, float]:
     return longitude, latitude
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def _number(where: str, told: Mapping[str, Any], key: str, usual: float | None, least: float, most: float) -> float:
-    """Number of a property; NaN for one that is not there and has no usual value."""
+def _number(where: str, told: Mapping[str, Any], key: str, usual: float, least: float, most: float) -> float:
+    """Number of a property; the usual one where it is missing."""
     value = told.get(key)
-    if value is None:
-        return math.nan if usual is None else usual
-    if not _is_number(value) or not least <= value <= most:
-        raise InputError(f"{where}: {key} must be a number within {least:g} … {most:g}, got {value!r}")
-    return float(value)
+    return usual if value is None else number_within(where, key, value, least, most)
 
 
 def _remarks(path: Path, signs: tuple[GeographicSign, ...], points: list[tuple[int, Any]], others: int) -> list[str]:
     def without(key: str) -> int:
-        return sum((one.get("properties") or {}).get(key) is None for _, one in points)
+        return sum(_block(one.get("properties")).get(key) is None for _, one in points)
 
     assumed = [
         (without("height_m"), f"no height_m: {USUAL_HEIGHT} m above the road are assumed"),

@@ -1,24 +1,29 @@
 """Where a vehicle was: GPX or CSV, WGS 84."""
 
 import csv
+import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple
-from xml.etree import ElementTree as ET
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.errors import InputError
+from fogsim.errors import InputError, shown
+from fogsim.files.readers import number_in_text, read_text
+from fogsim.files.xml_reader import read_tree
 
 SEMI_MAJOR, FLATTENING = 6_378_137.0, 1.0 / 298.257223563
 """Ellipsoid of WGS 84: semi-major axis [m], flattening [-] (NIMA TR8350.2, 2000, table 3.1)."""
 
 LONGEST_GAP = 5.0
 """Time without a position after which the track is taken to be interrupted [s]."""
+
+LONGEST_TIME = 1e12
+"""Largest number in a track: time in seconds since 1970 is about 2e9."""
 
 MOVING, MOST_LOOKED_AT = 10.0, 100
 """Way over which a direction of travel is told from positions [m], and among how many of them before and after."""
@@ -129,10 +134,7 @@ def load_track(path: Path) -> Track:
     readers = {".gpx": _gpx_points, ".csv": _csv_points}
     if path.suffix.lower() not in readers:
         raise InputError(f"--track {path}: expected a name that ends in .gpx or .csv")
-    try:
-        points = list(readers[path.suffix.lower()](path))
-    except OSError as error:
-        raise InputError(f"--track {path}: cannot be read: {error.strerror}") from error
+    points = list(readers[path.suffix.lower()](path))
     points = [one for number, one in enumerate(points) if number == 0 or one[0] != points[number - 1][0]]
     if len(points) < 2:
         raise InputError(f"--track {path}: expected two positions with different times or more, got {len(points)}")
@@ -149,14 +151,10 @@ Point = tuple[float, float, float, float]
 
 
 def _gpx_points(path: Path) -> Iterator[Point]:
-    try:
-        root = ET.parse(path).getroot()  # noqa: S314 - the user's own file; expat fetches nothing
-    except ET.ParseError as error:
-        raise InputError(f"--track {path}: expected GPX: {error}") from error
     start = None
-    for number, point in enumerate(root.iterfind(".//{*}trkpt")):
+    for number, point in enumerate(read_tree(path, "gpx").iter("trkpt")):
         where = f"--track {path}: point {number}"
-        told = (point.findtext("{*}time") or "").strip()
+        told = (point.findtext("time") or "").strip()
         if not told:
             raise InputError(f"{where} has no <time>, so nothing says which image it belongs to")
         time = _instant(where, told)
@@ -165,8 +163,8 @@ def _gpx_points(path: Path) -> Iterator[Point]:
 
 
 def _csv_points(path: Path) -> Iterator[Point]:
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        rows = csv.DictReader(file)
+    rows = csv.DictReader(io.StringIO(read_text(path), newline=""))
+    try:
         names = rows.fieldnames or ()
         column = {meant: _column(path, names, known) for meant, known in COLUMNS.items()}
         counted, start = column["time"] == "time_s", None
@@ -177,6 +175,8 @@ def _csv_points(path: Path) -> Iterator[Point]:
             start = (0.0 if counted else time) if start is None else start
             heading = _float(where, "heading_deg", row["heading_deg"]) if row.get("heading_deg") else math.nan
             yield time - start, *_degrees(where, row[column["latitude"]], row[column["longitude"]]), heading
+    except csv.Error as error:
+        raise InputError(f"{path}:{rows.line_num + 1}: not valid CSV: {error}") from error
 
 
 def _column(path: Path, names: Sequence[str], known: Sequence[str]) -> str:
@@ -189,8 +189,8 @@ def _column(path: Path, names: Sequence[str], known: Sequence[str]) -> str:
 def _instant(where: str, told: str) -> float:
     try:
         return datetime.fromisoformat(told).timestamp()
-    except ValueError as error:
-        raise InputError(f"{where}: expected a time as 2026-05-04T07:08:09.5Z, got {told!r}") from error
+    except (ValueError, OverflowError) as error:
+        raise InputError(f"{where}: expected a time as 2026-05-04T07:08:09.5Z, got {shown(told)}") from error
 
 
 def _degrees(where: str, latitude: str | None, longitude: str | None) -> tuple[float, float]:
@@ -201,13 +201,7 @@ def _degrees(where: str, latitude: str | None, longitude: str | None) -> tuple[f
 
 
 def _float(where: str, name: str, told: str | None) -> float:
-    try:
-        value = float(told or "")
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise InputError(f"{where}: {name} must be a number, got {told!r}")
-    return value
+    return number_in_text(where, name, told or "", -LONGEST_TIME, LONGEST_TIME)
 
 
 def _headings(

@@ -1,6 +1,5 @@
 """Entries of catalogs that a file refers to."""
 
-import copy
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -57,7 +56,7 @@ class Catalogs:
             names += [one.attributes.get("name", "") for one in found.children]
             for one in found.children:
                 if one.attributes.get("name") == name:
-                    whole = copy.deepcopy(one)
+                    whole = one.copy()
                     own = declared(whole, {}, self.findings)
                     # What the reference gives goes before what the entry has.
                     whole.children = [child for child in whole.children if child.tag != "ParameterDeclarations"]
@@ -75,7 +74,7 @@ class Catalogs:
                     self._read[file] = read_xml(file)
                 except InputError as error:
                     self.findings.refused.append(str(error))
-                    self._read[file] = Node("", {}, file, 1, "")
+                    self._read[file] = Node("", {}, file, 1)
             # Whoever has copied a catalog may not have changed the name inside.
             yield from (
                 one

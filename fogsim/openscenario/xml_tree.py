@@ -1,14 +1,13 @@
 """Elements of an XML file with their lines and paths, and who has looked at what of them."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from xml.parsers import expat
 
-from fogsim.errors import InputError
+from fogsim.files.xml_reader import XmlFile
 
-MOST_BYTES = 20_000_000
-"""Largest file that is read."""
+MOST_BYTES, MOST_ELEMENTS = 20_000_000, 500_000
+"""Largest file that is read [bytes], and most elements in it."""
 
 
 @dataclass(slots=True)
@@ -25,8 +24,10 @@ class Node:
         Where it stands.
     line : int
         On which line.
-    path : str
-        Elements around it and itself, ``/OpenSCENARIO/Storyboard/Story[name]``.
+    label : str
+        Its tag, and in brackets the name that it has in the file.
+    above : Node or None
+        The element that it is in.
     children : list of Node
         Elements in it.
     is_read, read : bool, set of str
@@ -37,10 +38,16 @@ class Node:
     attributes: dict[str, str]
     file: Path
     line: int
-    path: str
+    label: str = ""
+    above: "Node | None" = field(default=None, repr=False, compare=False)
     children: list["Node"] = field(default_factory=list)
     is_read: bool = False
     read: set[str] = field(default_factory=set)
+
+    @property
+    def path(self) -> str:
+        """Elements around it and itself, ``/OpenSCENARIO/Storyboard/Story[name]``."""
+        return f"{self.above.path if self.above else ''}/{self.label}"
 
     @property
     def where(self) -> str:
@@ -96,6 +103,11 @@ class Node:
             node = None if node is None else node.one(tag)
         return node
 
+    def copy(self) -> "Node":
+        """It and everything in it, to be changed; it stays below the same element."""
+        children = [child.copy() for child in self.children]
+        return replace(self, attributes=dict(self.attributes), children=children, read=set(self.read))
+
     def walk(self) -> Iterator["Node"]:
         """It and everything in it."""
         yield self
@@ -114,50 +126,31 @@ def read_xml(path: Path) -> Node:
     Raises
     ------
     InputError
-        If it cannot be read, is too large, is no XML, or has a document type.
+        If it cannot be read, is too large, is not XML, or has a document type.
     """
-    try:
-        with path.open("rb") as file:
-            raw = file.read(MOST_BYTES + 1)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
-    if len(raw) > MOST_BYTES:
-        raise InputError(f"{path}: cannot be read: it has more than {MOST_BYTES} bytes")
     builder = _Builder(path)
-    try:
-        builder.parser.Parse(raw, True)
-    except expat.ExpatError as error:
-        raise InputError(f"{path}:{error.lineno}: no XML: {expat.errors.messages[error.code]}") from error
-    except (ValueError, LookupError) as error:
-        raise InputError(f"{path}: no XML: {error}") from error
+    builder.file.read_all(builder, MOST_BYTES, MOST_ELEMENTS)
     return builder.root
 
 
 class _Builder:
+    is_done = False
+
     def __init__(self, path: Path) -> None:
+        self.file = XmlFile(path)
+        self.root = Node("", {}, path, 1)
         self._path = path
         self._open: list[Node] = []
-        self.root = Node("", {}, path, 1, "")
-        self.parser = expat.ParserCreate()
-        self.parser.StartElementHandler = self._start
-        self.parser.EndElementHandler = self._end
-        self.parser.StartDoctypeDeclHandler = self._refuse
 
-    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
         above = self._open[-1] if self._open else None
         name = attributes.get("name") or attributes.get("entityRef")
-        path = f"{above.path if above else ''}/{tag}{f'[{name}]' if name else ''}"
-        node = Node(tag, attributes, self._path, self.parser.CurrentLineNumber, path)
+        node = Node(tag, attributes, self._path, self.file.line, f"{tag}[{name}]" if name else tag, above)
         if above is None:
             self.root = node
         else:
             above.children.append(node)
         self._open.append(node)
 
-    def _end(self, _: str) -> None:
+    def end(self, _: str) -> None:
         self._open.pop()
-
-    def _refuse(self, *_: object) -> None:
-        # Entities of a document type can grow without bound, or name other files.
-        line = self.parser.CurrentLineNumber
-        raise InputError(f"{self._path}:{line}: a document type (<!DOCTYPE …>) is not read; leave it out")

@@ -1,13 +1,13 @@
 """A YAML file as plain data that remembers on which line each key stands; single keys put in place of the file's."""
 
 import copy
-import stat
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from fogsim.errors import InputError, shown
+from fogsim.files.readers import read_text
 from fogsim.openscenario import is_openscenario, read_openscenario
 from fogsim.scenario.plain_yaml import DEEPEST, MOST_BYTES, KeyPath, PlainYamlError, parse_yaml
 from fogsim.units.quantities import UNIT_OF_SUFFIX
@@ -234,7 +234,7 @@ def read_document(path: Path) -> Document:
         twice, or is no mapping.
     """
     try:
-        data, lines = parse_yaml(_text(path))
+        data, lines = parse_yaml(read_text(path, MOST_BYTES))
     except PlainYamlError as error:
         where = path if error.line is None else f"{path}:{error.line}"
         raise InputError(f"{where}: not valid YAML: {error.problem}") from error
@@ -282,23 +282,3 @@ def _laid_upon(below: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, An
         else:
             data[key] = value
     return data
-
-
-def _text(path: Path) -> str:
-    try:
-        # What is no regular file (a pipe, a device) may never end.
-        if not stat.S_ISREG(path.stat().st_mode):
-            raise InputError(f"{path}: cannot be read: it is no regular file")
-        with path.open("rb") as file:
-            raw = file.read(MOST_BYTES + 1)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
-    if len(raw) > MOST_BYTES:
-        raise InputError(f"{path}: cannot be read: it has more than {MOST_BYTES} bytes")
-    try:
-        return raw.decode("utf-8")
-    except UnicodeDecodeError as error:
-        line = 1 + raw[: error.start].count(b"\n")
-        raise InputError(
-            f"{path}:{line}: not valid YAML: not UTF-8 text, got the byte 0x{raw[error.start]:02x}"
-        ) from error

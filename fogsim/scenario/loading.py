@@ -24,7 +24,7 @@ from fogsim.scenario.system_under_test import BLOCK, without_sut, without_sut_in
 from fogsim.scenario.traffic_schema import Traffic
 from fogsim.scenario.variation import KEYS, Case, Variation, chosen_cases, read_variation, with_case
 from fogsim.scenario.written_units import with_units_in_keys
-from fogsim.traffic.road.configuration import configured_files
+from fogsim.traffic.road.configuration import check_configured_files, check_sumo_file
 from fogsim.traffic.templates import PlacementError
 
 SCENARIO_FILE = "scenario.yaml"
@@ -227,6 +227,19 @@ def load_cases(
     return ScenarioCases(document, variation, tuple(cases))
 
 
+def check_configuration(config: Path) -> None:
+    """Check by its first element that a file is a SUMO configuration.
+
+    Raises
+    ------
+    InputError
+        If it is missing, with the nearest name in its folder, or another file.
+    """
+    if not _is_file(config):
+        raise InputError(_no_file(Document(config, {}, {}), config.parent, ("traffic", "config"), Path(config.name)))
+    check_sumo_file("config", config)
+
+
 def scenario_from_config(
     config: Path,
     ego: str,
@@ -253,6 +266,7 @@ def scenario_from_config(
     InputError
         If anything does not fit.
     """
+    check_configuration(config)
     traffic = {"config": config.name, "ego": ego, "warm_up_limit_s": DAY}
     document = Document(config, _bare(config.stem, traffic), {})
     return _checked(document, overrides, _context(config.parent, may_import), closed_demand=not others_add_vehicles)
@@ -458,8 +472,16 @@ def _check_files(document: Document, scenario: Scenario) -> None:
     missing = [(key_path, path) for key_path, path in named if not _is_file(scenario.directory / path)]
     if missing:
         raise InputError("\n".join(_no_file(document, scenario.directory, *one) for one in missing))
-    if traffic.config is not None:
-        configured_files(scenario.directory / traffic.config)
+    mistakes = []
+    for key_path, path in named:
+        try:
+            check_sumo_file(str(key_path[1]), scenario.directory / path)
+            if path == traffic.config:
+                check_configured_files(scenario.directory / path)
+        except InputError as error:
+            mistakes.append(f"{document.where(key_path)}: {dotted(key_path)}: {error}")
+    if mistakes:
+        raise InputError("\n".join(mistakes))
 
 
 def _check_departures(document: Document, scenario: Scenario) -> None:

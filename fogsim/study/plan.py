@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 
 from fogsim.errors import InputError, shown, suggest
+from fogsim.files.readers import open_regular
 from fogsim.parameters import checked_parameters
 from fogsim.registry.user_code import MayImport, import_anything
 from fogsim.scenario import Scenario, build, resolved, scenario_from_config
@@ -212,7 +213,7 @@ def file_digests(scenario: Scenario) -> dict[str, str]:
 @functools.lru_cache
 def _digest(path: Path, _: int) -> str:
     """Digest of a file's content, asked for anew when the file has been written anew."""
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()[:20]
 
 

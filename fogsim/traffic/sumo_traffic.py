@@ -17,7 +17,7 @@ from fogsim.traffic.drivers.sight import ClearAir, FogAccess
 from fogsim.traffic.road.network import read_net, road_network
 from fogsim.traffic.road.road_map import RoadMap
 from fogsim.traffic.road.signs import sign_map
-from fogsim.traffic.road.structures import mentions_structures, structures
+from fogsim.traffic.road.structures import structures
 from fogsim.traffic.setup import TrafficSetup
 from fogsim.traffic.sumo.claims import LoadMark, new_session
 from fogsim.traffic.sumo.command_line import command_line
@@ -222,7 +222,7 @@ class SumoTraffic:
     def _read_structures(self, api: Api) -> tuple[Structure, ...]:
         if self._structures is None:
             files = self._setup.additional or loaded_additional(api)
-            self._structures = structures(path for path in files if mentions_structures(path))
+            self._structures = structures(path for path in files if path.is_file())
         return self._structures
 
     def planned_network(self) -> tuple[RoadNetwork, SignMap] | None:

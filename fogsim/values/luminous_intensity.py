@@ -7,7 +7,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fogsim.errors import InputError
+from fogsim.errors import InputError, shown
 from fogsim.values import Beam
 
 FALL_OFF = 0.07
@@ -84,7 +84,9 @@ def checked_beam(beam: Beam, name: str = "beam") -> Beam:
     for axis in ("azimuth", "elevation"):
         values = np.asarray(getattr(beam, axis))
         if values.ndim != 1 or len(values) < 2 or not np.all(np.diff(values) > 0) or not np.all(np.isfinite(values)):
-            raise InputError(f"{name}: {axis} must be two or more finite, ascending angles [rad], got {values!r}")
+            raise InputError(
+                f"{name}: {axis} must be two or more finite, ascending angles [rad], got {shown(values.tolist())}"
+            )
     intensity = np.asarray(beam.intensity)
     expected = (len(beam.elevation), len(beam.azimuth))
     if intensity.shape != expected:

@@ -118,13 +118,14 @@ def test_an_interrupted_run_leaves_readable_results_that_say_they_are_partial(tm
         (["run", "nowhere/scenario.yaml"], "there is no such scenario file"),
         (["validate", "nowhere.yaml"], "there is no such scenario file"),
         (["run", TOWN], "is a SUMO configuration, not a scenario: run it with --sumocfg"),
-        (["run", "--sumocfg", __file__, "--ego", "a", "--visibility", "80"], "not a SUMO configuration"),
+        (["run", "--sumocfg", __file__, "--ego", "a", "--visibility", "80"], ":1: not XML"),
         (["run"], "expected either a scenario or --sumocfg FILE, got neither"),
         (["run", "motorway_fog_bank", "--sumocfg", TOWN], "got both"),
         (["run", "--sumocfg", TOWN, "--visibility", "120"], "--ego is missing"),
         (["run", "--sumocfg", TOWN, "--ego", "none", "--visibility", "120", "--video"], "--video shows what an ego's"),
         (["run", "--sumocfg", TOWN, "--ego", "veh18"], "--visibility is missing"),
         (["run", "--sumocfg", "no.sumocfg", "--ego", "a", "--visibility", "80"], "there is no file 'no.sumocfg'"),
+        (["run", "--sumocfg", "no.sumocfg", "--ego", "a"], "there is no file 'no.sumocfg'"),
     ],
 )
 def test_bad_input_ends_in_one_message_and_writes_nothing(

@@ -213,8 +213,8 @@ POINT = feature((24.9, 60.2))
         ([feature((24.9, 60.2), kind=None)], {}, 'feature 0: a sign needs a property "kind"'),
         ([feature((385_000.0, 6_672_000.0))], {}, "another coordinate frame"),
         ([feature((24.9, 60.2), diameter_m="big")], {}, r"diameter_m must be a number within 0\.1 … 10, got 'big'"),
-        ([feature((24.9, "north"))], {}, "expected coordinates"),
-        ([POINT], {"crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::3067"}}}, "is in urn.*3067"),
+        ([feature((24.9, "north"))], {}, "latitude must be a number within .*, got 'north'"),
+        ([POINT], {"crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::3067"}}}, "is in .urn.*3067"),
         ([POINT], {"coordinates": NET}, "x and y of a SUMO network"),
         ([POINT], {"features": None, "type": "Point"}, "expected a GeoJSON FeatureCollection .*got type 'Point'"),
     ],
@@ -224,7 +224,7 @@ def test_maps_that_are_refused(tmp_path: Path, features: list[object], members: 
         load_sign_file(geojson(tmp_path / "map.geojson", *features, **members))
 
 
-@pytest.mark.parametrize(("text", "told"), [("", "expected GeoJSON"), ("[]", "got list"), (None, "cannot be read")])
+@pytest.mark.parametrize(("text", "told"), [("", ":1: not valid JSON"), ("[]", "got list"), (None, "cannot be read")])
 def test_files_that_are_no_map(tmp_path: Path, text: str | None, told: str) -> None:
     if text is not None:
         (tmp_path / "map.geojson").write_text(text, encoding="utf-8")
@@ -239,12 +239,12 @@ def test_files_that_are_no_map(tmp_path: Path, text: str | None, told: str) -> N
         ("a.txt", "", r"ends in \.gpx or \.csv"),
         ("a.csv", "time_s,lat\n", "expected a column longitude or lon, got time_s, lat"),
         ("a.csv", "time_s,lat,lon\n0,1,2\n", "expected two positions"),
-        ("a.csv", "time_s,lat,lon\n0,1,2\n1,x,2\n", "line 3: latitude must be a number, got 'x'"),
+        ("a.csv", "time_s,lat,lon\n0,1,2\n1,x,2\n", "line 3: latitude must be a number within .*, got 'x'"),
         ("a.csv", "time,lat,lon\nnoon,1,2\n", "expected a time as 2026"),
         ("a.csv", "time_s,lat,lon\n0,91,2\n", "within ±90°"),
         ("a.csv", "time_s,lat,lon\n0,1,2\n2,1,2\n1,1,2\n", "time goes back after position 2 of 3"),
         ("a.csv", "time_s,lat,lon\n0,1,2\n1,1,2\n", "never moves"),
-        ("a.gpx", "<gpx", "expected GPX"),
+        ("a.gpx", "<gpx", ":1: not XML"),
         ("a.gpx", '<gpx><trk><trkseg><trkpt lat="1" lon="2"/></trkseg></trk></gpx>', "point 0 has no <time>"),
     ],
 )

@@ -124,7 +124,7 @@ def test_what_is_not_supported_is_told_at_once_with_paths_and_lines(changed: Cal
         ('revMajor="1"', 'revMajor="2"', "expected OpenSCENARIO XML 1.x"),
         ('filepath="two_lanes.xodr"', 'filepath="none.xodr"', "expected an OpenDRIVE file (.xodr) that is there"),
         ("<OpenSCENARIO>", "<!DOCTYPE x [<!ENTITY e 'x'>]><OpenSCENARIO>", "a document type"),
-        ("</OpenSCENARIO>", "", "no XML"),
+        ("</OpenSCENARIO>", "", "not XML"),
     ],
 )
 @pytest.mark.filterwarnings("ignore::fogsim.errors.LeftOutWarning")

@@ -201,7 +201,7 @@ def test_what_is_no_scenario_at_all(tmp_path: Path, text: str, message: str) -> 
 def test_a_file_that_is_not_text(tmp_path: Path) -> None:
     file = tmp_path / "scenario.yaml"
     file.write_bytes(b"\xff\xfe\x00\x80")
-    with pytest.raises(InputError, match="not valid YAML"):
+    with pytest.raises(InputError, match="expected UTF-8 text"):
         load_scenario(file)
 
 

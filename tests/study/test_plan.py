@@ -169,7 +169,9 @@ def test_a_file_that_the_configuration_names_is_missed_before_anything_is_run(tm
     text = STUDY.replace("scenario: motorway_fog_bank", "sumocfg: a.sumocfg").replace(
         "[advice=stopping_sight_distance]", "[]"
     )
-    with pytest.raises(InputError, match=r"a\.sumocfg names .*loops\.add\.xml, which is not there"):
+    with pytest.raises(
+        InputError, match=r"a\.sumocfg: traffic\.config: .*loops\.add\.xml: cannot be read: No such file"
+    ):
         load_study(written(tmp_path, text))
 
 

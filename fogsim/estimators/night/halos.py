@@ -10,9 +10,9 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from fogsim.errors import InputError, shown
+from fogsim.files.readers import number_within, read_json
 from fogsim.values.camera import Camera, Response
 from fogsim.vision.light.pixel_kernels import Pixels
 from fogsim.vision.sources.halo_profile import Halo, halos_of
@@ -89,19 +89,16 @@ class HaloThreshold:
         InputError
             If it cannot be read or is none.
         """
-        wanted = f"halos must be a file of `fogsim calibrate halos`, got {str(path)!r}"
         try:
-            data: Any = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            reason = error.strerror if isinstance(error, OSError) else error
-            raise InputError(f"{wanted}: no threshold can be read: {reason}") from error
-        names = list(cls.__dataclass_fields__)
-        if not isinstance(data, Mapping) or sorted(data) != sorted(names):
-            raise InputError(f"{wanted}: expected the keys {', '.join(names)}, got {shown(data)}")
-        try:
+            data, names = read_json(path), list(cls.__dataclass_fields__)
+            if not isinstance(data, Mapping) or sorted(data) != sorted(names):
+                given = sorted(data) if isinstance(data, Mapping) else data
+                raise InputError(f"expected the keys {', '.join(names)}, got {shown(given)}")  # noqa: TRY301
+            for name in set(names) - {"response"}:
+                number_within("", name, data[name])
             return cls(**data)
         except InputError as error:
-            raise InputError(f"{wanted}: {error}") from error
+            raise InputError(f"halos must be a file of `fogsim calibrate halos`, got {str(path)!r}: {error}") from error
 
     def checked_for(self, camera: Camera) -> "HaloThreshold":
         """Itself, if it was measured for a camera.

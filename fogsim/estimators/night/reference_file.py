@@ -2,7 +2,7 @@
 
 import io
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError, shown
+from fogsim.estimators.night.cells import camera_of_cells
 from fogsim.estimators.night.references import ReferenceSource, VeilReferences
+from fogsim.files.array_archive import read_arrays
+from fogsim.files.readers import number_within
 from fogsim.values.camera import Camera, Response
 from fogsim.values.light import Lamp, lamp_names
 
@@ -131,18 +134,40 @@ def read_references(path: Path) -> list[VeilReferences]:
         If it cannot be read, or is no such file.
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
-            return [_one(file, index) for index in range(max(len(file.files) // len(_KEYS), 1))]
-    except (OSError, ValueError, KeyError, TypeError, EOFError, InputError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else shown(error)
+        arrays = read_arrays(path)
+        return [_one(arrays, index) for index in range(max(len(arrays) // len(_KEYS), 1))]
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+        reason = error if isinstance(error, InputError) else shown(error)
         raise InputError(
-            f"references must be a file of `fogsim calibrate veil`, got {str(path)!r}: no references can be read: "
-            f"{reason}"
+            f"references must be a file of `fogsim calibrate veil`, got {str(path)!r}: {reason}"
         ) from error
 
 
-def _one(file: Any, index: int) -> VeilReferences:
-    head = json.loads(str(file[f"head{index}"]))
+def _one(arrays: Mapping[str, NDArray[Any]], index: int) -> VeilReferences:
+    head = json.loads(str(arrays[f"head{index}"]))
     camera = Camera(**{**head["camera"], "principal_point": tuple(head["camera"]["principal_point"])})
-    arrays = (np.asarray(file[f"{name}{index}"], np.float64) for name in ("visibility", "veil", "road"))
-    return VeilReferences(camera, Lamp(head["lamps"]), str(head["droplets"]), float(head["setback"]), *arrays)
+    visibility, veil, road = (_numbers(arrays[f"{name}{index}"]) for name in ("visibility", "veil", "road"))
+    cells = camera_of_cells(camera)
+    wanted = (len(visibility), cells.height, cells.width)
+    if veil.shape != wanted or road.shape != wanted or not (np.isfinite(veil).all() and np.isfinite(road).all()):
+        raise InputError(
+            f"expected a veil and a road of finite luminances in {wanted} cells, got {veil.shape} and {road.shape}"
+        )
+    if (
+        visibility.ndim != 1
+        or not len(visibility)
+        or visibility[0] <= 0.0
+        or not (visibility[1:] > visibility[:-1]).all()
+    ):
+        raise InputError(f"expected visibilities above 0 that ascend, got {shown(visibility.tolist())}")
+    lamps = Lamp(head["lamps"])
+    if not lamps or int(lamps) & ~int(HEAD_LAMPS):
+        raise InputError(f"expected head lamps, got {shown(head['lamps'])}")
+    setback = number_within("", "setback", head["setback"], 0.0)
+    return VeilReferences(camera, lamps, str(head["droplets"]), setback, visibility, veil, road)
+
+
+def _numbers(array: NDArray[Any]) -> NDArray[np.float64]:
+    if array.dtype.kind not in "fiu" or not array.ndim:
+        raise InputError(f"expected arrays of numbers, got {array.dtype}")
+    return np.asarray(array, np.float64)

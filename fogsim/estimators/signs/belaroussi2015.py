@@ -263,10 +263,7 @@ class Belaroussi2015:
 
 
 def _read_range(path: str, camera: Camera) -> OperatingRange:
-    try:
-        return _checked_range(OperatingRange.read(Path(path)), camera)
-    except InputError as error:
-        raise InputError(f"operating_range: {error}") from error
+    return _checked_range(OperatingRange.read(Path(path)), camera)
 
 
 def _checked_range(measured: OperatingRange, camera: Camera) -> OperatingRange:

@@ -12,6 +12,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import isotonic_regression
 
 from fogsim.errors import InputError, shown
+from fogsim.files.readers import number_within, read_json
 from fogsim.linear_algebra import inverse_of, matrix_product, times
 
 FLAT = 0.35
@@ -132,28 +133,17 @@ class OperatingRange:
             If it cannot be read or does not fit; the message names file and key.
         """
         try:
-            data = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            reason = error.strerror if isinstance(error, OSError) else error
-            raise InputError(
-                f"operating_range must be a file of `fogsim calibrate signs`, got {str(path)!r}: no calibration of a "
-                f"sign detector can be read: {reason}"
-            ) from error
-        names = ("focal_length_px", "diameter_m", *_COLUMNS.values())
-        if not isinstance(data, Mapping) or set(data) != set(names):
-            given = sorted(data) if isinstance(data, Mapping) else shown(data)
-            raise InputError(
-                f"{path}: expected the keys {', '.join(names)}, as `fogsim calibrate signs` writes; got {given}"
-            )
-        try:
-            columns: dict[str, Any] = {
-                name: tuple(float(value) for value in data[key]) for name, key in _COLUMNS.items()
-            }
-            return cls(float(data["focal_length_px"]), float(data["diameter_m"]), **columns)
-        except (TypeError, ValueError) as error:
-            raise InputError(f"{path}: expected numbers, and lists of them: {error}") from error
+            data, names = read_json(path), ("focal_length_px", "diameter_m", *_COLUMNS.values())
+            if not isinstance(data, Mapping) or set(data) != set(names):
+                given = sorted(data) if isinstance(data, Mapping) else data
+                raise InputError(f"expected the keys {', '.join(names)}, got {shown(given)}")  # noqa: TRY301
+            columns = {name: _column(key, data[key]) for name, key in _COLUMNS.items()}
+            focal_length, diameter = (number_within("", key, data[key]) for key in names[:2])
+            return cls(focal_length, diameter, **columns)
         except InputError as error:
-            raise InputError(f"{path}: {error}") from error
+            raise InputError(
+                f"operating_range must be a file of `fogsim calibrate signs`, got {str(path)!r}: {error}"
+            ) from error
 
     def as_json(self) -> str:
         """The calibration's file."""
@@ -167,6 +157,12 @@ _COLUMNS = {
     "first_detection": "first_detection_m",
     "deviation": "deviation_m",
 }
+
+
+def _column(key: str, values: Any) -> tuple[float, ...]:
+    if not isinstance(values, list):
+        raise InputError(f"{key} must be a list of numbers, got {shown(values)}")
+    return tuple(number_within(key, str(place), value) for place, value in enumerate(values))
 
 
 class _Curve:

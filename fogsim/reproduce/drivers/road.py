@@ -5,12 +5,11 @@ SUMO's instantaneous loops write every passage into a file, which is read.
 
 import math
 import tempfile
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from xml.etree import ElementTree as ET
 
 from fogsim.atmosphere import FieldAccess
+from fogsim.files.xml_reader import read_tree
 from fogsim.scenario import build, load_scenario
 from fogsim.traffic import AfterCollision, Event, TrafficSetup, libsumo_traffic
 from fogsim.units import extinction_from_visibility
@@ -88,7 +87,7 @@ def passed(
         finally:
             # SUMO writes the loops' file to its end only now.
             traffic.close()
-        return list(_events(folder / "outputs" / "loops.xml"))
+        return [dict(one.attrib) for one in read_tree(folder / "outputs" / "loops.xml").iter("instantOut")]
 
 
 def _setup(folder: Path, overrides: tuple[str, ...], lanes: int, demand: str) -> TrafficSetup:
@@ -126,10 +125,3 @@ def _net(lanes: int) -> str:
         f'<junction id="b" type="dead_end" x="{LENGTH}" y="0" incLanes="{incoming}" intLanes="" '
         f'shape="{LENGTH},-8 {LENGTH},0"/></net>'
     )
-
-
-def _events(path: Path) -> Iterator[dict[str, str]]:
-    for _, element in ET.iterparse(path):  # noqa: S314 - SUMO has just written it
-        if element.tag == "instantOut":
-            yield dict(element.attrib)
-            element.clear()

@@ -1,11 +1,25 @@
 """What a SUMO configuration file names, without starting SUMO, and which of its options FogSim overrides."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree import ElementTree as ET
+from xml.etree.ElementTree import Element
 
 from fogsim.errors import InputError
+from fogsim.files.xml_reader import read_tree, root_tag
+from fogsim.traffic.road.opendrive import is_opendrive
+
+_DEMAND = tuple(
+    "routes additional additionals add trips vehicles persons vTypes stops shapes polygons pois tazs detectors "  # noqa: SIM905
+    "calibrators tlLogics".split()
+)
+ROOTS: Mapping[str, tuple[str, ...]] = {
+    "config": ("configuration", "sumoConfiguration"),
+    "net": ("net",),
+    "routes": _DEMAND,
+    "additional": _DEMAND,
+}
+"""First elements of SUMO's files, as its documentation and its tools write them; the usual ones come first."""
 
 _NET = ("net-file", "net", "n")
 _ADDITIONAL = ("additional-files", "additional", "a")
@@ -36,6 +50,43 @@ _UNSUPPORTED = (
 
 OVERRIDES = tuple(argument for option in _UNSUPPORTED for argument in (f"--{option.names[0]}", option.value))
 """Arguments of SUMO's command line that override options of a configuration that FogSim does not support."""
+
+
+def check_sumo_file(kind: str, path: Path) -> None:
+    """Check by its first element that a file is what it should be, which takes no time in a large file.
+
+    Parameters
+    ----------
+    kind : str
+        A key of `ROOTS`. Additional files may be OpenDRIVE files.
+    path : Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If it is missing, or another file.
+    """
+    roots = ("OpenDRIVE",) if kind == "additional" and is_opendrive(path) else ROOTS[kind]
+    root_tag(path, *roots)
+
+
+def check_configured_files(config: Path) -> None:
+    """Check the network, route and additional files of a SUMO configuration with `check_sumo_file`.
+
+    Names with variables or with separators that only SUMO knows are left to SUMO.
+
+    Raises
+    ------
+    InputError
+        If a file is missing, or another file; or the configuration names no network.
+    """
+    configured_files(config)
+    root = _root(config)
+    for kind, options in (("net", _NET), ("routes", _ROUTES), ("additional", _ADDITIONAL)):
+        for path in _named(config, root, options):
+            if not set(str(path).removeprefix(str(config.parent))).intersection("$; "):
+                check_sumo_file(kind, path)
 
 
 def configured_files(config: Path) -> tuple[Path, tuple[Path, ...]]:
@@ -152,20 +203,17 @@ def input_files(config: Path) -> tuple[Path, ...]:
     return _named(config, _root(config), (*_NET, *_ADDITIONAL, *_FURTHER))
 
 
-def _root(config: Path) -> ET.Element:
-    try:
-        return ET.parse(config).getroot()  # noqa: S314 - the user's own file; expat fetches nothing
-    except (OSError, ET.ParseError) as error:
-        raise InputError(f"{config}: not a SUMO configuration: {error}") from error
+def _root(config: Path) -> Element:
+    return read_tree(config, *ROOTS["config"])
 
 
-def _values(root: ET.Element, options: tuple[str, ...]) -> Iterator[str]:
+def _values(root: Element, options: tuple[str, ...]) -> Iterator[str]:
     """Values of an option, which SUMO reads from either attribute, or from between the tags."""
     for element in root.iter():
         if element.tag in options:
             yield (element.get("value") or element.get("v") or element.text or "").strip()
 
 
-def _named(config: Path, root: ET.Element, options: tuple[str, ...]) -> tuple[Path, ...]:
+def _named(config: Path, root: Element, options: tuple[str, ...]) -> tuple[Path, ...]:
     names = [name.strip() for value in _values(root, options) for name in value.split(",")]
     return tuple(config.parent / name for name in names if name)

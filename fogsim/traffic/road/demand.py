@@ -4,8 +4,9 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from fogsim.errors import InputError
+from fogsim.files.xml_reader import read_elements
 from fogsim.traffic.road.configuration import configured_demand
-from fogsim.traffic.road.xml_stream import UNREADABLE, read_elements
 
 MOST_BYTES = 50_000_000
 """Bytes of files, unpacked, after which nothing is claimed about a demand."""
@@ -113,7 +114,7 @@ def read_demand(
         reader.file = file
         try:
             left -= read_elements(file, reader, left)
-        except UNREADABLE:
+        except InputError:
             # SUMO tells what is wrong with it when it starts.
             reader.is_open = True
         if reader.is_done:

@@ -6,7 +6,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fogsim.traffic.road.xml_stream import UNREADABLE, read_elements
+from fogsim.errors import InputError
+from fogsim.files.xml_reader import read_elements
 
 MOST_BYTES = 50_000_000
 """Bytes of a network file, unpacked, after which it is not looked at."""
@@ -69,7 +70,7 @@ def read_net_edges(net: Path, wanted: Collection[str], most_bytes: int = MOST_BY
     reader = _EdgeReader(wanted)
     try:
         size = read_elements(net, reader, most_bytes)
-    except UNREADABLE:
+    except InputError:
         return None
     if not reader.lanes or (size == most_bytes and not reader.is_done):
         return None

@@ -1,13 +1,17 @@
 """SUMO's netconvert, which makes networks of OpenDRIVE files: a program of its own, in the package eclipse-sumo."""
 
 import importlib.util
+import os
 import re
+import resource
 import shutil
 import subprocess
 import tempfile
 from pathlib import Path
 
 from fogsim.errors import InputError, MissingDependencyError
+from fogsim.files.readers import read_text
+from fogsim.traffic.road.opendrive import read_opendrive
 
 USUAL_LIMIT = 130.0 / 3.6
 """Speed limit of lanes of which an OpenDRIVE file tells none [m/s]."""
@@ -16,6 +20,8 @@ _TYPES = ("driving", "entry", "exit", "onRamp", "offRamp", "mwyEntry", "mwyExit"
 """Types of OpenDRIVE lanes on which vehicles drive; of others there are no lanes in the network."""
 
 _LONGEST_RUN = 300.0  # [s]
+_MOST_MEMORY, _MOST_BYTES = 4 * 2**30, 2**28  # of the program; of its network [bytes]
+_MOST_SHOWN = 1000  # of its last messages [bytes]
 _COMMENT = re.compile(r"<!--.*?-->\s*", re.DOTALL)
 
 
@@ -72,6 +78,7 @@ def opendrive_net(path: Path) -> str:
         If there is no netconvert.
     """
     program = netconvert_program()
+    read_opendrive(path)
     with tempfile.TemporaryDirectory() as folder:
         types, net = Path(folder) / "types.typ.xml", Path(folder) / "road.net.xml"
         lines = [f'<type id="{name}" priority="1" speed="{USUAL_LIMIT:.3f}" width="3.65"/>' for name in _TYPES]
@@ -79,12 +86,37 @@ def opendrive_net(path: Path) -> str:
         command = [program, "--opendrive-files", str(path.resolve()), "-o", str(net), "-t", str(types)]
         command += ["--output.original-names", "--offset.disable-normalization", "--opendrive.curve-resolution", "1"]
         command += ["--no-turnarounds", "--precision", "3", "--xml-validation", "never"]
+        reported = _run(command, path, Path(folder))
+        if reported or not net.is_file():
+            raise InputError(
+                f"{path}: no OpenDRIVE road network that SUMO's netconvert can read: {reported or 'no output'}"
+            )
+        # A comment at the top tells when it was made.
+        return _COMMENT.sub("", read_text(net, _MOST_BYTES))
+
+
+def _run(command: list[str], path: Path, folder: Path) -> str:
+    """Run netconvert with limited time, memory and output; what it reported if it failed."""
+    messages = folder / "messages.txt"
+    # Its OpenBLAS would otherwise reserve address space for each processor.
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    with (
+        messages.open("wb") as sink,
+        subprocess.Popen(command, stdout=sink, stderr=sink, env=environment) as process,  # noqa: S603
+    ):
+        limits = ((resource.RLIMIT_AS, _MOST_MEMORY), (resource.RLIMIT_FSIZE, _MOST_BYTES), (resource.RLIMIT_CORE, 0))
+        for limit, most in limits:
+            resource.prlimit(process.pid, limit, (most, most))
         try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=_LONGEST_RUN, check=False)  # noqa: S603
+            code = process.wait(_LONGEST_RUN)
         except subprocess.TimeoutExpired as error:
             raise InputError(f"{path}: netconvert has not read it within {_LONGEST_RUN:g} s") from error
-        if done.returncode or not net.is_file():
-            told = " ".join(done.stderr.split()) or f"it ended with {done.returncode}"
-            raise InputError(f"{path}: no OpenDRIVE road network that SUMO's netconvert can read: {told}")
-        # A comment at the top tells when it was made.
-        return _COMMENT.sub("", net.read_text(encoding="utf-8"))
+        finally:
+            process.kill()
+    if not code:
+        return ""
+    with messages.open("rb") as file:
+        file.seek(max(file.seek(0, 2) - _MOST_SHOWN, 0))
+        reported = " ".join(file.read().decode(errors="replace").split())
+    allowed = f"at most {_MOST_MEMORY >> 30} GiB of memory and {_MOST_BYTES >> 20} MiB of output"
+    return f"{reported} (it ended with {code}; {allowed})".strip()

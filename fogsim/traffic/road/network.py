@@ -1,6 +1,5 @@
 """Roads of a SUMO network as plain geometry."""
 
-import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -9,14 +8,15 @@ import sumolib
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
+from fogsim.files.readers import FARTHEST
+from fogsim.files.xml_reader import read_elements, root_tag
 from fogsim.garbage import no_garbage_collection
 from fogsim.traffic.road.map_cache import cached_map, compacted, is_worth_caching, keep_map
 from fogsim.traffic.road.net_lanes import map_of
 from fogsim.traffic.road.road_map import RoadMap
-from fogsim.traffic.road.xml_stream import open_unpacked
 from fogsim.values import Lane, RoadNetwork, Structure
 
-_ROOT, _HEAD = re.compile(rb"<net\s[^>]*>"), 1 << 20  # tag of the root, and in how many first bytes of a file it stands
+_MOST_BYTES = 2_000_000_000  # of a network, unpacked
 
 
 @no_garbage_collection()
@@ -45,21 +45,40 @@ def read_net(path: Path) -> RoadMap:
 
 
 def _parsed(path: Path) -> RoadMap:
+    reader = _NetElements()
+    root_tag(path, "net")
     try:
-        net = sumolib.net.readNet(str(path), withInternal=True, withFoes=False)
-        found = map_of(net, _is_lefthand(path))
-    except Exception as error:
-        raise InputError(f"{path}: not a SUMO network: {error}") from error
+        read_elements(path, reader, _MOST_BYTES)
+        reader.endDocument()
+        found = map_of(reader.getNet(), reader.is_lefthand)
+    except InputError:
+        raise
+    except Exception as error:  # sumolib checks nothing
+        raise InputError(f"{path}: not a SUMO network: {type(error).__name__}: {error}") from error
     if not found.edges:
         raise InputError(f"{path}: the SUMO network has no edges")
+    points = np.concatenate([np.zeros((0, 3)), *(lane.centreline for lane in found.lanes)])
+    if not (np.abs(points) <= FARTHEST).all():
+        lane_id = next(lane.lane_id for lane in found.lanes if not (np.abs(lane.centreline) <= FARTHEST).all())
+        raise InputError(f"{path}: lane {lane_id!r}: its shape must have coordinates within ±{FARTHEST:g} m")
     return found
 
 
-def _is_lefthand(path: Path) -> bool:
-    """Whether a network file says that its vehicles keep to the left, which sumolib does not tell."""
-    with open_unpacked(path) as source:
-        root = _ROOT.search(source.read(_HEAD))
-    return root is not None and b'lefthand="' in root[0] and b'lefthand="false"' not in root[0]
+class _NetElements(sumolib.net.NetReader):  # type: ignore[misc]  # sumolib has no types
+    """Hands elements to sumolib, and keeps whether vehicles keep to the left, which sumolib ignores."""
+
+    is_done = is_lefthand = False
+
+    def __init__(self) -> None:
+        super().__init__(withInternal=True, withFoes=False)
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        if tag == "net":
+            self.is_lefthand = attributes.get("lefthand", "false") != "false"
+        self.startElement(tag, attributes)
+
+    def end(self, tag: str) -> None:
+        self.endElement(tag)
 
 
 def road_network(roads: RoadMap, route: Sequence[str], structures: tuple[Structure, ...] = ()) -> RoadNetwork:

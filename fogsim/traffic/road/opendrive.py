@@ -4,9 +4,11 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree import ElementTree as ET
+from xml.etree.ElementTree import Element
 
-from fogsim.errors import InputError
+from fogsim.errors import InputError, shown
+from fogsim.files.readers import FARTHEST, number_in_text, number_within
+from fogsim.files.xml_reader import read_tree
 from fogsim.traffic.road.plan_view import PlanView, plan_view
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Sign
@@ -18,6 +20,16 @@ HEIGHT = 2.6
 """Height of the middle of a sign that tells no height [m]."""
 DIAMETER = 0.9
 """Diameter of a sign that tells no size [m]."""
+FASTEST = 300.0 / KMH_PER_MPS
+"""Highest speed on a sign [m/s]."""
+
+LONGEST_ROAD = 50_000.0
+"""Longest road that is read [m]: the time that netconvert takes grows with the square of a curve's length."""
+
+_SECTIONS = ("planView", "elevationProfile", "lateralProfile", "lanes")
+_NUMBERS = frozenset(
+    "s sOffset x y hdg a b c d aU bU cU dU aV bV cV dV curvature curvStart curvEnd width height".split()  # noqa: SIM905
+)
 
 _METRES_PER_SECOND = {"": 1 / KMH_PER_MPS, "km/h": 1 / KMH_PER_MPS, "mph": 0.44704, "m/s": 1.0}
 """Units of a signal's speed; without one it is km/h."""
@@ -71,24 +83,43 @@ def opendrive_signs(path: Path, net_offset: tuple[float, float] = (0.0, 0.0)) ->
     InputError
         If the file is not OpenDRIVE, or a signal has no usable place.
     """
-    try:
-        root = ET.parse(path).getroot()  # noqa: S314 - the user's own file; expat fetches nothing
-    except (OSError, ET.ParseError) as error:
-        raise InputError(f"{path}: not an OpenDRIVE file: {error}") from error
-    if root.tag != "OpenDRIVE":
-        raise InputError(f"{path}: not an OpenDRIVE file: expected <OpenDRIVE> at its top, got <{root.tag}>")
-    return [sign for road in root.iter("road") for sign in _road_signs(path, road, net_offset)]
+    roads = read_opendrive(path).iter("road")
+    return [sign for road in roads for sign in _road_signs(path, road, net_offset)]
 
 
-def _road_signs(path: Path, element: ET.Element, net_offset: tuple[float, float]) -> Iterator[Sign]:
+def read_opendrive(path: Path) -> Element:
+    """Root of an OpenDRIVE file whose roads can be built: lengths, coordinates and coefficients are of a sane size.
+
+    Raises
+    ------
+    InputError
+        If the file is not OpenDRIVE, or a number of a road is not finite or too large.
+    """
+    root = read_tree(path, "OpenDRIVE")
+    for road in root.iter("road"):
+        where = f"{path}: road {shown(road.get('id', '?'))}"
+        along = [number_in_text(where, "length", road.get("length", "0"), 0.0, LONGEST_ROAD)]
+        for element in (one for section in road if section.tag in _SECTIONS for one in section.iter()):
+            inside = f"{where}: <{element.tag}>"
+            for key, text in element.attrib.items():
+                if key in _NUMBERS:
+                    number_in_text(inside, key, text)
+            if element.tag == "geometry":
+                along.append(number_in_text(inside, "length", element.get("length", "0"), 0.0, LONGEST_ROAD))
+        if sum(along[1:]) > LONGEST_ROAD:
+            raise InputError(f"{where}: its geometry is {sum(along[1:]):g} m long; at most {LONGEST_ROAD:g} m are read")
+    return root
+
+
+def _road_signs(path: Path, element: Element, net_offset: tuple[float, float]) -> Iterator[Sign]:
     signals = [s for s in element.iterfind("signals/signal") if s.get("dynamic", "no") != "yes"]
     if not signals:
         return
-    where = f"{path}: road {element.get('id', '?')!r}"
+    where = f"{path}: road {shown(element.get('id', '?'))}"
+    records = element.iterfind("elevationProfile/elevation")
+    elevation = tuple(tuple(float(e.get(key, "0")) for key in ("s", "a", "b", "c", "d")) for e in records)
     try:
         line = plan_view(element.iterfind("planView/geometry"))
-        records = element.iterfind("elevationProfile/elevation")
-        elevation = tuple(tuple(float(e.get(key, "0")) for key in ("s", "a", "b", "c", "d")) for e in records)
     except ValueError as error:
         raise InputError(f"{where}: {error}") from None
     left_hand = element.get("rule", "RHT") == "LHT"
@@ -97,56 +128,46 @@ def _road_signs(path: Path, element: ET.Element, net_offset: tuple[float, float]
         yield _sign(road, signal, net_offset, left_hand)
 
 
-def _sign(road: _Road, signal: ET.Element, net_offset: tuple[float, float], left_hand: bool) -> Sign:
-    where = f"{road.where}: signal {signal.get('id', '?')!r}"
+def _sign(road: _Road, signal: Element, net_offset: tuple[float, float], left_hand: bool) -> Sign:
+    where = f"{road.where}: signal {shown(signal.get('id', '?'))}"
+    s, t = (number_in_text(where, key, signal.get(key, "")) for key in "st")
     try:
-        s, t = float(signal.attrib["s"]), float(signal.attrib["t"])
         x, y, along = road.line.at(s)
-        size = max(_number(signal, "width"), _number(signal, "height"))
-        above = float(signal.attrib["zOffset"]) + 0.5 * size if "zOffset" in signal.attrib else HEIGHT
-        kind, value = _meaning(signal)
-        turn = _number(signal, "hOffset")
-    except KeyError as error:
-        raise InputError(f"{where}: a signal needs the attribute {error}") from None
     except ValueError as error:
         raise InputError(f"{where}: {error}") from None
+    size = max(_number(where, signal, key, 0.0) for key in ("width", "height"))
+    above = _number(where, signal, "zOffset") + 0.5 * size if "zOffset" in signal.attrib else HEIGHT
+    kind, value = _meaning(where, signal)
     position = (
         x - t * math.sin(along) + net_offset[0],
         y + t * math.cos(along) + net_offset[1],
         road.height(s) + above,
     )
-    heading = along + turn + (0.0 if _faces_along(signal, t, left_hand) else math.pi)
+    heading = along + _number(where, signal, "hOffset") + (0.0 if _faces_along(signal, t, left_hand) else math.pi)
     return Sign(f"xodr.{signal.get('id', '')}", kind, value, position, heading, size or DIAMETER)
 
 
-def _faces_along(signal: ET.Element, t: float, left_hand: bool) -> bool:
+def _faces_along(signal: Element, t: float, left_hand: bool) -> bool:
     """Whether it speaks to those who drive along the reference line; where it says both, the side tells."""
     orientation = signal.get("orientation", "none")
     return orientation == "+" or (orientation != "-" and (t > 0 if left_hand else t <= 0))
 
 
-def _meaning(signal: ET.Element) -> tuple[str, float]:
+def _meaning(where: str, signal: Element) -> tuple[str, float]:
     """Kind and value of a signal."""
     code, name = signal.get("type", ""), signal.get("name", "").lower()
-    value = _number(signal, "value")
+    value = _number(where, signal, "value")
     if code == GERMAN_SPEED_LIMIT and value <= 0 and signal.get("subtype", "").isdecimal():
-        value = float(signal.get("subtype", ""))
+        value = _number(where, signal, "subtype")
     if (code == GERMAN_SPEED_LIMIT or name.startswith("speed")) and value > 0:
         unit = signal.get("unit", "")
         if unit not in _METRES_PER_SECOND:
             allowed = ", ".join(filter(None, _METRES_PER_SECOND))
-            raise ValueError(f"expected the speed's unit to be one of {allowed}, got {unit!r}")
-        return "speed_limit", value * _METRES_PER_SECOND[unit]
+            raise InputError(f"{where}: expected the speed's unit to be one of {allowed}, got {unit!r}")
+        return "speed_limit", number_within(where, "speed in m/s", value * _METRES_PER_SECOND[unit], 0.0, FASTEST)
     # Files write -1 for "no value".
     return f"xodr.{code or 'unknown'}", max(value, 0.0)
 
 
-def _number(signal: ET.Element, key: str) -> float:
-    text = signal.get(key, "").strip()
-    try:
-        number = float(text or "0")
-    except ValueError:
-        raise ValueError(f"expected a number for {key}, got {text!r}") from None
-    if not math.isfinite(number):
-        raise ValueError(f"expected a finite number for {key}, got {text!r}")
-    return number
+def _number(where: str, signal: Element, key: str, least: float = -FARTHEST) -> float:
+    return number_in_text(where, key, signal.get(key, "").strip() or "0", least)

@@ -4,12 +4,13 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree import ElementTree as ET
+from xml.etree.ElementTree import Element, fromstring
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
+from fogsim.traffic.road.opendrive import read_opendrive
 from fogsim.traffic.road.plan_view import PlanView, plan_view
 
 FARTHEST_ROUTE = 50_000.0
@@ -269,11 +270,11 @@ def read_opendrive_lanes(net: str, opendrive: Path) -> OpenDriveLanes:
     InputError
         If the file has no road to drive on.
     """
-    root = ET.fromstring(net)  # noqa: S314 - netconvert's own output
+    root = fromstring(net)  # noqa: S314 - netconvert's own output
     lanes = tuple(_lanes(root))
     if not lanes:
         raise InputError(f"{opendrive}: there is no lane to drive on")
-    source = ET.parse(opendrive).getroot()  # noqa: S314 - the user's own file; expat fetches nothing
+    source = read_opendrive(opendrive)
     roads = {}
     for road in source.iter("road"):
         try:
@@ -284,7 +285,7 @@ def read_opendrive_lanes(net: str, opendrive: Path) -> OpenDriveLanes:
     return OpenDriveLanes(lanes, _followers(root, {lane.edge for lane in lanes}), roads, latitude, longitude)
 
 
-def _lanes(root: ET.Element) -> Iterator[RoadLane]:
+def _lanes(root: Element) -> Iterator[RoadLane]:
     for edge in root.iter("edge"):
         for lane in edge.iter("lane") if edge.get("function") is None else ():
             origins = next((p.get("value", "") for p in lane.iter("param") if p.get("key") == "origId"), "")
@@ -302,7 +303,7 @@ def _lanes(root: ET.Element) -> Iterator[RoadLane]:
             )
 
 
-def _followers(root: ET.Element, edges: set[str]) -> dict[str, list[str]]:
+def _followers(root: Element, edges: set[str]) -> dict[str, list[str]]:
     found: dict[str, dict[str, int]] = {}
     for one in root.iter("connection"):
         begin, end = one.attrib["from"], one.attrib["to"]

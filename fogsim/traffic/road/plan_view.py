@@ -7,6 +7,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from fogsim.files.readers import number_in_text
 from fogsim.linear_algebra import matrix_product
 
 SPIRAL_NODES, SPIRAL_WEIGHTS = np.polynomial.legendre.leggauss(24)
@@ -199,9 +200,7 @@ def _piece(geometry: Element) -> Piece | CubicPiece | UnknownPiece:
 
 
 def _numbers(element: Element, *keys: str) -> list[float]:
-    try:
-        return [float(element.attrib[key]) for key in keys]
-    except KeyError as error:
-        raise ValueError(f"<{element.tag}> needs the attribute {error}") from None
-    except ValueError as error:
-        raise ValueError(f"<{element.tag}> needs numbers for {', '.join(keys)}: {error}") from None
+    missing = [key for key in keys if key not in element.attrib]
+    if missing:
+        raise ValueError(f"<{element.tag}> needs the attribute {missing[0]!r}")
+    return [number_in_text(f"<{element.tag}>", key, element.attrib[key]) for key in keys]

@@ -3,14 +3,14 @@
 import math
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import sumolib
 
-from fogsim.errors import InputError
+from fogsim.files.readers import FARTHEST, number_in_text
 from fogsim.traffic.road.limit_signs import SIGN_DIAMETER, SIGN_HEIGHT, SPEED_LIMIT
-from fogsim.traffic.road.opendrive import is_opendrive, opendrive_signs
+from fogsim.traffic.road.marked_shapes import MarkedShape, marked_shapes
+from fogsim.traffic.road.opendrive import FASTEST, is_opendrive, opendrive_signs
 from fogsim.traffic.road.road_map import RoadMap
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Sign, SignMap
@@ -22,6 +22,10 @@ LIMITS = frozenset((SPEED_LIMIT, "end_of_speed_limit", "variable_speed_limit"))
 """Kinds whose value is a speed, in km/h in additional files."""
 GANTRY_HEIGHT = 6.2
 """Height of the middle of a face that hangs over a lane, above the road [m]: vehicles up to 4.5 m pass below."""
+
+DIAMETERS, HEIGHTS = (0.05, 20.0), (0.0, 50.0)
+"""Sizes of signs, and heights of their middle above the road [m]."""
+
 LonLat = tuple[float, float]
 
 
@@ -42,7 +46,10 @@ def sign_map(roads: RoadMap, additional: Iterable[Path]) -> SignMap:
     """
     signs, pieces = list(roads.limit_signs), _Roads(roads)
     for path in additional:
-        signs += opendrive_signs(path, _net_offset(roads)) if is_opendrive(path) else _marked_signs(path, pieces)
+        if is_opendrive(path):
+            signs += opendrive_signs(path, _net_offset(roads))
+        else:
+            signs += [_marked_sign(shape, pieces) for shape in marked_shapes(path, SIGN_TYPE)]
     return SignMap(tuple(signs))
 
 
@@ -104,42 +111,24 @@ class _Roads:
         return float(self._start[nearest, 2] + share[nearest] * step[nearest, 2]), bool(gap[nearest] < 0)
 
 
-def _marked_signs(path: Path, roads: _Roads) -> list[Sign]:
-    """Signs that POIs and polygons of an additional file stand for."""
-    try:
-        shapes = list(sumolib.xml.parse(str(path), ["poi", "poly"]))
-    except Exception as error:  # whatever its parser makes of a file that is none
-        raise InputError(f"{path}: not a SUMO additional file: {error}") from error
-    return [_marked_sign(path, s, roads) for s in shapes if str(s.getAttributeSecure("type", "")).startswith(SIGN_TYPE)]
+def _marked_sign(shape: MarkedShape, roads: _Roads) -> Sign:
+    x, y = _middle(shape)
+    heading = math.radians(90.0 - number_in_text(shape.where, "angle", shape.attributes.get("angle", "")))
+    if shape.kind in LIMITS:
+        value = shape.parameter("value", 0.0, FASTEST * KMH_PER_MPS) / KMH_PER_MPS
+    else:
+        value = shape.parameter("value", -FARTHEST, FARTHEST, 0.0)
+    diameter = shape.parameter("diameter", *DIAMETERS, SIGN_DIAMETER)
+    ground, over_lane = roads.below(x, y)
+    above = shape.parameter("height", *HEIGHTS, GANTRY_HEIGHT if over_lane else SIGN_HEIGHT)
+    return Sign(shape.name, shape.kind, value, (x, y, ground + above), heading, diameter)
 
 
-def _marked_sign(path: Path, shape: Any, roads: _Roads) -> Sign:
-    where = f"{path}: {shape.name} {shape.id!r}"
-    kind = str(shape.type).removeprefix(SIGN_TYPE)
-    parameters = {p.key: p.value for p in (shape.param or [])}
-    try:
-        value = float(parameters["value"] if kind in LIMITS else parameters.get("value", 0.0))
-        heading = math.radians(90.0 - float(shape.getAttributeSecure("angle", "")))
-        x, y = _middle(shape)
-        diameter = float(parameters.get("diameter", SIGN_DIAMETER))
-        ground, over_lane = roads.below(x, y)
-        above = float(parameters.get("height", GANTRY_HEIGHT if over_lane else SIGN_HEIGHT))
-    except KeyError:
-        raise InputError(f'{where}: a sign needs <param key="value" value="…"/>') from None
-    except (TypeError, ValueError) as error:
-        place = "shape" if shape.name == "poly" else "x, y"
-        raise InputError(f"{where}: a sign needs numbers for {place}, angle and its value: {error}") from None
-    if kind in LIMITS:
-        value /= KMH_PER_MPS
-    return Sign(str(shape.id), kind, value, (x, y, ground + above), heading, diameter)
-
-
-def _middle(shape: Any) -> tuple[float, float]:
+def _middle(shape: MarkedShape) -> tuple[float, float]:
     """Where a POI is, or the middle of a polygon's bounding box [m]."""
-    if shape.name == "poi":
-        return float(shape.getAttributeSecure("x", "")), float(shape.getAttributeSecure("y", ""))
-    corners = np.array([[float(v) for v in corner.split(",")[:2]] for corner in str(shape.shape).split()])
-    if not len(corners):
-        raise ValueError("the shape has no corners")
+    if shape.tag == "poi":
+        x, y = (number_in_text(shape.where, key, shape.attributes.get(key, "")) for key in "xy")
+        return x, y
+    corners = np.array([corner[:2] for corner in shape.corners()])
     x, y = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     return float(x), float(y)

@@ -2,18 +2,19 @@
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import sumolib
 
 from fogsim.errors import InputError, suggest
+from fogsim.traffic.road.marked_shapes import MarkedShape, marked_shapes
 from fogsim.traffic.road.opendrive import is_opendrive
-from fogsim.traffic.road.xml_stream import open_unpacked
 from fogsim.values import Structure, StructureKind
 
 STRUCTURE_TYPE = "fogsim.structure."
 """Polygons of type ``fogsim.structure.KIND`` in an additional file are structures; their shape is their middle line."""
+
+WIDEST, HEIGHTS = 10_000.0, (-1000.0, 10_000.0)
+"""Greatest width of a structure, and heights of its bottom and top [m]."""
 
 
 def structures(additional: Iterable[Path]) -> tuple[Structure, ...]:
@@ -29,47 +30,22 @@ def structures(additional: Iterable[Path]) -> tuple[Structure, ...]:
     InputError
         If a file is none, or a structure's kind or measures are not known.
     """
-    return tuple(one for path in additional if not is_opendrive(path) for one in _marked(path))
+    files = (path for path in additional if not is_opendrive(path))
+    return tuple(
+        _structure(shape) for path in files for shape in marked_shapes(path, STRUCTURE_TYPE) if shape.tag == "poly"
+    )
 
 
-def mentions_structures(path: Path) -> bool:
-    """Whether a file may have structures; quicker than reading those of a large one.
-
-    Parameters
-    ----------
-    path : Path
-        The file, packed by gzip or not; a missing one has none.
-    """
-    if not path.is_file():
-        return False
-    with open_unpacked(path) as source:
-        return STRUCTURE_TYPE.encode() in source.read()
-
-
-def _marked(path: Path) -> list[Structure]:
-    try:
-        shapes = list(sumolib.xml.parse(str(path), ["poly"]))
-    except Exception as error:  # whatever its parser makes of a file that is none
-        raise InputError(f"{path}: not a SUMO additional file: {error}") from error
-    marked = [shape for shape in shapes if str(shape.getAttributeSecure("type", "")).startswith(STRUCTURE_TYPE)]
-    return [_structure(path, shape) for shape in marked]
-
-
-def _structure(path: Path, shape: Any) -> Structure:
-    where, kind = f"{path}: poly {shape.id!r}", str(shape.type).removeprefix(STRUCTURE_TYPE)
+def _structure(shape: MarkedShape) -> Structure:
     kinds = [str(one) for one in StructureKind]
-    if kind not in kinds:
-        raise InputError(f"{where}: unknown kind of structure {kind!r}; {suggest(kind, kinds)}")
-    given = {parameter.key: parameter.value for parameter in (shape.param or [])}
-    try:
-        points = [[float(number) for number in corner.split(",")] for corner in str(shape.shape).split()]
-        line = np.array([[*point, 0.0][:3] for point in points], np.float64)
-        width, bottom, top = float(given["width"]), float(given.get("bottom", 0.0)), float(given["top"])
-    except KeyError as error:
-        raise InputError(f"{where}: a structure needs <param key={error} value='…'/>") from None
-    except ValueError as error:
-        raise InputError(f"{where}: a structure needs numbers for its shape, width, bottom and top: {error}") from None
-    line = line[[True, *np.any(line[1:] != line[:-1], axis=1)]]  # a corner that is told twice has no direction
+    if shape.kind not in kinds:
+        raise InputError(f"{shape.where}: unknown kind of structure {shape.kind!r}; {suggest(shape.kind, kinds)}")
+    line = np.array([[*corner, 0.0][:3] for corner in shape.corners()], np.float64)
+    width = shape.parameter("width", 0.0, WIDEST)
+    bottom, top = shape.parameter("bottom", *HEIGHTS, 0.0), shape.parameter("top", *HEIGHTS)
+    line = line[[True, *np.any(line[1:] != line[:-1], axis=1)]]  # a repeated corner has no direction
     if len(line) < 2 or width <= 0.0 or top <= bottom:
-        raise InputError(f"{where}: a structure needs a line of two points or more, a width, and a top over its bottom")
-    return Structure(str(shape.id), StructureKind(kind), line, width, bottom, top)
+        raise InputError(
+            f"{shape.where}: a structure needs a line of two points or more, a width, and a top over its bottom"
+        )
+    return Structure(shape.name, StructureKind(shape.kind), line, width, bottom, top)

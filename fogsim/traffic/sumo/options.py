@@ -5,9 +5,9 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree import ElementTree as ET
 
 from fogsim.errors import MissingDependencyError, nearest, shown
+from fogsim.files.xml_reader import read_tree
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 
 OptionValue = bool | int | float | str
@@ -118,7 +118,7 @@ def _options_of_template() -> Mapping[str, KnownOption]:
         template = Path(folder, "options.xml")
         # Six milliseconds, in which nothing is simulated.
         load_libsumo().start(["sumo", "--save-template", str(template)])
-        root = ET.parse(template).getroot()  # noqa: S314 - written by SUMO just now
+        root = read_tree(template)
     found: dict[str, KnownOption] = {}
     for element in root.iter():
         kind = element.get("type")

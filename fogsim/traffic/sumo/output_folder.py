@@ -6,9 +6,9 @@ import tempfile
 import warnings
 import weakref
 from pathlib import Path
-from xml.etree import ElementTree as ET
 
 from fogsim.errors import InputError
+from fogsim.files.xml_reader import root_tag
 
 _TO_THE_ROOT = "../" * 40
 """From any folder to the root: there is nothing above it."""
@@ -173,11 +173,10 @@ def _names(folder: Path) -> list[str]:
 def _is_whole(path: Path) -> bool:
     """Whether an XML file ends with the end of the element that it begins with."""
     try:
-        _, root = next(iter(ET.iterparse(path, events=("start",))))  # noqa: S314 - written by SUMO just now
-    except (ET.ParseError, StopIteration):
+        name = root_tag(path).encode()
+    except InputError:
         return False
     with path.open("rb") as file:
         file.seek(max(0, file.seek(0, 2) - _END_OF_XML))
         last = file.read().rstrip().rpartition(b"<")[2]
-    name = root.tag.encode()
     return last == b"/" + name + b">" or (last.startswith(name) and last.endswith(b"/>"))

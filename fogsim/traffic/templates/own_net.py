@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from fogsim.traffic.road.xml_stream import UNREADABLE, read_elements
+from fogsim.errors import InputError
+from fogsim.files.xml_reader import read_elements
 
 _MOST_BYTES = 2_000_000_000
 
@@ -100,7 +101,7 @@ def read_ways(net: Path, ways: Mapping[str, tuple[str, ...]]) -> KnownWays:
     reader = _Reader(frozenset(edge for edges in ways.values() for edge in edges))
     try:
         read_elements(net, reader, _MOST_BYTES)
-    except UNREADABLE:
+    except InputError:
         # SUMO tells what is wrong with it.
         return KnownWays(tuple(ways.items()), {})
     return KnownWays(tuple(ways.items()), reader.edges)
@@ -121,7 +122,7 @@ class _Reader:
         elif tag == "lane" and self._edge in self._wanted:
             before = self.edges.get(self._edge, KnownEdge(0, 0.0, 0.0))
             is_footway = attributes.get("allow") == "pedestrian"
-            measures = (float(attributes["length"]), float(attributes["speed"]))
+            measures = (float(attributes.get("length", "")), float(attributes.get("speed", "")))
             self.edges[self._edge] = KnownEdge(before.lanes + (not is_footway), *measures, before.footways + is_footway)
         elif tag == "connection":
             # All edges stand before the connections between them.

@@ -133,5 +133,5 @@ def test_a_file_that_has_no_references_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"file of `fogsim calibrate veil`, got .*wrong.npz"):
         make("night_road", CAMERA, references=str(wrong))
     np.savez(wrong, veil0=np.zeros(3))
-    with pytest.raises(InputError, match="no references can be read"):
+    with pytest.raises(InputError, match=r"wrong.npz.*head0"):
         make("night_road", CAMERA, references=str(wrong))

@@ -29,7 +29,7 @@ def test_short_names_and_no_additional_files(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "message"), [("<configuration", "not a SUMO configuration"), ("<configuration/>", "names no network")]
+    ("content", "message"), [("<configuration", "not XML"), ("<configuration/>", "names no network")]
 )
 def test_what_is_no_configuration(tmp_path: Path, content: str, message: str) -> None:
     with pytest.raises(InputError, match=message):

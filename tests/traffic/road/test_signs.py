@@ -56,14 +56,14 @@ def test_a_polygon_is_a_sign_in_its_middle(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("shape", "message"),
     [
-        ('<poi id="p" type="fogsim.sign.speed_limit" x="1" y="2" angle="90"/>', "poi 'p'.*needs <param"),
+        ('<poi id="p" type="fogsim.sign.speed_limit" x="1" y="2" angle="90"/>', "poi 'p'.*<param"),
         (
             '<poi id="p" type="fogsim.sign.stop" x="1" y="2"><param key="value" value="3"/></poi>',
-            "poi 'p'.*needs numbers for x, y",
+            "poi 'p'.*angle must be a number",
         ),
         (
             '<poly id="q" type="fogsim.sign.stop" angle="9" shape=""><param key="value" value="3"/></poly>',
-            "poly 'q'.*needs numbers for shape",
+            "poly 'q'.*expected a shape",
         ),
     ],
 )
@@ -75,7 +75,7 @@ def test_signs_that_say_nothing(tmp_path: Path, shape: str, message: str) -> Non
 def test_what_is_no_additional_file(tmp_path: Path) -> None:
     file = tmp_path / "broken.add.xml"
     file.write_text("<additional><poi", encoding="utf-8")
-    with pytest.raises(InputError, match="not a SUMO additional file"):
+    with pytest.raises(InputError, match="not XML"):
         sign_map(read_net(NET), [file])
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fogsim.errors import InputError
-from fogsim.traffic.road.structures import mentions_structures, structures
+from fogsim.traffic.road.structures import structures
 from fogsim.values import StructureKind
 
 WALL = """<additional>
@@ -23,8 +23,6 @@ def test_a_polygon_is_a_structure_by_its_type(tmp_path: Path) -> None:
     file.write_text(WALL, encoding="utf-8")
     (wall,) = structures([file, tmp_path / "map.xodr"])
     assert (wall.structure_id, wall.kind, wall.width, wall.bottom, wall.top) == ("w", StructureKind.WALL, 0.3, 0.0, 3.0)
-    assert mentions_structures(file)
-    assert not mentions_structures(tmp_path / "missing.xml")
     np.testing.assert_array_equal(wall.line, [[0.0, 0.0, 1.5], [10.0, 0.0, 2.0]])
 
 
@@ -39,8 +37,8 @@ def test_a_corner_that_is_told_twice_counts_once(tmp_path: Path) -> None:
     ("old", "new", "told"),
     [
         ("structure.wall", "structure.wal", "poly 'w': unknown kind of structure 'wal'; did you mean 'wall'"),
-        ('key="top"', 'key="height"', "poly 'w': a structure needs <param key='top'"),
-        ('"3"', '"high"', "poly 'w': a structure needs numbers"),
+        ('key="top"', 'key="height"', "poly 'w': <param key=.top. value=.…./> is missing"),
+        ('"3"', '"high"', "poly 'w': top must be a number within .*, got 'high'"),
         ('"3"', '"0"', "a top over its bottom"),
     ],
 )

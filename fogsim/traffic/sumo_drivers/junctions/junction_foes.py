@@ -9,7 +9,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from fogsim.traffic.road.xml_stream import open_unpacked
+from fogsim.files.xml_reader import open_unpacked
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 
 Foe = tuple[str, float, float, float, float, str, str, bool, bool]

@@ -1,0 +1,239 @@
+"""JSON, CSV and arrays that are hostile or broken: each ends at once, in one message that names the file."""
+
+import io
+import json
+import os
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from fogsim.errors import InputError
+from fogsim.estimators.night.halos import HaloThreshold
+from fogsim.estimators.night.reference_file import read_references, references_as_bytes
+from fogsim.estimators.night.references import VeilReferences
+from fogsim.estimators.signs.operating_range import OperatingRange
+from fogsim.files import array_archive
+from fogsim.offline.lamp_file import load_lamps
+from fogsim.offline.sign_file import load_sign_file
+from fogsim.offline.track_file import load_track
+from fogsim.values import Camera, Lamp
+
+Reader = Callable[[Path], object]
+SIGN = {
+    "type": "Feature",
+    "geometry": {"type": "Point", "coordinates": [24.9, 60.2]},
+    "properties": {"kind": "stop", "height_m": 2.4, "diameter_m": 0.9, "heading_deg": 30.0, "speed_limit_kmh": 50},
+}
+THRESHOLD = HaloThreshold(320, 240, 300.0, "srgb", 0.0, 30.0, 25.0, 0.01, 0.01, 100)
+RANGE = OperatingRange(300.0, 0.9, (50.0, 100.0, 200.0), (20.0, 40.0, 60.0), (25.0, 45.0, 65.0), (2.0, 3.0, 4.0))
+JSON: dict[str, tuple[Any, Reader]] = {
+    "signs": ({"type": "FeatureCollection", "features": [SIGN]}, load_sign_file),
+    "halos": (json.loads(THRESHOLD.as_json()), HaloThreshold.read),
+    "operating range": (json.loads(RANGE.as_json()), OperatingRange.read),
+}
+CSV, BEAM = "time_s,lat,lon\n0,50.0,8\n1,50.001,8\n", "0,-1,1\n-1,5,6\n1,7,8\n"
+
+
+def lamps_with_table(path: Path) -> object:
+    lamps = path.with_name("lamps.yaml")
+    lamps.write_text(f"low_beam: {path.name}\n", encoding="utf-8")
+    return load_lamps(lamps)
+
+
+TEXTS: dict[str, tuple[str, str, Reader]] = {
+    **{name: ("file.json", json.dumps(data), read) for name, (data, read) in JSON.items()},
+    "track": ("track.csv", CSV, load_track),
+    "beam": ("beam.csv", BEAM, lamps_with_table),
+}
+"""Name of a file, a text that can be read, and what reads it."""
+
+
+def refused(read: Reader, path: Path, told: str | None = None) -> None:
+    """Expect one line that names the file."""
+    with pytest.raises(InputError, match=told) as error:
+        read(path)
+    assert path.name in str(error.value)
+    assert len(str(error.value).splitlines()) == 1
+    assert len(str(error.value)) < 500
+
+
+@pytest.mark.parametrize("reader", TEXTS)
+def test_files_that_are_not_text(tmp_path: Path, reader: str) -> None:
+    name, text, read = TEXTS[reader]
+    file = tmp_path / name
+    file.write_text(text, encoding="utf-8")
+    read(file)
+    file.write_bytes(text.encode() + "\nGrün".encode("latin-1"))
+    refused(read, file, "expected UTF-8 text, got the byte 0xfc")
+    file.write_text("", encoding="utf-8")
+    refused(read, file)
+    file.write_text(text[: len(text) // 3], encoding="utf-8")
+    refused(read, file)
+    file.unlink()
+    refused(read, file, "cannot be read: No such file")
+    os.mkfifo(file)
+    refused(read, file, "cannot be read: not a regular file")
+
+
+ROOTS = ["null", "3", '"text"', "[]", "{}", "[" * 50_000, '{"a":' * 50_000, "[" * 400 + "]" * 400, "NaN", "9" * 5000]
+
+
+@pytest.mark.parametrize("reader", JSON)
+@pytest.mark.parametrize("text", ROOTS, ids=lambda text: text[:8])
+def test_json_that_is_something_else(tmp_path: Path, reader: str, text: str) -> None:
+    file = tmp_path / "file.json"
+    file.write_text(text, encoding="utf-8")
+    refused(JSON[reader][1], file)
+
+
+DEEP: list[Any] = []
+for _ in range(400):
+    DEEP = [DEEP]
+
+WRONG = {
+    "null": None,
+    "true": True,
+    "text": "wide",
+    "list": [],
+    "deep": DEEP,
+    "block": {"a": 1},
+    "-1e300": -1e300,
+    "1e300": 1e300,
+    "whole": 10**400,
+}
+
+
+def places(data: Any, at: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Paths of all values in it."""
+    keys = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    return [at, *(place for key, value in keys for place in places(value, (*at, key)))]
+
+
+def put(data: Any, at: tuple[Any, ...], value: object) -> Any:
+    """Copy of it with another value in a place."""
+    if not at:
+        return value
+    copy = dict(data) if isinstance(data, dict) else list(data)
+    copy[at[0]] = put(data[at[0]], at[1:], value)
+    return copy
+
+
+FREE = {("features", 0, "type"), ("type",)}
+"""Places that no reader looks at."""
+
+
+@pytest.mark.parametrize("reader", JSON)
+@pytest.mark.parametrize("wrong", WRONG)
+def test_values_of_wrong_types(tmp_path: Path, reader: str, wrong: str) -> None:
+    data, read = JSON[reader]
+    file = tmp_path / "file.json"
+    for at in places(data):
+        if at in FREE or (at[2:3] == ("properties",) and wrong in {"null", "text"}):
+            continue
+        file.write_text(json.dumps(put(data, at, WRONG[wrong])), encoding="utf-8")
+        refused(read, file)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (CSV + "2,50.0,9," + "x" * 200_000, ":4: not valid CSV: field larger than field limit"),
+        (CSV + '2,"50', "line 4: latitude|longitude must be a number"),
+        (CSV.replace("50.001", "nan"), "line 3: latitude must be a number"),
+        (CSV.replace("\n1,", "\n1e300,"), "line 3: time_s must be a number"),
+        ("time,lat,lon\n0001-01-01,1,2\n0001-01-01,1,2", "line 2: expected a time as|two positions"),
+        (CSV + "1\x002,1,2\n", "line 4: time_s must be a number|not valid CSV"),
+    ],
+)
+def test_tables_of_places(tmp_path: Path, text: str, told: str) -> None:
+    (tmp_path / "track.csv").write_text(text, encoding="utf-8")
+    refused(load_track, tmp_path / "track.csv", told)
+
+
+@pytest.mark.parametrize("number", ["nan", "inf", "1e999", "", "wide", "-5"])
+def test_tables_of_intensities(tmp_path: Path, number: str) -> None:
+    (tmp_path / "beam.csv").write_text(BEAM.replace("5", number), encoding="utf-8")
+    refused(lamps_with_table, tmp_path / "beam.csv")
+
+
+CAMERA = Camera(32, 24, 40.0, (15.5, 11.5), 1.3)
+
+
+def references() -> bytes:
+    cells = np.ones((2, 24, 32))
+    one = VeilReferences(CAMERA, Lamp.LOW_BEAM, "radiation", 1.9, np.array([50.0, np.inf]), cells, cells)
+    return references_as_bytes([one])
+
+
+def archive(**changes: NDArray[Any] | None) -> bytes:
+    """The references with other arrays in place of some; None for none."""
+    with np.load(io.BytesIO(references())) as file:
+        arrays = {name: file[name] for name in file.files} | changes
+    packed = io.BytesIO()
+    np.savez(packed, **{name: array for name, array in arrays.items() if array is not None})
+    return packed.getvalue()
+
+
+def head(**changes: object) -> NDArray[Any]:
+    with np.load(io.BytesIO(references())) as file:
+        return np.array(json.dumps({**json.loads(str(file["head0"])), **changes}))
+
+
+def with_pickle() -> bytes:
+    return archive(veil0=np.array([{"a": 1}], dtype=object))
+
+
+def not_arrays() -> bytes:
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w") as file:
+        file.writestr("head0.npy", b"\x93NUMPY nothing")
+    return packed.getvalue()
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        lambda: b"",
+        lambda: b"PK nothing",
+        lambda: references()[:200],
+        lambda: references()[:-30],
+        lambda: archive().replace(b"NUMPY", b"NUMPI"),
+        with_pickle,
+        not_arrays,
+        lambda: archive(head0=None),
+        lambda: archive(head0=np.array("[1]")),
+        lambda: archive(head0=np.array("[" * 50_000)),
+        lambda: archive(head0=np.zeros(3)),
+        lambda: archive(head0=head(camera=3)),
+        lambda: archive(head0=head(camera={"width": "wide"})),
+        lambda: archive(head0=head(lamps="low")),
+        lambda: archive(head0=head(lamps=10**30)),
+        lambda: archive(head0=head(setback=None)),
+        lambda: archive(visibility0=np.array([100.0, 50.0])),
+        lambda: archive(visibility0=np.array([50.0, np.nan])),
+        lambda: archive(visibility0=np.array(50.0)),
+        lambda: archive(veil0=np.ones((2, 5, 32))),
+        lambda: archive(veil0=np.full((2, 24, 32), np.nan)),
+        lambda: archive(veil0=np.ones((2, 24, 32), complex)),
+        lambda: archive(veil0=np.full((2, 24, 32), "x")),
+        lambda: archive(road0=np.zeros(0)),
+    ],
+)
+def test_references_that_are_damaged(tmp_path: Path, content: Callable[[], bytes]) -> None:
+    file = tmp_path / "file.npz"
+    file.write_bytes(references())
+    assert len(read_references(file)) == 1
+    file.write_bytes(content())
+    refused(read_references, file, "references must be a file of `fogsim calibrate veil`")
+
+
+def test_archives_are_not_unpacked_without_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(array_archive, "MOST_UNPACKED", 100_000)
+    file = tmp_path / "file.npz"
+    np.savez_compressed(file, head0=np.zeros(100_000))
+    refused(read_references, file, "larger than 100000 bytes, unpacked")

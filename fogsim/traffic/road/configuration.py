@@ -1,5 +1,6 @@
 """What a SUMO configuration file names, without starting SUMO, and which of its options FogSim overrides."""
 
+import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,19 +8,17 @@ from xml.etree.ElementTree import Element
 
 from fogsim.errors import InputError
 from fogsim.files.xml_reader import read_tree, root_tag
-from fogsim.traffic.road.opendrive import is_opendrive
 
-_DEMAND = tuple(
-    "routes additional additionals add trips vehicles persons vTypes stops shapes polygons pois tazs detectors "  # noqa: SIM905
-    "calibrators tlLogics".split()
-)
-ROOTS: Mapping[str, tuple[str, ...]] = {
+_FIRST_ELEMENTS: Mapping[str, tuple[str, ...]] = {
     "config": ("configuration", "sumoConfiguration"),
     "net": ("net",),
-    "routes": _DEMAND,
-    "additional": _DEMAND,
+    "routes": ("routes", "additional", "trips"),
+    "additional": ("additional", "routes", "OpenDRIVE"),
 }
-"""First elements of SUMO's files, as its documentation and its tools write them; the usual ones come first."""
+"""Usual first elements of SUMO's files by what they are for; SUMO reads files with others too, networks excepted."""
+
+_OTHER_FILES = {*itertools.chain(*_FIRST_ELEMENTS.values()), "OpenSCENARIO", "gpx", "kml", "osm", "html", "svg"}
+"""First elements that make a file one of another kind."""
 
 _NET = ("net-file", "net", "n")
 _ADDITIONAL = ("additional-files", "additional", "a")
@@ -58,7 +57,7 @@ def check_sumo_file(kind: str, path: Path) -> None:
     Parameters
     ----------
     kind : str
-        A key of `ROOTS`. Additional files may be OpenDRIVE files.
+        "config", "net", "routes" or "additional", which may be an OpenDRIVE file.
     path : Path
         The file.
 
@@ -67,8 +66,9 @@ def check_sumo_file(kind: str, path: Path) -> None:
     InputError
         If it is missing, or another file.
     """
-    roots = ("OpenDRIVE",) if kind == "additional" and is_opendrive(path) else ROOTS[kind]
-    root_tag(path, *roots)
+    tag, usual = root_tag(path), _FIRST_ELEMENTS[kind]
+    if tag not in usual and (kind == "net" or tag in _OTHER_FILES):
+        raise InputError(f"{path}: expected <{usual[0]}> at its top, got <{tag[:40]}>")
 
 
 def check_configured_files(config: Path) -> None:
@@ -204,7 +204,8 @@ def input_files(config: Path) -> tuple[Path, ...]:
 
 
 def _root(config: Path) -> Element:
-    return read_tree(config, *ROOTS["config"])
+    check_sumo_file("config", config)
+    return read_tree(config)
 
 
 def _values(root: Element, options: tuple[str, ...]) -> Iterator[str]:

@@ -135,7 +135,8 @@ def _sign(road: _Road, signal: Element, net_offset: tuple[float, float], left_ha
         x, y, along = road.line.at(s)
     except ValueError as error:
         raise InputError(f"{where}: {error}") from None
-    size = max(_number(where, signal, key, 0.0) for key in ("width", "height"))
+    # Some programs write -1 for a size that they do not know.
+    size = max(0.0, *(_number(where, signal, key) for key in ("width", "height")))
     above = _number(where, signal, "zOffset") + 0.5 * size if "zOffset" in signal.attrib else HEIGHT
     kind, value = _meaning(where, signal)
     position = (
@@ -169,5 +170,5 @@ def _meaning(where: str, signal: Element) -> tuple[str, float]:
     return f"xodr.{code or 'unknown'}", max(value, 0.0)
 
 
-def _number(where: str, signal: Element, key: str, least: float = -FARTHEST) -> float:
-    return number_in_text(where, key, signal.get(key, "").strip() or "0", least)
+def _number(where: str, signal: Element, key: str) -> float:
+    return number_in_text(where, key, signal.get(key, "").strip() or "0")

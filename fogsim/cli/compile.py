@@ -30,7 +30,7 @@ _JOINT = "estimators=[joint_road]"
 _DRIVES: dict[str, tuple[str, tuple[tuple[str, ...], ...]]] = {
     "drives by day": (
         "motorway_fog_bank",
-        (("end_when=lead.position > 100 km",), ("fog={visibility_m: 100, airlight: photons}",)),
+        (("end_when=lead.position > 5 km",), ("fog={visibility_m: 100, airlight: photons}",)),
     ),
     "drives by night": (
         "night_motorway_fog",

@@ -143,12 +143,12 @@ class Registry(Mapping[str, T]):
             needed = " and ".join(f"{wanted.replace('|', '() or ')}()" for wanted in lacking)
             raise InputError(f"{self.kind} {name!r} must have a method {needed}")
         methods = tuple(one for wanted in self._methods for one in wanted.split("|"))
-        made: Any = guarded(cls, f"{self.kind} {name!r}", methods, time_limit)  # type: ignore[arg-type] # it is hashable
+        make: Callable[..., Any] = guarded
         try:
-            inspect.signature(made, eval_str=True)
-        except Exception as error:
-            raise InputError(f"{self.kind} {name!r}: its parameters cannot be read: {error}") from error
-        factory: T = made
+            factory: T = make(cls, f"{self.kind} {name!r}", methods, time_limit)
+            inspect.signature(factory, eval_str=True)  # type: ignore[arg-type] # it is a class
+        except Exception as error:  # of a metaclass, a decorator, or an annotation
+            raise InputError(f"{self.kind} {name!r}: not a class that FogSim can use: {error}") from error
         return factory
 
     def __getitem__(self, name: str) -> T:

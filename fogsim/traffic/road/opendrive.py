@@ -7,7 +7,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from fogsim.errors import InputError, shown
-from fogsim.files.readers import FARTHEST, number_in_text, number_within
+from fogsim.files.readers import number_in_text, number_within
 from fogsim.files.xml_reader import read_tree
 from fogsim.traffic.road.plan_view import PlanView, plan_view
 from fogsim.units import KMH_PER_MPS

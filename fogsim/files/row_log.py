@@ -12,21 +12,9 @@ from fogsim.files.atomic import Reserve, naming
 
 
 class RowLog:
-    """A file in Arrow's streaming format, which has no end that must be written to be read.
+    """A file in Arrow's streaming format, which is readable wherever it ends.
 
-    It keeps as much room on the disk as it takes itself, for the table that is made of it.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    schema : pyarrow.Schema
-        Its columns.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written; the message names the file.
+    It reserves as much disk space as it has written, for the table that is made from it.
     """
 
     def __init__(self, path: Path, schema: Any) -> None:
@@ -38,18 +26,7 @@ class RowLog:
         self._write(schema.serialize())
 
     def append(self, batch: Any) -> None:
-        """Write rows (a pyarrow.RecordBatch); they are safe from the end of the process when it returns.
-
-        Parameters
-        ----------
-        batch : pyarrow.RecordBatch
-            The rows.
-
-        Raises
-        ------
-        OSError
-            If the disk is full; none of the rows is in the file then, and it stays readable.
-        """
+        """Write rows (pyarrow.RecordBatch), which then survive the process; on a full disk, none of them is written."""
         data = batch.serialize()
         self._reserve.grow(data.size)
         self._write(data)
@@ -79,35 +56,13 @@ class RowLog:
 
 
 def row_schema(path: Path) -> Any:
-    """Columns of a log, as a pyarrow.Schema.
-
-    Parameters
-    ----------
-    path : Path
-        The log.
-
-    Raises
-    ------
-    InputError
-        If it is no log.
-    """
+    """Columns of a log, as a pyarrow.Schema."""
     with path.open("rb") as file:
         return _reader(path, file).schema
 
 
 def row_batches(path: Path) -> Iterator[Any]:
-    """Batches of rows of a log (pyarrow.RecordBatch), as they were written, up to where it was cut off.
-
-    Parameters
-    ----------
-    path : Path
-        The log.
-
-    Raises
-    ------
-    InputError
-        If it is no log.
-    """
+    """Batches of rows of a log (pyarrow.RecordBatch) up to where it was cut off."""
     # Opened here, for Arrow takes no name that is not UTF-8.
     with path.open("rb") as file:
         # What cannot be read is the end of a log that was cut off.
@@ -128,25 +83,7 @@ def _reader(path: Path, file: IO[bytes]) -> Any:
 
 
 def read_rows(path: Path) -> Any:
-    """Rows of a log, also of one that was cut off in the middle of a row.
-
-    Of a row that was written more than once (by its column ``index``) the last one counts.
-
-    Parameters
-    ----------
-    path : Path
-        The log.
-
-    Returns
-    -------
-    pyarrow.Table
-        In the order of ``index``.
-
-    Raises
-    ------
-    InputError
-        If it is no log.
-    """
+    """Rows of a log as a pyarrow.Table sorted by ``index``; of rows with the same index, the last one counts."""
     schema = row_schema(path)
     table = pa.Table.from_batches(row_batches(path), schema=schema)
     index = table["index"].to_numpy()

@@ -5,10 +5,9 @@ import sys
 
 
 def open_standard_streams() -> None:
-    """Open /dev/null in place of each of the descriptors 0, 1 and 2 that is closed, and as ``sys.stdin`` and so on.
+    """Open /dev/null for each closed descriptor 0, 1 and 2, and as ``sys.stdin`` and so on.
 
-    Otherwise the next file that the process opens, or a pipe to a child, gets the number, and receives what libraries
-    print.
+    Otherwise the next file or pipe gets the number and receives what libraries print.
     """
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
         try:

@@ -11,8 +11,8 @@ VARIABLE = "FOGSIM_CACHE_DIR"
 def cache_directory() -> Path:
     """FogSim's folder in the user's cache directory, which may not exist yet.
 
-    That is `FOGSIM_CACHE_DIR` where it is set; else the folder ``fogsim`` in ``XDG_CACHE_HOME``, or where the operating
-    system has caches: ``~/.cache``, ``~/Library/Caches`` (macOS), ``%LOCALAPPDATA%`` (Windows).
+    ``FOGSIM_CACHE_DIR`` if set; otherwise ``fogsim`` in ``XDG_CACHE_HOME`` or in the system's cache folder:
+    ``~/.cache``, ``~/Library/Caches`` (macOS), ``%LOCALAPPDATA%`` (Windows).
     """
     named = os.environ.get(VARIABLE)
     if named:

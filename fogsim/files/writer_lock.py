@@ -16,18 +16,9 @@ from fogsim.files.atomic import naming
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class WritingProcess:
-    """A process, told from a later one with the same number.
+    """A process, distinguished from a later one with the same id by its start.
 
-    Attributes
-    ----------
-    id : int
-        Its number.
-    host : str
-        Name of its machine.
-    boot : str
-        When that machine was started, as the system tells it; empty where it does not.
-    start_time : int or None
-        When the process was started, in clock ticks since then; None where the system does not tell it.
+    `boot` identifies the start of its machine ("" if unknown) and `start_time` is in clock ticks since then.
     """
 
     id: int
@@ -42,13 +33,7 @@ class WritingProcess:
 
     @classmethod
     def from_json(cls, values: object) -> Self | None:
-        """Process that a file tells of; None if it tells of none.
-
-        Parameters
-        ----------
-        values : object
-            What the file holds.
-        """
+        """The process that a file names; None if the file names none."""
         if not isinstance(values, Mapping) or not isinstance(values.get("id"), int):
             return None
         told: dict[str, Any] = {field.name: values.get(field.name) for field in dataclasses.fields(cls)}
@@ -86,17 +71,9 @@ LOCK_NAME = ".fogsim.lock"
 
 
 class WriterLock:
-    """A directory's lock; the operating system frees it when its process ends, however it ends.
+    """A directory's lock, which the operating system releases when its process ends.
 
-    Parameters
-    ----------
-    folder : Path
-        The directory.
-
-    Raises
-    ------
-    InputError
-        If another writer holds it; the message names its process.
+    InputError names the process that holds it.
     """
 
     def __init__(self, folder: Path) -> None:

@@ -1,6 +1,6 @@
-"""Reading XML that someone else wrote: limited in size and depth, without document types, in any encoding of Python's.
+"""Reading untrusted XML: limited in size and depth, without document types, in any encoding that Python knows.
 
-Every XML file is read here, packed by gzip or not; what is wrong with one is an `InputError` of one line.
+Every XML file is read here, compressed by gzip or not; faults are one-line InputErrors.
 """
 
 import codecs
@@ -89,18 +89,7 @@ class XmlFile:
         most_elements: int | None = None,
         text: Callable[[str], object] | None = None,
     ) -> int:
-        """Read until the reader is done, or the file or the allowance ends.
-
-        Returns
-        -------
-        int
-            Bytes that have been read, unpacked; `most_bytes` if the end of the file was not reached.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be read, is not XML, has a document type or breaks a limit.
-        """
+        """Read until the reader is done or the file or the limit ends; return the unpacked bytes that were read."""
         done = given = 0
         with open_unpacked(self._path) as source:
             chunk = source.read(min(_HEAD, most_bytes))
@@ -134,13 +123,7 @@ class XmlFile:
         most_elements: int = MOST_ELEMENTS,
         text: Callable[[str], object] | None = None,
     ) -> None:
-        """Read the whole file.
-
-        Raises
-        ------
-        InputError
-            As `read`, or if the file is larger than `most_bytes`, unpacked.
-        """
+        """Read the whole file; InputError if it unpacks to more than `most_bytes`."""
         if self.read(reader, most_bytes, most_elements, text) >= most_bytes:
             raise InputError(f"{self._path}: cannot be read: larger than {most_bytes} bytes")
 
@@ -201,26 +184,14 @@ def read_elements(path: Path, reader: ElementReader, most_bytes: int) -> int:
 
 
 def read_tree(path: Path, *roots: str, most_bytes: int = MOST_BYTES) -> ET.Element:
-    """Root of a file, which must be one of `roots` if any are given; tags have no prefixes.
-
-    Raises
-    ------
-    InputError
-        As `XmlFile.read_all`, or if the root is another.
-    """
+    """Root of a file, which must be one of `roots` if any are given; tags lose their prefixes."""
     builder, file = _TreeBuilder(path, roots), XmlFile(path)
     file.read_all(builder, most_bytes, text=builder.tree.data)
     return builder.tree.close()
 
 
 def root_tag(path: Path, *roots: str) -> str:
-    """Tag of the first element, which must be one of `roots` if any are given; what follows it is not read.
-
-    Raises
-    ------
-    InputError
-        As `XmlFile.read`, or if it is another.
-    """
+    """Tag of the first element, which must be one of `roots` if any are given; the rest is not read."""
     reader = _RootReader(path, roots)
     read_elements(path, reader, _MOST_BEFORE_ROOT)
     if reader.tag is None:

@@ -13,21 +13,10 @@ from fogsim.registry.user_code import described
 
 @functools.cache
 def guarded(cls: type, who: str, methods: tuple[str, ...], limit: float | None = None) -> type:
-    """Subclass of a user's class that raises nothing but MethodError where FogSim calls or reads it.
+    """Subclass of a user's class that raises only MethodError from its attributes and `methods`.
 
-    KeyboardInterrupt passes, so that Ctrl-C ends a run. SystemExit does not: the exit codes of FogSim's commands come
-    from the outcomes of their runs.
-
-    Parameters
-    ----------
-    cls : type
-        The class.
-    who : str
-        Names the method in messages, such as "estimator 'mine:Fade'".
-    methods : tuple of str
-        Methods that FogSim calls; those that the class lacks are ignored.
-    limit : float or None
-        Longest time that one call may take [s]; None for any.
+    KeyboardInterrupt passes, so that Ctrl-C ends a run. SystemExit does not: exit codes come from the outcomes of runs.
+    `who` names the class in messages ("estimator 'mine:Fade'"); `limit` bounds each call [s].
     """
     guard = functools.partial(_guarded_call, file=_source(cls), limit=limit)
     # A named tuple, say, is made by __new__ and inherits an __init__ that takes no arguments.

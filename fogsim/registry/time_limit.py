@@ -20,14 +20,9 @@ _GRACE = 5.0
 
 @contextlib.contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """Raise an error within a block that takes longer; where compiled code keeps it from being raised, end the process.
+    """Raise TimeLimitError in a block that takes longer, each time the limit passes; main thread only.
 
-    Raises
-    ------
-    TimeLimitError
-        When the time is over, and again each time it is over once more.
-    InputError
-        Outside the main thread, which alone can be interrupted.
+    Where compiled code prevents the error, the process ends.
     """
     if threading.current_thread() is not threading.main_thread():
         raise InputError("a time limit for methods needs the main thread of Python; run without one, or run there")

@@ -40,13 +40,9 @@ def is_class_name(name: object) -> bool:
 
 
 def module_file(name: str, folder: Path | None) -> Path:
-    """File of the module in ``module:Class``; it lies in the scenario's folder, None for the working directory.
+    """File of the module in ``module:Class`` in the scenario's folder (None for the working directory).
 
-    Raises
-    ------
-    InputError
-        If there is no such file. Neither the standard library nor installed packages are searched: a scenario file
-        alone must not be able to run any of their functions.
+    Neither the standard library nor installed packages are searched: a scenario file must not run their functions.
     """
     module = _match(name)["module"]
     home = (folder or Path.cwd()).resolve()
@@ -62,13 +58,7 @@ def module_file(name: str, folder: Path | None) -> Path:
 
 
 def check_source(name: str, folder: Path | None) -> None:
-    """Check that the module of ``module:Class`` defines the class, without running it.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, it is not Python, or it has no such name.
-    """
+    """Raise InputError unless the module of ``module:Class`` defines the class; the module is not run."""
     file = module_file(name, folder)
     try:
         body = ast.parse(file.read_bytes(), str(file)).body
@@ -92,13 +82,7 @@ def _names_bound(statement: ast.stmt) -> Iterator[str]:
 
 
 def import_class(name: str, folder: Path | None = None) -> type:
-    """Import the class ``module:Class`` from a module in a folder, None for the working directory.
-
-    Raises
-    ------
-    InputError
-        If there is no such module or class, its import fails, or it is not defined in that folder.
-    """
+    """Import the class ``module:Class`` from a module in a folder, None for the working directory."""
     file = module_file(name, folder)
     home = (folder or Path.cwd()).resolve()
     module, wanted = _module(name, file, home), _match(name)["object"]
@@ -187,13 +171,7 @@ def _announced(group: str, _: tuple[str, ...]) -> Mapping[str, metadata.EntryPoi
 
 
 def load_announced(point: metadata.EntryPoint) -> Any:
-    """Import what an installed package announces.
-
-    Raises
-    ------
-    InputError
-        If its import fails.
-    """
+    """Import the object of an installed package's entry point."""
     try:
         return point.load()
     except KeyboardInterrupt:

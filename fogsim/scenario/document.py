@@ -45,18 +45,7 @@ def _is_place(key: str) -> bool:
 
 
 def parse_override(text: str) -> tuple[tuple[str, ...], Any]:
-    """Split ``key.path=value``; the value is read as YAML.
-
-    Parameters
-    ----------
-    text : str
-        The override.
-
-    Raises
-    ------
-    InputError
-        If there is no key or no ``=``, or the value is no YAML.
-    """
+    """Split ``key.path=value``; the value is parsed as YAML."""
     key, equals, value = text.partition("=")
     path = tuple(key.strip().split("."))
     if not equals or not all(path):
@@ -70,20 +59,7 @@ def parse_override(text: str) -> tuple[tuple[str, ...], Any]:
 
 
 def apply_overrides(data: dict[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
-    """Copy of plain data with overrides applied in order.
-
-    Parameters
-    ----------
-    data : dict
-        Content of a scenario file.
-    overrides : iterable of str
-        Each ``key.path=value``; a number in the path is a place in a list.
-
-    Raises
-    ------
-    InputError
-        If a path leads through something that has no keys, or beyond a list's end.
-    """
+    """Copy of plain data with ``key.path=value`` overrides in order; a number in a path is a list index."""
     result = copy.deepcopy(data)
     for text in overrides:
         path, value = parse_override(text)
@@ -112,13 +88,7 @@ def _set(data: dict[str, Any], path: tuple[str, ...], value: object, text: str) 
 
 
 def same_quantity(key: str, other: str) -> bool:
-    """Tell whether two keys differ by a unit at the end alone, which one of them has: ``speed`` and ``speed_kmh``.
-
-    Parameters
-    ----------
-    key, other : str
-        The keys.
-    """
+    """Whether two keys differ only by a unit suffix on one of them: ``speed`` and ``speed_kmh``."""
     shorter, longer = sorted((key, other), key=len)
     stem, _, suffix = longer.rpartition("_")
     return stem == shorter and suffix in UNIT_OF_SUFFIX
@@ -139,30 +109,14 @@ def _place(block: object, key: str, path: tuple[str, ...], text: str) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """Plain data from a file.
-
-    Attributes
-    ----------
-    path : Path
-        The file.
-    data : dict
-        Its content.
-    origins : mapping from key path to str
-        Where each key stands: ``file:line``, or the override that set it.
-    """
+    """Plain data from a file; `origins` has each key's ``file:line``, or the override that set it."""
 
     path: Path
     data: dict[str, Any]
     origins: Mapping[KeyPath, str]
 
     def where(self, key_path: KeyPath) -> str:
-        """Where a key stands, or the nearest block around it that has a place.
-
-        Parameters
-        ----------
-        key_path : KeyPath
-            The key, from the outermost block on.
-        """
+        """Origin of a key, or of the nearest enclosing block that has one."""
         for length in range(len(key_path), 0, -1):
             origin = self.origins.get(key_path[:length])
             if origin is not None:
@@ -179,14 +133,9 @@ class Document:
         return origin != str(self.path) and not is_openscenario(Path(origin.rpartition(":")[0]))
 
     def overridden(self, overrides: Iterable[str]) -> "Document":
-        """Copy in which the keys that overrides set, and all below them, stand where the overrides do.
+        """Copy in which overridden keys, and all below them, have the overrides as origins.
 
-        Blocks around them stand at both places.
-
-        Parameters
-        ----------
-        overrides : iterable of str
-            ``key.path=value`` each, known to be well formed.
+        Blocks around them have both origins.
         """
         origins = dict(self.origins)
         for text in overrides:
@@ -201,17 +150,7 @@ class Document:
 def read_scenario_document(path: Path) -> Document:
     """Read a scenario's YAML file, or an OpenSCENARIO file (``.xosc``) as the same data.
 
-    A YAML file with ``scenario: FILE.xosc`` has what stands there, and beside it, or in its place, its own.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Raises
-    ------
-    InputError
-        As of `read_document`, or if the OpenSCENARIO file does not fit.
+    A YAML file with ``scenario: FILE.xosc`` starts from that file and adds or replaces keys.
     """
     if is_openscenario(path):
         return _read_openscenario(path)
@@ -220,19 +159,7 @@ def read_scenario_document(path: Path) -> Document:
 
 
 def read_document(path: Path) -> Document:
-    """Read a YAML file.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, is no regular file of UTF-8 text, is too large (see `plain_yaml`), is no YAML, has a key
-        twice, or is no mapping.
-    """
+    """Read a YAML file, within the limits of `plain_yaml`; it must hold a mapping."""
     try:
         data, lines = parse_yaml(read_text(path, MOST_BYTES))
     except PlainYamlError as error:

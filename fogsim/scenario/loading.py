@@ -41,18 +41,7 @@ def catalogue() -> dict[str, Path]:
 
 
 def scenario_file(name_or_path: str | Path) -> Path:
-    """File of a scenario.
-
-    Parameters
-    ----------
-    name_or_path : str or Path
-        A name in the catalogue, a scenario file, or a folder that holds ``scenario.yaml``.
-
-    Raises
-    ------
-    InputError
-        If there is nothing of that name; `UnknownNameError` for an unknown name of the catalogue.
-    """
+    """File of a catalogue name, a scenario file, or a folder that holds ``scenario.yaml``."""
     path = Path(name_or_path)
     # Without a name, the path is that of the working directory.
     if _is_folder(path) and str(name_or_path):
@@ -133,18 +122,7 @@ def load_scenario(
 def scenario_reader(
     name_or_path: str | Path, *, others_add_vehicles: bool = False, may_import: MayImport = import_anything
 ) -> Callable[[Iterable[str]], Scenario]:
-    """Read a scenario file once, for scenarios that differ in their overrides.
-
-    Parameters
-    ----------
-    name_or_path, others_add_vehicles, may_import
-        As for `load_scenario`.
-
-    Returns
-    -------
-    callable
-        Makes a scenario of overrides, as `load_scenario` does.
-    """
+    """Read a scenario file once and return a function from overrides to scenarios, as `load_scenario` gives."""
     path = scenario_file(name_or_path)
     document, context = read_scenario_document(path), _context(path.parent, may_import)
     return lambda overrides: _checked(document, overrides, context, closed_demand=not others_add_vehicles)
@@ -157,17 +135,7 @@ def _context(folder: Path, may_import: MayImport = import_anything) -> dict[str,
 
 @dataclass(frozen=True, slots=True)
 class ScenarioCases:
-    """Cases of a scenario file.
-
-    Attributes
-    ----------
-    document : Document
-        What was read.
-    variation : Variation
-        What the file varies.
-    cases : tuple of (Case, Scenario)
-        Those that were asked for.
-    """
+    """The requested cases of a scenario file, and everything that it varies."""
 
     document: Document
     variation: Variation
@@ -187,27 +155,10 @@ def load_cases(
     *,
     may_import: MayImport = import_anything,
 ) -> ScenarioCases:
-    """Load and check the cases of a scenario file; one that varies nothing has one.
+    """Load and check the cases of a scenario file; a file that varies nothing has one.
 
-    Parameters
-    ----------
-    name_or_path : str or Path
-        As of `load_scenario`.
-    overrides : iterable of str
-        As of `load_scenario`.
-    wanted : str
-        Which cases, ``name=value`` with commas between; empty for all.
-    seed : int or None
-        Seed of the runs; None for those of the cases.
-    watch : callable or None
-        Called after each case with the number of cases that are checked, and how many there are.
-    may_import : callable
-        As of `load_scenario`.
-
-    Raises
-    ------
-    InputError
-        As of `load_scenario`, with the first case in which something does not fit; or if there is no such case.
+    `wanted` selects cases by comma-separated ``name=value`` ("" for all), `seed` replaces their seeds, and `watch`
+    receives the number of checked cases and their total. InputError describes the first case that does not fit.
     """
     path = scenario_file(name_or_path)
     document = _overridden(read_scenario_document(path), overrides)
@@ -228,13 +179,7 @@ def load_cases(
 
 
 def check_configuration(config: Path) -> None:
-    """Check by its first element that a file is a SUMO configuration.
-
-    Raises
-    ------
-    InputError
-        If it is missing, with the nearest name in its folder, or another file.
-    """
+    """Raise InputError unless a file's first element is that of a SUMO configuration."""
     if not _is_file(config):
         raise InputError(_no_file(Document(config, {}, {}), config.parent, ("traffic", "config"), Path(config.name)))
     check_sumo_file("config", config)
@@ -273,20 +218,7 @@ def scenario_from_config(
 
 
 def attached_scenario(ego: str, overrides: Iterable[str]) -> Scenario:
-    """Make a scenario of a simulation that runs already, so that it names no files.
-
-    Parameters
-    ----------
-    ego : str
-        Id of the vehicle that becomes the ego.
-    overrides : iterable of str
-        ``key.path=value`` each; the fog must be among them.
-
-    Raises
-    ------
-    InputError
-        If anything does not fit.
-    """
+    """Scenario of a running simulation, which names no files; the overrides must set the fog."""
     document = Document(Path("attached"), _bare("attached", {"ego": ego}), {})
     return _checked(document, overrides, _context(Path()), named_files=False)
 
@@ -303,63 +235,26 @@ def override(
     others_add_vehicles: bool = False,
     may_import: MayImport = import_anything,
 ) -> Scenario:
-    """Copy of a scenario with single keys changed.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    overrides : iterable of str
-        ``key.path=value`` each.
-    others_add_vehicles, may_import
-        As of `load_scenario`.
-
-    Raises
-    ------
-    InputError
-        If the changed scenario does not fit.
-    """
+    """Copy of a scenario with ``key.path=value`` overrides; InputError if it does not fit."""
     document = Document(scenario.directory / SCENARIO_FILE, resolved(scenario), {})
     context = _context(scenario.directory, may_import)
     return _checked(document, overrides, context, closed_demand=not others_add_vehicles)
 
 
 def clock_settings(step: float, camera: float, decision: float) -> list[str]:
-    """Overrides that set the clocks.
-
-    Parameters
-    ----------
-    step : float
-        Time between two traffic steps [s].
-    camera : float
-        Time between two frames [s].
-    decision : float
-        Time between two decisions [s].
-    """
+    """Overrides that set the traffic step, the camera period and the decision period [s]."""
     times = {"traffic_step": step, "camera_period": camera, "decision_period": decision}
     return [f"clocks.{key}_s={time!r}" for key, time in times.items()]
 
 
 def resolved(scenario: Scenario) -> dict[str, Any]:
-    """A scenario as plain data with every default filled in, fit for JSON; endless visibility is written "inf".
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """A scenario as JSON-compatible data with every default filled in; infinite visibility becomes "inf"."""
     data: dict[str, Any] = _without_infinities(scenario.model_dump(mode="json", exclude_none=True))
     return data
 
 
 def as_written(scenario: Scenario) -> dict[str, Any]:
-    """A scenario as plain data, without what is as it is by default.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """A scenario as plain data without its defaults."""
     data: dict[str, Any] = _without_infinities(scenario.model_dump(mode="json", exclude_none=True, exclude_unset=True))
     return data
 

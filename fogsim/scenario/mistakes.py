@@ -31,15 +31,7 @@ _KEY = "[key]"
 
 
 class Mistake(NamedTuple):
-    """One mistake in a file.
-
-    Attributes
-    ----------
-    path : KeyPath
-        Where it is, in the file's own keys.
-    text : str
-        What is wrong, in one line.
-    """
+    """One mistake in a file, at a path in the file's own keys, described in one line."""
 
     path: KeyPath
     text: str
@@ -61,21 +53,7 @@ def mistake_lines(
     further: Sequence[str] = (),
     beside: Sequence[str] = (),
 ) -> str:
-    """Every mistake in a line of its own.
-
-    Parameters
-    ----------
-    document : Document
-        What was checked.
-    model : type
-        Its schema.
-    error : ValidationError
-        What was found.
-    further : sequence of str
-        Lines about what else was found.
-    beside : sequence of str
-        Keys that the file may have in addition to those of its schema.
-    """
+    """One line for each mistake, followed by `further` lines; `beside` are top-level keys outside the schema."""
     found = mistakes_in(model, error, document.data, beside)
     told = [
         ": ".join((document.where(path), *([dotted(path)] if path else []), text)) for path, text in found[:MOST_TOLD]
@@ -88,19 +66,8 @@ def mistake_lines(
 def mistakes_in(schema: object, error: ValidationError, data: object, beside: Sequence[str] = ()) -> list[Mistake]:
     """Every mistake once, without those that only follow from another.
 
-    A list whose entries are wrong is not too short, a key whose name is misspelt is not missing, and a value that fits
-    none of several types is one mistake.
-
-    Parameters
-    ----------
-    schema : type or annotation
-        What the data must be.
-    error : ValidationError
-        What was found.
-    data : object
-        What was checked.
-    beside : sequence of str
-        Keys that may stand at the top in addition to those of the schema.
+    A list with wrong entries is not too short, a misspelt key is not missing, and a value that fits none of several
+    types is one mistake. `beside` are top-level keys outside the schema.
     """
     details = error.errors(include_url=False)
     blocks = {detail["loc"][:length] for detail in details for length in range(len(detail["loc"]))}
@@ -168,18 +135,9 @@ def _discriminator(context: dict[str, Any]) -> str:
 
 
 def _own_path(schema: object, location: Sequence[str | int], data: object) -> tuple[KeyPath, tuple[Any, ...], bool]:
-    """Path of a mistake in the file's own keys, types that the schema allows there, and whether one of several failed.
+    """Path of a mistake in the file's own keys, the types allowed there, and whether a union failed.
 
-    pydantic puts what it tried into its locations, too: the type in a union, the tag of a block, ``[key]``.
-
-    Parameters
-    ----------
-    schema : type or annotation
-        What the data must be.
-    location : sequence of str or int
-        From pydantic.
-    data : object
-        What was checked.
+    pydantic's locations also contain what it tried: the type in a union, the tag of a block, ``[key]``.
     """
     allowed: tuple[Any, ...] = tuple(_alternatives(schema))
     path: list[str | int] = []

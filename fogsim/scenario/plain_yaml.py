@@ -27,15 +27,7 @@ TEXT = "tag:yaml.org,2002:str"
 
 
 class PlainYamlError(Exception):
-    """Text that is no YAML, or holds what plain data does not.
-
-    Parameters
-    ----------
-    problem : str
-        What is wrong.
-    line : int or None
-        On which line, counted from 1.
-    """
+    """Text that is not YAML, or holds more than plain data; `line` counts from 1."""
 
     def __init__(self, problem: str, line: int | None = None) -> None:
         super().__init__(problem)
@@ -86,20 +78,10 @@ _Loader.add_constructor("tag:yaml.org,2002:int", _whole_number)
 
 
 def parse_yaml(text: str) -> tuple[Any, dict[KeyPath, int]]:
-    """Plain data of a text, and the line of each key and list entry.
+    """Plain data of a YAML text, and the line of each key and list entry.
 
-    All keys are text. Nothing but null, truth values, numbers, text, lists and mappings comes out.
-
-    Parameters
-    ----------
-    text : str
-        YAML.
-
-    Raises
-    ------
-    PlainYamlError
-        If it is no YAML, has a key twice, is larger, deeper or longer than the limits, repeats itself without end, or
-        has tags.
+    All keys become text; only null, booleans, numbers, text, lists and mappings are allowed. Duplicate keys, tags, and
+    texts beyond the limits raise PlainYamlError.
     """
     try:
         loader = _Loader(text)
@@ -160,13 +142,7 @@ def _line(node: yaml.Node) -> int:
 
 
 def dotted(key_path: KeyPath) -> str:
-    """Key path as it is written after ``--set``; keys that are no names are quoted, and long ones cut.
-
-    Parameters
-    ----------
-    key_path : KeyPath
-        The key, from the outermost block on.
-    """
+    """Key path as ``--set`` accepts it; unusual keys are quoted, and long ones shortened."""
     return ".".join(_readable(str(key)) for key in key_path)
 
 

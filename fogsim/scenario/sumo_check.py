@@ -31,14 +31,9 @@ _LONGER, _ASIDE = 1.05, 50.0  # by which SUMO may count a route longer than its 
 
 
 def step_mistake(clocks: Clocks) -> str | None:
-    """Say why SUMO cannot make a traffic step, and the nearest that it can; None if it can.
+    """Why SUMO cannot make a traffic step, and the nearest possible one; None if it can.
 
-    SUMO would make a step of whole milliseconds in its place, and times and speeds would disagree from then on.
-
-    Parameters
-    ----------
-    clocks : Clocks
-        The clocks of a scenario.
+    SUMO would round the step to whole milliseconds, and times and speeds would disagree from then on.
     """
     step, camera = clocks.traffic_step_s / CLOCK_TICK, clocks.camera_period_s / CLOCK_TICK
     if step > 0.5 and _is_whole(step):
@@ -60,17 +55,7 @@ def _is_whole(ticks: float) -> bool:
 
 
 def option_lines(document: Document, scenario: Scenario, *, own_simulation: bool) -> list[str]:
-    """Say which of a scenario's options of SUMO it does not take, each in one line.
-
-    Parameters
-    ----------
-    document : Document
-        Where its keys stand.
-    scenario : Scenario
-        The scenario.
-    own_simulation : bool
-        False if SUMO runs already, and not as the scenario has it.
-    """
+    """One line for each SUMO option of a scenario that it does not accept."""
     options = scenario.traffic.sumo_options
     if own_simulation:
         told = option_mistakes(options)
@@ -81,15 +66,7 @@ def option_lines(document: Document, scenario: Scenario, *, own_simulation: bool
 
 
 def trigger_mistakes(document: Document, scenario: Scenario) -> list[str]:
-    """Say which triggers can never come, whatever the network is, each in one line.
-
-    Parameters
-    ----------
-    document : Document
-        Where its keys stand.
-    scenario : Scenario
-        The scenario.
-    """
+    """One line for each trigger that can never fire, whatever the network is."""
     found = pointless_triggers(document, scenario, {"time": (0.0, last_time(scenario))})
     return [f"{document.where(at)}: {dotted(at)}: {text}" for at, text in found]
 
@@ -99,21 +76,9 @@ MOST_SHOWN = 10
 
 
 def demand_mistakes(document: Document, scenario: Scenario) -> list[str]:
-    """Say what of a scenario its route files and network can't have, each in one line.
+    """One line for each vehicle, edge or lane that a scenario names and its route files or network lack.
 
-    Nothing is claimed where vehicles may come from elsewhere, ways are not written out, or files are very large.
-
-    Parameters
-    ----------
-    document : Document
-        Where its keys stand.
-    scenario : Scenario
-        The scenario, whose files are there.
-
-    Raises
-    ------
-    InputError
-        If ``traffic.config`` is no SUMO configuration.
+    Nothing is reported where vehicles may come from elsewhere, routes are not written out, or files are very large.
     """
     named = dict(_named_vehicles(scenario))
     others = departing_vehicles(scenario.timeline) | {EGO}

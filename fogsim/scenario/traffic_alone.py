@@ -17,18 +17,7 @@ _NEEDS = "needs an ego, and traffic.ego is none"
 
 
 def without_ego(written: object) -> object:
-    """Fill in what follows from there being no ego, and refuse what needs one; other scenarios stay as they are.
-
-    Parameters
-    ----------
-    written : object
-        What stands in a scenario file.
-
-    Raises
-    ------
-    ValidationError
-        One mistake for each key that needs an ego.
-    """
+    """Fill in defaults of a scenario without an ego and refuse keys that need one; other data is unchanged."""
     traffic = written.get("traffic") if isinstance(written, dict) else None
     if not isinstance(written, dict) or not isinstance(traffic, dict) or traffic.get("ego") != NO_EGO:
         return written

@@ -25,18 +25,7 @@ WrittenCondition = Annotated[
 
 
 def refuse(mistakes: Iterable[tuple[KeyPath, str]]) -> None:
-    """Refuse what has mistakes.
-
-    Parameters
-    ----------
-    mistakes : iterable of tuple
-        Key path and what is wrong there.
-
-    Raises
-    ------
-    ValidationError
-        If there are any.
-    """
+    """Raise ValidationError if there are mistakes, given as key path and message."""
     told = [
         InitErrorDetails(type=PydanticCustomError(MISTAKE, "{told}", {"told": text}), loc=place, input=0)
         for place, text in mistakes

@@ -198,20 +198,7 @@ Expectations = dict[Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+$", max_lengt
 
 
 def metric_check(name: str, written: str) -> MetricCheck:
-    """Read what a metric must be.
-
-    Parameters
-    ----------
-    name : str
-        Name of the expectation.
-    written : str
-        ``minimum_gap_m >= 5``; a number may have a unit that fits that of the key.
-
-    Raises
-    ------
-    ValueError
-        If it is something else, or is met or missed by every value that the metric can have.
-    """
+    """Parse ``minimum_gap_m >= 5``, with an optional unit; ValueError if every value would pass, or none."""
     match = _METRIC.match(written)
     if match is None:
         raise ValueError(f"expected a key of metrics.json, one of {' '.join(OPERATORS)} and a value")
@@ -233,11 +220,5 @@ def metric_check(name: str, written: str) -> MetricCheck:
 
 
 def clauses_of(expect: Mapping[str, Expectation]) -> tuple[Clause, ...]:
-    """Clauses of some expectations, in their order.
-
-    Parameters
-    ----------
-    expect : mapping from str to Expectation
-        The expectations.
-    """
+    """Clauses of expectations, in order."""
     return tuple(clause for name, expectation in expect.items() for clause in expectation.clauses(name))

@@ -70,15 +70,7 @@ KEYS = tuple(VariationKeys.model_fields)
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One case of a file.
-
-    Attributes
-    ----------
-    values : mapping from str to value
-        What each name stands for.
-    seed : int
-        Seed of its run.
-    """
+    """One case of a file: a value for each varied name, and the seed of its run."""
 
     values: Mapping[str, Value]
     seed: int = 0
@@ -100,29 +92,13 @@ class Case:
 
 
 def value_text(value: Value) -> str:
-    """A value as labels and text in a file have it.
-
-    Parameters
-    ----------
-    value : value
-        The value.
-    """
+    """A value as labels and files show it."""
     return str(value).lower() if isinstance(value, bool) else f"{value:g}" if isinstance(value, float) else str(value)
 
 
 @dataclass(frozen=True, slots=True)
 class Variation:
-    """What a file varies.
-
-    Attributes
-    ----------
-    cases : tuple of Case
-        The grid, the last name fastest.
-    varied : mapping from str to Values
-        What each name stands for.
-    verdict : Verdict
-        When all of them together pass.
-    """
+    """What a file varies: its cases as a grid (the last name fastest), and when they pass together."""
 
     cases: tuple[Case, ...]
     varied: Mapping[str, Values] = field(default_factory=dict)
@@ -130,18 +106,7 @@ class Variation:
 
 
 def read_variation(document: Document) -> Variation:
-    """Read ``vary`` and ``verdict``, and check that each name stands somewhere.
-
-    Parameters
-    ----------
-    document : Document
-        What was read, with overrides in place.
-
-    Raises
-    ------
-    InputError
-        A line for each mistake, with file, line, key and what is allowed.
-    """
+    """Read ``vary`` and ``verdict``, and check that each varied name is used somewhere."""
     written = {key: document.data[key] for key in KEYS if key in document.data}
     try:
         keys = VariationKeys.model_validate(written)
@@ -243,15 +208,7 @@ def _check_reachable(document: Document, verdict: Verdict, number: int) -> None:
 
 
 def with_case(document: Document, case: Case) -> Document:
-    """Copy of a document with a case's values in place of their names, and without `KEYS`.
-
-    Parameters
-    ----------
-    document : Document
-        What `read_variation` has checked.
-    case : Case
-        The case.
-    """
+    """Copy of a document with a case's values in place of their names, and without `KEYS`."""
     data = {key: value for key, value in document.data.items() if key not in KEYS}
     return replace(document, data=_put(data, case.values) if case.values else data)
 
@@ -270,24 +227,10 @@ def _put(value: Any, values: Mapping[str, Value]) -> Any:
 
 
 def chosen_cases(variation: Variation, wanted: str, where: object, seed: int | None = None) -> tuple[Case, ...]:
-    """Cases that have some values.
+    """Cases that match comma-separated ``name=value`` pairs, as in `Case.label`; all cases for "".
 
-    Parameters
-    ----------
-    variation : Variation
-        What the file varies.
-    wanted : str
-        ``name=value`` pairs with commas between, as in `Case.label`; empty for all cases. A name that stands for
-        numbers may have one that is not in the grid.
-    where : object
-        What messages name: the file.
-    seed : int or None
-        Seed of the runs; None for those of the cases.
-
-    Raises
-    ------
-    InputError
-        If it is not of that form, or there is no such name, value or case.
+    A numeric name may have a value that is not in the grid. `where` names the file in messages, and `seed` replaces the
+    seeds of the cases.
     """
     pairs = _pairs(wanted, variation, where)
     of_seeds = next((name for name, values in variation.varied.items() if isinstance(values, SeedLevels)), None)

@@ -11,13 +11,7 @@ _MOST_DIGITS = 15
 
 
 def grid_mistake(sizes: Mapping[str, int]) -> str | None:
-    """Say why a grid has too many runs, without building it; None if it has not.
-
-    Parameters
-    ----------
-    sizes : mapping from str to int
-        Number of levels of each factor, the seeds among them.
-    """
+    """Why a grid has too many runs, from its number of levels per factor; None if it has not."""
     number = math.prod(sizes.values())
     if number <= MOST_RUNS:
         return None

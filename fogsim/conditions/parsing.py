@@ -45,23 +45,10 @@ DEEPEST = 20
 
 
 def parse_condition(written: object) -> Condition:
-    """Read a condition.
+    """Parse a condition; ValueError with what is allowed or nearest if it is malformed.
 
-    Parameters
-    ----------
-    written : str, mapping or sequence
-        Text; or a mapping from signals to the rest (``{"ego.speed": "> 90 km/h"}``), of which all must hold; or
-        ``all:``, ``any:`` with a list of conditions, ``not:`` with one. A list stands for all of its conditions.
-
-    Returns
-    -------
-    Condition
-        Whose `str` is the condition as text.
-
-    Raises
-    ------
-    ValueError
-        If it is none; with what is allowed, or nearest.
+    Text; or a mapping from signals to the rest (``{"ego.speed": "> 90 km/h"}``), all of which must hold; or ``all:``,
+    ``any:`` with a list of conditions, ``not:`` with one. A list stands for all of its conditions.
     """
     return _read(written, 0)
 
@@ -93,15 +80,10 @@ def _entry(key: object, value: object, depth: int) -> Condition:
 
 
 def mended(written: Mapping[object, object]) -> dict[object, object]:
-    """A mapping in which what YAML has torn apart at commas is whole again.
+    """A mapping with the entries joined that YAML split at commas.
 
-    In ``{gap(ego, slow): "< 80 m"}`` YAML takes the comma for one between two entries, and so it does in
-    ``{always: gap(ego, slow) > 5 m}``.
-
-    Parameters
-    ----------
-    written : mapping
-        As YAML gives it.
+    In ``{gap(ego, slow): "< 80 m"}`` YAML reads the comma as one between two entries, and also in ``{always: gap(ego,
+    slow) > 5 m}``.
     """
     result: dict[object, object] = {}
     pending = deque(written.items())

@@ -38,16 +38,9 @@ _OTHER = "\0"
 
 
 def outcomes(condition: Condition, limits: Limits = NO_LIMITS) -> frozenset[bool]:
-    """What a condition can be in some run: true, false or both.
+    """Values that a condition can have in some run: true, false or both; `limits` narrow the ranges of signals.
 
-    Every signal takes each value that makes a difference to the condition; signals are assumed to be independent.
-
-    Parameters
-    ----------
-    condition : Condition
-        The condition.
-    limits : mapping from str to (float, float)
-        Narrower ranges of signals in one run, for example of ``time``.
+    Each signal takes every value that makes a difference to the condition; signals are assumed to be independent.
     """
     asked = comparisons_of(condition)
     values = {signal: list(_values(signal, asked, limits)) for signal in _measured(asked)}
@@ -63,17 +56,7 @@ def outcomes(condition: Condition, limits: Limits = NO_LIMITS) -> frozenset[bool
 
 
 def pointless_parts(condition: Condition, limits: Limits = NO_LIMITS, ego: str = EGO) -> Iterator[str]:
-    """Say which parts of a condition compare something with itself, or can never be true, and why.
-
-    Parameters
-    ----------
-    condition : Condition
-        The condition.
-    limits : mapping from str to (float, float)
-        As for `outcomes`.
-    ego : str
-        Id of the ego, which conditions may also call ``ego``.
-    """
+    """Parts of a condition that compare a signal with itself or can never be true, with the reason."""
     for reference in signals_of(condition):
         vehicles = [EGO if name == ego else name for name in vehicles_of(reference)]
         if len(set(vehicles)) < len(vehicles):

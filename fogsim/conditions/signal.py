@@ -30,15 +30,7 @@ class Need(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class LanePlace:
-    """A lane by its number from the right, and how many there are.
-
-    Attributes
-    ----------
-    number : int
-        From 0.
-    count : int or None
-        None where it is not known.
-    """
+    """A lane by its number from the right, from 0, and the number of lanes (None if unknown)."""
 
     number: int
     count: int | None
@@ -68,28 +60,11 @@ class Place(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Signal:
-    """A quantity of a run that conditions may ask for.
+    """A quantity of a run that conditions can refer to.
 
-    Attributes
-    ----------
-    meaning : str
-        One line on it.
-    value : callable
-        Takes it from a moment and what stands in the place holders.
-    kind : Kind
-        What it is.
-    unit : str
-        SI unit of a number; "" for a pure one.
-    shown_unit : str
-        Unit in which it is shown; "" for the SI one.
-    least, most : float
-        Range of a number; what lies outside cannot come.
-    words : tuple of str
-        What a word may be; empty where any may come.
-    places : tuple of Place
-        What stands in the place holders.
-    needs : frozenset of Need
-        What the run must have.
+    `value` reads it from a moment and the arguments of its place holders. `unit` is SI, and `shown_unit` the one in
+    messages ("" for the SI one). Values outside `least` … `most` cannot occur; `words` are the possible words (empty
+    for any).
     """
 
     meaning: str
@@ -109,14 +84,6 @@ class Signal:
         return self.shown_unit or self.unit
 
     def read(self, moment: Moment, arguments: tuple[str, ...]) -> Value:
-        """Value at a moment; None where there is none.
-
-        Parameters
-        ----------
-        moment : Moment
-            The moment.
-        arguments : tuple of str
-            What stands in the place holders.
-        """
+        """Value at a moment; None if it has none."""
         value: Value = self.value(moment, *arguments)
         return None if isinstance(value, float) and math.isnan(value) else value

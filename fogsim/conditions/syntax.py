@@ -7,15 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """A signal of a run, such as ``ego.speed`` or ``gap(ego, slow)``.
-
-    Attributes
-    ----------
-    signal : str
-        Key in `SIGNALS`: ``X.speed``, ``gap(X, Y)``.
-    arguments : tuple of str
-        Vehicles, methods, numbers that stand in its place holders.
-    """
+    """A signal of a run, such as ``ego.speed``: its key in `SIGNALS` (``X.speed``) and arguments."""
 
     signal: str
     arguments: tuple[str, ...] = ()
@@ -45,15 +37,7 @@ def _always_quoted(name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A number to compare with.
-
-    Attributes
-    ----------
-    value : float
-        In SI units.
-    number, unit : str
-        As written: "70" and "km/h".
-    """
+    """A number to compare with: its SI value, and its number and unit as written."""
 
     value: float
     number: str
@@ -161,13 +145,7 @@ def _bracketed(part: Condition) -> str:
 
 
 def parts_of(condition: Condition) -> Iterator[Condition]:
-    """A condition and everything inside it, the innermost first.
-
-    Parameters
-    ----------
-    condition : Condition
-        The condition.
-    """
+    """A condition and all its parts, innermost first."""
     match condition:
         case AllOf(parts) | AnyOf(parts):
             for part in parts:
@@ -178,25 +156,13 @@ def parts_of(condition: Condition) -> Iterator[Condition]:
 
 
 def comparisons_of(condition: Condition) -> tuple[Comparison | Edge | Flag, ...]:
-    """What a condition asks of single signals, each once, in the order in which it is written.
-
-    Parameters
-    ----------
-    condition : Condition
-        The condition.
-    """
+    """Comparisons, edges and flags in a condition, each once, in written order."""
     asked = (part for part in parts_of(condition) if isinstance(part, Comparison | Edge | Flag))
     return tuple(dict.fromkeys(asked))
 
 
 def signals_of(condition: Condition) -> tuple[Reference, ...]:
-    """Signals that a condition asks for, each once, in the order in which they are written.
-
-    Parameters
-    ----------
-    condition : Condition
-        The condition.
-    """
+    """Signals in a condition, each once, in written order."""
     found: dict[Reference, None] = {}
     for asked in comparisons_of(condition):
         found[asked.left] = None

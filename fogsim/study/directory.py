@@ -29,24 +29,10 @@ class _Manifest(BaseModel):
 
 
 class StudyDirectory:
-    """Where a study's results are; one that is there is continued if it is of the same study.
+    """Directory of a study's results, created if missing and continued if it is of the same study.
 
-    Parameters
-    ----------
-    path : Path
-        The directory; it is made where it is not there.
-    study : Study
-        The study.
-
-    Attributes
-    ----------
-    results : Path
-        Folder of the runs that are done.
-
-    Raises
-    ------
-    InputError
-        If the directory holds something else, or a study with other runs; the message names the differences.
+    InputError if it holds something else, or a study with other runs. Results of completed runs are in the folder
+    `results`.
     """
 
     def __init__(self, path: Path, study: Study) -> None:

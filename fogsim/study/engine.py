@@ -34,13 +34,5 @@ class Engine(Protocol):
 
 
 def result_file(folder: Path, run: StudyRun) -> Path:
-    """Where the result of a run is.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the results.
-    run : StudyRun
-        The run.
-    """
+    """Path of a run's result in the folder of results."""
     return folder / f"{run.key}.json"

@@ -11,19 +11,7 @@ METHODS_KEY = "estimators"
 
 
 class MetricWords(NamedTuple):
-    """A metric as a paper would name it.
-
-    Attributes
-    ----------
-    label : str
-        Its name.
-    unit : str
-        Unit in which it is shown.
-    scale : float
-        Factor from the metric's own unit to that.
-    better : str
-        Which is better, ``less`` or ``more``; ``neither`` where that depends.
-    """
+    """A metric as a paper would name it; `scale` converts the metric's own unit to `unit`."""
 
     label: str
     unit: str
@@ -66,24 +54,12 @@ DELAY_METRICS = ("traffic_delay_s_per_vehicle_km", "traffic_mean_speed_mps", "me
 
 
 def metric_words(metric: str) -> MetricWords:
-    """A metric in words; its own name, which ends in its unit, where it has none.
-
-    Parameters
-    ----------
-    metric : str
-        Column of the table.
-    """
+    """Label and unit of a metric; by default its own name, which ends in its unit."""
     return MAIN_METRICS.get(metric) or MetricWords(metric, "", better="neither")
 
 
 def unknown_metrics(names: Iterable[str]) -> list[str]:
-    """What is wrong with names of metrics, a line each.
-
-    Parameters
-    ----------
-    names : iterable of str
-        What was chosen.
-    """
+    """What is wrong with names of metrics, one line each."""
     known = [key for key in metric_keys() if key != "ending"]
     return [
         f"unknown metric {name!r}; {suggest(name, known)}"
@@ -93,28 +69,12 @@ def unknown_metrics(names: Iterable[str]) -> list[str]:
 
 
 def main_metrics(chosen: Iterable[str], known: Iterable[str]) -> list[str]:
-    """Metrics that the report shows first.
-
-    Parameters
-    ----------
-    chosen : iterable of str
-        Of the study file; empty for the default.
-    known : iterable of str
-        Columns of the table that are numbers.
-    """
+    """Metrics that the report shows first: those that the study file chose, or the default ones that exist."""
     there = set(known)
     return [name for name in tuple(chosen) or MAIN_METRICS if name in there]
 
 
 def signed(value: float, digits: int = 3) -> str:
-    """A difference with its sign, to some digits.
-
-    Parameters
-    ----------
-    value : float
-        The difference.
-    digits : int
-        Digits that count.
-    """
+    """A difference with its sign, to `digits` significant digits."""
     text = f"{value:+.{digits}g}"
     return (f"{value:+.0f}" if "e+" in text else text).replace("-", "−")

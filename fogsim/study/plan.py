@@ -184,18 +184,7 @@ def _label(levels: Mapping[str, str]) -> str:
 
 
 def file_digests(scenario: Scenario) -> dict[str, str]:
-    """Digest of the content of each of SUMO's files that a scenario names, by its name.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-
-    Raises
-    ------
-    InputError
-        If one of them is not there.
-    """
+    """Digest of each SUMO file that a scenario names, by name; InputError if one is missing."""
     traffic, folder = scenario.traffic, scenario.directory
     named = [path for path in (traffic.config, traffic.net, *traffic.routes, *traffic.additional) if path is not None]
     files = [folder / path for path in named]
@@ -314,13 +303,7 @@ def _scenario(
 
 
 def needs_camera(scenario: Scenario) -> bool:
-    """Whether what the camera sees changes what happens: advice or lamps go by it.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """Whether advice or lamps depend on the camera."""
     deaf = scenario.advice.method in ("none", "fixed_speed"), scenario.lighting.method == "low_beam"
     methods = (scenario.advice, scenario.lighting)
     return any(m.informed_by == "belief" and not d for m, d in zip(methods, deaf, strict=True))

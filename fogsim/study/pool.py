@@ -24,39 +24,17 @@ Work = Callable[[Scenario, int, Path], str | None]
 
 @dataclass(frozen=True, slots=True)
 class ProcessPool:
-    """Parallel processes of this machine.
+    """Parallel processes on this machine; `work` must be a function of a module.
 
-    A process that dies takes its run with it and no other: those that were under way are run again, each alone, and
-    the one that dies again is noted as failed.
-
-    Attributes
-    ----------
-    processes : int
-        How many run at once.
-    work : Work
-        What is done with each run, in another process; a function of a module.
+    When a process dies, the runs that were in progress are run again, each alone; the one that dies again counts as
+    failed.
     """
 
     processes: int
     work: Work = run_to_file
 
     def run(self, runs: Sequence[StudyRun], folder: Path, watch: RunWatch) -> None:
-        """Run what is given, each run's outcome in its `result_file`.
-
-        Parameters
-        ----------
-        runs : sequence of StudyRun
-            What is to be run.
-        folder : Path
-            Where the results go, ``KEY.json`` each.
-        watch : RunWatch
-            Who is told of each run that is done, in this process.
-
-        Raises
-        ------
-        OSError
-            If a result cannot be written, as on a full disk.
-        """
+        """Run studies' runs, each outcome into its `result_file`; `watch` is called in this process after each."""
         waiting = list(reversed(runs))
         while waiting:
             for suspect in _run_until_broken(waiting, folder, self.processes, watch, self.work):
@@ -88,13 +66,7 @@ def _run_until_broken(
 
 
 def _submitted(pool: ProcessPoolExecutor, work: Work, run: StudyRun, result: Path) -> Future[str | None]:
-    """A run on its way to a process.
-
-    Raises
-    ------
-    BrokenProcessPool
-        Also if what has died is the server from which processes are forked; the next pool has a new one.
-    """
+    """Submit a run; BrokenProcessPool also if the fork server died, which the next pool starts again."""
     try:
         return pool.submit(work, run.scenario, run.seed, result)
     except (EOFError, ConnectionError) as error:

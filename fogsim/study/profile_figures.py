@@ -25,13 +25,6 @@ def survival_figure(study: Study, cells: Mapping[Cell, PooledProfiles]) -> Study
     """Share of vehicle-time with a time to collision above a threshold, for all thresholds.
 
     One minus it is the time-exposed time to collision (TET; Minderhoud & Bovy 2001) as a share, at every threshold.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    cells : mapping from tuple of str to PooledProfiles
-        Profiles of each cell that has any.
     """
     grid = Grid(study)
     figure, panels = grid.figure(2.2)
@@ -72,16 +65,9 @@ def _scale_near_hundred(axes: Axes, values: NDArray[np.float64]) -> None:
 
 
 def speed_figure(study: Study, cells: Mapping[Cell, PooledProfiles]) -> StudyFigure | None:
-    """Mean speed of everybody along the road, over the fog that is there; None where no road is known.
+    """Mean speed of all vehicles along the road, over the fog there; None if no road is known.
 
-    It is the ego's route, or that of ``traffic.along`` without an ego.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    cells : mapping from tuple of str to PooledProfiles
-        Profiles of each cell that has any.
+    The road is the ego's route, or ``traffic.along`` without an ego.
     """
     if not any(len(pooled.speeds()) for pooled in cells.values()):
         return None
@@ -146,15 +132,7 @@ def _shade_fog(axes: Axes, pooled: list[PooledProfiles]) -> None:
 
 
 def collisions_figure(study: Study, cells: Mapping[Cell, PooledProfiles]) -> StudyFigure | None:
-    """Where the collisions were, over the ego's way in plan; None where none has a place.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    cells : mapping from tuple of str to PooledProfiles
-        Profiles of each cell that has any.
-    """
+    """Positions of the collisions over the ego's path in plan; None if none has a position."""
     rows = [[*cell, *hit] for cell, pooled in cells.items() for hit in pooled.collisions]
     hits = [(hit.x, hit.y) for pooled in cells.values() for hit in pooled.collisions if hit.x is not None]
     if not hits:

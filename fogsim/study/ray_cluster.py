@@ -239,13 +239,7 @@ def _connection(ray: Any, address: str, processes: int | None) -> Iterator[None]
 
 
 def _refuse_silence(address: str) -> None:
-    """Refuse an address at which no Ray answers, which Ray itself would ask for two minutes and then end the process.
-
-    Raises
-    ------
-    InputError
-        If none does.
-    """
+    """Raise InputError if no Ray answers at an address; Ray itself would try for two minutes and end the process."""
     if address == "auto":
         return
     host, _, port = address.rpartition(":")

@@ -37,19 +37,7 @@ _MOST_FAILURES = 50
 
 @dataclass(frozen=True, slots=True)
 class _Findings:
-    """What the page shows.
-
-    Attributes
-    ----------
-    main : sequence of str
-        Metrics that are shown first.
-    differences : sequence of Difference
-        Of all metrics.
-    remarks : mapping from str to str
-        Metrics that cannot tell policies apart, and why.
-    figures : sequence of StudyFigure
-        All figures.
-    """
+    """Content of the report: metrics shown first, all differences, uninformative metrics with reasons, and figures."""
 
     main: Sequence[str]
     differences: Sequence[Difference]
@@ -64,19 +52,7 @@ class _Findings:
 
 
 def write_report(study: Study, rows: Sequence[Row], profiles: Mapping[Cell, PooledProfiles], folder: Path) -> None:
-    """Write ``comparison.csv``, ``report.html``, and the figures as SVG and CSV in ``figures``.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    rows : sequence of Row
-        Its table.
-    profiles : mapping from tuple of str to PooledProfiles
-        Profiles of each cell that has any.
-    folder : Path
-        Where they go.
-    """
+    """Write ``comparison.csv``, ``report.html``, and the figures as SVG and CSV in ``figures``."""
     done = [row for row in rows if row["status"] == "complete"]
     known = numeric_metrics(done, study.factors)
     main = main_metrics(study.metrics, known)

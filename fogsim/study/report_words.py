@@ -11,19 +11,7 @@ from fogsim.study.table import Row
 
 
 def summary(study: Study, rows: Sequence[Row], differences: Sequence[Difference], remarks: Mapping[str, str]) -> str:
-    """The summary of the report, as HTML.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    rows : sequence of Row
-        Its table.
-    differences : sequence of Difference
-        Of the metrics that the report shows first.
-    remarks : mapping from str to str
-        Metrics that cannot tell policies apart, and why.
-    """
+    """Summary of the report as HTML, from the differences of the metrics that it shows first."""
     telling = [one for one in differences if one.metric not in remarks]
     return "\n".join(
         [

@@ -13,18 +13,7 @@ def shipped_studies() -> dict[str, Path]:
 
 
 def study_file(name_or_path: str | Path) -> Path:
-    """File of a study.
-
-    Parameters
-    ----------
-    name_or_path : str or Path
-        A study file, or the name of a study that comes with FogSim.
-
-    Raises
-    ------
-    UnknownNameError
-        For one word that is neither; a path is opened as it is, and who opens it says what is wrong.
-    """
+    """Path of a study file or of a shipped study's name; a path is not checked."""
     path = Path(name_or_path)
     if path.suffix or len(path.parts) != 1 or path.exists():
         return path

@@ -167,11 +167,5 @@ def only_cases(tests: Iterable[FogTest], wanted: Mapping[Path, Sequence[str]]) -
 
 
 def label_of(run: StudyRun) -> str:
-    """A case as ``--case`` names it.
-
-    Parameters
-    ----------
-    run : StudyRun
-        Its run.
-    """
+    """A case as ``--case`` names it."""
     return ",".join(f"{name}={level}" for name, level in run.levels.items())

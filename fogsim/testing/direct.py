@@ -19,28 +19,12 @@ from fogsim.testing.session import FileOutcome, run_tests
 
 @dataclass(frozen=True, slots=True)
 class ThisProcess:
-    """An engine that runs one case after another where it is called: quick to begin, and a debugger can follow.
-
-    Attributes
-    ----------
-    work : Work
-        What is done with each run.
-    """
+    """An engine that runs the cases in the calling process, which starts quickly and can be debugged."""
 
     work: Work = check_to_file
 
     def run(self, runs: Sequence[StudyRun], folder: Path, watch: RunWatch) -> None:
-        """Run what is given, as of `Engine`.
-
-        Parameters
-        ----------
-        runs : sequence of StudyRun
-            What is to be run.
-        folder : Path
-            Where the results go, ``KEY.json`` each.
-        watch : RunWatch
-            Who is told of each run that is done.
-        """
+        """As `Engine.run`."""
         for run in runs:
             watch(run, self.work(run.scenario, run.seed, result_file(folder, run)))
 

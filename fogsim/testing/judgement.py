@@ -23,22 +23,7 @@ class Outcome(StrEnum):
 
 
 def rate_bounds(passed: int, tried: int, confidence: float) -> tuple[float, float]:
-    """Bounds of a pass rate, each one-sided: Clopper & Pearson (1934), Biometrika 26, 404.
-
-    Parameters
-    ----------
-    passed : int
-        Cases that passed.
-    tried : int
-        Cases that passed or failed, at least one.
-    confidence : float
-        Confidence of each bound, 0 … 1.
-
-    Returns
-    -------
-    (float, float)
-        The rate is at least the first, and at most the second, with this confidence.
-    """
+    """Lower and upper bound of a pass rate, each one-sided: Clopper & Pearson (1934), Biometrika 26, 404."""
     failed = tried - passed
     low = 0.0 if passed == 0 else float(betaincinv(passed, failed + 1, 1.0 - confidence))
     high = 1.0 if failed == 0 else float(betaincinv(passed + 1, failed, confidence))
@@ -80,15 +65,7 @@ class Judgement:
 
 
 def judge(test: FogTest, results: Sequence[CaseResult]) -> Iterator[Judgement]:
-    """Judge each clause of a test, by the cases whose runs did not go wrong.
-
-    Parameters
-    ----------
-    test : FogTest
-        The test.
-    results : sequence of CaseResult
-        Its cases.
-    """
+    """Judge each clause of a test, by the cases whose runs did not fail."""
     clauses: dict[tuple[str, str], list[tuple[StudyRun, Finding]]] = {}
     for result in results:
         for finding in result.findings:

@@ -14,15 +14,7 @@ _Test = Callable[[str], bool]
 
 @dataclass(frozen=True, slots=True)
 class Keywords:
-    """A condition on names.
-
-    Attributes
-    ----------
-    written : str
-        As it was given.
-    match : callable
-        Tells whether text with all names of an expectation meets it.
-    """
+    """A condition on names; `match` evaluates it on a text with all names of an expectation."""
 
     written: str
     match: _Test

@@ -38,19 +38,7 @@ _LARGEST_EMBEDDED = 6_000_000
 
 @dataclass(frozen=True, slots=True)
 class PageContent:
-    """What the page shows.
-
-    Attributes
-    ----------
-    outcomes : sequence of FileOutcome
-        What came of the tests.
-    artefacts : mapping from (str, str, str) to Artefacts
-        What was recorded of clauses that did not pass, by key of the run, name and clause.
-    seconds : float
-        How long it took [s].
-    settings : sequence of str
-        What ``--set`` put in place of the files' values.
-    """
+    """Content of the page; `artefacts` are by key of the run, expectation and clause."""
 
     outcomes: Sequence[FileOutcome]
     artefacts: Mapping[tuple[str, str, str], Artefacts]
@@ -59,15 +47,7 @@ class PageContent:
 
 
 def write_page(path: Path, content: PageContent) -> None:
-    """Write the page.
-
-    Parameters
-    ----------
-    path : Path
-        The file; its folder is made where it is not there.
-    content : PageContent
-        What it shows.
-    """
+    """Write the page; its folder is created if missing."""
     worst = _worst(content.outcomes)
     told = totals_text(content.outcomes, content.seconds)
     parts = [

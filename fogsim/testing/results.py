@@ -15,13 +15,7 @@ from fogsim.study.run_file import FailedRun, Finite, Metrics, RunRecord, Word, r
 
 
 def finding_to_json(finding: Finding) -> dict[str, Any]:
-    """A finding as files have it.
-
-    Parameters
-    ----------
-    finding : Finding
-        The finding.
-    """
+    """A finding as JSON data."""
     return dataclasses.asdict(finding)
 
 
@@ -83,17 +77,7 @@ class CaseResult:
 
 
 def read_result(folder: Path, run: StudyRun, expectations: Sequence[str]) -> CaseResult | None:
-    """What came of a case; None if it has no whole result.
-
-    Parameters
-    ----------
-    folder : Path
-        Where the results are.
-    run : StudyRun
-        The case.
-    expectations : sequence of str
-        Names of those that are asked for.
-    """
+    """Result of a case; None if it is missing or incomplete."""
     found = read_run(result_file(folder, run), _CASE)
     if isinstance(found, FailedRun):
         return CaseResult(run, found.message, duration=found.duration_s)

@@ -22,13 +22,7 @@ _PANEL_HEIGHT = 1.25
 
 
 class SignalLog:
-    """Signals of a run, step by step.
-
-    Parameters
-    ----------
-    conditions : iterable of Condition
-        Whose signals are noted.
-    """
+    """Signals of some conditions, step by step."""
 
     def __init__(self, conditions: Iterable[Condition]) -> None:
         asked = list(dict.fromkeys(conditions))
@@ -39,13 +33,7 @@ class SignalLog:
         self._history = History()
 
     def update(self, step: TrafficStep) -> None:
-        """Note the signals at a step.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            The step; each of a run, in their order.
-        """
+        """Record the signals at the next step."""
         moment = self._history.moment(step)
         self.times.append(step.time)
         for signal, values in self.values.items():
@@ -61,22 +49,7 @@ def _limits(condition: Condition) -> list[tuple[Reference, Quantity]]:
 
 
 def plot_signals(log: SignalLog, title: str, failures: Sequence[float]) -> str:
-    """Draw signals over time.
-
-    Parameters
-    ----------
-    log : SignalLog
-        At least one signal, of at least one step.
-    title : str
-        What stands above.
-    failures : sequence of float
-        When something failed [s].
-
-    Returns
-    -------
-    str
-        SVG.
-    """
+    """Draw signals over time as SVG, with marks where something failed [s]."""
     shown = list(log.values)[:MOST_PANELS]
     figure = Figure(figsize=(WIDTH, 0.7 + _PANEL_HEIGHT * len(shown)), layout="constrained")
     panels = figure.subplots(len(shown), 1, squeeze=False, sharex=True)[:, 0]

@@ -16,25 +16,9 @@ AnyStep = TypeVar("AnyStep", bound=TrafficStep)
 
 
 class Recording(Generic[AnyStep]):
-    """Recorders of one run, from its first step to the time when their files take their places.
+    """Recorders of one run, from its first step until their files are in place.
 
-    Parameters
-    ----------
-    directory : RunDirectory
-        Where the files go.
-    manifest : Manifest
-        What is known before the first step.
-    recorders : mapping from str to StepRecorder
-        Recorders by name.
-    metrics : MetricsOfRun
-        Metrics of the steps.
-
-    Attributes
-    ----------
-    failures : dict from str to str
-        Recorders that failed, and why.
-    files : list of str
-        Names of the files of the closed recording.
+    `failures` maps failed recorders to their errors; `files` are the names of the closed recording's files.
     """
 
     def __init__(
@@ -53,18 +37,7 @@ class Recording(Generic[AnyStep]):
         self.files: list[str] = []
 
     def record(self, step: AnyStep) -> None:
-        """Hand a step to metrics and recorders.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            The finished step.
-
-        Raises
-        ------
-        RecorderError
-            If one fails.
-        """
+        """Pass a finished step to metrics and recorders; RecorderError if one fails."""
         if not self._begun:
             self._begin()
         self._metrics.update(step)
@@ -86,19 +59,9 @@ class Recording(Generic[AnyStep]):
             self._begin()
 
     def close(self, manifest: Manifest, interruption: Interruption) -> Status:
-        """Close all recorders, also when some fail, and write metrics and manifest; nothing if it was never begun.
+        """Close all recorders, even if some fail, and write metrics and manifest; nothing if it never began.
 
-        Parameters
-        ----------
-        manifest : Manifest
-            How the run ended.
-        interruption : Interruption
-            What holds signals back; they are let through while a whole run's recorders are closed.
-
-        Returns
-        -------
-        Status
-            How it ended now.
+        Signals are let through while a complete run's recorders are closed. Returns the final status.
         """
         if not self._begun:
             self._directory.clear_sumo_outputs()

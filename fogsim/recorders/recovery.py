@@ -25,27 +25,11 @@ from fogsim.recorders.trajectories import write_trajectory_table
 
 
 def recover_run(path: Path, overwrite: bool = False) -> list[str]:
-    """Make readable what a run has left that was killed, or could not close its table.
+    """Recover the readable results of a run that was killed or could not close its table; return the files' names.
 
     Its rows become ``steps.parquet``, ``events.parquet`` and ``trajectories.parquet``, marked as partial, and its
-    manifest says "dead"; video and report are lost.
-
-    Parameters
-    ----------
-    path : Path
-        The run's directory.
-    overwrite : bool
-        True to let the results take the place of those of an earlier run.
-
-    Returns
-    -------
-    list of str
-        Names of the result files.
-
-    Raises
-    ------
-    InputError
-        If nothing is to be recovered, the run is not over, or earlier results must not be overwritten.
+    manifest says "dead"; video and report are lost. Raises InputError if there is nothing to recover, the run is not
+    over, or earlier results must not be overwritten.
     """
     folder = path / UNFINISHED
     manifest = read_manifest(folder)

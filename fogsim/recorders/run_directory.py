@@ -47,23 +47,10 @@ _RESERVE = "reserve"
 
 
 class RunDirectory:
-    """The directory of one run and the names of the files in it; it has one writer at a time.
+    """The directory of one run and the names of its files; it has one writer at a time.
 
-    Files are written into its folder ``unfinished``, which is there from the first step (`begin`) to the end of the run
-    (`finish`), when they take the place of earlier results in one go. Until then earlier results stay as they are.
-
-    Parameters
-    ----------
-    path : Path
-        The directory; it is made with its parents if it is not there.
-    overwrite : bool
-        True to replace results of an earlier run: the files that FogSim writes, and never another.
-
-    Raises
-    ------
-    InputError
-        If the path is not a directory, cannot be made, is written by another process, or holds results and must not be
-        overwritten.
+    Files are written into its folder ``unfinished`` from the first step (`begin`) to the end of the run (`finish`),
+    when they replace earlier results at once. `overwrite` allows replacing FogSim's own files, never others.
     """
 
     def __init__(self, path: Path, overwrite: bool = False) -> None:
@@ -129,13 +116,7 @@ class RunDirectory:
         return partial_path(self.path / SUMO_OUTPUTS)
 
     def clear_sumo_outputs(self) -> None:
-        """Remove what SUMO has written for a run that never came to its end.
-
-        Raises
-        ------
-        InputError
-            If it cannot be removed.
-        """
+        """Remove SUMO's outputs of a run that never finished."""
         try:
             if self.sumo_outputs.exists():
                 shutil.rmtree(self.sumo_outputs)
@@ -143,18 +124,7 @@ class RunDirectory:
             raise InputError(f"cannot remove {self.sumo_outputs}: {error.strerror}") from error
 
     def begin(self, manifest: Mapping[str, object]) -> None:
-        """Make the folder for what is written, in place of that of a run that was never finished.
-
-        Parameters
-        ----------
-        manifest : mapping
-            What is known of the run; JSON values only.
-
-        Raises
-        ------
-        OSError
-            If there is no room for it; nothing is lost then.
-        """
+        """Create the folder of unfinished results, replacing an unfinished run's; OSError if the disk is full."""
         new = partial_path(self.unfinished)
         shutil.rmtree(new, ignore_errors=True)
         try:
@@ -168,25 +138,14 @@ class RunDirectory:
         new.rename(self.unfinished)
 
     def write_metrics(self, metrics: Mapping[str, object]) -> None:
-        """Write ``metrics.json``; the room kept for it and the manifest is given back first.
-
-        Parameters
-        ----------
-        metrics : mapping
-            JSON values only.
-        """
+        """Write ``metrics.json``, after releasing the space reserved for it and the manifest."""
         (self.unfinished / _RESERVE).unlink(missing_ok=True)
         write_json(self.unfinished / _NAMES["metrics"], metrics)
 
     def finish(self, manifest: Mapping[str, object]) -> None:
-        """Write the manifest and let the new results take the place of the earlier ones, none of which stays.
+        """Write the manifest, with the names of the files, and replace all earlier results by the new ones.
 
-        If rows are left that could not be made a table, the earlier results and the folder of the new ones stay.
-
-        Parameters
-        ----------
-        manifest : mapping
-            What it says; the names of the files are added.
+        If rows are left that could not be made into a table, the earlier results and the folder of the new ones stay.
         """
         finish_folder(self.path, manifest)
 
@@ -259,25 +218,13 @@ class RunDirectory:
 
 
 def whole_files(folder: Path) -> list[str]:
-    """Names of the whole result files in a folder, and of that of SUMO's outputs, sorted.
-
-    Parameters
-    ----------
-    folder : Path
-        The folder.
-    """
+    """Sorted names of the complete result files in a folder and of its folder of SUMO's outputs."""
     files = [name for name in _NAMES.values() if (folder / name).is_file()]
     return sorted([*files, *([SUMO_OUTPUTS] if (folder / SUMO_OUTPUTS).is_dir() else [])])
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Manifest in a folder; empty if there is none, or it is damaged.
-
-    Parameters
-    ----------
-    folder : Path
-        The folder.
-    """
+    """Manifest in a folder; empty if it is missing or damaged."""
     try:
         content = read_json(folder / _NAMES["manifest"])
     except InputError:
@@ -286,15 +233,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 
 def finish_folder(path: Path, manifest: Mapping[str, object]) -> None:
-    """Finish a run directory: see `RunDirectory.finish`. When it is cut off, the next call completes it.
-
-    Parameters
-    ----------
-    path : Path
-        The run directory.
-    manifest : mapping
-        What it says; the names of the files are added.
-    """
+    """Finish a run directory: see `RunDirectory.finish`. The next call completes an interrupted one."""
     folder = path / UNFINISHED
     (folder / _RESERVE).unlink(missing_ok=True)
     # What a call before this one has moved already is named by the manifest that it wrote.
@@ -338,13 +277,7 @@ def _listed(folder: Path) -> list[str]:
 
 
 def refuse_living(folder: Path) -> None:
-    """Refuse a folder of a process that lives: a second way to know it, should its lock have been removed.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of unfinished results.
-    """
+    """Refuse a folder whose process is alive, in case its lock was removed."""
     manifest = read_manifest(folder)
     process = WritingProcess.from_json(manifest.get("process"))
     if process is None or manifest.get("status") != "running" or process == WritingProcess.this():

@@ -38,17 +38,7 @@ _NEAR = 0.05  # Difference at which a speed has been reached [m/s]
 
 @dataclass
 class Effect:
-    """What an event does.
-
-    Attributes
-    ----------
-    do : dict
-        Blocks of an entry of the timeline, by their subjects.
-    lasts : float
-        How long that takes, as far as a time is given [s].
-    ends : list of str
-        Conditions that hold when the rest is over.
-    """
+    """What an event does: timeline blocks by subject, their known duration [s], and conditions that end the rest."""
 
     do: dict[str, dict[str, Any]] = field(default_factory=dict)
     lasts: float = 0.0
@@ -63,19 +53,7 @@ class Effect:
 
 @dataclass
 class Actions:
-    """Reads actions.
-
-    Attributes
-    ----------
-    vehicles : mapping from str to Vehicle
-        The vehicles.
-    catalogs : Catalogs
-        Where environments may be.
-    positions : Positions
-        Knows the map, and where everybody begins.
-    called : callable
-        A vehicle's name in conditions.
-    """
+    """Reads actions; `called` gives a vehicle's name in conditions."""
 
     vehicles: Mapping[str, Vehicle]
     catalogs: Catalogs
@@ -88,17 +66,7 @@ class Actions:
         return self.catalogs.findings
 
     def take(self, action: Node, actors: list[str], effect: Effect) -> None:
-        """Add what an action does.
-
-        Parameters
-        ----------
-        action : Node
-            A ``PrivateAction``, a ``GlobalAction``, or what holds one.
-        actors : list of str
-            Who does it, if it is private.
-        effect : Effect
-            Takes it.
-        """
+        """Add an action (``PrivateAction``, ``GlobalAction``, or their parent) of some actors to an effect."""
         for one in action.all():
             if one.tag in ("PrivateAction", "GlobalAction", "LongitudinalAction", "LateralAction", "AppearanceAction"):
                 self.take(one, actors, effect)

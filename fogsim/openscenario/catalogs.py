@@ -20,17 +20,7 @@ LOCATIONS = {
 
 @dataclass
 class Catalogs:
-    """The catalogs that a file names.
-
-    Attributes
-    ----------
-    folder : Path
-        Folder to which their places are relative: the file's.
-    locations : Node or None
-        The element ``CatalogLocations``.
-    findings : Findings
-        Takes what cannot be found.
-    """
+    """The catalogs that a file names, relative to its folder."""
 
     folder: Path
     locations: Node | None
@@ -38,13 +28,7 @@ class Catalogs:
     _read: dict[Path, Node] = field(default_factory=dict)
 
     def entry(self, reference: Node) -> Node | None:
-        """What a ``CatalogReference`` refers to, with its parameters; None if there is none, which is noted.
-
-        Parameters
-        ----------
-        reference : Node
-            The reference.
-        """
+        """The element that a ``CatalogReference`` refers to, with its parameters; None, and a finding, if missing."""
         catalog, name = reference.get("catalogName"), reference.get("entryName")
         given = {
             one.get("parameterRef"): one.get("value")

@@ -39,16 +39,9 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class Environment:
-    """What an environment says.
+    """Fog and light of an environment: V_met [m], extent and illuminance of the ground [lx], None if not given.
 
-    Attributes
-    ----------
-    visibility : float or None
-        Meteorological visibility [m]; None if it says nothing of fog.
-    box : Box or None
-        Where the fog is; None for everywhere.
-    illuminance : float or None
-        Of the ground [lx]; None if it says nothing of light.
+    A `box` of None is fog everywhere.
     """
 
     visibility: float | None = None
@@ -57,17 +50,7 @@ class Environment:
 
 
 def environment_of(action: Node, catalogs: Catalogs, lanes: OpenDriveLanes) -> Environment:
-    """What an ``EnvironmentAction`` says.
-
-    Parameters
-    ----------
-    action : Node
-        The action.
-    catalogs : Catalogs
-        Where it may refer to.
-    lanes : OpenDriveLanes
-        The map, which may tell where on earth it is.
-    """
+    """Fog and light of an ``EnvironmentAction``; the map may give its geographic position."""
     findings, reference = catalogs.findings, action.one("CatalogReference")
     node = catalogs.entry(reference) if reference else action.one("Environment")
     if node is None:
@@ -159,14 +142,7 @@ def _leave_out_weather(weather: Node, findings: Findings) -> None:
 def fog_block(environment: Environment, route: Any, lowest: float) -> dict[str, Any]:
     """The block ``fog`` of a scenario.
 
-    Parameters
-    ----------
-    environment : Environment
-        What the file says at the beginning.
-    route : (n, 2) float64
-        Middle of the ego's way [m].
-    lowest : float
-        Height of its lowest point, from which heights of fog count [m].
+    `route` (n, 2) is the middle of the ego's route, and heights of fog count from `lowest` [m].
     """
     visibility = math.inf if environment.visibility is None else environment.visibility
     box = environment.box

@@ -17,21 +17,7 @@ _PARTS = ("Story", "Act", "ManeuverGroup", "Maneuver", "Event", "Action")
 
 @dataclass
 class Entry:
-    """An event as an entry of the timeline.
-
-    Attributes
-    ----------
-    name : str
-        Its name there.
-    node : Node
-        The event.
-    actors : list of str
-        Who acts.
-    effect : Effect
-        What it does.
-    trigger : Trigger
-        When it begins; `NEVER` until it is known.
-    """
+    """An event as an entry of the timeline; its trigger is `NEVER` until it is known."""
 
     name: str
     node: Node
@@ -42,17 +28,7 @@ class Entry:
 
 @dataclass
 class Storyboard:
-    """Reads stories.
-
-    Attributes
-    ----------
-    catalogs : Catalogs
-        Where maneuvers may be.
-    actions : Actions
-        Reads what events do.
-    entries : dict from int to Entry
-        Events by the identity of their elements.
-    """
+    """Reads stories; `entries` has the events by the identity of their elements."""
 
     catalogs: Catalogs
     actions: Actions
@@ -68,13 +44,7 @@ class Storyboard:
         return self.catalogs.findings
 
     def find_events(self, storyboard: Node) -> None:
-        """Find every event and what it does; when comes later, for events refer to one another.
-
-        Parameters
-        ----------
-        storyboard : Node
-            The element.
-        """
+        """Find all events and their effects; triggers follow later, since events refer to one another."""
         self._stories = storyboard.all("Story")
         for group in self._groups():
             actors = group.one("Actors")
@@ -146,13 +116,7 @@ class Storyboard:
         return both(self._acts[id(act)], own)
 
     def state(self, node: Node) -> Trigger:
-        """Condition for a state of an element of the storyboard.
-
-        Parameters
-        ----------
-        node : Node
-            A ``StoryboardElementStateCondition``.
-        """
+        """Trigger for a ``StoryboardElementStateCondition``."""
         kind = node.get("storyboardElementType")
         kind = "ManeuverGroup" if kind == "maneuverGroup" else kind[:1].upper() + kind[1:]
         name, state = node.get("storyboardElementRef"), node.get("state")

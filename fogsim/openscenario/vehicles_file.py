@@ -12,37 +12,12 @@ STANDS = 0.1
 
 
 def front_spot(vehicle: Vehicle, spot: Spot, lanes: OpenDriveLanes) -> Spot:
-    """Place of a vehicle's front bumper.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        The vehicle.
-    spot : Spot
-        Its reference point.
-    lanes : OpenDriveLanes
-        The lanes.
-
-    Raises
-    ------
-    ValueError
-        If the road ends before.
-    """
+    """Place of a vehicle's front bumper from its reference point; ValueError if the road ends before it."""
     return lanes.along(spot, vehicle.front)
 
 
 def vehicles_text(vehicles: Mapping[str, Vehicle], begin: Beginning, lanes: OpenDriveLanes) -> str:
-    """Text of the route file: each vehicle is there from the beginning, at its place and speed.
-
-    Parameters
-    ----------
-    vehicles : mapping from str to Vehicle
-        The vehicles.
-    begin : Beginning
-        Where they are, and how fast.
-    lanes : OpenDriveLanes
-        The lanes.
-    """
+    """Text of the route file: every vehicle is present from the start, with its initial position and speed."""
     lines = []
     for name, vehicle in vehicles.items():
         front = front_spot(vehicle, begin.spots[name], lanes)

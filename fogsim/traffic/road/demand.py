@@ -20,17 +20,7 @@ _OPENING = frozenset(("include", "calibrator", "personTrip"))
 
 @dataclass(frozen=True, slots=True)
 class VehicleRoute:
-    """The way of a vehicle whose edges are written out.
-
-    Attributes
-    ----------
-    edges : tuple of str
-        Ids of its edges.
-    depart_lane : int or None
-        Lane of the first edge on which it departs, counted from 0; None if SUMO chooses it.
-    file : Path
-        Where the vehicle stands.
-    """
+    """A vehicle's written-out edges, its departure lane (from 0, None if SUMO chooses), and the file with it."""
 
     edges: tuple[str, ...]
     depart_lane: int | None
@@ -39,20 +29,11 @@ class VehicleRoute:
 
 @dataclass(frozen=True, slots=True)
 class Demand:
-    """What route and additional files say about some vehicles.
+    """What route and additional files say about the wanted vehicles.
 
-    Attributes
-    ----------
-    files : tuple of Path
-        The files.
-    found : frozenset of str
-        Those of the wanted vehicles that can come.
-    names : tuple of str
-        Ids of vehicles in the order of the files, at most `MOST_NAMES`; of a flow, its first and its last one.
-    routes : mapping from vehicle id to VehicleRoute
-        Ways of wanted vehicles, where they are written out and nothing changes them.
-    is_open : bool
-        True if vehicles may come that are not in sight, so that nothing can be said about those who were not found.
+    `found` are those that can come, and `routes` the written-out, fixed routes. `names` are at most `MOST_NAMES` ids in
+    file order; a flow has its first and last. `is_open` if other vehicles may come, so that nothing is known about
+    those that were not found.
     """
 
     files: tuple[Path, ...]
@@ -62,31 +43,12 @@ class Demand:
     is_open: bool
 
     def lacks(self, vehicle: str) -> bool:
-        """True if a wanted vehicle can never come.
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        """
+        """Whether a wanted vehicle can never come."""
         return not self.is_open and vehicle not in self.found
 
 
 def read_configured_demand(config: Path, wanted: Iterable[str]) -> Demand:
-    """Look for some vehicles in the files of a SUMO configuration.
-
-    Parameters
-    ----------
-    config : Path
-        The ``.sumocfg`` file.
-    wanted : iterable of str
-        Ids of the vehicles.
-
-    Raises
-    ------
-    InputError
-        If it is no SUMO configuration.
-    """
+    """Search for vehicles in the files of a SUMO configuration."""
     configured = configured_demand(config)
     if configured.is_open:
         return Demand(configured.files, frozenset(), (), {}, is_open=True)
@@ -96,18 +58,9 @@ def read_configured_demand(config: Path, wanted: Iterable[str]) -> Demand:
 def read_demand(
     files: Iterable[Path], wanted: Iterable[str], most_bytes: int = MOST_BYTES, *, reroutes: bool = False
 ) -> Demand:
-    """Look for some vehicles in route and additional files.
+    """Search for vehicles in additional and route files, in SUMO's order.
 
-    Parameters
-    ----------
-    files : iterable of Path
-        The files in the order in which SUMO reads them: additional files first.
-    wanted : iterable of str
-        Ids of the vehicles.
-    most_bytes : int
-        Bytes, unpacked, after which the demand counts as open.
-    reroutes : bool
-        Whether vehicles look for other ways than those written.
+    After `most_bytes` unpacked bytes the demand counts as open.
     """
     files, reader, left = tuple(files), _DemandReader(frozenset(wanted), reroutes), most_bytes
     for file in files:

@@ -23,12 +23,7 @@ SIGN_DIAMETER = 0.9
 def limit_sign(edge: Any, side: float) -> Sign | None:
     """Sign at the start of an edge whose limit differs from that of every edge leading to it.
 
-    Parameters
-    ----------
-    edge : sumolib.net.edge.Edge
-        The edge.
-    side : float
-        Where it stands: on the left (1) or right (−1) of the road, on that to which vehicles keep.
+    It stands on the side that vehicles keep to: left (1) or right (−1).
     """
     limit = edge.getSpeed()
     if any(abs(incoming.getSpeed() - limit) < 0.1 for incoming in edge.getIncoming()):

@@ -17,56 +17,20 @@ Point = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True)
 class NetEdges:
-    """Edges that vehicles drive on.
-
-    Attributes
-    ----------
-    lanes : mapping from edge id to int
-        How many lanes each has.
-    axes : mapping from edge id to sequence of points
-        Middle lane [m] of each edge that was asked for.
-    signals : tuple of str
-        Ids of traffic lights.
-    """
+    """Edges for vehicles: number of lanes, middle lanes [m] of the requested ones, and ids of traffic lights."""
 
     lanes: Mapping[str, int]
     axes: Mapping[str, Sequence[Point]]
     signals: tuple[str, ...] = ()
 
     def route_length(self, route: Sequence[str]) -> float:
-        """Length of the axis that fog is laid along [m]: middle lanes of a route's edges, end to end.
-
-        Parameters
-        ----------
-        route : sequence of str
-            Ids of its edges.
-
-        Raises
-        ------
-        KeyError
-            If the axis of one of them was not asked for.
-        """
+        """Length of the axis that fog is laid along [m]: middle lanes of a route's edges, end to end."""
         points = [point for edge in route for point in self.axes[edge]]
         return sum(math.dist(one, other) for one, other in itertools.pairwise(points))
 
 
 def read_net_edges(net: Path, wanted: Collection[str], most_bytes: int = MOST_BYTES) -> NetEdges | None:
-    """List the edges of a network.
-
-    Parameters
-    ----------
-    net : Path
-        SUMO network file.
-    wanted : collection of str
-        Edges whose axes are asked for.
-    most_bytes : int
-        Bytes, unpacked, after which it is given up.
-
-    Returns
-    -------
-    NetEdges or None
-        None if the file is too large, or no network; the latter is told when it is drawn.
-    """
+    """Edges of a network, with axes of the wanted ones; None if it is too large or not a network."""
     reader = _EdgeReader(wanted)
     try:
         size = read_elements(net, reader, most_bytes)

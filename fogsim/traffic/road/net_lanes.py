@@ -21,16 +21,9 @@ _ADJOINING = 0.6  # two carriageways whose borders lie nearer than this share a 
 
 
 def map_of(net: Any, lefthand: bool) -> RoadMap:
-    """Map of a network.
+    """Map of a network that was read with its internal edges.
 
-    In one without any road or footway, the tracks or waterways are drawn in their place, as lanes without lines.
-
-    Parameters
-    ----------
-    net : sumolib.net.Net
-        The network, with what lies within junctions.
-    lefthand : bool
-        Whether vehicles keep to the left.
+    Without any road or footway, tracks or waterways are drawn instead, as lanes without lines.
     """
     edges = net.getEdges()
     lanes = [lane for edge in edges for lane in edge.getLanes()]

@@ -26,13 +26,7 @@ _COMMENT = re.compile(r"<!--.*?-->\s*", re.DOTALL)
 
 
 def netconvert_program() -> str:
-    """Path of netconvert.
-
-    Raises
-    ------
-    MissingDependencyError
-        If it is not there.
-    """
+    """Path of netconvert; MissingDependencyError if it is missing."""
     package = importlib.util.find_spec("sumo")
     folders = [Path(place) / "bin" for place in (package.submodule_search_locations or ())] if package else []
     found = shutil.which("netconvert") or next(
@@ -46,36 +40,15 @@ def netconvert_program() -> str:
 
 
 def netconvert_recipe() -> bytes:
-    """What a network depends on beside its OpenDRIVE file: the program, and how it is called.
-
-    Raises
-    ------
-    MissingDependencyError
-        If there is no netconvert.
-    """
+    """What a network depends on in addition to its OpenDRIVE file: the program and its arguments."""
     program = Path(netconvert_program())
     return f"{program}\0{program.stat().st_mtime_ns}\0".encode() + Path(__file__).read_bytes()
 
 
 def opendrive_net(path: Path) -> str:
-    """SUMO network of an OpenDRIVE file, in the file's own coordinates.
+    """Text of the SUMO network of an OpenDRIVE file, in the file's coordinates.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    str
-        Text of the network; its lanes have the parameter ``origId``, OpenDRIVE's road and lane.
-
-    Raises
-    ------
-    InputError
-        If netconvert cannot read the file.
-    MissingDependencyError
-        If there is no netconvert.
+    Its lanes have the parameter ``origId``, OpenDRIVE's road and lane.
     """
     program = netconvert_program()
     read_opendrive(path)

@@ -54,47 +54,24 @@ class _Road:
 
 
 def is_opendrive(path: Path) -> bool:
-    """Tell whether a file is OpenDRIVE, by its name.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    """
+    """Whether a file is OpenDRIVE, by its name."""
     return path.suffix.lower() == ".xodr"
 
 
 def opendrive_signs(path: Path, net_offset: tuple[float, float] = (0.0, 0.0)) -> list[Sign]:
-    """Signs that the static signals of an OpenDRIVE file stand for; dynamic ones (traffic lights) are left out.
+    """Signs of the static signals of an OpenDRIVE file; dynamic ones (traffic lights) are left out.
 
-    Signals of type 274 or whose name begins with "speed" are speed limits (their value, by unit; for type 274 the
-    subtype in km/h where there is no value, as the catalogue of 2017 numbers them). Every other, and a speed sign that
-    tells no speed, is of kind ``xodr.TYPE`` with its value as it stands, 0 without one.
-
-    Parameters
-    ----------
-    path : Path
-        OpenDRIVE file.
-    net_offset : tuple of float
-        What the conversion to a SUMO network added to x and y [m] (``netOffset`` in the net).
-
-    Raises
-    ------
-    InputError
-        If the file is not OpenDRIVE, or a signal has no usable place.
+    Signals of type 274 or whose name begins with "speed" are speed limits (their value, by unit; for type 274 without a
+    value the subtype in km/h, as the catalogue of 2017 numbers them). All others, and speed signs without a speed, are
+    of kind ``xodr.TYPE`` with their plain value, 0 without one. `net_offset` [m] was added to x and y by the conversion
+    to a SUMO network.
     """
     roads = read_opendrive(path).iter("road")
     return [sign for road in roads for sign in _road_signs(path, road, net_offset)]
 
 
 def read_opendrive(path: Path) -> Element:
-    """Root of an OpenDRIVE file whose roads can be built: lengths, coordinates and coefficients are of a sane size.
-
-    Raises
-    ------
-    InputError
-        If the file is not OpenDRIVE, or a number of a road is not finite or too large.
-    """
+    """Root of an OpenDRIVE file; InputError unless lengths, coordinates and coefficients have a sane size."""
     root = read_tree(path, "OpenDRIVE")
     for road in root.iter("road"):
         where = f"{path}: road {shown(road.get('id', '?'))}"

@@ -30,12 +30,7 @@ _BESIDE = 0.6  # of posts, beyond the edge of the outermost lane [m]
 def signal_heads(lanes: Sequence[Any], side: float) -> Iterator[SignalHead]:
     """Heads at the end of an edge: one on a post for the outermost lane, one on its arm for each other lane.
 
-    Parameters
-    ----------
-    lanes : sequence of sumolib.net.lane.Lane
-        Lanes of the edge for vehicles, from the side that these keep to.
-    side : float
-        That side: 1 for the left, −1 for the right.
+    `lanes` (sumolib) are those for vehicles, from the side that they keep to: left (1) or right (−1).
     """
     heads = [(lane, signal, links) for lane in lanes for signal, links in _signals(lane)]
     if not heads:
@@ -62,14 +57,9 @@ def signal_heads(lanes: Sequence[Any], side: float) -> Iterator[SignalHead]:
 
 
 def crossing_heads(crossing: Any, side: float) -> Iterator[SignalHead]:
-    """Heads for persons: beyond both ends of a crossing with lights, beside it.
+    """Heads for pedestrians at both ends of a crossing lane (sumolib).
 
-    Parameters
-    ----------
-    crossing : sumolib.net.lane.Lane
-        Lane of the crossing.
-    side : float
-        Side that vehicles keep to: 1 for the left, −1 for the right.
+    `side` is the side that vehicles keep to: left (1) or right (−1).
     """
     edge = crossing.getEdge()
     ways = [way for source in edge.getIncoming() for way in source.getConnections(edge) if way.getTLSID()]

@@ -30,20 +30,7 @@ LonLat = tuple[float, float]
 
 
 def sign_map(roads: RoadMap, additional: Iterable[Path]) -> SignMap:
-    """Signs of a network; none at all make an empty map.
-
-    Parameters
-    ----------
-    roads : RoadMap
-        The network.
-    additional : iterable of Path
-        SUMO additional files, and OpenDRIVE files (``.xodr``) that the network was made from.
-
-    Raises
-    ------
-    InputError
-        If a sign cannot be placed or has no usable value.
-    """
+    """Signs of a network, of SUMO additional files and of OpenDRIVE files; possibly none."""
     signs, pieces = list(roads.limit_signs), _Roads(roads)
     for path in additional:
         if is_opendrive(path):
@@ -54,18 +41,7 @@ def sign_map(roads: RoadMap, additional: Iterable[Path]) -> SignMap:
 
 
 def geographic_position(roads: RoadMap) -> Callable[[float, float], LonLat] | None:
-    """Conversion of a network's x, y [m] to longitude and latitude [deg].
-
-    Parameters
-    ----------
-    roads : RoadMap
-        The network.
-
-    Returns
-    -------
-    callable or None
-        None where the network has no projection or pyproj is not installed.
-    """
+    """Conversion of a network's x, y [m] to longitude and latitude [deg]; None without projection or pyproj."""
     if roads.location is None:
         return None
     net = sumolib.net.Net()

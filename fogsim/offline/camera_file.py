@@ -24,19 +24,10 @@ Coefficient = Annotated[Number, Field(ge=-100, le=100)]
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """A camera as its owner knows it: what images from disk need before the methods can read them.
+    """Calibration of a real camera: a pinhole along the vehicle's axis, its lens distortion, and its yaw.
 
-    Attributes
-    ----------
-    camera : Camera
-        Size, focal length, principal point, mount height, pitch, roll, response and bits, as if the lens were a pinhole
-        and looked along the vehicle's axis.
-    distortion : tuple of float
-        Brown's coefficients of the lens k1, k2, p1, p2 as OpenCV has them [-]; empty for a pinhole.
-    yaw : float
-        Angle of the optical axis to the left of the vehicle's axis [rad].
-    remarks : tuple of str
-        What was assumed because the file does not say it.
+    `distortion` has Brown's coefficients k1, k2, p1, p2 as in OpenCV [-], empty for a pinhole; `yaw` is the angle of
+    the optical axis to the left of the vehicle's axis [rad]; `remarks` are assumptions where the file says nothing.
     """
 
     camera: Camera
@@ -45,13 +36,7 @@ class Calibration:
     remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse a camera that does not see where its vehicle drives.
-
-        Raises
-        ------
-        InputError
-            If the yaw turns the vehicle's axis out of the image.
-        """
+        """Raise InputError if the yaw turns the vehicle's axis out of the image."""
         u0, focal = self.camera.principal_point[0], self.camera.focal_length
         least, most = math.atan(-u0 / focal), math.atan((self.camera.width - 1 - u0) / focal)
         if self.yaw != 0.0 and not least <= self.yaw <= most:
@@ -108,42 +93,12 @@ class CameraFile(Section):
 
 
 def load_camera(path: Path) -> Camera:
-    """Read the file of a camera whose images need no straightening.
-
-    Parameters
-    ----------
-    path : Path
-        A YAML file with the keys of `CameraFile`.
-
-    Returns
-    -------
-    Camera
-        The calibration, in SI units and radians.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, a key does not fit (one line for each mistake), or there is a yaw or a distortion,
-        which a `Camera` cannot hold: see `load_calibration`.
-    """
+    """Read the file of a camera whose images need no rectification; InputError if it has a yaw or a distortion."""
     return straight_camera(load_calibration(path), path)
 
 
 def straight_camera(calibration: Calibration, path: Path) -> Camera:
-    """Camera of a calibration whose images need no straightening.
-
-    Parameters
-    ----------
-    calibration : Calibration
-        What was read.
-    path : Path
-        The file that it was read from.
-
-    Raises
-    ------
-    InputError
-        If there is a yaw or a distortion.
-    """
+    """Camera of a calibration; InputError if it has a yaw or a distortion."""
     if not calibration.is_straight:
         raise InputError(
             f"{path}: distortion and yaw_deg are undone by `fogsim estimate` alone (in Python load_calibration); "

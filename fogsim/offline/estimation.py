@@ -173,17 +173,7 @@ def _place(source: Source, picture: Picture) -> str:
 
 
 class _Bench:
-    """The estimators of several methods side by side, for each bit depth that occurs.
-
-    Parameters
-    ----------
-    camera : Camera
-        The assumed calibration.
-    methods : sequence of str
-        Names in the registry.
-    night : NightDrive or None
-        What they are told of a drive by night.
-    """
+    """Estimators of several methods, for each bit depth that occurs."""
 
     def __init__(self, camera: Camera, methods: Sequence[str], night: NightDrive | None) -> None:
         self._camera, self._night = camera, night
@@ -207,13 +197,7 @@ class _Bench:
         return (one for estimators in self._estimators.values() for one in estimators)
 
     def estimates(self, image: Pixels, time: float, signs: tuple[SignSighting, ...]) -> tuple[Estimate, ...]:
-        """Estimates of all methods from an image, and the signs that the map has ahead.
-
-        Raises
-        ------
-        InputError
-            If the image is not one of the camera.
-        """
+        """Estimates of all methods from an image and the signs ahead; InputError if it is not of the camera."""
         pixels, camera = _in_bits(image, self._camera)
         if pixels.shape[:2] != (camera.height, camera.width):
             rows, cols = pixels.shape[:2]
@@ -230,13 +214,7 @@ class _Bench:
 
 
 def _in_bits(image: Pixels, camera: Camera) -> tuple[Pixels, Camera]:
-    """Image and camera with the bit depth in which they are estimated.
-
-    Raises
-    ------
-    InputError
-        If the image has fewer bits than the camera.
-    """
+    """Image and camera with the bit depth of the estimation; InputError if the image has fewer bits than the camera."""
     if image.dtype == np.uint8 and camera.bits > 8:
         raise InputError(f"the image has 8 bits, the camera {camera.bits}; leave `bits` out of the camera file")
     if image.dtype == np.uint16 and camera.bits == 8:

@@ -64,13 +64,7 @@ def find_source(
 
 
 def is_video(path: Path) -> bool:
-    """Whether a file is a video by its ending.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    """
+    """Whether a file is a video, by its suffix."""
     return path.suffix.lower() in VIDEO_ENDINGS
 
 
@@ -110,13 +104,7 @@ def _ordered(paths: Iterable[Path]) -> list[Path]:
 
 
 def is_sequence(paths: Sequence[Path]) -> bool:
-    """Whether files are a numbered sequence: names that differ in one number, which grows in equal steps.
-
-    Parameters
-    ----------
-    paths : sequence of Path
-        The files in their order.
-    """
+    """Whether files are a numbered sequence: names that differ in one number, which grows in equal steps."""
     if len(paths) < 2:
         return False
     # The last number counts: "drive2_cam1_0007.png".

@@ -48,18 +48,7 @@ class LampFile(Section):
 
 
 def load_lamps(path: Path) -> LampMount:
-    """Read a file of lamps.
-
-    Parameters
-    ----------
-    path : Path
-        A YAML file with the keys of `LampFile`.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, a key does not fit (one line for each mistake), or a table of intensities cannot be read.
-    """
+    """Read a YAML file with the keys of `LampFile`; InputError has one line for each mistake."""
     document = read_document(path)
     try:
         read = LampFile.model_validate(document.data)

@@ -41,15 +41,7 @@ _APART = 3.0
 
 
 class Overlay:
-    """Draws images of one camera, all in the same size.
-
-    Parameters
-    ----------
-    camera : Camera
-        The assumed calibration.
-    methods : sequence of str
-        Names of the methods, each of which has its line below the image.
-    """
+    """Draws images of one camera in the same size, with a line for each method below the image."""
 
     def __init__(self, camera: Camera, methods: Sequence[str]) -> None:
         self._bits = camera.bits
@@ -61,18 +53,7 @@ class Overlay:
         self.size = (width, height + _LINE * (len(methods) + 1))
 
     def draw(self, result: FrameEstimates) -> Image.Image:
-        """Draw an image and its estimates.
-
-        Parameters
-        ----------
-        result : FrameEstimates
-            Of an image that could be read.
-
-        Returns
-        -------
-        PIL image
-            RGB, of this overlay's ``size``.
-        """
+        """Draw an image and its estimates, as RGB."""
         canvas = Image.new("RGB", self.size, GROUND)
         if result.picture.image is not None:
             shown = _shown(result.picture.image, self._bits)

@@ -58,13 +58,7 @@ class Straightener:
             self._maps = _maps(calibration, self.camera)
 
     def __call__(self, image: Pixels) -> Pixels:
-        """Straighten an image; one of another size than the camera's is given back as it is.
-
-        Parameters
-        ----------
-        image : (rows, cols) or (rows, cols, 3) uint8 or uint16
-            Pixel values.
-        """
+        """Rectify an image; one of another size than the camera's is returned unchanged."""
         if self._maps is None or image.shape[:2] != self._size:
             return image
         places, fractions = self._maps

@@ -14,24 +14,12 @@ ENDLESS = 10_000.0
 
 
 def metres(visibility: float) -> str:
-    """Visibility [m] with its unit; "clear" from ten kilometres on.
-
-    Parameters
-    ----------
-    visibility : float
-        Visibility [m].
-    """
+    """Visibility [m] with its unit; "clear" from ten kilometres on."""
     return "clear" if visibility >= ENDLESS else f"{visibility:.0f} m"
 
 
 def interval_text(estimate: Estimate) -> str:
-    """Give the 90 % interval of a valid estimate's visibility.
-
-    Parameters
-    ----------
-    estimate : Estimate
-        A valid one.
-    """
+    """The 90 % interval of a valid estimate's visibility."""
     low, high = estimate.visibility_interval
     if high >= ENDLESS:
         return f"> {low:.0f} m"
@@ -107,13 +95,7 @@ def _along_the_road(estimate: Estimate) -> dict[str, object]:
 
 
 def denser_text(estimate: Estimate) -> str:
-    """Say where much denser fog is ahead; empty if nowhere.
-
-    Parameters
-    ----------
-    estimate : Estimate
-        The estimate.
-    """
+    """Where much denser fog is ahead; empty if nowhere."""
     return "" if estimate.denser is None else f"denser beyond {estimate.denser.distance:.0f} m"
 
 

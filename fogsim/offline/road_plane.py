@@ -26,30 +26,15 @@ MOST_STEPS = 30
 
 @dataclass(frozen=True, slots=True)
 class RoadPlane:
-    """A flat road without end under a camera, and nothing else before the sky.
-
-    Attributes
-    ----------
-    calibration : Calibration
-        The camera: its mount height, pitch, roll and lens tell where the road is; its yaw changes no distance.
-    """
+    """An infinite flat road under a camera, with only sky above the horizon; the yaw changes no distance."""
 
     calibration: Calibration
 
     def distance(self) -> Floats:
-        """Distance along each pixel's ray to the road.
+        """Distance along each pixel's ray to the road (rows, cols) [m]; ``inf`` at and above the horizon.
 
-        A ray d of unit length that points down meets the road at H / −d_z.
-
-        Returns
-        -------
-        (rows, cols) float64
-            Distances [m]; ``inf`` at and above the horizon.
-
-        Raises
-        ------
-        InputError
-            If the horizon is not within the image, or the lens shows some pixel by no ray.
+        A ray d of unit length that points down meets the road at H / −d_z. InputError if the horizon is outside the
+        image, or the lens has no ray for a pixel.
         """
         camera, sine = self.calibration.camera, self.sines()
         road = sine < 0.0
@@ -62,13 +47,7 @@ class RoadPlane:
         return np.where(road, camera.mount_height / np.where(road, -sine, 1.0), math.inf)
 
     def sines(self) -> Floats:
-        """Sines of the elevations of the pixels' rays, (rows, cols).
-
-        Raises
-        ------
-        InputError
-            If the lens shows some pixel by no ray.
-        """
+        """Sines of the elevations of the pixels' rays, (rows, cols); InputError if the lens has no ray for a pixel."""
         camera = self.calibration.camera
         right, down = _unbent_rays(self.calibration)
         across, lower, ahead = camera_axes(camera, CameraPose((0.0, 0.0, camera.mount_height), 0.0))[:, 2].tolist()
@@ -124,23 +103,9 @@ def _bent(
 
 
 def told_camera(image: Path, horizon_row: float, focal_length: float, mount_height: float) -> Calibration:
-    """Calibration of a pinhole without roll of which the least is known that a flat road needs.
+    """Minimal calibration for a flat road: a pinhole without roll, its principal point in the image's middle.
 
-    Parameters
-    ----------
-    image : Path
-        An image or a video of the camera, which tells the size; its middle is taken for the principal point.
-    horizon_row : float
-        Row of the horizon [px].
-    focal_length : float
-        Focal length [px].
-    mount_height : float
-        Height of the camera above the road [m].
-
-    Raises
-    ------
-    InputError
-        If the image cannot be read or a value is impossible.
+    The image or video gives the size; horizon row and focal length are in px, mount height above the road in m.
     """
     for option, value, unit in (("--focal-length", focal_length, "pixels"), ("--mount-height", mount_height, "metres")):
         if not (value > 0.0 and math.isfinite(value)):

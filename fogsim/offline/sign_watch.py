@@ -167,13 +167,7 @@ class SignWatch:
         return Sign(sign.sign_id, sign.kind, sign.value, (float(x), float(y), sign.height), heading, sign.diameter)
 
     def _nearest_positions(self, path: Path) -> NDArray[np.intp]:
-        """Number of the track's position nearest to each sign.
-
-        Raises
-        ------
-        InputError
-            If no sign is near any position.
-        """
+        """Index of the track position nearest to each sign; InputError if no sign is near the track."""
         distance, nearest = _apart(self._track, self._longitude, self._latitude)
         if distance.min() > REACH:
             swapped, _ = _apart(self._track, self._latitude, self._longitude)

@@ -43,22 +43,10 @@ class _Record(BaseModel, strict=True):
 
 
 class DatasetDirectory:
-    """The directory of one data set, new or to be continued.
+    """The directory of one data set, new or to be continued, with one writer at a time.
 
-    A frame is there when its record is, which is written after its images. It has one writer at a time, and replaces
-    no file but its own.
-
-    Parameters
-    ----------
-    path : Path
-        The directory; it is made with its parents if it is not there.
-    identity : mapping
-        What the data set is of; JSON values only.
-
-    Raises
-    ------
-    InputError
-        If the path is no directory, is written by another process, or holds something else than this data set.
+    A frame is complete when its record is written, after its images; only the data set's own files are replaced.
+    `identity` is JSON data, and InputError is raised if the directory holds anything else.
     """
 
     def __init__(self, path: Path, identity: Mapping[str, Any]) -> None:
@@ -114,35 +102,14 @@ class DatasetDirectory:
         return all(self._layer(layer, number).is_file() for layer in LAYERS) and self._found(number) is not None
 
     def beyond(self, frames: int) -> int:
-        """How many frames there are in all, where they are more than these; else 0.
-
-        Parameters
-        ----------
-        frames : int
-            How many are wanted.
-        """
+        """Number of all frames if there are more than `frames`, otherwise 0."""
         numbers = [int(p.stem) for p in (self.path / _RECORDS).glob("[0-9]*.json") if p.stem.isdecimal()]
         return len(numbers) if any(number >= frames for number in numbers) else 0
 
     def write(
         self, number: int, layers: Mapping[str, NDArray[np.uint8] | NDArray[np.uint16]], record: Mapping[str, Any]
     ) -> None:
-        """Write a frame: its images, and then its record with their names.
-
-        Parameters
-        ----------
-        number : int
-            Its place in the data set, from 0.
-        layers : mapping
-            An image for each of `LAYERS`.
-        record : mapping
-            Its "image" and "annotations".
-
-        Raises
-        ------
-        InputError
-            If one of its files is there and is another: it is not of this data set, or was changed.
-        """
+        """Write a frame: its images, then its record; InputError if one of its files exists with other content."""
         for layer in LAYERS:
             path, data = self._layer(layer, number), png(layers[layer])
             if path.exists() and read_bytes(path) != data:
@@ -153,13 +120,7 @@ class DatasetDirectory:
         write_json(self._record(number), {**record, "image": {**self._names(number), **record["image"]}})
 
     def record(self, number: int) -> dict[str, Any]:
-        """Record of a frame that `has` reports.
-
-        Raises
-        ------
-        InputError
-            If it has been damaged since.
-        """
+        """Record of a frame that `has` reports; InputError if it is damaged."""
         found = self._found(number)
         if found is None:
             raise InputError(f"{self._record(number)}: damaged; the same command makes its frame again")
@@ -180,13 +141,7 @@ class DatasetDirectory:
         return {_key(layer): self._layer(layer, number).relative_to(self.path).as_posix() for layer in LAYERS}
 
     def write_annotations(self, annotations: Mapping[str, Any]) -> None:
-        """Write the COCO file, in place of one that is there.
-
-        Parameters
-        ----------
-        annotations : mapping
-            Its content; JSON values only.
-        """
+        """Write the COCO file, replacing an existing one."""
         write_json(self.path / ANNOTATIONS, annotations)
 
     def _layer(self, layer: str, number: int) -> Path:

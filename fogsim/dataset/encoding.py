@@ -77,18 +77,7 @@ def decoded_transmission(values: NDArray[np.uint16]) -> NDArray[np.float64]:
 
 
 def png(image: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
-    """PNG file of an image.
-
-    Parameters
-    ----------
-    image : (rows, cols) or (rows, cols, 3) uint8 or uint16
-        Pixel values, red first; all their bits are kept.
-
-    Raises
-    ------
-    FogSimError
-        If it cannot be encoded.
-    """
+    """PNG file of an image (rows, cols[, 3]), red first, with all its bits."""
     # OpenCV has blue first.
     pixels: NDArray[Any] = image if image.ndim == 2 else np.ascontiguousarray(image[..., ::-1])
     done, data = cv2.imencode(".png", pixels, [cv2.IMWRITE_PNG_COMPRESSION, _COMPRESSION])

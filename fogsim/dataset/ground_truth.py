@@ -47,13 +47,7 @@ _OF_TYPE = {
 
 
 def vehicle_class(body: str) -> SemanticClass:
-    """Class of a vehicle by its body kind in the traffic state.
-
-    Parameters
-    ----------
-    body : str
-        One of `TrafficState.types`.
-    """
+    """Class of a vehicle by its body, one of `TrafficState.types`."""
     return _OF_TYPE.get(body, SemanticClass.OTHER_VEHICLE)
 
 

@@ -61,18 +61,7 @@ def compile_command() -> None:
 
 
 def compile_kernels() -> Iterator[str]:
-    """Compile what drives by day and by night need, and keep it on disk; what is compiled already costs seconds.
-
-    Yields
-    ------
-    str
-        What is ready, as soon as it is.
-
-    Raises
-    ------
-    FogSimError
-        If a part of the loop does not work here.
-    """
+    """Compile and cache the kernels of drives by day and by night; yield a description of each finished part."""
     from fogsim.jit import processors
 
     with ProcessPoolExecutor(min(2, processors()), multiprocessing.get_context("spawn"), _be_quiet) as pool:
@@ -145,17 +134,7 @@ def _estimate_visibility() -> None:
 
 
 def read_foggy_road(method: str, parameters: Mapping[str, Any], size: Sequence[int]) -> "list[Estimate]":
-    """Let a method read pictures of a foggy road by day, and say what it makes of each.
-
-    Parameters
-    ----------
-    method : str
-        Its name.
-    parameters : mapping
-        Its own.
-    size : (2,) sequence of int
-        Width and height of the pictures [px].
-    """
+    """Estimates of a method from synthetic images of a foggy road by day, of a width and height [px]."""
     from fogsim.estimators import ESTIMATORS
     from fogsim.values import Camera
 
@@ -165,17 +144,7 @@ def read_foggy_road(method: str, parameters: Mapping[str, Any], size: Sequence[i
 
 
 def fuse_estimates(fusion: str, parameters: Mapping[str, Any], estimates: "Sequence[Sequence[Estimate]]") -> None:
-    """Let a fusion take in what methods said of the pictures that they read.
-
-    Parameters
-    ----------
-    fusion : str
-        Its name.
-    parameters : mapping
-        Its own.
-    estimates : sequence of sequence of Estimate
-        Of each method, of each picture.
-    """
+    """Pass each method's estimates to a fusion, image by image."""
     from fogsim.fusion import fuse, make
 
     chosen = make(fusion, **parameters)
@@ -305,9 +274,9 @@ def _cross_a_footway() -> None:
 
 
 def _foggy_road(camera: "Camera", lead: float, visibility: float = 120.0, bank: float = _SKY) -> "NDArray[np.uint8]":
-    """Picture of a straight road in fog with lane marks and a dark vehicle ahead: (rows, cols, 3) uint8.
+    """Image of a straight road in fog with lane marks and a dark vehicle ahead: (rows, cols, 3) uint8.
 
-    From `bank` [m] on the fog is five times as dense.
+    From `bank` [m] on, the fog is five times as dense.
     """
     import numpy as np
 

@@ -1,7 +1,6 @@
-"""A first run compiles in two processes: its own, which draws, and one beside it, which reads pictures.
+"""A first run compiles in two processes: its own renders, and a second one runs estimators and fusion.
 
-What each method asks of pictures, and what makes a belief of it, shares hardly a kernel with what draws them, and takes
-half of the time.
+Estimators and fusion share hardly a kernel with rendering, and take half of the time.
 """
 
 import importlib
@@ -27,14 +26,9 @@ _ENDS_WITHIN = 5.0
 
 @contextmanager
 def compiling_beside() -> Iterator[Callable[["Scenario"], None]]:
-    """Start another process, if nothing of what it compiles is kept on the disk yet.
+    """Start the second process, if its kernels are not cached yet; yield a function that passes it a scenario.
 
-    It is started before a scenario is loaded, so that it has loaded what it needs when it hears of one.
-
-    Yields
-    ------
-    tell : callable
-        Gets the scenario that is about to be run: what its methods and its fusion need is compiled there.
+    It is started before a scenario is loaded, so that its imports are done when the scenario arrives.
     """
     process = _started()
     if process is None:
@@ -110,15 +104,10 @@ def _is_first() -> bool:
 
 
 def read_pictures(parent: int) -> None:
-    """Let methods read pictures, and fuse what they say, until all that they need is on the disk.
+    """Run estimators and a fusion on images until their kernels are cached: the second process's part.
 
-    The other process's part. What it is to do comes as JSON on its standard input: size of the pictures, methods with
-    their parameters, and a fusion.
-
-    Parameters
-    ----------
-    parent : int
-        Process for which it is done: nobody needs it any more when that has ended.
+    Standard input has JSON: size of the images, methods with their parameters, and a fusion. It ends when the process
+    `parent` has ended.
     """
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     from fogsim.cli.compile import fuse_estimates, read_foggy_road, read_own_beams

@@ -17,9 +17,9 @@ LARGEST = 2**63 - 1
 
 
 def check_values(app: typer.Typer) -> None:
-    """Let every command refuse numbers outside ``min`` and ``max`` of their option, NaN among them, and empty paths.
+    """Make every command refuse numbers outside ``min`` and ``max`` of their option, NaN included, and empty paths.
 
-    An empty string, as from an unset variable of a shell, would otherwise be the current directory.
+    An empty string, as from an unset shell variable, would otherwise be the current directory.
     """
     for command in app.registered_commands:
         for parameter in signature(command.callback or check_values).parameters.values():
@@ -95,13 +95,7 @@ def _refuse(name: str, expected: str, given: object) -> NoReturn:
 
 
 def pixel_values(text: str) -> tuple[float, ...]:
-    """Value of ``--airlight``: a pixel value, or three with commas between them.
-
-    Raises
-    ------
-    InputError
-        If it is something else.
-    """
+    """Value of ``--airlight``: a pixel value, or three separated by commas."""
     try:
         values = tuple(float(part) for part in text.split(","))
     except ValueError:

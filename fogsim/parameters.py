@@ -40,16 +40,9 @@ _COLLECTIONS: Mapping[Any, tuple[type, ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """Numbers that a parameter may have, both ends included: ``Annotated[float, Range(0.0, 60.0, "s")]``.
+    """Range of a parameter, both ends included: ``Annotated[float, Range(0.0, 60.0, "s")]``.
 
-    Attributes
-    ----------
-    least, most : float
-        The ends, in the unit.
-    unit : str
-        The unit, as it is to appear in messages; empty for a pure number.
-    or_nan : bool
-        Whether NaN, for an unknown value, is allowed too.
+    The ends are in the unit, which messages show; `or_nan` also allows NaN, for an unknown value.
     """
 
     least: float = -sys.float_info.max
@@ -74,8 +67,7 @@ def checked_parameters(target: C) -> C:
 
     Checked are numbers (``float`` is finite unless a `Range` in ``Annotated`` allows more), ``bool``, ``str``,
     ``Literal``, the names of a ``StrEnum``, arrays by their type, instances of classes, callables, and unions,
-    sequences, iterables, tuples and mappings of all these. An unknown, missing or surplus argument raises InputError
-    too.
+    sequences, iterables, tuples and mappings of all these. Unknown, missing and surplus arguments raise InputError too.
     """
     call: Callable[..., Any] = target.__init__ if isinstance(target, type) else target  # type: ignore[misc]
     who = target.__name__ if isinstance(target, type) else f"{target.__name__}()"
@@ -139,15 +131,7 @@ def _call_mistake(
 
 
 def accepted_parameters(factory: Callable[..., object], given_elsewhere: Collection[str] = ()) -> dict[str, Any]:
-    """`inspect.Parameter` by name of all that a factory takes by keyword.
-
-    Parameters
-    ----------
-    factory : callable
-        A class or function.
-    given_elsewhere : collection of str
-        Those that are left out.
-    """
+    """`inspect.Parameter` by name of a factory's keyword parameters, without those `given_elsewhere`."""
     return {
         name: parameter
         for name, parameter in inspect.signature(factory, eval_str=True).parameters.items()
@@ -164,16 +148,7 @@ def parameter_mistakes(
 ) -> Iterator[tuple[str, str]]:
     """Name and mistake of every parameter that does not fit a factory's signature.
 
-    Parameters
-    ----------
-    factory : callable
-        What would be called.
-    given : mapping
-        Its parameters by name.
-    given_elsewhere : collection of str
-        Those that it is given by its caller, and that are none of the user's.
-    classes : bool
-        As of `check_of`.
+    Parameters `given_elsewhere` come from the caller and may not be set; `classes` is as in `check_of`.
     """
     known = accepted_parameters(factory, given_elsewhere)
     for name, value in given.items():
@@ -189,33 +164,19 @@ def parameter_mistakes(
 
 
 def mismatch(annotation: object, value: object) -> str | None:
-    """What a value had to be by an annotation; None if it is, or if the annotation is none of those that are checked.
+    """What an annotation expects of a value that does not fit; None if it fits or is not checked.
 
-    Parameters
-    ----------
-    annotation : object
-        Of a parameter; see `checked_parameters`. Classes are not checked: what a file gives may be converted.
-    value : object
-        What was given.
-
-    Examples
-    --------
-    >>> mismatch(Annotated[float, Range(0.0, 1.0)], 7)
-    'a number 0 … 1'
+    Classes are not checked, since values from files may be converted: ``mismatch(Annotated[float, Range(0.0, 1.0)],
+    7)`` is ``'a number 0 … 1'``.
     """
     check = check_of(annotation, classes=False)
     return None if check is None else check(value)
 
 
 def check_of(annotation: Any, *, classes: bool) -> Check | None:
-    """Check by an annotation: from a value to what it had to be, or None if it is; None where nothing is checked.
+    """Function from a value to what an annotation expects, or None if it fits; None if nothing is checked.
 
-    Parameters
-    ----------
-    annotation : object
-        Of a parameter; see `checked_parameters`.
-    classes : bool
-        Whether instances of classes, arrays and callables are checked.
+    `classes` includes instances of classes, arrays and callables.
     """
     origin, parts = get_origin(annotation), get_args(annotation)
     check = _plain_check(annotation, FINITE)

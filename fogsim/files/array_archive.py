@@ -1,4 +1,4 @@
-"""Reading numpy's archives that someone else wrote (``.npz``)."""
+"""Reading untrusted archives of numpy arrays (``.npz``)."""
 
 import io
 import zipfile

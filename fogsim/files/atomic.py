@@ -17,10 +17,10 @@ from typing import BinaryIO
 from fogsim.errors import InputError
 
 PARTIAL_SUFFIX = ".part"
-"""What the name of a file ends in until it is whole."""
+"""Suffix of a file's name until it is complete."""
 
 _LEAST_RESERVE = 2**18
-"""Room that a reserve keeps in any case [bytes]."""
+"""Minimum size of a reserve [bytes]."""
 
 _MOST_LINKS = 40
 """Links that Linux follows in one path."""
@@ -37,7 +37,7 @@ def final_path(path: Path) -> Path:
 
 
 def partial_path(path: Path) -> Path:
-    """Where a file is written until it is whole: its name, or that of its link's target, with ``.part`` behind it."""
+    """Temporary path of an incomplete file: its name, or that of its link's target, with ``.part`` appended."""
     final = final_path(path)
     return final.with_name(final.name + PARTIAL_SUFFIX)
 
@@ -49,7 +49,7 @@ def publish(path: Path) -> None:
         replaced = final.stat()
         if not stat.S_ISREG(replaced.st_mode):
             raise InputError(f"{path} is not a regular file, and is not replaced")
-        # Who may not give files away keeps the new one.
+        # Without the right to change the owner, the new owner stays.
         with contextlib.suppress(PermissionError):
             os.chown(part, replaced.st_uid, replaced.st_gid)
         part.chmod(stat.S_IMODE(replaced.st_mode))
@@ -57,7 +57,7 @@ def publish(path: Path) -> None:
 
 
 def open_descriptor(path: Path) -> int | None:
-    """Number of the file, open in this process, that a path stands for, as /dev/stdout does; None for other paths."""
+    """Descriptor of this process that a path names, as /dev/stdout does; None for other paths."""
     for _ in range(_MOST_LINKS):
         # On Linux /dev/fd is a link to the former.
         folders = (os.path.realpath("/proc/self/fd"), "/dev/fd")
@@ -70,7 +70,7 @@ def open_descriptor(path: Path) -> int | None:
 
 
 def is_stream(path: Path) -> bool:
-    """Whether what is written to a path goes through it: a pipe, a terminal, another device, /dev/stdout."""
+    """Whether a path is written to directly: a pipe, a terminal, another device, /dev/stdout."""
     if open_descriptor(path) is not None:
         return True
     try:
@@ -90,7 +90,7 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
     part = partial_path(path)
     try:
         with naming(part):
-            # It may be a link.
+            # The path may be a link.
             part.unlink(missing_ok=True)
             with part.open("wb") as file:
                 yield file
@@ -105,7 +105,7 @@ def _opened_stream(path: Path) -> BinaryIO:
     descriptor = open_descriptor(path)
     if descriptor is None:
         return path.open("wb")
-    # The file that stdout is redirected to would be cut off if it were opened by its name.
+    # Opening the file behind stdout by its name would truncate it.
     for printed in (sys.stdout, sys.stderr):
         if printed is not None:
             printed.flush()
@@ -158,5 +158,5 @@ class Reserve:
             file.write(bytes(size))
 
     def release(self) -> None:
-        """Give the room back; twice does nothing."""
+        """Release the space; may be called twice."""
         self._path.unlink(missing_ok=True)

@@ -10,7 +10,7 @@ from fogsim.files.cache_entries import keep_newest, read_entry, replace_file, wr
 from fogsim.files.readers import read_bytes
 from fogsim.files.user_cache import VARIABLE, cache_directory
 
-_MOST_KEPT = 200  # of each kind; the oldest go
+_MOST_KEPT = 200  # of each type; the oldest are removed
 _LARGEST_SOURCE = 2**29  # [bytes]
 
 

@@ -1,4 +1,4 @@
-"""What output options name: a target that cannot be written is refused before the work begins."""
+"""Checks of output options: a target that cannot be written is refused before the work begins."""
 
 import contextlib
 import errno
@@ -66,7 +66,7 @@ def refuse_clashes(files: Mapping[str, Path], folders: Mapping[str, Path]) -> No
 
 @contextlib.contextmanager
 def _one_error(named: str) -> Iterator[None]:
-    """Tell what the operating system refuses as an InputError."""
+    """Raise what the operating system refuses as an InputError."""
     try:
         yield
     except InputError:
@@ -93,7 +93,7 @@ def _refuse_unwritable_stream(path: Path, named: str, seeks: bool) -> None:
 
 
 def _refuse_unmakeable(target: Path, named: str, makes_folder: bool) -> None:
-    """Refuse a file whose folder cannot be made or written, or whose name is too long."""
+    """Refuse a file whose folder cannot be created or written, or whose name is too long."""
     there = next((one for one in target.parents if os.path.lexists(one)), Path())
     if not there.is_dir():
         raise InputError(f"{named}: {there} is not a folder")
@@ -104,6 +104,6 @@ def _refuse_unmakeable(target: Path, named: str, makes_folder: bool) -> None:
         raise OSError(errno.ENAMETOOLONG, os.strerror(errno.ENAMETOOLONG))
     with contextlib.suppress(FileNotFoundError):
         target.lstat()  # fails for a path that is too long
-    # Permissions do not tell of a file system that is read-only, or for root of any.
+    # Permissions do not show a read-only file system, and for root they show nothing.
     with tempfile.TemporaryFile(dir=there):
         pass

@@ -1,4 +1,4 @@
-"""Reading files that someone else wrote: regular files only, of limited size, and one error for all that is wrong."""
+"""Reading untrusted files: regular files only, of limited size, with one error for all faults."""
 
 import json
 import math
@@ -11,10 +11,10 @@ from typing import Any, NoReturn
 from fogsim.errors import InputError, shown
 
 MOST_BYTES = 64 * 2**20
-"""Largest file that is read whole, unless a reader has a limit of its own [bytes]."""
+"""Default limit of files that are read whole [bytes]."""
 
 FARTHEST = 1e8
-"""Largest number that a file can hold where nothing narrower is known: coordinates of UTM reach 1e7 m."""
+"""Largest number in a file without a narrower limit: UTM coordinates reach 1e7 m."""
 
 
 def open_regular(path: Path) -> BufferedReader:
@@ -36,7 +36,7 @@ def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
     """Content of a regular file of at most `most` bytes."""
     try:
         with open_regular(path) as file:
-            # Asking for `most` at once would allocate it.
+            # Reading `most` at once would allocate it.
             size = os.fstat(file.fileno()).st_size
             content = file.read(min(size, most) + 1)
             if len(content) > size:  # files in /proc have no size

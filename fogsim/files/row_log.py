@@ -1,4 +1,4 @@
-"""Rows in a file that can be read however the process ends that writes it."""
+"""Rows in a file that stays readable however its process ends."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -33,9 +33,9 @@ class RowLog:
 
     def _write(self, data: Any) -> None:
         rest = memoryview(data)
-        # Not kept open: how a recorder is left is not in its hands.
+        # Not kept open, since a recorder may be abandoned at any time.
         with naming(self.path), self.path.open("r+b", buffering=0) as file:
-            # Whatever an interruption has left of the rows before is written over.
+            # Overwrites what an interruption left of earlier rows.
             file.seek(self._whole)
             try:
                 while rest:
@@ -46,11 +46,11 @@ class RowLog:
         self._whole += data.size
 
     def release_reserve(self) -> None:
-        """Give back the room that was kept."""
+        """Release the reserved space."""
         self._reserve.release()
 
     def remove(self) -> None:
-        """Remove the file; twice does nothing."""
+        """Remove the file; may be called twice."""
         self._reserve.release()
         self.path.unlink(missing_ok=True)
 
@@ -63,9 +63,9 @@ def row_schema(path: Path) -> Any:
 
 def row_batches(path: Path) -> Iterator[Any]:
     """Batches of rows of a log (pyarrow.RecordBatch) up to where it was cut off."""
-    # Opened here, for Arrow takes no name that is not UTF-8.
+    # Opened here, since Arrow accepts only names in UTF-8.
     with path.open("rb") as file:
-        # What cannot be read is the end of a log that was cut off.
+        # Unreadable data is the end of a log that was cut off.
         reader = _reader(path, file)
         while True:
             try:

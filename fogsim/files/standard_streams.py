@@ -1,4 +1,4 @@
-"""Standard streams of a process that was started without them, as daemons are and commands with ``>&-``."""
+"""Standard streams of a process that was started without them, such as a daemon or a command with ``>&-``."""
 
 import os
 import sys
@@ -13,7 +13,7 @@ def open_standard_streams() -> None:
         try:
             os.fstat(descriptor)
         except OSError:
-            # The lowest free number, which is this one; children inherit it like any standard stream.
+            # This is the lowest free number; children inherit it like any standard stream.
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
         if getattr(sys, name) is None:
             mode = "w" if descriptor else "r"

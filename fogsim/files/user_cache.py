@@ -1,11 +1,11 @@
-"""Where what can be made again is kept between runs."""
+"""The cache directory of the user."""
 
 import os
 import sys
 from pathlib import Path
 
 VARIABLE = "FOGSIM_CACHE_DIR"
-"""Name of the environment variable that names another directory."""
+"""Environment variable with another directory."""
 
 
 def cache_directory() -> Path:

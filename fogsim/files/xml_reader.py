@@ -24,21 +24,21 @@ MOST_ELEMENTS = 2_000_000
 """Most elements of a file that is kept as a tree; they take half a gigabyte."""
 
 DEEPEST, MOST_ATTRIBUTES = 100, 1000
-"""Most elements inside one another, and most attributes of one."""
+"""Maximum depth of elements, and of attributes per element."""
 
 LONGEST_TAG = 2**23
 """Longest tag or comment [bytes]; expat reads one again with each chunk."""
 
 _CHUNK = 2**16
 _HEAD = 2**12
-"""The first chunk is smaller, for those who want to know the first element only [bytes]."""
+"""The first chunk is smaller, for readers of only the first element [bytes]."""
 
 _MOST_BEFORE_ROOT = 2**20
 _MOST_SHOWN, _MOST_ROOTS_SHOWN = 80, 2  # characters of a tag in a message, and expected first elements
 _ENCODING = re.compile(rb"""(?:\xef\xbb\xbf)?<\?xml[^>]*?\sencoding\s*=\s*["']([^"'>]*)["']""")
 _BUILT_IN = frozenset(("utf-8", "utf-16", "iso-8859-1", "us-ascii"))
 _PROBE = rb"<a b='\u0041-1'/>"
-"""Bytes that an encoding must leave as they are, since the declaration that names it has been read as ASCII."""
+"""Bytes that an encoding must map to ASCII, since the declaration that names it was read as ASCII."""
 
 
 class ElementReader(Protocol):
@@ -46,7 +46,7 @@ class ElementReader(Protocol):
 
     @property
     def is_done(self) -> bool:
-        """True when the rest of the file does not matter."""
+        """True when the rest of the file is not needed."""
         ...
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
@@ -60,7 +60,7 @@ class ElementReader(Protocol):
 
 @contextmanager
 def open_unpacked(path: Path) -> Iterator[IO[bytes]]:
-    """Open a regular file, packed by gzip or not; damage found while it is read is an `InputError`."""
+    """Open a regular file, compressed by gzip or not; damage found while reading is an `InputError`."""
     with open_regular(path) as plain:
         is_packed = plain.read(2) == b"\x1f\x8b"
         plain.seek(0)
@@ -79,7 +79,7 @@ class XmlFile:
 
     @property
     def line(self) -> int:
-        """Line of the element that is being read."""
+        """Line of the current element."""
         return self._parser.CurrentLineNumber
 
     def read(
@@ -179,7 +179,7 @@ class XmlFile:
 
 
 def read_elements(path: Path, reader: ElementReader, most_bytes: int) -> int:
-    """Show the elements of a file to a reader; see `XmlFile.read`."""
+    """Pass the elements of a file to a reader; see `XmlFile.read`."""
     return XmlFile(path).read(reader, most_bytes)
 
 
@@ -200,7 +200,7 @@ def root_tag(path: Path, *roots: str) -> str:
 
 
 class _RootReader:
-    """Looks at the first element."""
+    """Reads only the first element."""
 
     def __init__(self, path: Path, roots: tuple[str, ...]) -> None:
         self._path = path
@@ -223,7 +223,7 @@ class _RootReader:
 
 
 class _TreeBuilder(_RootReader):
-    """Keeps all elements."""
+    """Builds a tree of all elements."""
 
     is_done = False
 

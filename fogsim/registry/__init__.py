@@ -1,4 +1,4 @@
-"""A registry: one mapping from names to factories per kind; docs, command line and schema read it."""
+"""A registry: one mapping from names to factories per type; docs, command line and schema read it."""
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -54,7 +54,7 @@ class Registry(Mapping[str, T]):
 
     @property
     def known(self) -> list[str]:
-        """Names of all entries, and of what installed packages announce; sorted."""
+        """Sorted names of all entries and of installed packages' entry points."""
         return sorted({*self._entries, *(announced(self._group) if self._group else ())})
 
     def find(self, name: str, folder: Path | None = None, time_limit: float | None = None) -> T:
@@ -83,7 +83,7 @@ class Registry(Mapping[str, T]):
         return self.find(name, folder)
 
     def version(self, name: str, folder: Path | None = None) -> str | None:
-        """Version of a user's method; None for FogSim's, and for those that a program has registered itself."""
+        """Version of a user's method; None for FogSim's own and for registered ones."""
         return None if name in self._entries else version_of(name, self._group, folder)
 
     def _guarded(self, name: str, cls: Any, time_limit: float | None) -> T:

@@ -11,11 +11,11 @@ from fogsim.errors import InputError
 
 
 class TimeLimitError(BaseException):
-    """A call took too long; no `except Exception` of the code that is called stops it."""
+    """A call took too long; `except Exception` in the called code does not catch it."""
 
 
 _GRACE = 5.0
-"""Time after a limit at which a process ends that compiled code keeps from raising an error [s]."""
+"""Grace period after a limit before a process ends in which compiled code blocks the error [s]."""
 
 
 @contextlib.contextmanager
@@ -36,7 +36,7 @@ def time_limit(seconds: float) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        # Its own alarm, by which a lost signal comes again, goes on.
+        # Its alarm, which repeats a lost signal, continues.
         raise
     except BaseException:
         signal.setitimer(signal.ITIMER_REAL, 0.0)

@@ -1,4 +1,4 @@
-"""A YAML file as plain data that remembers on which line each key stands; single keys put in place of the file's."""
+"""A YAML file as plain data with the line of each key, and overrides of single keys."""
 
 import copy
 from collections.abc import Iterable, Mapping
@@ -19,15 +19,15 @@ TAKES_THE_PLACE_OF = {
     ("traffic", "config"): ("net", "routes", "additional"),
     ("traffic", "net"): ("config",),
 }
-"""Setting the key on the left leaves out those beside it that exclude it: ``--set fog.visibility_m=80`` makes the fog
-homogeneous whatever kind the file has."""
+"""Setting the key on the left removes the keys that exclude it: ``--set fog.visibility_m=80`` makes any fog
+homogeneous."""
 
 _FOREIGN, _TIMELINE = "scenario", "timeline"
 
 _SET = "--set "
 
 _LONGEST_SHOWN = 200
-"""Most characters of an override that a message repeats."""
+"""Maximum length of an override in messages."""
 
 
 def _shown_override(text: str) -> str:
@@ -36,7 +36,7 @@ def _shown_override(text: str) -> str:
 
 
 def _override_path(text: str) -> KeyPath:
-    """Key path of a well-formed override; a number in it is a place in a list."""
+    """Key path of a well-formed override; a number in it is a list index."""
     return tuple(int(key) if _is_place(key) else key for key in text.partition("=")[0].strip().split("."))
 
 
@@ -75,7 +75,7 @@ def _set(data: dict[str, Any], path: tuple[str, ...], value: object, text: str) 
     block: Any = data
     for depth, key in enumerate(path[:-1]):
         place = key if isinstance(block, dict) else _place(block, key, path[: depth + 1], text)
-        # A block of which the file has but the name is an empty one.
+        # A block without content is an empty one.
         if isinstance(block, dict) and block.get(key) is None:
             block[key] = {}
         block = block[place]
@@ -124,11 +124,11 @@ class Document:
         return str(self.path)
 
     def is_overridden(self, key_path: KeyPath) -> bool:
-        """Whether a key's value is that of an override."""
+        """Whether an override set a key."""
         return self.where(key_path).startswith(_SET)
 
     def is_written(self, key_path: KeyPath) -> bool:
-        """Whether a key stands in a file of FogSim's or an override, not in an OpenSCENARIO file or a program."""
+        """Whether a key is from a file of FogSim's or an override, not from an OpenSCENARIO file or a program."""
         origin = self.where(key_path)
         return origin != str(self.path) and not is_openscenario(Path(origin.rpartition(":")[0]))
 
@@ -176,7 +176,7 @@ def _read_openscenario(path: Path) -> Document:
 
 
 def _upon_openscenario(document: Document) -> Document:
-    """A document upon the OpenSCENARIO file that it names; its timeline comes after that of the file."""
+    """A document on top of the OpenSCENARIO file that it names; its timeline follows that of the file."""
     named = document.data[_FOREIGN]
     path = document.path.parent / str(named)
     if not isinstance(named, str) or not is_openscenario(path):
@@ -193,14 +193,14 @@ def _upon_openscenario(document: Document) -> Document:
                 origins[(block, first + place, *rest)] = origin
             case _:
                 origins[key] = origin
-    # What a file asks for by itself is that its events come; a test says what it asks for.
+    # The file's own expectation is that its events happen; a test states its own.
     data = _laid_upon({**below.data, "expect": {}}, own)
     data[_TIMELINE] = [*below.data[_TIMELINE], *further] if isinstance(further, list) else further
     return Document(document.path, data, origins)
 
 
 def _laid_upon(below: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
-    """Blocks of which the upper ones' keys count; a fog is another fog as a whole."""
+    """Merge blocks, with the keys of the upper ones first; a fog is replaced as a whole."""
     data = dict(below)
     for key, value in own.items():
         under = data.get(key)

@@ -1,4 +1,4 @@
-"""YAML to plain data in which numbers are what they look like, within limits of size, depth and count."""
+"""YAML to plain data, with numbers as they are written, within limits of size, depth and count."""
 
 import re
 from typing import Any
@@ -14,13 +14,13 @@ MOST_BYTES = 1_000_000
 """Largest text that is read."""
 
 MOST_NODES = 20_000
-"""Most keys and values, those that aliases repeat counted every time."""
+"""Maximum number of keys and values, with repetitions by aliases."""
 
 DEEPEST = 40
-"""Most blocks and lists inside one another."""
+"""Maximum depth of blocks and lists."""
 
 MOST_DIGITS = 300
-"""Most characters of a number."""
+"""Maximum length of a number."""
 
 MERGE = "tag:yaml.org,2002:merge"
 TEXT = "tag:yaml.org,2002:str"
@@ -59,7 +59,7 @@ def _whole_number(_: yaml.SafeLoader, node: yaml.ScalarNode) -> int | float:
     return int(node.value)
 
 
-# Those of YAML 1.1 would come first.
+# Those of YAML 1.1 would take precedence.
 _Loader.yaml_implicit_resolvers = {}
 _Loader.add_implicit_resolver(
     "tag:yaml.org,2002:bool", re.compile(r"(?i:yes|no|true|false|on|off)\Z"), list("yYnNtTfFoO")
@@ -101,7 +101,7 @@ def parse_yaml(text: str) -> tuple[Any, dict[KeyPath, int]]:
 
 
 class _Walk:
-    """Every node as often as aliases show it: notes the lines of keys and makes all keys text."""
+    """Visit every node as often as aliases repeat it: record the lines of keys and convert all keys to text."""
 
     def __init__(self, lines: dict[KeyPath, int]) -> None:
         self._lines, self._nodes = lines, 0

@@ -138,10 +138,10 @@ class Section(BaseModel):
 
 
 GIVEN_BY_THE_LOOP = frozenset({"camera"})
-"""Constructor arguments that the loop hands in, so no scenario sets them."""
+"""Constructor arguments that the loop passes, so that no scenario sets them."""
 
 MISTAKE = "parameter"
-"""Type of the errors of parameters, whose messages say all."""
+"""Type of the errors of parameters, whose messages are complete."""
 
 
 class Method(BaseModel):
@@ -162,7 +162,7 @@ def method_of(registry: Registry[Callable[..., Any]]) -> BeforeValidator:
             try:
                 factory = registry.find_if_allowed(written["method"], **(info.context or {"folder": None}))
             except InputError as error:
-                # Only a plain ValueError is a message to pydantic's user.
+                # pydantic shows only a plain ValueError's message.
                 raise ValueError(str(error)) from None
             if factory is not None:
                 _check_parameters(factory, written.get("parameters"))

@@ -1,4 +1,4 @@
-"""A scenario of one's own, begun from one that is there."""
+"""Creating a scenario of your own from an existing one."""
 
 import re
 import shutil
@@ -20,7 +20,7 @@ _HEAD = """\
 """
 
 SCHEMA_FILE = "fogsim.schema.json"
-"""File by which editors complete and check a scenario's keys."""
+"""File with which editors complete and check a scenario's keys."""
 
 
 def begin_scenario(name: str, source: str, parent: Path) -> tuple[Path, ...]:

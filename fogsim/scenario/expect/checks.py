@@ -1,4 +1,4 @@
-"""What of a scenario's expectations its run could not tell, and the names that stand in them."""
+"""Expectations of a scenario that its run could not evaluate, and the names in them."""
 
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from fogsim.scenario.schema import Scenario
 
 MOST_SHOWN = 5
-"""Most metrics that a message lists."""
+"""Maximum number of metrics in a message."""
 
 
 def check_expectations(scenario: "Scenario") -> None:
@@ -35,7 +35,7 @@ def run_content(scenario: "Scenario") -> RunContent:
     """What the conditions of a scenario can refer to."""
     has_ego = scenario.traffic.has_ego
     methods = tuple(one.method for one in scenario.estimators)
-    # On a road by template places count along its way.
+    # On a template's road, positions count along it.
     has_way = bool(scenario.traffic.along) or scenario.road is not None
     has = {Need.EGO: has_ego, Need.ROUTE: has_ego or has_way, Need.FRAMES: bool(methods)}
     return RunContent(

@@ -1,4 +1,4 @@
-"""Conditions in scenario files: read when the file is, written back as text."""
+"""Conditions in scenario files: parsed with the file, written back as text."""
 
 from collections.abc import Iterable
 from typing import Annotated
@@ -14,7 +14,7 @@ _SCHEMA = {"format": "condition", "anyOf": [{"type": "string"}, {"type": "object
 
 
 def _condition(written: object) -> Condition:
-    """A condition that is written, or that a program has made."""
+    """A condition from a file or a program."""
     return written if isinstance(written, Condition) else parse_condition(written)
 
 

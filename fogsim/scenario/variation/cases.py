@@ -1,4 +1,4 @@
-"""The blocks ``vary`` and ``verdict``: what differs between the cases of a file, and when all of them together pass."""
+"""The blocks ``vary`` and ``verdict``: the cases of a file, and when all of them together pass."""
 
 import contextlib
 import itertools
@@ -21,7 +21,7 @@ from fogsim.scenario.variation.levels import LevelsError, SeedLevels, Value, Val
 from fogsim.units.quantities import split_quantity
 
 _PLACE = re.compile(r"\$(?:\$|\{([^{}]*)\}|([A-Za-z_][A-Za-z0-9_]*))")
-"""Where a name stands: ``$name``, ``${name}``; ``$$`` is a plain ``$``."""
+"""Uses of a name: ``$name``, ``${name}``; ``$$`` is a plain ``$``."""
 
 
 class Verdict(Section):
@@ -49,7 +49,7 @@ NONE_FAILS = Verdict()
 
 
 class VariationKeys(Section):
-    """Keys that stand in a file beside those of a scenario."""
+    """Keys of a file in addition to those of a scenario."""
 
     vary: dict[str, Any] = Field(default_factory=dict)
     """What differs between the cases of the file: a name and its values; ``$name`` stands for them elsewhere."""
@@ -77,17 +77,17 @@ class Case:
 
     @property
     def levels(self) -> dict[str, str]:
-        """What each name stands for, as text."""
+        """Value of each name, as text."""
         return {name: value_text(value) for name, value in self.values.items()}
 
     @property
     def label(self) -> str:
-        """The case as ``--case`` names it; empty for the one of a file that varies nothing."""
+        """The case as ``--case`` names it; empty for the only case of a file without variation."""
         return ",".join(f"{name}={level}" for name, level in self.levels.items())
 
     @property
     def folder_name(self) -> str:
-        """The case as a folder may be named; ``seedN`` for a file that varies nothing."""
+        """Name of the case's folder; ``seedN`` for a file without variation."""
         return re.sub(r"[^\w.,=-]", "_", self.label)[:100] or f"seed{self.seed}"
 
 
@@ -150,7 +150,7 @@ def _parsed(document: Document, written: Mapping[str, Any]) -> tuple[dict[str, V
 
 
 def _misplaced(document: Document, named: Mapping[str, object], varied: Mapping[str, Values]) -> list[str]:
-    """Names that stand nowhere, and places of names that are none."""
+    """Names that are not used, and uses of unknown names."""
     used: set[str] = set()
     mistakes = []
     for at, text in _texts({key: value for key, value in document.data.items() if key not in KEYS}, ()):
@@ -191,7 +191,7 @@ def _grid(document: Document, varied: Mapping[str, Values]) -> tuple[Case, ...]:
 
 
 def _case(varied: Mapping[str, Values], chosen: Mapping[str, Value]) -> Case:
-    """The case of a cell of the grid, with what is drawn for its seed."""
+    """The case of a cell of the grid, with the draws for its seed."""
     seed = next((int(chosen[name]) for name, values in varied.items() if isinstance(values, SeedLevels)), 0)
     return Case(
         {name: values.value(seed) if values.is_drawn else chosen[name] for name, values in varied.items()}, seed
@@ -263,7 +263,7 @@ def _pairs(wanted: str, variation: Variation, where: object) -> dict[str, str]:
 
 
 def _beside_grid(values: Values, text: str) -> Value | None:
-    """Value of a text for a name whose values are numbers; None if it cannot be one."""
+    """A text as a number for a numeric name; None if it is not one."""
     if isinstance(values, SeedLevels):
         return int(text) if text.isdecimal() else None
     if not values.is_numeric:
@@ -274,7 +274,7 @@ def _beside_grid(values: Values, text: str) -> Value | None:
 
 
 def _distinct(cases: Iterable[Case], name: str, varied: Mapping[str, Values]) -> list[Case]:
-    """Cases that differ in more than one name, and what is drawn for it."""
+    """Cases that differ in several names, and the draws for their seeds."""
     kept: dict[str, Case] = {}
     for case in cases:
         rest = {key: value for key, value in case.values.items() if key != name and not varied[key].is_drawn}

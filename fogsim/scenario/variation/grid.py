@@ -1,10 +1,10 @@
-"""How many runs a file may stand for."""
+"""Limit of a file's number of runs."""
 
 import math
 from collections.abc import Mapping
 
 MOST_RUNS = 100_000
-"""Most runs of a study, and most cases of a scenario file."""
+"""Maximum number of runs of a study and of cases of a scenario file."""
 
 _MOST_NAMED = 5
 _MOST_DIGITS = 15

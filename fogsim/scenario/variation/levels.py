@@ -1,4 +1,4 @@
-"""Values that a name stands for in the cases of a file: a list, a range, seeds, or draws of a distribution."""
+"""Values of a name in the cases of a file: a list, a range, seeds, or draws from a distribution."""
 
 import math
 import re
@@ -10,7 +10,7 @@ from fogsim.randomness import named_generator
 from fogsim.units.quantities import split_quantity
 
 MOST_VALUES = 100_000
-"""Most values of one name."""
+"""Maximum number of values of one name."""
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 _SEEDS = re.compile(r"\s*([0-9]{1,9})\s+seeds?\s*\Z")
@@ -25,7 +25,7 @@ _EXPECTED = "expected a list, {from, to, step}, 20 seeds, or {uniform: [low, hig
 _MOST_DRAWS = 10_000
 
 Value = str | float | int | bool
-"""What a name stands for in one case."""
+"""Value of a name in one case."""
 
 
 class LevelsError(ValueError):
@@ -52,7 +52,7 @@ class Levels:
 
     @property
     def is_numeric(self) -> bool:
-        """Whether all are numbers, perhaps with a unit."""
+        """Whether all are numbers, with or without a unit."""
         return all(not isinstance(one, bool) and _number_and_unit(one) is not None for one in self.values)
 
     def value(self, _: int) -> Value:
@@ -103,7 +103,7 @@ class Draws:
 
 
 Values = Levels | Draws
-"""What a name stands for."""
+"""All values of a name."""
 
 
 def parse_levels(name: str, written: object) -> Values:
@@ -210,7 +210,7 @@ def _draws(name: str, kind: str, written: dict[str, object]) -> Draws:
 
 
 def _numbers(written: dict[str, object]) -> tuple[list[float], str]:
-    """Numbers of values that have one unit together, and that unit."""
+    """Numbers of values with one common unit, and that unit."""
     found: dict[str, tuple[float, str]] = {}
     for key, value in written.items():
         one = _number_and_unit(value)

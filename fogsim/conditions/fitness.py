@@ -1,4 +1,4 @@
-"""Whether a run can tell what a condition asks: what it needs, and the names that stand in it."""
+"""Whether a run can evaluate a condition: what it needs, and the names in it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

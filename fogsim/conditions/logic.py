@@ -1,4 +1,4 @@
-"""Logic of three values: true, false and not known (Kleene), and what compares with what."""
+"""Three-valued logic (Kleene): true, false and unknown; and comparisons of values."""
 
 import operator
 from collections.abc import Callable, Mapping
@@ -62,5 +62,5 @@ def passed(before: Value, now: Value, how: str, operand: Value) -> bool | None:
 
 
 def _without_count(value: Value) -> Value:
-    """A lane's number: on a road with more lanes it is the same lane."""
+    """Compare lane numbers; a number means the same lane on wider roads."""
     return value.number if isinstance(value, LanePlace) else value

@@ -1,4 +1,4 @@
-"""A finished step as conditions look at it: with what has happened before, and with places along the route."""
+"""A finished step as conditions see it: with earlier events, and positions along the route."""
 
 import functools
 
@@ -7,7 +7,7 @@ from fogsim.values import Step, TrafficState, TrafficStep
 from fogsim.values.traffic import with_persons
 
 EGO = "ego"
-"""What the ego is called in conditions, whatever its id."""
+"""Name of the ego in conditions, whatever its id."""
 
 
 class Moment:
@@ -43,7 +43,7 @@ class Moment:
         return self.traffic.row(name) if row is None and self.step.traffic.persons.ids else row
 
     def position(self, vehicle: str) -> float | None:
-        """Position of a vehicle's front bumper along the route [m], in the ego's count; None if it is not there."""
+        """Position of a vehicle's front bumper along the route [m], in the ego's count; None if it is not on it."""
         step = self.ego_step
         if step is not None and self.row(vehicle) == step.ego:
             return step.route_position
@@ -51,7 +51,7 @@ class Moment:
         return None if place is None else place.front
 
     def extent(self, vehicle: str) -> Extent | None:
-        """The part of the route that a vehicle covers; None if it is not there."""
+        """The part of the route that a vehicle covers; None if it is not on it."""
         row, place = self.row(vehicle), self._place(vehicle)
         return None if row is None or place is None else extent_of(place, self.traffic, row)
 
@@ -67,12 +67,12 @@ class Moment:
         place = self._on_route(self._route, row)
         if step is None or place is None:
             return place
-        # SUMO counts the ego's way along its lanes, and the polyline is one of them: others are put into its count.
+        # SUMO counts the ego's position along its lanes, the polyline along one: convert others to SUMO's count.
         ego = self._on_route(self._route, step.ego)
         return None if ego is None else RoutePlace(place.front - ego.front + step.route_position, place.along)
 
     def _on_route(self, route: Route, row: int) -> RoutePlace | None:
-        """Place of a vehicle by the polyline alone."""
+        """Position of a vehicle along the polyline."""
         if row not in self._by_row:
             traffic, step = self.traffic, self.ego_step
             near = None if step is None else step.route_position
@@ -81,7 +81,7 @@ class Moment:
 
 
 class History:
-    """What conditions remember of a run, whichever they are; hands out moments, one a step."""
+    """Shared memory of a run's conditions, which creates one moment per step."""
 
     def __init__(self) -> None:
         self._collisions: set[tuple[str, str]] = set()

@@ -1,4 +1,4 @@
-"""Where vehicles are along a route: places, extents, gaps and times between them."""
+"""Vehicles along a route: positions, extents, gaps and times between them."""
 
 import math
 from dataclasses import dataclass
@@ -10,10 +10,10 @@ from fogsim.jit import kernel
 from fogsim.values import TrafficState
 
 FARTHEST_ASIDE = 30.0
-"""Distance from the route up to which a vehicle has a place along it [m]: that of the other carriageway."""
+"""Largest lateral distance of a position on a route [m]; it includes the other carriageway."""
 
 _AS_NEAR = 1.0
-"""Where a route passes a place twice, its ways there lie this near to one another [m]."""
+"""Where a route passes a point twice, its parts there are at most this far apart [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +87,7 @@ def piece_about(
         apart = abs(start[i] + at[i] - near)
         if aside[i] <= farthest and (here < 0 or apart < least):
             here, least = i, apart
-    # Points of one piece of the way are all as near: the nearest of those about this one is meant.
+    # Points of one piece are about as near: the nearest of those around this one is meant.
     found = here
     for i in range(len(start)):
         is_about = aside[i] <= farthest and abs(start[i] - start[here]) <= 2.0 * FARTHEST_ASIDE
@@ -130,7 +130,7 @@ def time_to_meet(one: Extent, other: Extent) -> float:
 
 
 def headway_between(one: Extent, other: Extent) -> float:
-    """Time that the vehicle behind needs for the gap at its speed [s]; ``inf`` if it stands or drives away."""
+    """Time that the vehicle behind needs for the gap at its speed [s]; ``inf`` if it stops or moves away."""
     gap = gap_between(one, other)
     speed = one.velocity if gap >= 0.0 else other.velocity
     return abs(gap) / speed if speed > 0.0 else math.inf

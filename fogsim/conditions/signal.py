@@ -1,4 +1,4 @@
-"""What a signal of a run is: its unit, its range, what it needs, and how it is read from a moment."""
+"""A signal of a run: its unit, its range, its needs, and how to read it from a moment."""
 
 import math
 from collections.abc import Callable
@@ -9,7 +9,7 @@ from fogsim.conditions.moment import Moment
 
 
 class Kind(Enum):
-    """What a signal is."""
+    """Type of a signal."""
 
     NUMBER = "number"
     FLAG = "true or false"
@@ -23,9 +23,9 @@ class Need(StrEnum):
 
     EGO = "an ego"
     FRAMES = "frames"
-    """A camera and estimators, which need an ego, too."""
+    """A camera and estimators, which also need an ego."""
     ROUTE = "a route (traffic.along)"
-    """Of the ego, or ``traffic.along``."""
+    """The ego's, or ``traffic.along``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,18 +37,18 @@ class LanePlace:
 
     @property
     def names(self) -> frozenset[str] | None:
-        """Which of "right" and "left" it is; None where the left one is not known."""
+        """ "right" or "left"; None if the left one is unknown."""
         if self.count is None:
             return frozenset({"right"}) if self.number == 0 else None
         return frozenset(name for name, at in (("right", 0), ("left", self.count - 1)) if self.number == at)
 
 
 Value = float | bool | str | frozenset[str] | LanePlace | None
-"""What a signal is now; None where it has no value."""
+"""Current value of a signal; None if it has none."""
 
 
 class Place(Enum):
-    """What stands in the place holders of a signal's name."""
+    """Type of an argument in a signal's name."""
 
     VEHICLE = "vehicle"
     BANK = "fog bank"
@@ -80,7 +80,7 @@ class Signal:
 
     @property
     def told_in(self) -> str:
-        """Unit in which it is shown."""
+        """Unit in messages."""
         return self.shown_unit or self.unit
 
     def read(self, moment: Moment, arguments: tuple[str, ...]) -> Value:

@@ -1,4 +1,4 @@
-"""What a condition is once it has been read: plain values, which say as text what was written."""
+"""Parsed conditions: plain values whose text is the condition as written."""
 
 import re
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ _PLAIN = re.compile(r"[\w:#@.\-]+")
 
 
 def _quoted(name: str) -> str:
-    """A name as a condition may have it, in quotation marks where it must."""
+    """A name as conditions need it, in quotation marks if necessary."""
     return name if _PLAIN.fullmatch(name) else _always_quoted(name)
 
 
@@ -74,7 +74,7 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """A signal that passes a value now: ``falls below``, ``rises above``, ``becomes`` or, of any value, ``changes``."""
+    """A signal that passes a value now: ``falls below``, ``rises above``, ``becomes``, or ``changes`` (no value)."""
 
     left: Reference
     how: str
@@ -96,7 +96,7 @@ class Flag:
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """A condition that has been true without a break for some time [s]."""
+    """A condition that has been true without a break for a time [s]."""
 
     part: "Condition"
     duration: Quantity
@@ -128,7 +128,7 @@ class AllOf:
 
 @dataclass(frozen=True, slots=True)
 class AnyOf:
-    """Conditions of which one is true at least."""
+    """Conditions of which at least one is true."""
 
     parts: tuple["Condition", ...]
 

@@ -1,4 +1,4 @@
-"""Watches a condition over the steps of a run: true, false, or not known."""
+"""Evaluates a condition over the steps of a run: true, false, or unknown."""
 
 import math
 from collections.abc import Mapping
@@ -61,7 +61,7 @@ class Watch:
         return self.values[comparison.left], self._operand(comparison.right)
 
     def told(self) -> str:
-        """Say what the signals of the condition were at the last step: ``gap(ego, slow) = 83.2 m``."""
+        """Values of the condition's signals at the last step: ``gap(ego, slow) = 83.2 m``."""
         return ", ".join(
             f"{signal} = {shown_value(signal, v, self._units[signal])}" for signal, v in self.values.items()
         )
@@ -106,7 +106,7 @@ class Watch:
 
 
 def _shown_units(parts: tuple[Condition, ...]) -> dict[Reference, str]:
-    """Units in which signals are told: those in which the condition compares them, else their own."""
+    """Units in which signals are shown: those of the condition's comparisons, otherwise their own."""
     units: dict[Reference, str] = {}
     for part in parts:
         if isinstance(part, Comparison | Edge | Flag):

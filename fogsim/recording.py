@@ -1,4 +1,4 @@
-"""A run whose results are written down, and stay readable if it is interrupted."""
+"""A run with recorded results, which stay readable if it is interrupted."""
 
 import contextlib
 import dataclasses
@@ -135,8 +135,8 @@ class _Recorded(Generic[AnyStep]):
     road: RoadSpeeds | None = None
 
     def along_road(self) -> NDArray[np.float64]:
-        """Means along the road, as of `RunInformation`."""
-        # The summary has the metrics hand over the last steps.
+        """Means along the road, as in `RunInformation`."""
+        # The summary makes the metrics hand over the last steps.
         self.metrics.summary()
         return np.zeros((0, 4)) if self.road is None else self.road.means()
 
@@ -176,7 +176,7 @@ def _record(
                     what.watch(step)
                     last = step
                     if step.ending is not None:
-                        # Whoever takes warnings for errors is not to lose a run that is over by one of the loop's.
+                        # With warnings as errors, a warning of the loop must not lose a finished run.
                         break
             status = Status.COMPLETE
         except KeyboardInterrupt:
@@ -201,7 +201,7 @@ def _record(
 
 
 def _note_failure(directory: RunDirectory, manifest: Manifest, error: MethodError) -> None:
-    """Leave a manifest of a run that failed before it could begin, unless earlier results are there."""
+    """Leave a manifest of a run that failed before it began, unless earlier results exist."""
     if not (directory.earlier or directory.unfinished.exists()):
         directory.begin(manifest.to_json())
         ended = dataclasses.replace(

@@ -1,4 +1,4 @@
-"""Recorders of one run, which take its steps; what they have written stays readable however it ends."""
+"""Recorders of one run, which receive its steps; their files stay readable however it ends."""
 
 import contextlib
 import dataclasses
@@ -54,7 +54,7 @@ class Recording(Generic[AnyStep]):
         self._begun = True
 
     def begin_if_nothing_is_lost(self) -> None:
-        """Begin without a step, unless earlier results are there."""
+        """Begin without a step, unless earlier results exist."""
         if not (self._begun or self._directory.earlier or self._directory.unfinished.exists()):
             self._begin()
 
@@ -96,7 +96,7 @@ class Recording(Generic[AnyStep]):
 
     @contextlib.contextmanager
     def _noting_failure(self, name: str) -> Iterator[None]:
-        """Note why a recorder failed, where the reason is not known already."""
+        """Record why a recorder failed, unless the reason is already known."""
         try:
             yield
         except Exception as error:  # noqa: BLE001 - a recorder may be anybody's, and must not cost the others their files

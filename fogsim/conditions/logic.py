@@ -62,5 +62,5 @@ def passed(before: Value, now: Value, how: str, operand: Value) -> bool | None:
 
 
 def _without_count(value: Value) -> Value:
-    """Compare lane numbers; a number means the same lane on wider roads."""
+    """A lane's number alone, which is the same lane on a wider road."""
     return value.number if isinstance(value, LanePlace) else value

@@ -286,7 +286,7 @@ class _Text:
         return self._text[self._at :].lstrip()
 
     def _take(self, pattern: re.Pattern[str]) -> str:
-        """The next token if it matches a pattern, otherwise None."""
+        """The next token that matches a pattern; empty if none does."""
         match = pattern.match(self._rest())
         if match is None:
             return ""

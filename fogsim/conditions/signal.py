@@ -37,7 +37,7 @@ class LanePlace:
 
     @property
     def names(self) -> frozenset[str] | None:
-        """ "right" or "left"; None if the left one is unknown."""
+        """Which of "right" and "left" it is; None if the left one is unknown."""
         if self.count is None:
             return frozenset({"right"}) if self.number == 0 else None
         return frozenset(name for name, at in (("right", 0), ("left", self.count - 1)) if self.number == at)

@@ -14,7 +14,7 @@ _DISTRIBUTIONS = ("fogsim", "numpy", "libsumo", "pyrender", "opencv-python-headl
 
 
 class Status(StrEnum):
-    """How far a run has come."""
+    """Status of a run."""
 
     RUNNING = "running"
     COMPLETE = "complete"
@@ -46,7 +46,7 @@ class Manifest:
     own_methods: Mapping[str, str] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, object]:
-        """What ``manifest.json`` says, without the names of files."""
+        """Contents of ``manifest.json``, without the names of files."""
         return {
             "status": self.status.value,
             "message": self.message,
@@ -65,7 +65,7 @@ class Manifest:
 
 
 def versions() -> dict[str, str | None]:
-    """Versions of FogSim, Python, the libraries that decide results, and the platform; None where not installed."""
+    """Versions of FogSim, Python, the libraries that affect results, and the platform; None if not installed."""
     found: dict[str, str | None] = {name: _version(name) for name in _DISTRIBUTIONS}
     return {**found, "python": platform.python_version(), "platform": platform.platform()}
 

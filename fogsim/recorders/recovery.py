@@ -34,7 +34,7 @@ def recover_run(path: Path, overwrite: bool = False) -> list[str]:
     folder = path / UNFINISHED
     manifest = read_manifest(folder)
     if not manifest and folder.exists() and read_manifest(path):
-        # Its process was killed when all results were in their places.
+        # Its process was killed when all results were in place.
         with WriterLock(path):
             shutil.rmtree(folder)
         return whole_files(path)
@@ -44,7 +44,7 @@ def recover_run(path: Path, overwrite: bool = False) -> list[str]:
         refuse_living(folder)
         dead = manifest["status"] == Status.RUNNING.value
         earlier = whole_files(path)
-        # A run that was over had been told to replace them.
+        # A run that was over had permission to replace them.
         if dead and earlier and not overwrite:
             raise InputError(
                 f"{path} holds results of an earlier run ({', '.join(earlier)}), which would give way; "
@@ -60,9 +60,9 @@ def recover_run(path: Path, overwrite: bool = False) -> list[str]:
 
 
 def _make_readable(folder: Path) -> None:
-    """Make tables of the rows in a folder."""
+    """Make tables from the rows in a folder."""
     rows, trajectories, events = folder / ROW_LOG, folder / TRAJECTORY_LOG, folder / EVENT_LOG
-    # A log without a head is of a process that was killed as it began.
+    # A log without a header is of a process that was killed at its start.
     if rows.exists():
         with contextlib.suppress(InputError):
             write_table(folder / "steps.parquet", read_rows(rows), complete=False)

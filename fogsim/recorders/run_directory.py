@@ -1,4 +1,4 @@
-"""The directory that the results of one run go to."""
+"""The directory of one run's results."""
 
 import shutil
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ UNFINISHED = "unfinished"
 """Folder in the directory that holds the results of a run until its end."""
 
 LOG_SUFFIX = ".arrows"
-"""What names of files of rows in the unfinished folder end in, until they are made ``….parquet``."""
+"""Suffix of the unfinished folder's row files, until they become ``….parquet``."""
 
 ROW_LOG = "steps" + LOG_SUFFIX
 """Rows of ``steps.parquet``."""
@@ -29,7 +29,7 @@ EVENT_LOG = "events" + LOG_SUFFIX
 """Rows of ``events.parquet``."""
 
 SUMO_OUTPUTS = "sumo_outputs"
-"""Folder of the files that SUMO itself has written; ``sumo_outputs.part`` until the end of the run."""
+"""Folder of SUMO's own outputs; ``sumo_outputs.part`` until the end of the run."""
 
 _NAMES = {
     "manifest": "manifest.json",
@@ -70,7 +70,7 @@ class RunDirectory:
             raise
 
     def _unmake(self) -> None:
-        """Remove the directories that were made, as far as nothing is in them."""
+        """Remove the created directories that are empty."""
         for folder in self._made:
             if not folder.is_dir() or any(folder.iterdir()):
                 break
@@ -87,7 +87,7 @@ class RunDirectory:
             raise InputError(f"{outputs} is not of an earlier run; move it, or choose another directory with --out")
         if overwrite:
             return
-        # Without a manifest it is what a run left that was killed when all its results were in their places.
+        # Without a manifest, a run was killed when all its results were in place.
         if self.manifest.exists():
             raise InputError(
                 f"{self.path} holds rows of a run that did not come to its end: {_fate_of_run(self.unfinished)}. "
@@ -101,18 +101,18 @@ class RunDirectory:
 
     @property
     def earlier(self) -> list[str]:
-        """Names of results that are there, of an earlier run until `finish`; also those that were left half written."""
+        """Names of existing results, of an earlier run until `finish`, including incomplete ones."""
         whole = [self.path / name for name in _NAMES.values()]
         return [name.name for name in whole + [partial_path(name) for name in whole] if name.is_file()]
 
     @property
     def unfinished(self) -> Path:
-        """Folder of what is being written."""
+        """Folder of unfinished results."""
         return self.path / UNFINISHED
 
     @property
     def sumo_outputs(self) -> Path:
-        """Folder of what SUMO itself writes, from before the first step on."""
+        """Folder of SUMO's own outputs, from before the first step on."""
         return partial_path(self.path / SUMO_OUTPUTS)
 
     def clear_sumo_outputs(self) -> None:
@@ -150,7 +150,7 @@ class RunDirectory:
         finish_folder(self.path, manifest)
 
     def close(self) -> None:
-        """Let others write; directories that were made stay if something is in them."""
+        """Release the lock; created directories stay if they are not empty."""
         self._lock.release()
         self._unmake()
 
@@ -174,17 +174,17 @@ class RunDirectory:
 
     @property
     def table(self) -> Path:
-        """One row a step."""
+        """A row per step."""
         return self.unfinished / _NAMES["table"]
 
     @property
     def trajectories(self) -> Path:
-        """One row a vehicle and step."""
+        """A row per vehicle and step."""
         return self.unfinished / _NAMES["trajectories"]
 
     @property
     def events(self) -> Path:
-        """One row an event."""
+        """A row per event."""
         return self.unfinished / _NAMES["events"]
 
     @property
@@ -199,21 +199,21 @@ class RunDirectory:
 
     @property
     def video(self) -> Path:
-        """What the camera saw, with a panel beside it."""
+        """Camera frames, with a panel next to them."""
         return self.unfinished / _NAMES["video"]
 
     @property
     def restored_video(self) -> Path:
-        """The same with half of the picture restored."""
+        """The same with half of each frame restored."""
         return self.unfinished / _NAMES["restored_video"]
 
     @property
     def report(self) -> Path:
-        """Report to read."""
+        """HTML report."""
         return self.unfinished / _NAMES["report"]
 
     def files(self) -> list[str]:
-        """Names of the whole result files of a finished run, sorted."""
+        """Sorted names of the complete result files of a finished run."""
         return whole_files(self.path)
 
 
@@ -236,7 +236,7 @@ def finish_folder(path: Path, manifest: Mapping[str, object]) -> None:
     """Finish a run directory: see `RunDirectory.finish`. The next call completes an interrupted one."""
     folder = path / UNFINISHED
     (folder / _RESERVE).unlink(missing_ok=True)
-    # What a call before this one has moved already is named by the manifest that it wrote.
+    # Files that an earlier call has moved already are named in the manifest that it wrote.
     names = {_NAMES["manifest"], *whole_files(folder), *_listed(folder)}
     outputs = partial_path(path / SUMO_OUTPUTS)
     if outputs.is_dir() and any(outputs.iterdir()):
@@ -244,7 +244,7 @@ def finish_folder(path: Path, manifest: Mapping[str, object]) -> None:
     write_json(folder / _NAMES["manifest"], {**manifest, "files": sorted(names)})
     if any((folder / log).exists() for log in (ROW_LOG, TRAJECTORY_LOG)):
         return
-    # Without a manifest the directory claims nothing while old files give way to new ones.
+    # Without a manifest the directory claims nothing while new files replace old ones.
     (path / _NAMES["manifest"]).unlink(missing_ok=True)
     for name in _NAMES.values():
         partial_path(path / name).unlink(missing_ok=True)
@@ -260,7 +260,7 @@ def finish_folder(path: Path, manifest: Mapping[str, object]) -> None:
 
 
 def _place_sumo_outputs(path: Path, there_are: bool) -> None:
-    """Let what SUMO has written take the place of that of an earlier run; where it wrote nothing, nothing stays."""
+    """Replace an earlier run's SUMO outputs; without new ones, the old ones are removed."""
     outputs, final = partial_path(path / SUMO_OUTPUTS), path / SUMO_OUTPUTS
     if outputs.exists() or not there_are:
         shutil.rmtree(final, ignore_errors=True)
@@ -290,7 +290,7 @@ def refuse_living(folder: Path) -> None:
 
 
 def _fate_of_run(folder: Path) -> str:
-    """Say what has become of the run of an unfinished folder."""
+    """Status of the run of an unfinished folder."""
     manifest = read_manifest(folder)
     process = WritingProcess.from_json(manifest.get("process"))
     if process is not None and manifest.get("status") == "running":

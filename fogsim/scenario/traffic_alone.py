@@ -73,7 +73,7 @@ def _has_way(written: dict[str, Any]) -> bool:
 
 
 def _of_place(written: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
-    """Events and conditions that need an ego's route."""
+    """Keys that need an ego's route."""
     drivers, fog = written.get("drivers"), written.get("fog")
     advised = drivers.get("advised") if isinstance(drivers, dict) else None
     if advised == "ego":

@@ -19,7 +19,7 @@ RESAMPLES = 9_999
 """Resamples of bootstraps and permutation tests."""
 
 SATURATED_SHARE = 0.9
-"""A metric whose extreme value this share of all runs has says little about the rest [-]."""
+"""Share of runs at a metric's extreme value above which it shows little about the rest [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,21 +31,21 @@ class Difference:
     metric : str
         The metric; its name ends in its unit.
     levels : mapping from str to str
-        Levels of all factors of what is compared.
+        Levels of all factors of the compared policy.
     baseline_mean, mean : float
         Means under the baseline and here, in the metric's unit.
     difference : float
         Mean of the differences of runs with the same seed.
     low, high : float or None
-        Ends of its bootstrap interval (BCa; Efron 1987); None where no two differences differ.
+        Ends of its bootstrap interval (BCa; Efron 1987); None if all differences are equal.
     p_value : float or None
-        Of a paired permutation test of no difference, two-sided; None where no run differs, or there is but one.
+        Of a paired permutation test of no difference, two-sided; None if no run differs, or there is only one.
     pairs : int
-        Seeds of which both runs have a value.
+        Number of seeds with a value in both runs.
     seeds_for_half_width : int or None
-        Seeds that an interval of the study's wanted half-width would need, by the normal law.
+        Seeds needed for an interval of the study's wanted half-width, by the normal distribution.
     adjusted_p_value : float or None
-        The p-value for a family of comparisons (Benjamini & Hochberg 1995), once `adjust_p_values` has found it.
+        The p-value adjusted for a family of comparisons (Benjamini & Hochberg 1995), once `adjust_p_values` has run.
     """
 
     metric: str
@@ -61,10 +61,10 @@ class Difference:
     adjusted_p_value: float | None = None
 
     def is_shown(self, confidence: float) -> bool:
-        """Whether the data show that there is a difference: the interval excludes 0, and the test agrees.
+        """Whether the data show a difference: the interval excludes 0, and the test agrees.
 
-        A difference that is the same in every run has no interval, and goes by the test. Of few seeds, the bootstrap
-        alone would claim too much: three differences of one sign exclude 0, and happen by chance in one case of four.
+        A difference that is the same in every run has no interval; only the test counts. With few seeds, the bootstrap
+        alone would claim too much: three differences of one sign exclude 0, and occur by chance in one case of four.
 
         Parameters
         ----------
@@ -150,7 +150,7 @@ def mean_interval(values: NDArray[np.float64], confidence: float) -> tuple[float
 
 
 def _p_value(differences: NDArray[np.float64]) -> float | None:
-    """Two-sided paired permutation test: under no difference each sign is as likely as the other."""
+    """Two-sided paired permutation test: without a difference, both signs are equally likely."""
     if len(differences) < 2 or not differences.any():
         return None
     test = stats.permutation_test(

@@ -1,4 +1,4 @@
-"""How a study's figures look: panels, colours and markers for people who see colours differently, SVG and CSV."""
+"""Style of a study's figures: panels, colours and markers that colour-blind readers can distinguish, SVG and CSV."""
 
 import io
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,7 +20,7 @@ WIDTH = 7.2
 """Width of a figure over both columns of a page [in]."""
 
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#882255", "#999933")
-"""Okabe & Ito's colours (2008), the two that white paper swallows replaced by two of Tol's; black is the baseline's."""
+"""Okabe & Ito's colours (2008), the two that are faint on white replaced by two of Tol's; black is the baseline's."""
 
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">")
 _DASHES: Sequence[tuple[int, tuple[float, ...]]] = ((0, ()), (0, (5, 1.5)), (0, (1.5, 1.5)), (0, (6, 1.5, 1.5, 1.5)))

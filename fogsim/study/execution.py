@@ -1,4 +1,4 @@
-"""One run of a study: its metrics in a row of plain values, and its profiles."""
+"""One run of a study: its metrics as a row of plain values, and its profiles."""
 
 import traceback
 import warnings

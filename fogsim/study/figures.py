@@ -82,7 +82,7 @@ def trade_off_figure(study: Study, rows: Sequence[Row], across: str, upwards: st
                 label=policy,
             )
         if not any(axes.dataLim.intervaly):
-            # Around nothing but zeros matplotlib would show negative numbers, which there are none of.
+            # Around only zeros matplotlib would show negative numbers, which do not occur.
             axes.set_ylim(-0.05, 1.0)
     label_figure(figure, metric_words(across).axis, metric_words(upwards).axis)
     name = f"trade_off_{upwards}"
@@ -104,7 +104,7 @@ def _mean_and_interval(
 
 
 def _errors(mean: float | None, ends: Sequence[float | None], scale: float) -> list[list[float]] | None:
-    """Lengths of the two bars at a point, as matplotlib takes them."""
+    """Lengths of the two error bars at a point, as matplotlib needs them."""
     low, high = ends
     if mean is None or low is None or high is None:
         return None

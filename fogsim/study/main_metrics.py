@@ -1,4 +1,4 @@
-"""Metrics that a study's report shows first, in words; and which metrics there are to choose from."""
+"""Metrics that a study's report shows first, in words, and all that it can choose from."""
 
 from collections.abc import Iterable
 from typing import Literal, NamedTuple
@@ -7,7 +7,7 @@ from fogsim.errors import suggest
 from fogsim.metrics import metric_keys
 
 METHODS_KEY = "estimators"
-"""Key under which each estimator has metrics of its own, ``estimators.METHOD.KEY``."""
+"""Key of the estimators' own metrics, ``estimators.METHOD.KEY``."""
 
 
 class MetricWords(NamedTuple):
@@ -40,17 +40,17 @@ MAIN_METRICS = {
     "above_advice_time_share": MetricWords("The ego's time above the advice", "%", 100.0),
     "belief_median_error_percent": MetricWords("Median error of believed visibility", "%"),
 }
-"""What is shown where a study file chooses nothing, as far as the table has it, in this order."""
+"""Default metrics, in this order, if the table has them."""
 
 SAFETY_METRICS = (
     ("collisions",),
     ("traffic_conflicts_per_vehicle_km", "traffic_exposed_time_share"),
     ("traffic_overdriving_time_share", "negative_margin_time_share"),
 )
-"""Vertical axes of trade-off figures: of each group the first that the table has and that varies."""
+"""Vertical axes of trade-off figures: from each group the first that the table has and that varies."""
 
 DELAY_METRICS = ("traffic_delay_s_per_vehicle_km", "traffic_mean_speed_mps", "mean_speed_mps")
-"""Their horizontal axis, likewise."""
+"""Their horizontal axes, chosen in the same way."""
 
 
 def metric_words(metric: str) -> MetricWords:

@@ -1,4 +1,4 @@
-"""Runs of a study in parallel processes of this machine; whatever ends them, finished runs are kept."""
+"""Runs of a study in parallel processes of this machine; completed runs are kept however it ends."""
 
 import contextlib
 import multiprocessing
@@ -19,7 +19,7 @@ from fogsim.study.execution import failure, run_to_file
 from fogsim.study.plan import StudyRun
 
 Work = Callable[[Scenario, int, Path], str | None]
-"""Runs a scenario with a seed, writes the result into a file, and tells what went wrong, if anything did."""
+"""Runs a scenario with a seed, writes the result into a file, and returns the error, if any."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class ProcessPool:
 def _run_until_broken(
     waiting: list[StudyRun], folder: Path, processes: int, watch: RunWatch, work: Work
 ) -> list[StudyRun]:
-    """Run from the end of a list, which becomes shorter; gives back what was under way when a process died."""
+    """Execute runs from the end of a list, removing them; return those in progress when a process died."""
     under_way: dict[Future[str | None], StudyRun] = {}
     try:
         with _pool(processes) as pool:
@@ -75,8 +75,8 @@ def _submitted(pool: ProcessPoolExecutor, work: Work, run: StudyRun, result: Pat
 
 @contextlib.contextmanager
 def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
-    # One SUMO a process, and none of this process's threads or contexts in it: all are forked from a process that has
-    # imported what they need and done nothing else.
+    # One SUMO per process, without threads or contexts of this one: all are forked from a process that has only
+    # imported what they need.
     open_standard_streams()
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["fogsim.study.execution"])
@@ -92,14 +92,14 @@ def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
 
 
 def _leave_signals_to_parent() -> None:
-    """Let Ctrl-C, which a terminal sends to all, end the process that waits for the runs, and it end this one."""
+    """Let Ctrl-C, which a terminal sends to all processes, end the one that waits for the runs, which ends this one."""
     for signum in (signal.SIGINT, signal.SIGHUP):
         signal.signal(signum, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
 def _end_with_parent() -> None:
-    """End this process when the one that waits for it is killed, so that nothing goes on unseen."""
+    """End this process when the one that waits for it is killed, so that it does not continue unnoticed."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()

@@ -1,4 +1,4 @@
-"""Profiles of all runs of a cell of the grid, added up."""
+"""Profiles of all runs of a cell of the grid, summed."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -77,7 +77,7 @@ class PooledProfiles:
         return np.array(found).reshape(-1, 3)
 
     def extinctions(self) -> NDArray[np.float64]:
-        """Place along the road [m] and mean extinction there [1/m], as columns: at egos, else at everybody."""
+        """Columns of position along the road [m] and mean extinction there [1/m], at egos or else all vehicles."""
         time, fog = (0, 2) if any(sums[0] > 0.0 for sums in self.road.values()) else (3, 5)
         found = [(place, sums[fog] / sums[time]) for place, sums in self._road() if sums[time] > 0.0]
         return np.array(found).reshape(-1, 2)

@@ -1,4 +1,4 @@
-"""Figures of profiles: survival of time to collision, speed over the road, map of collisions."""
+"""Figures of profiles: survival of time to collision, speed along the road, map of collisions."""
 
 from collections.abc import Mapping
 
@@ -15,10 +15,10 @@ from fogsim.study.profiles import CLASS_WIDTH, CLASSES
 from fogsim.units import KMH_PER_MPS, visibility_from_extinction
 
 _EVEN = 1.15
-"""Fog whose extinction varies by less than this factor is even, and not shaded."""
+"""Fog whose extinction varies by less than this factor is uniform, and not shaded."""
 
 _LEAST_TIME = 5.0
-"""Time of vehicles from which a mean speed at a place is drawn [s]."""
+"""Least vehicle time for drawing a mean speed at a position [s]."""
 
 
 def survival_figure(study: Study, cells: Mapping[Cell, PooledProfiles]) -> StudyFigure:
@@ -54,7 +54,7 @@ def survival_figure(study: Study, cells: Mapping[Cell, PooledProfiles]) -> Study
 
 
 def _scale_near_hundred(axes: Axes, values: NDArray[np.float64]) -> None:
-    """Let the panels' common axis of 100 % minus a share [%] be logarithmic, and show the share: 90, 99, 99.9 % up."""
+    """Make the panels' common axis logarithmic in 100 % minus a share [%], labelled 90, 99, 99.9 % upwards."""
     above_zero = values[values > 0.0]
     least, most = (above_zero.min(), above_zero.max()) if len(above_zero) else (0.01, 10.0)
     axes.set_ylim(1.4 * most, least / 1.4)
@@ -101,7 +101,7 @@ def _have_ego(cells: Mapping[Cell, PooledProfiles]) -> bool:
 
 
 def _with_gaps(table: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rows by place, with NaN between those that are not neighbours, so that no line is drawn across."""
+    """Rows by position, with NaN between distant ones, so that no line is drawn across."""
     if len(table) < 2:
         return table.reshape(-1, 3)
     breaks = np.flatnonzero(np.diff(table[:, 0]) > 1.5 * CELL_LENGTH) + 1
@@ -109,7 +109,7 @@ def _with_gaps(table: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _shade_fog(axes: Axes, pooled: list[PooledProfiles]) -> None:
-    """Shade the places of a road by the mean extinction that was found there, and say the least visibility."""
+    """Shade a road by the mean extinction at each position, and label the least visibility."""
     sums: dict[float, NDArray[np.float64]] = {}
     for one in pooled:
         for place, extinction in one.extinctions():

@@ -20,17 +20,17 @@ CLASS_WIDTH = 0.25
 """Width of a class of time to collision [s]."""
 
 CLASSES = 40
-"""Number of the classes; what is longer is in none."""
+"""Number of the classes; longer times are in none."""
 
 MOST_COLLISIONS = 100
-"""Collisions of which place and speed are kept; their number is a metric."""
+"""Maximum number of collisions with position and speed; their total is a metric."""
 
 COLLISION_COLUMNS = ("time_s", "x_m", "y_m", "impact_speed_mps", "collider", "victim")
 PATH_COLUMNS = ("place_m", "x_m", "y_m")
 
 
 class RunProfiles:
-    """Watches the steps of one run, and everybody in them as one of the watchers of its metrics."""
+    """Watches the steps of one run, and all vehicles in them as one of the watchers of its metrics."""
 
     def __init__(self) -> None:
         self._last: TrafficStep | None = None
@@ -103,11 +103,11 @@ def _column(values: NDArray[np.float64]) -> list[object]:
 
 
 def _short(value: object) -> object:
-    """A number in the digits that a figure needs; None where it is undefined."""
+    """A number rounded to the digits that a figure needs; None if undefined."""
     if not isinstance(value, float):
         return value
     return float(f"{value:.6g}") + 0.0 if math.isfinite(value) else None
 
 
 Profiles = Mapping[str, Any]
-"""What `RunProfiles.to_json` gives."""
+"""Schema of the data from `RunProfiles.to_json`."""

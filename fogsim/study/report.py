@@ -1,4 +1,4 @@
-"""A study as a page to read: what was compared, what came out, and how sure that is."""
+"""A study as a page to read: what was compared, the results, and their certainty."""
 
 import base64
 from collections.abc import Iterator, Mapping, Sequence
@@ -92,7 +92,7 @@ def _figures(
     profiles: Mapping[Cell, PooledProfiles],
     differences: Sequence[Difference],
 ) -> Iterator[StudyFigure]:
-    """All figures of which there is something to draw."""
+    """All figures with data."""
     drawable = [name for name in numeric_metrics(rows, study.factors) if remarks.get(name) != "does not vary"]
     across = next((name for name in DELAY_METRICS if name in drawable), None)
     for group in SAFETY_METRICS:
@@ -134,7 +134,7 @@ def _page(study: Study, rows: Sequence[Row], found: _Findings, folder: Path) -> 
 
 
 def _embedded(figure: StudyFigure) -> str:
-    """A figure as a picture of its own, so that names of parts within two figures do not meet."""
+    """A figure as a separate image, so that ids within two figures do not clash."""
     data = base64.b64encode(figure.svg.encode()).decode("ascii")
     caption = f'{escape(figure.caption)} <a href="figures/{escape(figure.name)}.svg">SVG</a> '
     caption += f'<a href="figures/{escape(figure.name)}.csv">CSV</a>'
@@ -163,7 +163,7 @@ def _failures(study: Study, failed: Sequence[Row]) -> list[str]:
 
 
 def _details(study: Study, found: _Findings) -> Iterator[str]:
-    """What few will want to read, folded."""
+    """Details, folded."""
     yield "<h2>All comparisons</h2>"
     for title, differences in (("Main metrics", found.of_main()), ("All other metrics", found.of_others())):
         if differences:

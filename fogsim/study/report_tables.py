@@ -77,7 +77,7 @@ def plain_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def _table(head: Sequence[str], body: Sequence[Sequence[str]], texts: int) -> str:
-    """A table whose first columns are text, and the others numbers; it scrolls by itself where it is too wide."""
+    """A table whose first columns are text, and the others numbers; it scrolls if it is too wide."""
     kinds = ["" if i < texts else ' class="value"' for i in range(len(head))]
     top = "".join(f"<th{kind}>{escape(name)}</th>" for name, kind in zip(head, kinds, strict=True))
     lines = "\n".join(

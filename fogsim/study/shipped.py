@@ -1,4 +1,4 @@
-"""The studies that come with FogSim, by name, as its scenarios are."""
+"""The studies that come with FogSim, by name."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ from fogsim.scenario import catalogue
 
 
 def shipped_studies() -> dict[str, Path]:
-    """Names and files of the studies that come with FogSim: beside its scenarios."""
+    """Names and files of the shipped studies, which are next to the scenarios."""
     folders = {file.parents[1] / "studies" for file in catalogue().values()}
     return {file.stem: file for folder in folders for file in sorted(folder.glob("*.yaml"))}
 

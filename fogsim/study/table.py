@@ -1,4 +1,4 @@
-"""The table of a study: a row for each run, in the order of the grid, whatever the order in which they were run."""
+"""The table of a study: a row for each run in the order of the grid, regardless of the order of execution."""
 
 import csv
 import io
@@ -58,7 +58,7 @@ def write_table(rows: Sequence[Row], folder: Path) -> None:
 
 
 def _column(values: Sequence[Value]) -> pa.Array:
-    """A column of text, whole numbers or numbers; text where kinds are mixed."""
+    """A column of text, integers or floats; text if types are mixed."""
     kinds = {type(value) for value in values if value is not None}
     if kinds <= {int}:
         return pa.array(values, pa.int64()) if kinds else pa.array(values, pa.float64())

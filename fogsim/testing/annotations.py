@@ -1,4 +1,4 @@
-"""What did not pass as GitHub shows it beside the lines of the files: workflow commands on stdout."""
+"""Failures as GitHub shows them next to the lines of the files: workflow commands on stdout."""
 
 from collections.abc import Iterator, Sequence
 

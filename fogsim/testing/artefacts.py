@@ -1,4 +1,4 @@
-"""What is kept of a case that failed: a video around the failure, and a plot of what was looked at."""
+"""Artefacts of failed cases: a video around the failure, and a plot of the signals."""
 
 import hashlib
 import itertools
@@ -30,7 +30,7 @@ from fogsim.traffic_run import run_traffic
 from fogsim.values import Step, TrafficStep
 
 BEFORE, AFTER = 6.0, 2.0
-"""How long before a failure its video begins, and how long after it it ends [s]."""
+"""Time of a video before a failure, and after it [s]."""
 
 _VIDEO = "video.mp4"
 
@@ -47,12 +47,12 @@ class Artefacts:
 
     @property
     def files(self) -> list[Path]:
-        """Those that are there."""
+        """The existing files."""
         return [one for one in (self.plot, self.video) if one is not None]
 
 
 Kept = Mapping[tuple[str, str, str], Artefacts]
-"""What was kept, by key of the run, name and clause."""
+"""Artefacts by key of the run, name and clause."""
 
 
 def keep_artefacts(
@@ -85,7 +85,7 @@ def keep_artefacts(
 
 
 def _folder_name(test: FogTest, run: StudyRun) -> str:
-    """Name of the folder of a case: one that says what it is, and a digest by which it is like no other."""
+    """Name of a case's folder: a description and a digest that makes it unique."""
     label = label_of(run)
     digest = hashlib.sha256(f"{test.path.resolve()} {label}".encode()).hexdigest()[:6]
     return re.sub(r"[^A-Za-z0-9_.,=-]", "_", f"{test.name}-{digest}{'-' if label else ''}{label}")[:150]

@@ -1,4 +1,4 @@
-"""One case: a run that is watched by what is expected of it."""
+"""One case: a run with its expectations evaluated."""
 
 import time
 import warnings
@@ -22,7 +22,7 @@ def check_case(scenario: Scenario, seed: int, sumo_outputs: Path | None = None) 
     standard, watch = build.safety_standard(scenario), ExpectationWatch(clauses_of(scenario.expect))
     ending = None
     with warnings.catch_warnings():
-        # What was not played is for the expectations to say.
+        # Expectations decide about events that were not played.
         warnings.simplefilter("ignore", UnplayedWarning)
         if scenario.traffic.has_ego:
             of_ego = RunMetrics(standard)

@@ -1,4 +1,4 @@
-"""Whether all cases of a file together pass: each clause of each expectation by itself."""
+"""Whether all cases of a file together pass, for each clause of each expectation."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from fogsim.testing.results import CaseResult
 
 
 class Outcome(StrEnum):
-    """What a line of the report says."""
+    """Wording of an outcome in the report."""
 
     PASSED = "passed"
     FAILED = "failed"
@@ -32,22 +32,22 @@ def rate_bounds(passed: int, tried: int, confidence: float) -> tuple[float, floa
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What came of a clause in all cases.
+    """Result of a clause over all cases.
 
     Attributes
     ----------
     name, clause : str
         The expectation and its clause.
     outcome : Outcome
-        What came of it.
+        The clause's outcome.
     numbers : (int, int, int)
         Cases that passed, failed, and were inconclusive.
     telling : Finding
-        A finding that shows why: the first one that failed, else the first of those that the outcome is about.
+        A finding that shows why: the first that failed, otherwise the first with the outcome.
     run : StudyRun
         Its case.
     why : str
-        What the outcome goes by, where there are several cases.
+        Reason for the outcome, if there are several cases.
     """
 
     name: str

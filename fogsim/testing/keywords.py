@@ -1,4 +1,4 @@
-"""Which expectations are asked for: words with ``and``, ``or``, ``not`` and parentheses, as of pytest's ``-k``."""
+"""Selection of expectations: words with ``and``, ``or``, ``not`` and parentheses, as in pytest's ``-k``."""
 
 import re
 from collections.abc import Callable
@@ -21,7 +21,7 @@ class Keywords:
 
 
 def parse_keywords(written: str) -> Keywords:
-    """Read a condition on names: a word is met where it is part of a name, in whatever case.
+    """Parse a condition on names: a word matches if it is part of a name, in upper or lower case.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def parse_keywords(written: str) -> Keywords:
     Raises
     ------
     InputError
-        If it is none.
+        If it is malformed.
     """
     parser = _Parser(written)
     return Keywords(written, parser.whole())

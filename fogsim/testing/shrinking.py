@@ -1,4 +1,4 @@
-"""The smallest case that fails: as many names as can be at their first values, numbers as near to them as can be."""
+"""The smallest failing case: as many names as possible at their first values, numbers as near to them as possible."""
 
 import contextlib
 from collections.abc import Callable, Mapping, Sequence
@@ -18,13 +18,13 @@ from fogsim.testing.wording import command_text
 from fogsim.units.quantities import split_quantity
 
 HALVINGS = 5
-"""How often the way of a number to its first value is halved."""
+"""Maximum number of bisection steps between a number and its first value."""
 
 Values = Mapping[str, str]
-"""Names and their values, as text; those that are drawn for the seed are left out."""
+"""Names and their values, as text, without those that are drawn for the seed."""
 
 Fails = Callable[[Values], bool | None]
-"""Whether a case fails; None if it cannot be one."""
+"""Whether a case fails; None if there is no such case."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +107,7 @@ def _run(
 
 
 def _at_first_values(values: Values, first: Values, fails: Fails) -> Values:
-    """A failing case none of whose names can be put to its first value alone."""
+    """A failing case in which no single name can be reset to its first value."""
     changed = True
     while changed:
         changed = False

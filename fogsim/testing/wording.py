@@ -1,4 +1,4 @@
-"""What came of tests, in words that terminal, reports and annotations share."""
+"""Test results in words, shared by terminal, reports and annotations."""
 
 import shlex
 from collections.abc import Sequence

@@ -15,7 +15,7 @@ from fogsim.openscenario.xml_tree import Node
 from fogsim.units import KMH_PER_MPS
 
 SHAPES = {"step": "step", "linear": "linear", "sinusoidal": "sinusoidal", "cubic": "sinusoidal"}
-"""Shapes of dynamics and the one in FogSim that is nearest."""
+"""Shapes of dynamics, and the nearest one in FogSim."""
 
 LAMPS = {
     "daytimeRunningLights": ("daytime",),
@@ -29,7 +29,7 @@ LAMPS = {
     "indicatorRight": ("indicator_right",),
     "warningLights": ("indicator_left", "indicator_right"),
 }
-"""Lamps of each kind of light."""
+"""Lamps of each type of light."""
 
 _UNLIT = ("licensePlateIllumination", "reversingLights", "specialPurposeLights")
 _STAY = 1e5  # Time for which a vehicle stays in the lane that it has changed to [s]
@@ -45,7 +45,7 @@ class Effect:
     ends: list[str] = field(default_factory=list)
 
     def add(self, subject: str, **blocks: Any) -> None:
-        """Let a subject do something more."""
+        """Add an action of a subject."""
         mine = self.do.setdefault(subject, {})
         for key, block in blocks.items():
             mine[key] = {**mine.get(key, {}), **block} if key == "lamps" else block
@@ -62,7 +62,7 @@ class Actions:
 
     @property
     def findings(self) -> Findings:
-        """Takes what cannot be done."""
+        """Receives what cannot be done."""
         return self.catalogs.findings
 
     def take(self, action: Node, actors: list[str], effect: Effect) -> None:
@@ -185,7 +185,7 @@ class Actions:
             return
         mode = self.findings.word(state, "mode", ("on", "off", "flashing"))
         for key in ("luminousIntensity", "flashingOnDuration", "flashingOffDuration"):
-            # Lamps shine as their kind does, and indicators flash as the law has it.
+            # Lamps shine as their type does, and indicators flash as the law requires.
             state.get(key)
         for colour in state.all("Color"):
             self.findings.leave_out(colour, "lamps have the colour of their kind")
@@ -223,4 +223,4 @@ ACTIONS: Mapping[str, str] = {
     "EnvironmentAction": "`fog` and `light`.",
     **{tag: inspect.getdoc(action) or "" for tag, action in _PRIVATE.items()},
 }
-"""Actions that are read, and what becomes of each."""
+"""Actions that are read, and their translation."""

@@ -15,7 +15,7 @@ LOCATIONS = {
     "ControllerCatalog": "Controller",
     "ManeuverCatalog": "Maneuver",
 }
-"""Kinds of catalogs that are read, and what is in them."""
+"""Types of catalogs that are read, and their elements."""
 
 
 @dataclass
@@ -42,7 +42,7 @@ class Catalogs:
                 if one.attributes.get("name") == name:
                     whole = one.copy()
                     own = declared(whole, {}, self.findings)
-                    # What the reference gives goes before what the entry has.
+                    # Values of the reference take precedence over those of the entry.
                     whole.children = [child for child in whole.children if child.tag != "ParameterDeclarations"]
                     put_parameters(whole, {**own, **given}, self.findings)
                     whole.is_read = True
@@ -59,7 +59,7 @@ class Catalogs:
                 except InputError as error:
                     self.findings.refused.append(str(error))
                     self._read[file] = Node("", {}, file, 1)
-            # Whoever has copied a catalog may not have changed the name inside.
+            # A copied catalog may still have its old name inside.
             yield from (
                 one
                 for one in self._read[file].children

@@ -1,4 +1,4 @@
-"""Where the sun stands, and how bright it makes the ground."""
+"""Elevation of the sun, and illuminance of the ground."""
 
 import datetime as dt
 import math
@@ -6,7 +6,7 @@ import math
 from numpy.polynomial import polynomial
 
 USUAL_LATITUDE = math.radians(50.0)
-"""Latitude where a map tells none [rad]."""
+"""Latitude if a map gives none [rad]."""
 
 _BRANCHES = (
     (20.0, (3.74, 3.97, -4.07, 1.47)),

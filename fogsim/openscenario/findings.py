@@ -1,4 +1,4 @@
-"""What of a file FogSim cannot do, and what it leaves out: each told once, with its path and line."""
+"""What FogSim cannot do of a file, and what it leaves out: each reported once, with its path and line."""
 
 import math
 import warnings
@@ -22,12 +22,12 @@ PASSED_OVER = {
     "UsedArea": "part of the map that is used",
     "ConstraintGroup": "limits of parameters",
 }
-"""Elements that change nothing in FogSim, and what they are."""
+"""Elements without effect in FogSim, and what they are."""
 
 ATTRIBUTES_PASSED_OVER = frozenset(
     {"name", "model3d", "mass", "role", "animation", "maximumExecutionCount", "atmosphericPressure", "temperature"}
 )
-"""Attributes that change nothing in FogSim."""
+"""Attributes without effect in FogSim."""
 
 
 @dataclass
@@ -96,7 +96,7 @@ class Findings:
 
 
 def _seen(node: Node) -> None:
-    """Mark it and what is in it, so that it is told once."""
+    """Mark an element and its children as read, so that it is reported once."""
     for one in node.walk():
         one.is_read = True
         one.read.update(one.attributes)

@@ -1,4 +1,4 @@
-"""The beginning: where vehicles are, how fast they drive, their lamps, the fog and the light."""
+"""The initial state: positions, speeds and lamps of vehicles, fog and light."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -54,7 +54,7 @@ def _take_global(action: Node, begin: Beginning, actions: Actions) -> None:
 
 
 def _place(private: list[Node], vehicles: Mapping[str, Vehicle], actions: Actions) -> None:
-    """Place vehicles, those last whose place is relative to another's."""
+    """Place vehicles; those relative to another one last."""
     wanted: dict[str, Node] = {}
     for one in private:
         name = one.get("entityRef")
@@ -83,7 +83,7 @@ def _take_private(action: Node, name: str, begin: Beginning, actions: Actions) -
     done = effect.do.get(name, {})
     speed = done.pop("speed", None)
     if speed is not None:
-        # At the beginning there is nothing that a speed could change from.
+        # At the start there is no earlier speed to change from.
         begin.speeds[name] = _speed(speed, begin.speeds)
     if done:
         begin.effect.add(name, **done)

@@ -1,4 +1,4 @@
-"""Parameters of a file put in place of ``$name`` and ``${expression}``."""
+"""Values of a file's parameters in place of ``$name`` and ``${expression}``."""
 
 import ast
 import math
@@ -14,7 +14,7 @@ _NAME = re.compile(r"\$([A-Za-z_][A-Za-z0-9_.]*)")
 _EXPRESSION = re.compile(r"\$\{([^{}]*)\}")
 _LONGEST = 500
 _FREE_TEXT = ("name", "description", "author", "license")
-"""Attributes in which a ``$`` that means nothing does no harm."""
+"""Attributes in which a ``$`` without meaning does no harm."""
 
 _UNARY: Mapping[type[ast.AST], Callable[[float], float]] = {
     ast.USub: operator.neg,

@@ -1,4 +1,4 @@
-"""Where the positions of a file are on the lanes of the network."""
+"""Positions of a file on the lanes of the network."""
 
 import inspect
 import math
@@ -103,4 +103,4 @@ _KINDS: Mapping[str, Callable[[Positions, Node], Spot]] = {
 }
 
 POSITIONS: Mapping[str, str] = {tag: inspect.getdoc(kind) or "" for tag, kind in _KINDS.items()}
-"""Kinds of positions that are read, and which place each is."""
+"""Types of positions that are read, with the place of each."""

@@ -1,4 +1,4 @@
-"""An OpenSCENARIO file as the plain data of a scenario file, and SUMO's files that go with it."""
+"""An OpenSCENARIO file as the plain data of a scenario file, with its SUMO files."""
 
 import re
 import warnings
@@ -28,10 +28,10 @@ from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, read_opendrive_l
 from fogsim.units import KMH_PER_MPS
 
 USUAL_DURATION = 120.0
-"""Longest simulated time of a file whose stop trigger names none [s]."""
+"""Longest simulated time of a file whose stop trigger has no time [s]."""
 
 NEAR_THE_END = 10.0
-"""How near to the end of its route the ego has arrived [m]."""
+"""Distance to the end of its route at which the ego has arrived [m]."""
 
 Key = tuple[str | int, ...]
 
@@ -108,7 +108,7 @@ class _Reader:
         actions = story.actions
         begin = read_beginning(self.storyboard.one("Init"), self.vehicles, actions)
         if ego not in begin.spots:
-            # Without a route there is nothing along which anything could be measured.
+            # Without a route, no position along it can be measured.
             self.findings.refuse(
                 self.root, f"no vehicle that could be the ego has a place; there are {len(self.vehicles)}"
             )
@@ -185,7 +185,7 @@ def begin_at_once(entries: list[tuple[Node, dict[str, Any]]], begin: Beginning, 
 
 
 def _initial(begin: Beginning, ego: str) -> dict[str, Any]:
-    """Entry of the timeline that holds what holds from the beginning: the speeds of all but the ego, and lamps."""
+    """Entry of the timeline for the initial state: the speeds of all vehicles but the ego, and lamps."""
     for name in begin.spots:
         speed = begin.speeds.get(name, 0.0)
         if name != ego or speed <= STANDS:

@@ -40,7 +40,7 @@ class Storyboard:
 
     @property
     def findings(self) -> Findings:
-        """Takes what cannot be played."""
+        """Receives what cannot be played."""
         return self.catalogs.findings
 
     def find_events(self, storyboard: Node) -> None:
@@ -82,7 +82,7 @@ class Storyboard:
             self.actions.take(action, actors, entry.effect)
 
     def timeline(self) -> list[tuple[Node, dict[str, Any]]]:
-        """Entries of the timeline, each with the element that it stands for."""
+        """Entries of the timeline, each with its element."""
         triggers = self._need_triggers()
         for story in self._stories:
             for act in story.all("Act"):
@@ -103,7 +103,7 @@ class Storyboard:
         return self.triggers
 
     def _act_begins(self, act: Node, triggers: Triggers) -> Trigger:
-        """When an act begins; what is more than a time is remembered by a mark."""
+        """When an act begins; a trigger that is more than a time becomes a mark."""
         begins = triggers.trigger(act.one("StartTrigger")) or AT_ONCE
         if begins.at is not None or not begins.condition:
             return begins
@@ -148,7 +148,7 @@ class Storyboard:
         return self._acts[id(act)]
 
     def _over(self, part: Node) -> Trigger:
-        """When all events in it are over."""
+        """When all events in an element are over."""
         inner = {id(event): event for act in self._all_acts() for event in _events(act)}
         if part.tag == "Action":
             events = [self._entry(part).node]
@@ -179,7 +179,7 @@ def _is_called(node: Node, kind: str, name: str) -> bool:
 
 
 def _free_name(wanted: str, taken: set[str]) -> str:
-    """A name for an entry of the timeline: letters, digits and _, not taken yet."""
+    """A name for an entry of the timeline: letters, digits and _, and unique."""
     name = re.sub(r"\W", "_", wanted, flags=re.ASCII)[:80] or "event"
     name = name if name[0].isalpha() or name[0] == "_" else f"_{name}"
     number = 1
@@ -191,7 +191,7 @@ def _free_name(wanted: str, taken: set[str]) -> str:
 
 
 def _until(stop: Trigger | None, triggers: Triggers, node: Node) -> str:
-    """What must hold beside an event's own trigger while its act has not been stopped."""
+    """Condition for an event in addition to its trigger: its act has not been stopped."""
     if stop is None or not stop.condition:
         return ""
     if stop.at is not None:

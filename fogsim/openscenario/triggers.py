@@ -22,7 +22,7 @@ RULES = {
 
 _EDGES = ("none", "rising", "falling", "risingOrFalling")
 _WORD = re.compile(r"[A-Za-z_][\w:#@\-]*")
-_STILL = 0.1  # Speed below which a vehicle stands [m/s]
+_STILL = 0.1  # Speed below which a vehicle counts as stopped [m/s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +78,7 @@ class Triggers:
 
     @property
     def findings(self) -> Findings:
-        """Takes what cannot be asked for."""
+        """Receives what conditions cannot express."""
         return self.positions.findings
 
     def trigger(self, node: Node | None) -> Trigger | None:
@@ -157,7 +157,7 @@ class Triggers:
         if test.signal and test.rule in ("<", "<=", ">", ">="):
             how = "rises above" if (test.rule[0] == ">") == is_rising else "falls below"
             return f"{test.signal} {how} {test.value}"
-        # What was otherwise before is so now.
+        # An edge: the condition was different before.
         name = f"before_{len(self.marks)}"
         now, before = (test.text, f"not ({test.text})") if is_rising else (f"not ({test.text})", test.text)
         self.mark(name, Trigger(before), node)
@@ -329,7 +329,7 @@ CONDITIONS: Mapping[str, str] = {
     "the actions take.",
     **{tag: inspect.getdoc(test) or "" for tag, test in _TESTS.items()},
 }
-"""Conditions that are read, and what becomes of each."""
+"""Conditions that are read, and their translation."""
 
 
 def at_time(time: float) -> Trigger:

@@ -1,4 +1,4 @@
-"""Elements of an XML file with their lines and paths, and who has looked at what of them."""
+"""Elements of an XML file with their lines and paths, and a record of what was read."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -7,7 +7,7 @@ from pathlib import Path
 from fogsim.files.xml_reader import XmlFile
 
 MOST_BYTES, MOST_ELEMENTS = 20_000_000, 500_000
-"""Largest file that is read [bytes], and most elements in it."""
+"""Largest file that is read [bytes], and its maximum number of elements."""
 
 
 @dataclass(slots=True)
@@ -29,7 +29,7 @@ class Node:
 
     @property
     def path(self) -> str:
-        """Elements around it and itself, ``/OpenSCENARIO/Storyboard/Story[name]``."""
+        """Path of the element, ``/OpenSCENARIO/Storyboard/Story[name]``."""
         return f"{self.above.path if self.above else ''}/{self.label}"
 
     @property
@@ -63,12 +63,12 @@ class Node:
         return node
 
     def copy(self) -> "Node":
-        """It and everything in it, to be changed; it stays below the same element."""
+        """An independent copy of it and all its descendants, with the same parent."""
         children = [child.copy() for child in self.children]
         return replace(self, attributes=dict(self.attributes), children=children, read=set(self.read))
 
     def walk(self) -> Iterator["Node"]:
-        """It and everything in it."""
+        """The element and all its descendants."""
         yield self
         for child in self.children:
             yield from child.walk()

@@ -1,4 +1,4 @@
-"""What a SUMO configuration file names, without starting SUMO, and which of its options FogSim overrides."""
+"""Contents of a SUMO configuration file, read without SUMO, and its options that FogSim overrides."""
 
 import itertools
 from collections.abc import Iterator, Mapping
@@ -15,10 +15,10 @@ _FIRST_ELEMENTS: Mapping[str, tuple[str, ...]] = {
     "routes": ("routes", "additional", "trips"),
     "additional": ("additional", "routes", "OpenDRIVE"),
 }
-"""Usual first elements of SUMO's files by what they are for; SUMO reads files with others too, networks excepted."""
+"""Usual first elements of SUMO's files by their use; SUMO also reads files with others, except for networks."""
 
 _OTHER_FILES = {*itertools.chain(*_FIRST_ELEMENTS.values()), "OpenSCENARIO", "gpx", "kml", "osm", "html", "svg"}
-"""First elements that make a file one of another kind."""
+"""First elements of files of other types."""
 
 _NET = ("net-file", "net", "n")
 _ADDITIONAL = ("additional-files", "additional", "a")
@@ -30,7 +30,7 @@ _REROUTING = "device.rerouting"
 
 @dataclass(frozen=True, slots=True)
 class _UnsupportedOption:
-    """An option that must have one value with FogSim: its names, that value, equivalent ones, and the reason."""
+    """An option that FogSim fixes: its names, value, equivalent values, and the reason."""
 
     names: tuple[str, ...]
     value: str
@@ -48,7 +48,7 @@ _UNSUPPORTED = (
 )
 
 OVERRIDES = tuple(argument for option in _UNSUPPORTED for argument in (f"--{option.names[0]}", option.value))
-"""Arguments of SUMO's command line that override options of a configuration that FogSim does not support."""
+"""SUMO arguments that override unsupported options of a configuration."""
 
 
 def check_sumo_file(kind: str, path: Path) -> None:
@@ -130,7 +130,7 @@ def _root(config: Path) -> Element:
 
 
 def _values(root: Element, options: tuple[str, ...]) -> Iterator[str]:
-    """Values of an option, which SUMO reads from either attribute, or from between the tags."""
+    """Values of an option, which SUMO reads from either attribute, or from the element's text."""
     for element in root.iter():
         if element.tag in options:
             yield (element.get("value") or element.get("v") or element.text or "").strip()

@@ -1,4 +1,4 @@
-"""Which vehicles and persons a simulation can have, as its route and additional files say, without starting SUMO."""
+"""Vehicles and persons of a simulation, from its route and additional files, without starting SUMO."""
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
@@ -9,13 +9,13 @@ from fogsim.files.xml_reader import read_elements
 from fogsim.traffic.road.configuration import configured_demand
 
 MOST_BYTES = 50_000_000
-"""Bytes of files, unpacked, after which nothing is claimed about a demand."""
+"""Unpacked bytes of files after which nothing is claimed about a demand."""
 
 MOST_NAMES = 10_000
-"""Most ids that are kept to tell the nearest of them."""
+"""Maximum number of ids that are kept to suggest the nearest."""
 
 _OPENING = frozenset(("include", "calibrator", "personTrip"))
-"""Elements that bring vehicles whose ids are not in sight."""
+"""Elements that create vehicles with unknown ids."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,7 @@ def read_demand(
         try:
             left -= read_elements(file, reader, left)
         except InputError:
-            # SUMO tells what is wrong with it when it starts.
+            # SUMO reports its faults when it starts.
             reader.is_open = True
         if reader.is_done:
             break
@@ -79,7 +79,7 @@ def read_demand(
 
 
 class _DemandReader:
-    """Looks for wanted vehicles among elements."""
+    """Searches elements for wanted vehicles."""
 
     def __init__(self, wanted: frozenset[str], reroutes: bool) -> None:
         self.file = Path()
@@ -112,7 +112,7 @@ class _DemandReader:
         elif tag == "route":
             self._take_route(attributes)
         elif tag == "routeDistribution":
-            # One of its routes is drawn.
+            # SUMO chooses one of its routes at random.
             self._inside = ((), None)
         elif tag in _OPENING or (tag == "vType" and "scale" in attributes):
             self.is_open = True
@@ -156,7 +156,7 @@ class _DemandReader:
 
 
 def _flow_vehicles(flow: str, number: int | None, wanted: Collection[str]) -> tuple[str, ...]:
-    """Those of some vehicles that a flow makes, each of which it calls by its own id and a number from 0 on."""
+    """Wanted vehicles of a flow, which are named by its id and a number from 0."""
     made = []
     for vehicle in wanted:
         name, _, place = vehicle.rpartition(".")

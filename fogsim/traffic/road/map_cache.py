@@ -25,8 +25,8 @@ from fogsim.files.user_cache import cache_directory
 from fogsim.traffic.road.road_map import RoadMap, edge_ranges
 from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, Sign, SignalHead
 
-_WORTHWHILE = 1_000_000  # bytes of a network's file, from which on reading takes a fifth of a second
-_MOST_FILES = 16  # of the cache; the oldest go
+_WORTHWHILE = 1_000_000  # bytes of a network's file, above which reading takes a fifth of a second
+_MOST_FILES = 16  # of the cache; the oldest are removed
 _MADE_BY = ("limit_signs.py", "map_cache.py", "net_lanes.py", "network.py", "road_map.py", "signal_heads.py")
 _MARKINGS, _KINDS, _ENDS = tuple(LaneMarking), tuple(LaneKind), tuple(LaneEnd)
 _UNREADABLE = (OSError, ValueError, KeyError, IndexError, TypeError, EOFError, zipfile.BadZipFile, zlib.error)
@@ -77,7 +77,7 @@ def _place(net: Path) -> Path:
 
 @functools.cache
 def _version() -> bytes:
-    """What made a map: the versions of FogSim and sumolib, and the source."""
+    """Identity of the code that makes maps: the versions of FogSim and sumolib, and the source."""
     sources = [Path(__file__).with_name(name).read_bytes() for name in _MADE_BY]
     versions = [metadata.version(name).encode() for name in ("fogsim", "eclipse-sumo")]
     return hashlib.sha256(b"\0".join((*versions, *sources))).digest()
@@ -162,7 +162,7 @@ def _cut(arrays: Mapping[str, NDArray[Any]], name: str) -> list[NDArray[np.float
 
 
 def _text(texts: Sequence[str]) -> NDArray[np.uint8]:
-    # No text of XML has a NUL in it.
+    # Texts from XML contain no NUL.
     return np.frombuffer("".join(f"{text}\0" for text in texts).encode(), np.uint8)
 
 

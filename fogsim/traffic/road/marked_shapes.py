@@ -1,4 +1,4 @@
-"""POIs and polygons of SUMO additional files whose type marks them as FogSim's: signs and structures."""
+"""POIs and polygons of SUMO additional files that are marked as FogSim's: signs and structures."""
 
 from dataclasses import dataclass, field
 from pathlib import Path

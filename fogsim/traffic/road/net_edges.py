@@ -1,4 +1,4 @@
-"""Edges of a SUMO network as its file lists them, for checks that must not wait for the whole network."""
+"""Edges of a SUMO network as listed in its file, for checks that must be faster than reading the whole network."""
 
 import itertools
 import math
@@ -10,7 +10,7 @@ from fogsim.errors import InputError
 from fogsim.files.xml_reader import read_elements
 
 MOST_BYTES = 50_000_000
-"""Bytes of a network file, unpacked, after which it is not looked at."""
+"""Unpacked bytes of a network file after which reading stops."""
 
 Point = tuple[float, ...]
 
@@ -63,7 +63,7 @@ class _EdgeReader:
         elif tag == "tlLogic":
             self.signals[attributes.get("id", "")] = None
         elif tag == "connection":
-            # All edges and programs of traffic lights stand before the connections.
+            # All edges and programs of traffic lights come before the connections.
             self.is_done = True
 
     def end(self, tag: str) -> None:
@@ -71,6 +71,6 @@ class _EdgeReader:
 
 
 def _points(shape: str) -> list[Point]:
-    """Points of a shape [m]; those without a height lie at 0."""
+    """Points of a shape [m]; those without a height are at 0."""
     points = [tuple(map(float, point.split(","))) for point in shape.split()]
     return [(*point, 0.0) if len(point) == 2 else point for point in points]

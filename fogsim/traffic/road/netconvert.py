@@ -1,4 +1,4 @@
-"""SUMO's netconvert, which makes networks of OpenDRIVE files: a program of its own, in the package eclipse-sumo."""
+"""SUMO's netconvert, which converts OpenDRIVE files to networks: a program of the package eclipse-sumo."""
 
 import importlib.util
 import os
@@ -14,10 +14,10 @@ from fogsim.files.readers import read_text
 from fogsim.traffic.road.opendrive import read_opendrive
 
 USUAL_LIMIT = 130.0 / 3.6
-"""Speed limit of lanes of which an OpenDRIVE file tells none [m/s]."""
+"""Speed limit of lanes without one in the OpenDRIVE file [m/s]."""
 
 _TYPES = ("driving", "entry", "exit", "onRamp", "offRamp", "mwyEntry", "mwyExit", "connectingRamp", "slipLane")
-"""Types of OpenDRIVE lanes on which vehicles drive; of others there are no lanes in the network."""
+"""Types of OpenDRIVE lanes for vehicles; other lanes are not in the network."""
 
 _LONGEST_RUN = 300.0  # [s]
 _MOST_MEMORY, _MOST_BYTES = 4 * 2**30, 2**28  # of the program; of its network [bytes]
@@ -64,12 +64,12 @@ def opendrive_net(path: Path) -> str:
             raise InputError(
                 f"{path}: no OpenDRIVE road network that SUMO's netconvert can read: {reported or 'no output'}"
             )
-        # A comment at the top tells when it was made.
+        # A comment at the top has the time of the conversion.
         return _COMMENT.sub("", read_text(net, _MOST_BYTES))
 
 
 def _run(command: list[str], path: Path, folder: Path) -> str:
-    """Run netconvert with limited time, memory and output; what it reported if it failed."""
+    """Run netconvert with limited time, memory and output; return its report if it failed."""
     messages = folder / "messages.txt"
     # Its OpenBLAS would otherwise reserve address space for each processor.
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}

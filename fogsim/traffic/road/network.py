@@ -55,7 +55,7 @@ def _parsed(path: Path) -> RoadMap:
 
 
 class _NetElements(sumolib.net.NetReader):  # type: ignore[misc]  # sumolib has no types
-    """Hands elements to sumolib, and keeps whether vehicles keep to the left, which sumolib ignores."""
+    """Passes elements to sumolib, and records left-hand traffic, which sumolib ignores."""
 
     is_done = is_lefthand = False
 

@@ -1,4 +1,4 @@
-"""Lanes of a network that netconvert has made of an OpenDRIVE file, found by road, lane and s, or by coordinates."""
+"""Lanes of a network that netconvert made from an OpenDRIVE file, found by road, lane and s, or by coordinates."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,10 +14,10 @@ from fogsim.traffic.road.opendrive import read_opendrive
 from fogsim.traffic.road.plan_view import PlanView, plan_view
 
 FARTHEST_ROUTE = 50_000.0
-"""Length at which a route that finds no end is cut off [m]."""
+"""Length at which an endless route is cut off [m]."""
 
 _TURNS = {"s": 0, "r": 1, "R": 1, "l": 2, "L": 2}
-"""Directions of connections, the one that is taken first where nothing is said."""
+"""Directions of connections, in order of preference."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +81,7 @@ class OpenDriveLanes:
                 o.removeprefix(f"{road}_") for one in self.lanes for o in one.origins if o.startswith(f"{road}_")
             )
             raise ValueError(f"road {road!r} has no lane {lane!r} to drive on; it has {', '.join(known) or 'none'}")
-        # Across the road the foot of the reference point is on each lane.
+        # Across the road, the reference point is projected onto each lane.
         return min((_foot(one, x, y) for one in found), key=lambda found: found[0])[1]
 
     def across(self, road: str, s: float, t: float) -> tuple[float, float, float]:
@@ -143,7 +143,7 @@ class OpenDriveLanes:
 
 
 def _foot(lane: RoadLane, x: float, y: float) -> tuple[float, Spot]:
-    """Distance of a point to a lane [m], and the place on it that is nearest."""
+    """Distance of a point to a lane [m], and its nearest place on it."""
     starts, steps = lane.shape[:-1], np.diff(lane.shape, axis=0)
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     to_point = np.array([x, y]) - starts
@@ -199,7 +199,7 @@ def _followers(root: Element, edges: set[str]) -> dict[str, list[str]]:
 
 
 def _origin(reference: str) -> tuple[float | None, float | None]:
-    """Latitude and longitude [rad] to which a map projection refers, if it tells."""
+    """Latitude and longitude [rad] of a map projection's origin, if the file has one."""
     terms = dict(term.partition("=")[::2] for term in reference.replace("+", " ").split())
     try:
         return math.radians(float(terms["lat_0"])), math.radians(float(terms.get("lon_0", "0")))

@@ -1,4 +1,4 @@
-"""Reference lines of OpenDRIVE roads: straight lines, arcs, spirals and cubic polynomials end to end."""
+"""Reference lines of OpenDRIVE roads: connected straight lines, arcs, spirals and cubic polynomials."""
 
 import math
 from collections.abc import Iterable
@@ -11,7 +11,7 @@ from fogsim.files.readers import number_in_text
 from fogsim.linear_algebra import matrix_product
 
 SPIRAL_NODES, SPIRAL_WEIGHTS = np.polynomial.legendre.leggauss(24)
-"""Gauss-Legendre rule on −1 … 1; on a spiral that turns by π it is exact to far below a millimetre."""
+"""Gauss-Legendre rule on −1 … 1; on a spiral that turns by π its error is far below a millimetre."""
 
 Place = tuple[float, float, float]
 """x, y [m] and heading, counterclockwise from east [rad]."""
@@ -93,7 +93,7 @@ class PlanView:
     def at(self, s: float) -> Place:
         """Point at s [m]; ValueError if it is not on the road, or the shape there is unknown."""
         end = self.pieces[-1].s + self.pieces[-1].length
-        # Files round s; a centimetre beyond an end is that end.
+        # Files round s; up to a centimetre beyond an end counts as that end.
         if not -0.01 <= s <= end + 0.01:
             raise ValueError(f"expected s on the road, 0 … {end:g} m, got {s:g}")
         piece = next((p for p in reversed(self.pieces) if p.s <= s), self.pieces[0])

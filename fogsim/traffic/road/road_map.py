@@ -1,4 +1,4 @@
-"""Roads and signs of a network as its file has them, whoever drives there."""
+"""Roads and signs of a network from its file, whatever drives there."""
 
 import itertools
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""What stands beside a road or over it: polygons of SUMO additional files."""
+"""Structures next to a road or over it: polygons of SUMO additional files."""
 
 from collections.abc import Iterable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The calibration of a camera in a file, ``camera.yaml``, for images from disk: read, or written as guessed."""
+"""The calibration of a camera in a file, ``camera.yaml``, for images from disk: read, or written from a guess."""
 
 import math
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from fogsim.scenario.section import Number, PixelPlace, Pixels, Section, Whole
 from fogsim.values import Camera, Response
 
 MADE_TO_BE_LOOKED_AT = 8
-"""Bit depth of images whose values are for the eye; sensors' own, of more bits, are proportional to light."""
+"""Bit depth of images for viewing; sensor values with more bits are proportional to light."""
 
 Coefficient = Annotated[Number, Field(ge=-100, le=100)]
 
@@ -47,7 +47,7 @@ class Calibration:
 
     @property
     def is_straight(self) -> bool:
-        """Whether images are as they must be: of a pinhole that looks along the vehicle's axis."""
+        """Whether images are already those of a pinhole along the vehicle's axis."""
         return self.yaw == 0.0 and not any(self.distortion)
 
 
@@ -152,7 +152,7 @@ def load_calibration(path: Path) -> Calibration:
 
 
 def camera_text(guess: CameraGuess) -> str:
-    """Text of a camera file, with comments that say what each value was taken from.
+    """Text of a camera file, with comments on the source of each value.
 
     Parameters
     ----------
@@ -185,12 +185,12 @@ def write_camera(path: Path, guess: CameraGuess, *, overwrite: bool = False) -> 
     guess : CameraGuess
         The calibration and its reasons.
     overwrite : bool
-        True to replace a file that is there.
+        True to replace an existing file.
 
     Raises
     ------
     InputError
-        If it is there already and not to be replaced, or cannot be written.
+        If it exists and must not be replaced, or cannot be written.
     """
     refuse_unwritable(path, "--camera", overwrite=overwrite)
     write_text(path, camera_text(guess))

@@ -20,15 +20,15 @@ from fogsim.offline.source import Picture, Source
 from fogsim.values import Camera, Estimate, Frame, Observation, SignLook, SignSighting
 
 ALL = "all"
-"""Stands for every method of the registry."""
+"""Represents every method of the registry."""
 
 WHOLE_RANGE_BITS = 12
-"""Bit depth in which images that use all 16 bits are estimated; four more bits are noise in any camera."""
+"""Bit depth for estimating images that use all 16 bits; four more bits are noise in any camera."""
 
 
 @dataclass(frozen=True, slots=True)
 class FrameEstimates:
-    """What the methods say about one image.
+    """Estimates of the methods for one image.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class FrameEstimates:
 
 
 def chosen_methods(names: Sequence[str]) -> tuple[str, ...]:
-    """Methods that are meant by names, each once, "all" being all.
+    """Methods with the given names, each once; "all" stands for every method.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def chosen_methods(names: Sequence[str]) -> tuple[str, ...]:
     Raises
     ------
     UnknownNameError
-        If there is no such method; the message has the known ones and the nearest.
+        If a name is unknown; the message has the known ones and the nearest.
     """
     for name in names:
         if name != ALL and name not in ESTIMATORS:
@@ -76,7 +76,7 @@ def estimate_images(
     track: Path | None = None,
     night: NightDrive | None = None,
 ) -> Iterator[FrameEstimates]:
-    """Estimate the fog in a person's own images or video.
+    """Estimate the fog in your own images or video.
 
     Parameters
     ----------
@@ -84,23 +84,23 @@ def estimate_images(
         One video, or image files, folders and patterns; see `find_source`.
     camera : Camera or Calibration
         Their calibration (`fogsim.offline.load_calibration` reads it from a file). Images of a lens that distorts or of
-        a camera with yaw are straightened first; the result's pictures are the straightened ones.
+        a camera with yaw are rectified first, and the results contain the rectified images.
     methods : str or sequence of str
         Names in `fogsim.estimators.ESTIMATORS`, or "all".
     sequence : bool or None
-        Whether images follow one another in time, so that methods may use earlier ones; None to tell by their names.
+        Whether images follow one another in time, so that methods may use earlier ones; None to decide by their names.
     rate : float or None
         Images of a sequence in a second [1/s]; None for 10.
     signs, track : Path or None
         A map of signs, GeoJSON, and the positions of the drive from its first image on, GPX or CSV: both or neither;
         see `fogsim.offline.watch_signs`.
     night : NightDrive or None
-        Own lamps and calibrations of a drive by night; without it methods of the night take the low beams to be lit.
+        Own lamps and calibrations of a drive by night; without it, night methods assume the low beams.
 
     Yields
     ------
     FrameEstimates
-        For each image in turn; one that cannot be read has its reason in ``picture.error`` and no estimates.
+        For each image in turn; an unreadable one has its reason in ``picture.error`` and no estimates.
 
     Raises
     ------
@@ -126,8 +126,8 @@ def estimates_of(
 ) -> Iterator[FrameEstimates]:
     """Estimate the fog in the images of a source; see `estimate_images`.
 
-    An image that does not fit the camera is passed over like one that cannot be read, unless none has fitted before:
-    then it is the calibration that is of another camera.
+    An image that does not fit the camera is skipped like an unreadable one, unless none has fitted before:
+    then the calibration is of another camera.
 
     Parameters
     ----------

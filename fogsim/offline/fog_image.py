@@ -1,4 +1,4 @@
-"""Fog on images from disk: Koschmieder's law on what the pixel values stand for, over a depth map."""
+"""Fog on images from disk: Koschmieder's law on linear light, with a depth map."""
 
 from pathlib import Path
 
@@ -21,11 +21,11 @@ from fogsim.values import Camera
 from fogsim.values.camera_response import exposure_of, respond
 
 LEAST_SKY = 0.001
-"""Share of the image that must be sky for the airlight to be taken from it; the brightest such share is taken else."""
+"""Least share of sky in an image from which its airlight is taken; otherwise, the brightest such share is used."""
 
 
 BRIGHTEST_ABOVE_ROAD = 0.2
-"""Share of what is above the horizon of a road without depth map that its airlight is taken from: woods are darker."""
+"""Share of the area above the horizon for the airlight of a road without depth map, since woods are darker."""
 
 
 def fog_image(

@@ -63,7 +63,7 @@ def _airlight(
     given: tuple[float, ...] | None,
     layer: FogLayer | None,
 ) -> NDArray[np.float64]:
-    """Airlight of a video, as given or from the sky of its first frame, red first."""
+    """Airlight of a video, given or from the sky of its first frame, red first."""
     if given is not None:
         return np.asarray(given_airlight(given, 3, first, camera)[::-1])
     return in_layer(airlight_of(first, distance, BRIGHTEST_ABOVE_ROAD), first, camera, layer)

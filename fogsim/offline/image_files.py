@@ -20,10 +20,10 @@ from fogsim.files.readers import read_bytes
 from fogsim.values import Camera
 
 DEPTH_KINDS = ("planar", "range")
-"""What a depth map may hold: distance along the optical axis, or along the viewing ray."""
+"""Types of a depth map: distance along the optical axis, or along the viewing ray."""
 
 CHECKED_FORMATS = ("JPEG", "PNG", "BMP", "PPM")
-"""Pillow's names of formats of which OpenCV may show as much as there is of a file."""
+"""Pillow's names of formats whose truncated files OpenCV may read as far as they go."""
 
 MOST_BYTES = 2**31
 """Largest file of an image or a depth map [bytes]."""
@@ -45,7 +45,7 @@ def _decoded(path: Path) -> NDArray[np.generic]:
     if not data:
         raise InputError(f"{path}: the file is empty")
     _refuse_damaged(path, data)
-    # OpenCV would print lines of its own about what is told below.
+    # OpenCV would also print its own messages about errors that are reported below.
     level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
@@ -59,7 +59,7 @@ def _decoded(path: Path) -> NDArray[np.generic]:
 
 
 def _refuse_damaged(path: Path, data: bytes) -> None:
-    """Refuse what OpenCV would fill up, or take all memory for, without a word."""
+    """Refuse images that OpenCV would silently fill up, or that would exhaust memory."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -141,7 +141,7 @@ def _refuse_impossible(path: Path, depth: NDArray[np.float64]) -> None:
 def refuse_unwritable_image(
     path: Path, option: str = "", *, overwrite: bool = True, read: Iterable[Path] = (), makes_folder: bool = False
 ) -> None:
-    """Refuse a file as `refuse_unwritable` does, and one whose ending is no image's."""
+    """Refuse a file as `refuse_unwritable` does, and one without the suffix of an image."""
     ending = path.suffix.lower()
     if not ending or not cv2.haveImageWriter(f"image{ending}"):
         named = f"{option} {path}".lstrip()

@@ -1,4 +1,4 @@
-"""Where a vehicle's front lamps are and how they shine, in a file, ``lamps.yaml``."""
+"""Positions and beams of a vehicle's front lamps in a file, ``lamps.yaml``."""
 
 from pathlib import Path
 from typing import Annotated

@@ -20,7 +20,7 @@ from fogsim.values import Camera, Estimate
 from fogsim.values.camera_response import respond
 
 ESTIMATOR = "joint_road"
-"""What tells the extinction where no visibility is given."""
+"""Method that estimates the extinction if no visibility is given."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class RestorationWish:
     beside: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be restored."""
+        """Refuse an invalid restoration."""
         needs = METHODS.find(self.method).needs_extinction
         if self.visibility is None:
             return
@@ -90,7 +90,7 @@ def restored_images(source: Source, camera: Camera, wish: RestorationWish) -> It
 
 
 def _estimated(source: Source, camera: Camera, wish: RestorationWish) -> Iterator[tuple[Picture, Estimate | None]]:
-    """Images, with their estimates where some are wanted."""
+    """Images, with their estimates if needed."""
     if wish.estimates:
         for result in estimates_of(source, camera, (ESTIMATOR,)):
             yield result.picture, next(iter(result.estimates), None)
@@ -124,7 +124,7 @@ def _restored(
 def _airlight(
     image: Pixels, camera: Camera, wish: RestorationWish, estimate: Estimate | None
 ) -> NDArray[np.float64] | None:
-    """Pixel values of the airlight that is given, or of the picture's own with the estimate's luminance."""
+    """Pixel values of the given airlight, or of the image's own with the estimate's luminance."""
     if wish.airlight is not None:
         return np.array(wish.airlight)
     told = None if estimate is None else estimate.diagnostics.get("airlight")

@@ -1,4 +1,4 @@
-"""Distances to the flat road below the horizon, which stand in for a depth map of an open road."""
+"""Distances to the flat road below the horizon, in place of a depth map of an open road."""
 
 import math
 from dataclasses import dataclass
@@ -18,10 +18,10 @@ from fogsim.values.pinhole import camera_axes
 Floats = NDArray[np.float64]
 
 MOST_UNBENT = 1e-3
-"""How far from its pixel a ray may come out that is bent by the lens again [px]; beyond it no ray is the pixel's."""
+"""Largest error of a ray after the lens model [px]; above it the pixel has no ray."""
 
 MOST_STEPS = 30
-"""Steps of Newton's method; some five are enough for lenses of cameras on vehicles."""
+"""Steps of Newton's method; about five are enough for lenses of vehicle cameras."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class RoadPlane:
 
 
 def _unbent_rays(calibration: Calibration) -> tuple[Floats, Floats]:
-    """Each pixel's ray in the camera's axes, to the right and down of 1 along the axis, without the lens's bending."""
+    """Each pixel's ray in the camera's axes, right and down per 1 along the axis, without the lens's bending."""
     camera = calibration.camera
     u0, v0 = camera.principal_point
     rows, columns = np.indices((camera.height, camera.width), dtype=np.float64)
@@ -68,7 +68,7 @@ def _unbent_rays(calibration: Calibration) -> tuple[Floats, Floats]:
         bent, (same, mixed, other) = _bent(right, down, calibration.distortion)
         off = (bent[0] - seen[0], bent[1] - seen[1])
         determinant = same * other - mixed * mixed
-        with np.errstate(all="ignore"):  # where the lens folds the image, which is told below
+        with np.errstate(all="ignore"):  # where the lens folds the image, which is reported below
             right = right - (other * off[0] - mixed * off[1]) / determinant
             down = down - (same * off[1] - mixed * off[0]) / determinant
     with np.errstate(all="ignore"):
@@ -86,7 +86,7 @@ def _unbent_rays(calibration: Calibration) -> tuple[Floats, Floats]:
 def _bent(
     right: Floats, down: Floats, distortion: tuple[float, ...]
 ) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats, Floats]]:
-    """Rays behind the lens by Brown's model, as `Straightener` has it, and their derivatives (a symmetric matrix)."""
+    """Rays behind the lens by Brown's model, as in `Straightener`, and their derivatives (a symmetric matrix)."""
     k1, k2, p1, p2 = distortion
     square = right**2 + down**2
     radial, growth = 1.0 + square * (k1 + k2 * square), 2.0 * (k1 + 2.0 * k2 * square)

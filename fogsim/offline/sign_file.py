@@ -1,4 +1,4 @@
-"""A person's own map of signs: GeoJSON, points in WGS 84."""
+"""Your own map of signs: GeoJSON, points in WGS 84."""
 
 import math
 from collections import Counter
@@ -14,10 +14,10 @@ from fogsim.scene import SIGN_KINDS
 from fogsim.units import KMH_PER_MPS
 
 USUAL_HEIGHT, USUAL_DIAMETER = 2.2, 0.6
-"""Height of the middle of a face above the road, and its size, where the map tells none [m]."""
+"""Default height of a face's middle above the road, and its default size [m]."""
 
 WGS84 = ("CRS84", "4326")
-"""What names of the coordinate frame end in that GeoJSON may be in."""
+"""Suffixes of the names of coordinate frames that GeoJSON may use."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +80,7 @@ def _kind_of(told: Mapping[str, Any]) -> str:
 
 
 def _refuse_other_frames(path: Path, told: Mapping[str, Any]) -> None:
-    """Refuse a map that says itself that it is not in longitude and latitude."""
+    """Refuse a map that declares other coordinates than longitude and latitude."""
     if told.get("coordinates") == NET:
         raise InputError(
             f"{path}: its points are x and y of a SUMO network, which tells no projection; expected longitude and "
@@ -138,7 +138,7 @@ def _place(where: str, told: Any) -> tuple[float, float]:
 
 
 def _number(where: str, told: Mapping[str, Any], key: str, usual: float, least: float, most: float) -> float:
-    """Number of a property; the usual one where it is missing."""
+    """Number of a property; the default if it is missing."""
     value = told.get(key)
     return usual if value is None else number_within(where, key, value, least, most)
 

@@ -1,4 +1,4 @@
-"""Where a vehicle was: GPX or CSV, WGS 84."""
+"""Positions of a vehicle: GPX or CSV, WGS 84."""
 
 import csv
 import io
@@ -20,20 +20,20 @@ SEMI_MAJOR, FLATTENING = 6_378_137.0, 1.0 / 298.257223563
 """Ellipsoid of WGS 84: semi-major axis [m], flattening [-] (NIMA TR8350.2, 2000, table 3.1)."""
 
 LONGEST_GAP = 5.0
-"""Time without a position after which the track is taken to be interrupted [s]."""
+"""Time without a position after which the track counts as interrupted [s]."""
 
 LONGEST_TIME = 1e12
 """Largest number in a track: time in seconds since 1970 is about 2e9."""
 
 MOVING, MOST_LOOKED_AT = 10.0, 100
-"""Way over which a direction of travel is told from positions [m], and among how many of them before and after."""
+"""Distance over which a direction is derived from positions [m], and number of positions before and after."""
 
 COLUMNS: Mapping[str, tuple[str, ...]] = {
     "time": ("time_s", "time"),
     "latitude": ("latitude", "lat"),
     "longitude": ("longitude", "lon"),
 }
-"""Columns of a CSV file, and how each may be called."""
+"""Columns of a CSV file, and their possible names."""
 
 
 class GeographicPose(NamedTuple):
@@ -103,7 +103,7 @@ def load_track(path: Path) -> Track:
 
 
 Point = tuple[float, float, float, float]
-"""Time [s], latitude, longitude, and heading clockwise from north [deg], NaN if it is not told."""
+"""Time [s], latitude, longitude, and heading clockwise from north [deg], NaN if missing."""
 
 
 def _gpx_points(path: Path) -> Iterator[Point]:
@@ -163,7 +163,7 @@ def _float(where: str, name: str, told: str | None) -> float:
 def _headings(
     path: Path, longitude: NDArray[np.float64], latitude: NDArray[np.float64], told: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Directions of travel: as they are told, else by the way from the position before to the one after."""
+    """Directions of travel: as given, otherwise from the position before to the one after."""
     if not np.isnan(told).any():
         return np.unwrap(np.radians(90.0 - told))
     east, north = metres_per_radian(float(latitude.mean()))

@@ -1,4 +1,4 @@
-"""Videos that are written frame by frame, and are there only when they are whole."""
+"""Videos that are written frame by frame, and get their names when complete."""
 
 from pathlib import Path
 from types import TracebackType
@@ -12,7 +12,7 @@ from fogsim.recorders.video import Encoder, encoder_command
 from fogsim.values import Camera
 
 RATE_FACTOR = 12
-"""Constant rate factor: what is left of the road far away in fog is a few pixel values, and is to be kept."""
+"""Constant rate factor: distant road in fog differs by only a few pixel values, which must be kept."""
 
 
 class VideoWriter:
@@ -33,13 +33,13 @@ class VideoWriter:
         self._encoder.write(frame.tobytes())
 
     def __enter__(self) -> Self:
-        """Begin; the file is made with the first frame."""
+        """Begin; the file is created with the first frame."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Give the video its name, or leave none."""
+        """Give the video its name, or remove it."""
         try:
             if self._encoder is not None:
                 self._encoder.finish()

@@ -1,4 +1,4 @@
-"""What is written about a frame: its entry in the COCO file, and its objects with their boxes."""
+"""Annotations of a frame: its entry in the COCO file, and its objects with their boxes."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -56,7 +56,7 @@ def object_records(step: Step, instance: NDArray[np.uint16], transmission: NDArr
     records = []
     for number, box, inside in _objects(instance):
         if number == step.ego + 1:
-            # The own bonnet is no object to be found.
+            # The own bonnet is not an object.
             continue
         rows, cols = box
         records.append(
@@ -87,7 +87,7 @@ def _objects(instance: NDArray[np.uint16]) -> Iterable[tuple[int, tuple[slice, s
 
 
 def _object(step: Step, number: int) -> dict[str, Any]:
-    """What is known of the object of a number in the instance mask."""
+    """Attributes of an object by its number in the instance mask."""
     row, vehicles = number - 1, len(step.traffic.ids)
     if row < vehicles:
         return {

@@ -1,4 +1,4 @@
-"""The directory of a data set: where its files are, whose it is, and what of it is there already."""
+"""The directory of a data set: its files, its identity, and its progress."""
 
 import json
 from collections.abc import Mapping
@@ -26,7 +26,7 @@ _RECORDS = "records"
 
 
 class _ImageEntry(BaseModel, strict=True):
-    """What continuing a data set, or a reader of its COCO file, needs of a frame's entry."""
+    """Fields of a frame's entry that a continued data set, or a reader of its COCO file, needs."""
 
     width: PositiveInt
     height: PositiveInt
@@ -56,7 +56,7 @@ class DatasetDirectory:
         self._lock = WriterLock(self.path)
         try:
             self._check(dict(identity))
-            # What is ours is told before anything is written.
+            # The data set's identity is written before anything else.
             write_json(self.path / IDENTITY, identity)
             for folder in (*LAYERS, _RECORDS):
                 (self.path / folder).mkdir(exist_ok=True)
@@ -65,7 +65,7 @@ class DatasetDirectory:
             raise
 
     def close(self) -> None:
-        """Let others write."""
+        """Release the lock."""
         self._lock.release()
 
     def __enter__(self) -> Self:
@@ -98,7 +98,7 @@ class DatasetDirectory:
             )
 
     def has(self, number: int) -> bool:
-        """Whether a frame has all its files and a record that is whole; otherwise it is made again."""
+        """Whether a frame has all its files and a complete record; otherwise it is made again."""
         return all(self._layer(layer, number).is_file() for layer in LAYERS) and self._found(number) is not None
 
     def beyond(self, frames: int) -> int:
@@ -127,7 +127,7 @@ class DatasetDirectory:
         return found
 
     def _found(self, number: int) -> dict[str, Any] | None:
-        """Record of a frame; None if there is none, or it is damaged."""
+        """Record of a frame; None if it is missing or damaged."""
         try:
             found = read_json(self._record(number))
             entry = _Record.model_validate(found).image
@@ -137,7 +137,7 @@ class DatasetDirectory:
         return cast("dict[str, Any]", found) if is_own else None
 
     def _names(self, number: int) -> dict[str, str]:
-        """Files of a frame, as its record has them."""
+        """Files of a frame, from its record."""
         return {_key(layer): self._layer(layer, number).relative_to(self.path).as_posix() for layer in LAYERS}
 
     def write_annotations(self, annotations: Mapping[str, Any]) -> None:
@@ -157,7 +157,7 @@ def _key(layer: str) -> str:
 
 
 def _differences(there: Any, wanted: Any, place: str = "") -> list[str]:
-    """What two plain values differ in, in words."""
+    """Difference between two plain values, in words."""
     if isinstance(there, dict) and isinstance(wanted, dict):
         keys = sorted(there.keys() | wanted.keys())
         return [d for key in keys for d in _differences(there.get(key), wanted.get(key), f"{place}.{key}".lstrip("."))]

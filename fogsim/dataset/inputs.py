@@ -13,7 +13,7 @@ from fogsim.traffic.road.configuration import input_files
 def identity(scenario: Scenario, seed: int, every: int) -> dict[str, Any]:
     """Everything that determines a data set's frames, as JSON data; `every` counts camera periods per frame."""
     found = versions()
-    # The same frames are made on any machine.
+    # Any machine makes the same frames.
     del found["platform"]
     return {
         "seed": seed,

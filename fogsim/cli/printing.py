@@ -12,7 +12,7 @@ from rich.markup import escape as escape_markup
 from fogsim.errors import printable
 
 FAILED = 1
-"""Exit code if an expectation was not met, or a user's method failed."""
+"""Exit code if an expectation or a user's method failed."""
 
 BAD_INPUT = 2
 """Exit code of bad input."""
@@ -31,7 +31,7 @@ def escape(text: object, *, in_one_line: bool = False) -> str:
 
 def print_error(error: object) -> None:
     """Print an error, or its message, on stderr."""
-    # The exit code counts, also where stderr takes no line.
+    # The exit code matters even if stderr cannot be written.
     with contextlib.suppress(OSError):
         stderr.print(f"[bold red]error:[/] {escape(error)}", soft_wrap=True)
 

@@ -21,7 +21,7 @@ def progress_bar(console: Console, *, stays: bool = False) -> Progress:
 
     Otherwise it disappears, and nothing is drawn without a terminal.
     """
-    # rich would lead stdout to its own console, which is stderr: fine on a terminal, and wrong for a pipe or a file.
+    # rich would redirect stdout to its own console, stderr: fine on a terminal, but wrong for a pipe or a file.
     to_terminal = sys.stdout.isatty()
     columns = (
         BarColumn(bar_width=20),
@@ -58,7 +58,7 @@ class SimulationProgress:
         rate = step.time / task.elapsed if task.elapsed else 0.0
         found = f"V ≈ {step.belief.visibility:.0f} m" if isinstance(step, Step) else f"{len(step.traffic.ids)} vehicles"
         description = f"{step.time:.0f} of {self._duration:.0f} s, {rate:.1f}× real time, {found}"
-        # A run that is over is done, however much of its longest duration is left.
+        # A finished run is complete, however much of its longest duration is left.
         done = step.time if step.ending is None else self._duration
         self._progress.update(self._task, completed=done, description=description)
 

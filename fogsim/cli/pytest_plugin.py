@@ -34,7 +34,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> FogFile | 
 
 
 class FogFile(pytest.File):
-    """A scenario file with what it expects; its cases are run once, when the first of its items is."""
+    """A scenario file with expectations; its cases are run once, for the first of its items."""
 
     _tests: list[FogTest]
 
@@ -53,7 +53,7 @@ class FogFile(pytest.File):
 
     @functools.cached_property
     def outcome(self) -> FileOutcome:
-        """What came of all cases."""
+        """Results of all cases."""
         from fogsim.testing import check_test
 
         (test,) = self._tests
@@ -86,13 +86,13 @@ class FogItem(pytest.Item):
         return str(excinfo.value) if isinstance(excinfo.value, NotPassedError) else super().repr_failure(excinfo, style)
 
     def reportinfo(self) -> tuple[Path, int, str]:
-        """Where it stands."""
+        """File and line of the expectation."""
         line = self._test.lines[self.name].rpartition(":")[2]
         return self.path, int(line) - 1 if line.isdecimal() else 0, f"{self.path.name}::{self.name}"
 
 
 class NotPassedError(Exception):
-    """An expectation has failed, was inconclusive, or its run went wrong."""
+    """An expectation failed or was inconclusive, or its run failed."""
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share, and the scenario that they stand for."""
+"""Arguments and options that several commands share, and the scenario that they select."""
 
 import json
 import math
@@ -38,12 +38,12 @@ MethodTimeout = Annotated[
 
 
 def with_timeout(settings: Sequence[str] | None, method_timeout: float | None) -> list[str]:
-    """Settings with the time limit for methods [s] that an option gives."""
+    """Settings with the time limit for methods [s] from an option."""
     return [*(settings or ()), *([] if method_timeout is None else [f"method_timeout_s={method_timeout!r}"])]
 
 
 class CodeNotice:
-    """Names each Python file beside a scenario once, before it is imported, and allows it."""
+    """Names each Python file beside a scenario once, before its import, and allows it."""
 
     def __init__(self) -> None:
         self._named: set[Path] = set()

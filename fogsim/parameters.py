@@ -1,4 +1,4 @@
-"""Arguments: types and ranges stand in the annotations of constructors and functions and are checked at every call."""
+"""Arguments: types and ranges are in the annotations of constructors and functions, and checked at every call."""
 
 import functools
 import inspect
@@ -19,12 +19,12 @@ from fogsim.errors import InputError, nearest, shown, suggest
 
 C = TypeVar("C", bound=Callable[..., Any])
 Check = Callable[[Any], str | None]
-"""From a value to what it had to be; None if it is."""
+"""From a value to what was expected; None if the value fits."""
 
 _Checks = tuple[list[tuple[str, Check | None]], dict[str, Check | None]]
 
 _NOTHING = object()
-"""What fits no annotation that is checked: its check tells what is expected."""
+"""A value that fits no checked annotation; its check says what is expected."""
 
 _ANYTHING: tuple[Any, ...] = (inspect.Parameter.empty, Any, object)
 
@@ -35,7 +35,7 @@ _COLLECTIONS: Mapping[Any, tuple[type, ...]] = {
     tuple: (list, tuple, np.ndarray),
     Iterable: (Iterable,),
 }
-"""What is taken for each type of collection."""
+"""Accepted types for each type of collection."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +74,7 @@ def checked_parameters(target: C) -> C:
 
     @functools.cache
     def checks() -> _Checks:
-        # Not before the first call: annotations may name what is defined further down.
+        # Not before the first call: annotations may name later definitions.
         return _argument_checks(inspect.signature(call, eval_str=True))
 
     @functools.wraps(call)
@@ -102,12 +102,12 @@ def checked_parameters(target: C) -> C:
 
 
 def _given(value: object) -> str:
-    """A value as messages repeat it; of an array, what it is an array of."""
+    """A value as messages show it; for an array, its type and shape."""
     return f"an array of {value.dtype}, shape {value.shape}" if isinstance(value, np.ndarray) else shown(value)
 
 
 def _argument_checks(signature: inspect.Signature) -> _Checks:
-    """Checks of a signature's positional arguments, in their order, and of all its named ones."""
+    """Checks of a signature's positional arguments in order, and of all its named ones."""
     checks = {
         name: check_of(one.annotation, classes=True)
         for name, one in signature.parameters.items()
@@ -243,7 +243,7 @@ def _entries_check(entry: Check | None, kinds: tuple[type, ...], *, may_be_empty
         each = None
         # A text is one value.
         if isinstance(value, kinds) and not isinstance(value, str | bytes | Mapping):
-            # What a generator gives is known only when it is used up.
+            # The values of a generator are known only after it is exhausted.
             if entry is None or not isinstance(value, list | tuple | np.ndarray):
                 return None
             each = next((wrong for wrong in map(entry, value) if wrong is not None), None)
@@ -264,7 +264,7 @@ def _unknown_name(names: type[StrEnum], value: object) -> str | None:
 
 
 def _plain_check(kind: object, interval: Range) -> Check | None:
-    """Check of a number, truth value, text or None; None for any other type."""
+    """Check of a number, boolean, text or None; None for any other type."""
     within = _UNNAMED_RANGES.get(interval, f" {interval}")
     if kind is float:
         return _number_check(float, Real, interval, f"a number{within}")
@@ -280,7 +280,7 @@ def _number_check(usual: Any, kind: Any, interval: Range, expected: str) -> Chec
     least, most, or_nan = interval.least, interval.most, interval.or_nan
 
     def check(value: Any) -> str | None:
-        # Asking for the abstract class takes longer.
+        # The abstract class would be slower.
         is_number = type(value) is usual or (isinstance(value, kind) and not isinstance(value, bool))
         return None if is_number and (least <= value <= most or (or_nan and math.isnan(value))) else expected
 
@@ -288,7 +288,7 @@ def _number_check(usual: Any, kind: Any, interval: Range, expected: str) -> Chec
 
 
 def _class_check(annotation: Any, origin: Any, parts: tuple[Any, ...]) -> Check | None:
-    """Check of an array, mapping, callable, path or instance; None where the annotation is none of these."""
+    """Check of an array, mapping, callable, path or instance; None for other annotations."""
     kind: Any = origin if isinstance(origin, type) else annotation
     if kind in _ANYTHING or not isinstance(kind, type):
         return None
@@ -312,7 +312,7 @@ def _instance_check(kinds: tuple[type, ...], expected: str) -> Check:
 
 
 def _array_check(scalar: type[np.generic]) -> Check:
-    # Any precision of floating point serves; whole numbers wrap.
+    # Any precision of floating point fits; integers would wrap.
     kind = np.floating if issubclass(scalar, np.floating) else scalar
     expected = f"an array of {np.dtype(scalar)}"
 

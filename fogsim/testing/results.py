@@ -66,7 +66,7 @@ class CaseResult:
 
     @property
     def is_passed(self) -> bool:
-        """Whether there was an expectation, and all of them passed."""
+        """Whether there were expectations, and all of them passed."""
         verdicts = [one.verdict for one in self.findings]
         return bool(verdicts) and all(one is FindingVerdict.PASSED for one in verdicts)
 

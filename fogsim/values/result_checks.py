@@ -1,4 +1,4 @@
-"""What methods of the user's return, checked before it goes on: an error names method, field and value."""
+"""Checks of what users' methods return; errors name method, field and value."""
 
 import math
 from collections.abc import Mapping
@@ -27,7 +27,7 @@ from fogsim.values.light import ALL_LAMPS
 T = TypeVar("T")
 
 _SUM_TOLERANCE = 1e-6
-"""How far the probabilities of a belief may be from adding up to 1."""
+"""Tolerance of the sum of a belief's probabilities."""
 
 
 def checked_estimate(method: str, value: object) -> Estimate:
@@ -60,7 +60,7 @@ def checked_belief(method: str, value: object) -> Belief:
         raise InputError(
             f"{who}: log_extinction and probability must be of one length, got {len(cells)} and {len(probability)}"
         )
-    # Copies are of one type, for which the kernel is compiled.
+    # Copies have one type, for which the kernel is compiled.
     is_ascending, least, total = distribution_of(np.array(cells, float), np.array(probability, float))
     if not (is_ascending and math.isfinite(cells[0]) and math.isfinite(cells[-1])):
         raise InputError(f"{who}: log_extinction must be finite and ascending, got {shown(cells)}")

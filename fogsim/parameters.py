@@ -1,4 +1,4 @@
-"""Arguments: types and ranges stand in the annotations of constructors and functions and are checked at every call."""
+"""Arguments: types and ranges are in the annotations of constructors and functions, and checked at every call."""
 
 import functools
 import inspect
@@ -19,12 +19,12 @@ from fogsim.errors import InputError, nearest, shown, suggest
 
 C = TypeVar("C", bound=Callable[..., Any])
 Check = Callable[[Any], str | None]
-"""From a value to what it had to be; None if it is."""
+"""From a value to what was expected; None if the value fits."""
 
 _Checks = tuple[list[tuple[str, Check | None]], dict[str, Check | None]]
 
 _NOTHING = object()
-"""What fits no annotation that is checked: its check tells what is expected."""
+"""A value that fits no checked annotation; its check says what is expected."""
 
 _ANYTHING: tuple[Any, ...] = (inspect.Parameter.empty, Any, object)
 
@@ -35,21 +35,14 @@ _COLLECTIONS: Mapping[Any, tuple[type, ...]] = {
     tuple: (list, tuple, np.ndarray),
     Iterable: (Iterable,),
 }
-"""What is taken for each type of collection."""
+"""Accepted types for each type of collection."""
 
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """Numbers that a parameter may have, both ends included: ``Annotated[float, Range(0.0, 60.0, "s")]``.
+    """Range of a parameter, both ends included: ``Annotated[float, Range(0.0, 60.0, "s")]``.
 
-    Attributes
-    ----------
-    least, most : float
-        The ends, in the unit.
-    unit : str
-        The unit, as it is to appear in messages; empty for a pure number.
-    or_nan : bool
-        Whether NaN, for an unknown value, is allowed too.
+    The ends are in the unit, which messages show; `or_nan` also allows NaN, for an unknown value.
     """
 
     least: float = -sys.float_info.max
@@ -74,15 +67,14 @@ def checked_parameters(target: C) -> C:
 
     Checked are numbers (``float`` is finite unless a `Range` in ``Annotated`` allows more), ``bool``, ``str``,
     ``Literal``, the names of a ``StrEnum``, arrays by their type, instances of classes, callables, and unions,
-    sequences, iterables, tuples and mappings of all these. An unknown, missing or surplus argument raises InputError
-    too.
+    sequences, iterables, tuples and mappings of all these. Unknown, missing and surplus arguments raise InputError too.
     """
     call: Callable[..., Any] = target.__init__ if isinstance(target, type) else target  # type: ignore[misc]
     who = target.__name__ if isinstance(target, type) else f"{target.__name__}()"
 
     @functools.cache
     def checks() -> _Checks:
-        # Not before the first call: annotations may name what is defined further down.
+        # Not before the first call: annotations may name later definitions.
         return _argument_checks(inspect.signature(call, eval_str=True))
 
     @functools.wraps(call)
@@ -110,12 +102,12 @@ def checked_parameters(target: C) -> C:
 
 
 def _given(value: object) -> str:
-    """A value as messages repeat it; of an array, what it is an array of."""
+    """A value as messages show it; for an array, its type and shape."""
     return f"an array of {value.dtype}, shape {value.shape}" if isinstance(value, np.ndarray) else shown(value)
 
 
 def _argument_checks(signature: inspect.Signature) -> _Checks:
-    """Checks of a signature's positional arguments, in their order, and of all its named ones."""
+    """Checks of a signature's positional arguments in order, and of all its named ones."""
     checks = {
         name: check_of(one.annotation, classes=True)
         for name, one in signature.parameters.items()
@@ -139,15 +131,7 @@ def _call_mistake(
 
 
 def accepted_parameters(factory: Callable[..., object], given_elsewhere: Collection[str] = ()) -> dict[str, Any]:
-    """`inspect.Parameter` by name of all that a factory takes by keyword.
-
-    Parameters
-    ----------
-    factory : callable
-        A class or function.
-    given_elsewhere : collection of str
-        Those that are left out.
-    """
+    """`inspect.Parameter` by name of a factory's keyword parameters, without those `given_elsewhere`."""
     return {
         name: parameter
         for name, parameter in inspect.signature(factory, eval_str=True).parameters.items()
@@ -164,16 +148,7 @@ def parameter_mistakes(
 ) -> Iterator[tuple[str, str]]:
     """Name and mistake of every parameter that does not fit a factory's signature.
 
-    Parameters
-    ----------
-    factory : callable
-        What would be called.
-    given : mapping
-        Its parameters by name.
-    given_elsewhere : collection of str
-        Those that it is given by its caller, and that are none of the user's.
-    classes : bool
-        As of `check_of`.
+    Parameters `given_elsewhere` come from the caller and may not be set; `classes` is as in `check_of`.
     """
     known = accepted_parameters(factory, given_elsewhere)
     for name, value in given.items():
@@ -189,33 +164,19 @@ def parameter_mistakes(
 
 
 def mismatch(annotation: object, value: object) -> str | None:
-    """What a value had to be by an annotation; None if it is, or if the annotation is none of those that are checked.
+    """What an annotation expects of a value that does not fit; None if it fits or is not checked.
 
-    Parameters
-    ----------
-    annotation : object
-        Of a parameter; see `checked_parameters`. Classes are not checked: what a file gives may be converted.
-    value : object
-        What was given.
-
-    Examples
-    --------
-    >>> mismatch(Annotated[float, Range(0.0, 1.0)], 7)
-    'a number 0 … 1'
+    Classes are not checked, since values from files may be converted: ``mismatch(Annotated[float, Range(0.0, 1.0)],
+    7)`` is ``'a number 0 … 1'``.
     """
     check = check_of(annotation, classes=False)
     return None if check is None else check(value)
 
 
 def check_of(annotation: Any, *, classes: bool) -> Check | None:
-    """Check by an annotation: from a value to what it had to be, or None if it is; None where nothing is checked.
+    """Function from a value to what an annotation expects, or None if it fits; None if nothing is checked.
 
-    Parameters
-    ----------
-    annotation : object
-        Of a parameter; see `checked_parameters`.
-    classes : bool
-        Whether instances of classes, arrays and callables are checked.
+    `classes` includes instances of classes, arrays and callables.
     """
     origin, parts = get_origin(annotation), get_args(annotation)
     check = _plain_check(annotation, FINITE)
@@ -282,7 +243,7 @@ def _entries_check(entry: Check | None, kinds: tuple[type, ...], *, may_be_empty
         each = None
         # A text is one value.
         if isinstance(value, kinds) and not isinstance(value, str | bytes | Mapping):
-            # What a generator gives is known only when it is used up.
+            # The values of a generator are known only after it is exhausted.
             if entry is None or not isinstance(value, list | tuple | np.ndarray):
                 return None
             each = next((wrong for wrong in map(entry, value) if wrong is not None), None)
@@ -303,7 +264,7 @@ def _unknown_name(names: type[StrEnum], value: object) -> str | None:
 
 
 def _plain_check(kind: object, interval: Range) -> Check | None:
-    """Check of a number, truth value, text or None; None for any other type."""
+    """Check of a number, boolean, text or None; None for any other type."""
     within = _UNNAMED_RANGES.get(interval, f" {interval}")
     if kind is float:
         return _number_check(float, Real, interval, f"a number{within}")
@@ -319,7 +280,7 @@ def _number_check(usual: Any, kind: Any, interval: Range, expected: str) -> Chec
     least, most, or_nan = interval.least, interval.most, interval.or_nan
 
     def check(value: Any) -> str | None:
-        # Asking for the abstract class takes longer.
+        # The abstract class would be slower.
         is_number = type(value) is usual or (isinstance(value, kind) and not isinstance(value, bool))
         return None if is_number and (least <= value <= most or (or_nan and math.isnan(value))) else expected
 
@@ -327,7 +288,7 @@ def _number_check(usual: Any, kind: Any, interval: Range, expected: str) -> Chec
 
 
 def _class_check(annotation: Any, origin: Any, parts: tuple[Any, ...]) -> Check | None:
-    """Check of an array, mapping, callable, path or instance; None where the annotation is none of these."""
+    """Check of an array, mapping, callable, path or instance; None for other annotations."""
     kind: Any = origin if isinstance(origin, type) else annotation
     if kind in _ANYTHING or not isinstance(kind, type):
         return None
@@ -351,7 +312,7 @@ def _instance_check(kinds: tuple[type, ...], expected: str) -> Check:
 
 
 def _array_check(scalar: type[np.generic]) -> Check:
-    # Any precision of floating point serves; whole numbers wrap.
+    # Any precision of floating point fits; integers would wrap.
     kind = np.floating if issubclass(scalar, np.floating) else scalar
     expected = f"an array of {np.dtype(scalar)}"
 

@@ -1,4 +1,4 @@
-"""A run whose results are written down, and stay readable if it is interrupted."""
+"""A run with recorded results, which stay readable if it is interrupted."""
 
 import contextlib
 import dataclasses
@@ -43,22 +43,10 @@ from fogsim.values.result_checks import checked_recorder
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class RecordedRun:
-    """What came of a recorded run.
+    """Result of a recorded run.
 
-    Attributes
-    ----------
-    status : Status
-        Complete or interrupted.
-    ending : Ending or None
-        Why the simulated run was over, None if it was interrupted.
-    summary : RunSummary
-        Its metrics.
-    directory : Path
-        Where the results are.
-    files : tuple of str
-        Their names; none if it was interrupted before its first step, and earlier results are there.
-    unplayed : Unplayed
-        What of the script was not played; empty if it was interrupted.
+    `ending` is None and `unplayed` empty if it was interrupted; `files` are names in the directory, and none if it was
+    interrupted before its first step and earlier results are there.
     """
 
     status: Status
@@ -83,73 +71,14 @@ def record_run(
 ) -> RecordedRun:
     """Run a scenario and write its results into a directory.
 
-    From the first step on they are written into its folder ``unfinished``. When the run is over they take the place of
-    what is there in one go; docs/reference/results.md tells what is in them:
+    Files are written into its folder ``unfinished`` from the first step on, and replace earlier results at once when
+    the run is over; docs/reference/results.md describes them. `recorders` names members of `RECORDERS`, and `watch` is
+    called with each finished `Step` after them. KeyboardInterrupt gives an interrupted run and is not raised again; its
+    files are readable.
 
-    - ``manifest.json``, always: status, ending, seed, resolved scenario, versions, command line, process, times [UTC].
-      Its status is "running" from the first step to the end.
-    - ``metrics.json``, always, at the end: `RunSummary`'s keys, which end in their units, and ``complete``.
-    - ``steps.parquet``, by the recorder ``table``: a row for each step, columns in SI units and radians.
-    - ``trajectories.parquet``, by ``trajectories``: a row for each vehicle and step, in SUMO's FCD columns.
-    - ``events.parquet``, by ``events``: a row for each event: of the timeline, collisions, faults of sensors, the end.
-    - ``video.mp4``, by ``video``: a frame of 1024×480 px (H.264) for each step, at real speed.
-    - ``restored.mp4``, by ``restored_video``: the same, the right half of the picture with contrast restored.
-    - ``report.html``, by ``report``: metrics, figures and pictures in one file.
-    - ``sumo_outputs``, a folder: what SUMO writes, where its files or options ask for outputs.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        From `load_scenario`; the step is its camera period [s], the run ends at its duration [s] or earlier.
-    seed : int
-        At least 0; the same scenario and seed give the same steps, bit for bit.
-    out : str or Path
-        Directory for the results; it is made with its parents where it is not there.
-    overwrite : bool
-        True to replace the results that are there, once the run is over; files that are not FogSim's stay.
-    recorders : iterable of str
-        Which of `RECORDERS` write, each at most once; by default those of `USUAL_RECORDERS`.
-    command_line : sequence of str
-        Program and arguments of the command that started it, for the manifest; empty if none did.
-    watch : callable
-        Called with each finished `Step` after all recorders have taken it, for a progress bar. What it raises ends the
-        run as any other error does, KeyboardInterrupt as Ctrl-C.
-    camera_processes : int
-        As of `fogsim.run`.
-
-    Returns
-    -------
-    RecordedRun
-        Complete, or interrupted by KeyboardInterrupt (Ctrl-C), which is not raised again; in both cases every file is
-        readable and says which it is.
-
-    Raises
-    ------
-    InputError
-        If `out` is a file, cannot be made, is written by another process, or holds results and must not be overwritten,
-        or if a recorder of the user's own lacks a method.
-    UnknownNameError
-        If there is no such recorder.
-    MissingDependencyError
-        If a video is to be written and there is no ffmpeg.
-    RecorderError
-        If a recorder fails, with its name; the others' files are kept, and the manifest's status is "failed".
-    MethodError
-        If a user's method fails; the message names it and the line of its code.
-    FogSimError
-        If a part of the loop cannot start or fails on the way.
-
-    Warns
-    -----
-    UnplayedWarning
-        When all is written, as of `run`.
-
-    Notes
-    -----
-    Any error is raised again. One before the first step leaves none of the files and none of the directories that were
-    made for them, and earlier results as they were; one after it leaves what was recorded until then, and a manifest of
-    status "failed" with the error's message. An error of a user's method leaves that manifest in either case, where
-    there are no earlier results.
+    Other errors are raised again. Before the first step they leave the directory as it was; later they leave what was
+    recorded and a manifest of status "failed" with the message. An error of a user's method leaves that manifest in
+    either case, if there are no earlier results.
     """
 
     def of_ego() -> _Recorded[Step]:
@@ -176,39 +105,7 @@ def record_traffic(
 ) -> RecordedRun:
     """Run a scenario without an ego and write its results into a directory, as `record_run` does.
 
-    There is no video, and table and report are of everybody.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        From `load_scenario`; its ``traffic.ego`` is none.
-    seed : int
-        As of `record_run`.
-    out : str or Path
-        As of `record_run`.
-    overwrite : bool
-        As of `record_run`.
-    recorders : iterable of str
-        Which of `TRAFFIC_RECORDERS` write, each at most once; by default `USUAL_TRAFFIC_RECORDERS`.
-    command_line : sequence of str
-        As of `record_run`.
-    watch : callable
-        As of `record_run`; it gets each `TrafficStep`.
-
-    Returns
-    -------
-    RecordedRun
-        As of `record_run`.
-
-    Raises
-    ------
-    FogSimError
-        As of `record_run`, or if the scenario has an ego.
-
-    Warns
-    -----
-    UnplayedWarning
-        As of `record_run`.
+    There is no video; table and report cover all vehicles.
     """
 
     def alone() -> _Recorded[TrafficStep]:
@@ -229,21 +126,7 @@ AnyStep = TypeVar("AnyStep", bound=TrafficStep)
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class _Recorded(Generic[AnyStep]):
-    """A run that is recorded.
-
-    Attributes
-    ----------
-    steps : callable
-        Begins it, given the folder of what SUMO writes.
-    metrics : MetricsOfRun
-        Its metrics.
-    recorders : Registry
-        Who can write it.
-    watch : callable
-        Called with each finished step.
-    road : RoadSpeeds or None
-        The road whose speeds are asked for.
-    """
+    """How a run is recorded; `steps` starts it, given the folder of SUMO's outputs."""
 
     steps: Callable[[Path], Generator[AnyStep, None, None]]
     metrics: MetricsOfRun[AnyStep]
@@ -252,8 +135,8 @@ class _Recorded(Generic[AnyStep]):
     road: RoadSpeeds | None = None
 
     def along_road(self) -> NDArray[np.float64]:
-        """Means along the road, as of `RunInformation`."""
-        # The summary has the metrics hand over the last steps.
+        """Means along the road, as in `RunInformation`."""
+        # The summary makes the metrics hand over the last steps.
         self.metrics.summary()
         return np.zeros((0, 4)) if self.road is None else self.road.means()
 
@@ -293,7 +176,7 @@ def _record(
                     what.watch(step)
                     last = step
                     if step.ending is not None:
-                        # Whoever takes warnings for errors is not to lose a run that is over by one of the loop's.
+                        # With warnings as errors, a warning of the loop must not lose a finished run.
                         break
             status = Status.COMPLETE
         except KeyboardInterrupt:
@@ -318,7 +201,7 @@ def _record(
 
 
 def _note_failure(directory: RunDirectory, manifest: Manifest, error: MethodError) -> None:
-    """Leave a manifest of a run that failed before it could begin, unless earlier results are there."""
+    """Leave a manifest of a run that failed before it began, unless earlier results exist."""
     if not (directory.earlier or directory.unfinished.exists()):
         directory.begin(manifest.to_json())
         ended = dataclasses.replace(
@@ -343,22 +226,7 @@ def _information(what: _Recorded[AnyStep], scenario: Scenario, seed: int, direct
 
 @checked_parameters
 def record_signs(scenario: Scenario, out: str | Path, *, overwrite: bool = False) -> SignMap:
-    """Write the sign map of a scenario as GeoJSON; no simulation is started.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    out : str or Path
-        The file.
-    overwrite : bool
-        True to replace one that is there.
-
-    Raises
-    ------
-    InputError
-        If the network, or a sign of the additional files, cannot be read, or the file is there or cannot be written.
-    """
+    """Write the sign map of a scenario as GeoJSON, without starting a simulation."""
     out = Path(out)
     refuse_unwritable(out, "--out", overwrite=overwrite, makes_folder=True)
     setup = build.traffic_setup(scenario)

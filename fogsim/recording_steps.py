@@ -1,4 +1,4 @@
-"""Recorders of one run, which take its steps; what they have written stays readable however it ends."""
+"""Recorders of one run, which receive its steps; their files stay readable however it ends."""
 
 import contextlib
 import dataclasses
@@ -16,25 +16,9 @@ AnyStep = TypeVar("AnyStep", bound=TrafficStep)
 
 
 class Recording(Generic[AnyStep]):
-    """Recorders of one run, from its first step to the time when their files take their places.
+    """Recorders of one run, from its first step until their files are in place.
 
-    Parameters
-    ----------
-    directory : RunDirectory
-        Where the files go.
-    manifest : Manifest
-        What is known before the first step.
-    recorders : mapping from str to StepRecorder
-        Recorders by name.
-    metrics : MetricsOfRun
-        Metrics of the steps.
-
-    Attributes
-    ----------
-    failures : dict from str to str
-        Recorders that failed, and why.
-    files : list of str
-        Names of the files of the closed recording.
+    `failures` maps failed recorders to their errors; `files` are the names of the closed recording's files.
     """
 
     def __init__(
@@ -53,18 +37,7 @@ class Recording(Generic[AnyStep]):
         self.files: list[str] = []
 
     def record(self, step: AnyStep) -> None:
-        """Hand a step to metrics and recorders.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            The finished step.
-
-        Raises
-        ------
-        RecorderError
-            If one fails.
-        """
+        """Pass a finished step to metrics and recorders; RecorderError if one fails."""
         if not self._begun:
             self._begin()
         self._metrics.update(step)
@@ -81,24 +54,14 @@ class Recording(Generic[AnyStep]):
         self._begun = True
 
     def begin_if_nothing_is_lost(self) -> None:
-        """Begin without a step, unless earlier results are there."""
+        """Begin without a step, unless earlier results exist."""
         if not (self._begun or self._directory.earlier or self._directory.unfinished.exists()):
             self._begin()
 
     def close(self, manifest: Manifest, interruption: Interruption) -> Status:
-        """Close all recorders, also when some fail, and write metrics and manifest; nothing if it was never begun.
+        """Close all recorders, even if some fail, and write metrics and manifest; nothing if it never began.
 
-        Parameters
-        ----------
-        manifest : Manifest
-            How the run ended.
-        interruption : Interruption
-            What holds signals back; they are let through while a whole run's recorders are closed.
-
-        Returns
-        -------
-        Status
-            How it ended now.
+        Signals are let through while a complete run's recorders are closed. Returns the final status.
         """
         if not self._begun:
             self._directory.clear_sumo_outputs()
@@ -133,7 +96,7 @@ class Recording(Generic[AnyStep]):
 
     @contextlib.contextmanager
     def _noting_failure(self, name: str) -> Iterator[None]:
-        """Note why a recorder failed, where the reason is not known already."""
+        """Record why a recorder failed, unless the reason is already known."""
         try:
             yield
         except Exception as error:  # noqa: BLE001 - a recorder may be anybody's, and must not cost the others their files

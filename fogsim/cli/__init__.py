@@ -1,1 +1,1 @@
-"""The command line: one file a command; arguments, progress and exit codes, nothing else."""
+"""The command line: one file per command; arguments, progress and exit codes only."""

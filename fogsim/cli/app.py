@@ -52,7 +52,7 @@ def _take_common_options(
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
-    """Take the options that stand before a command."""
+    """Accept the options before a command."""
 
 
 # In the order of --help.
@@ -78,16 +78,16 @@ check_values(app)
 
 
 def main() -> None:
-    """Run the command line; errors that a user can mend end in one message and exit code 2, signals in one line."""
+    """Run the command line; user errors end in one message and exit code 2, signals in one line."""
     signals = ProgramSignals()
     signals.listen()
     code: object = 0
     try:
         code = _run_app()
-        # All is saved; an exception in Python's own end would be told as a traceback.
+        # All is saved; an exception while Python ends would be shown as a traceback.
         leave_on_signals()
     except BaseException:
-        # Whatever an import or a library made of the exception that the signal raised.
+        # Imports and libraries may convert the exception that the signal raised.
         if signals.last is None:
             raise
     if signals.last is not None:
@@ -98,7 +98,7 @@ def main() -> None:
 
 
 def _run_app() -> object:
-    """Run the command that was given, and return what it exits with."""
+    """Run the given command, and return its exit code."""
     code: object = 0
     try:
         with warnings.catch_warnings():
@@ -117,7 +117,7 @@ def _run_app() -> object:
 
 
 def _flush_stdout() -> bool:
-    """Write what is left in the buffer of stdout, and report whether it could be written."""
+    """Flush stdout, and return whether it could be written."""
     try:
         sys.stdout.flush()
     except OSError as error:

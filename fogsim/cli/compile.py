@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from fogsim.values import Camera, Estimate
 
 _SIZES = ((160, 120), (640, 480))
-"""Pictures that are estimated: methods choose what they do by size [px]."""
+"""Sizes of images for the estimators, which choose algorithms by size [px]."""
 
 _FEW = "estimators=[{method: negru2013, parameters: {as_published: true}}]"
-"""What needs few kernels."""
+"""Settings that need few kernels."""
 
 _JOINT = "estimators=[joint_road]"
-"""What does more in some roads and fogs than in the pictures below."""
+"""Estimator with kernels that the images below do not reach, in other roads and fogs."""
 
 _DRIVES: dict[str, tuple[str, tuple[tuple[str, ...], ...]]] = {
     "drives by day": (
@@ -44,13 +44,13 @@ _DRIVES: dict[str, tuple[str, tuple[tuple[str, ...], ...]]] = {
     "drives on a clear day": ("clear_day", ((_JOINT,),)),
     "drives in a city": ("city_fog", ((),)),
 }
-"""Scenario, and what is set in one drive after the other, since it is drawn by kernels of its own."""
+"""Scenario, and settings of its consecutive drives, since other settings use other kernels."""
 
 _FRAMES = 10
 """Frames of each drive."""
 
 _SKY = 1e6
-"""Distance of the sky in those pictures [m]."""
+"""Distance of the sky in those images [m]."""
 
 
 def compile_command() -> None:
@@ -61,22 +61,11 @@ def compile_command() -> None:
 
 
 def compile_kernels() -> Iterator[str]:
-    """Compile what drives by day and by night need, and keep it on disk; what is compiled already costs seconds.
-
-    Yields
-    ------
-    str
-        What is ready, as soon as it is.
-
-    Raises
-    ------
-    FogSimError
-        If a part of the loop does not work here.
-    """
+    """Compile and cache the kernels of drives by day and by night; yield a description of each finished part."""
     from fogsim.jit import processors
 
     with ProcessPoolExecutor(min(2, processors()), multiprocessing.get_context("spawn"), _be_quiet) as pool:
-        # The estimators share hardly a kernel with the drawing; the other drives share many with the first.
+        # Estimators share hardly any kernels with rendering; the other drives share many with the first.
         first, *others = _DRIVES
         pending: dict[Future[None], str] = {
             pool.submit(_drive, *_DRIVES[first]): first,
@@ -98,14 +87,14 @@ def compile_kernels() -> Iterator[str]:
 
 
 def _be_quiet() -> None:
-    """Let these processes not announce what they were started for."""
+    """Keep these processes from announcing their own compilation."""
     logging.getLogger("fogsim").setLevel(logging.ERROR)
 
 
 def _drive(scenario: str, drives: Sequence[Sequence[str]]) -> None:
-    """Draw the first frames of a scenario with each of some settings.
+    """Render the first frames of a scenario with each of some settings.
 
-    For its metrics all are in one junction.
+    For its metrics, all vehicles are in one junction.
     """
     from fogsim.loop import run
     from fogsim.metrics import RunMetrics
@@ -120,7 +109,7 @@ def _drive(scenario: str, drives: Sequence[Sequence[str]]) -> None:
 
 
 def _estimate_visibility() -> None:
-    """Let every daytime method, also as published, read pictures of a foggy road with a vehicle ahead that leaves."""
+    """Run every daytime method, also as published, on images of a foggy road with a vehicle ahead that leaves."""
     import numpy as np
 
     from fogsim.estimators import ESTIMATORS
@@ -139,23 +128,13 @@ def _estimate_visibility() -> None:
     for fusion in FUSIONS:
         fuse_estimates(fusion, {}, said)
     _follow_a_bend(camera)
-    # What takes more pictures than these: a vehicle ahead that leaves far enough, and fog that is sure to vary.
+    # Cases that need more than these images: a vehicle ahead that leaves far enough, and fog that varies for certain.
     fit_decay(np.array([20.0, 40.0, 60.0]), np.array([0.5, 0.3, 0.2]), np.full(3, 0.01), 0.02, 0.01)
     extinction_at(np.array([10.0, 100.0]), np.full(2, math.log(0.03)), 50.0)
 
 
 def read_foggy_road(method: str, parameters: Mapping[str, Any], size: Sequence[int]) -> "list[Estimate]":
-    """Let a method read pictures of a foggy road by day, and say what it makes of each.
-
-    Parameters
-    ----------
-    method : str
-        Its name.
-    parameters : mapping
-        Its own.
-    size : (2,) sequence of int
-        Width and height of the pictures [px].
-    """
+    """Estimates of a method from synthetic images of a foggy road by day, of a width and height [px]."""
     from fogsim.estimators import ESTIMATORS
     from fogsim.values import Camera
 
@@ -165,17 +144,7 @@ def read_foggy_road(method: str, parameters: Mapping[str, Any], size: Sequence[i
 
 
 def fuse_estimates(fusion: str, parameters: Mapping[str, Any], estimates: "Sequence[Sequence[Estimate]]") -> None:
-    """Let a fusion take in what methods said of the pictures that they read.
-
-    Parameters
-    ----------
-    fusion : str
-        Its name.
-    parameters : mapping
-        Its own.
-    estimates : sequence of sequence of Estimate
-        Of each method, of each picture.
-    """
+    """Pass each method's estimates to a fusion, image by image."""
     from fogsim.fusion import fuse, make
 
     chosen = make(fusion, **parameters)
@@ -184,7 +153,7 @@ def fuse_estimates(fusion: str, parameters: Mapping[str, Any], estimates: "Seque
 
 
 def _restore_contrast() -> None:
-    """Restore pictures of a foggy road of 8 and 16 bits, for the eye too."""
+    """Restore images of a foggy road with 8 and 16 bits, also with tone mapping."""
     import numpy as np
 
     from fogsim.restoration import METHODS, restore_contrast
@@ -199,7 +168,7 @@ def _restore_contrast() -> None:
 
 
 def _follow_a_bend(camera: "Camera") -> None:
-    """Lay strips along a road that bends and sags, which that of the pictures does not."""
+    """Lay strips along a road with curves and sags, unlike that of the images."""
     import numpy as np
 
     from fogsim.vision.lines.horizon import Horizon
@@ -214,7 +183,7 @@ def _follow_a_bend(camera: "Camera") -> None:
 
 
 def _read(estimator: "Estimator", camera: "Camera") -> "list[Estimate]":
-    """Let a method read pictures in colour and, in the end, in grey."""
+    """Run a method on images in colour and, finally, in grey."""
     import numpy as np
 
     from fogsim.values import Frame, LeadMeasurement, Observation
@@ -229,7 +198,7 @@ def _read(estimator: "Estimator", camera: "Camera") -> "list[Estimate]":
 
 
 def read_own_beams() -> None:
-    """Let methods of the night read pictures of a lit road, in colour and in grey."""
+    """Run night methods on images of a lit road, in colour and in grey."""
     import numpy as np
 
     from fogsim.calibration.veil_references import usual_references
@@ -245,7 +214,7 @@ def read_own_beams() -> None:
 
 
 def _detect_signs() -> None:
-    """Look for a sign in a grey picture, one in colour, one of more bits, and one of light."""
+    """Search for a sign in images in grey, in colour, with more bits, and of light."""
     import numpy as np
 
     from fogsim.vision.symmetry.detection import SearchRegion, detect_signs
@@ -262,7 +231,7 @@ def _detect_signs() -> None:
 
 
 def _find_lamps() -> None:
-    """Look for the halo of a lamp in a picture of 8 bits, and in one of more."""
+    """Search for the halo of a lamp in images with 8 bits and with more."""
     import numpy as np
 
     from fogsim.estimators.night.halos import HaloWatch
@@ -274,7 +243,7 @@ def _find_lamps() -> None:
 
 
 def _light_a_road() -> None:
-    """Let another vehicle's head lamps light a wall in fog, for such a vehicle may come late in a drive."""
+    """Light a wall in fog by another vehicle's head lamps, since such a vehicle may appear late in a drive."""
     import numpy as np
 
     from fogsim.atmosphere import Air
@@ -292,7 +261,7 @@ def _light_a_road() -> None:
 
 
 def _cross_a_footway() -> None:
-    """Look whether vehicles drive over a footway, which most roads have not."""
+    """Check for vehicles that drive over a footway, which most roads do not have."""
     import numpy as np
 
     from fogsim.scene.junctions import walkable
@@ -305,9 +274,9 @@ def _cross_a_footway() -> None:
 
 
 def _foggy_road(camera: "Camera", lead: float, visibility: float = 120.0, bank: float = _SKY) -> "NDArray[np.uint8]":
-    """Picture of a straight road in fog with lane marks and a dark vehicle ahead: (rows, cols, 3) uint8.
+    """Image of a straight road in fog with lane marks and a dark vehicle ahead: (rows, cols, 3) uint8.
 
-    From `bank` [m] on the fog is five times as dense.
+    From `bank` [m] on, the fog is five times as dense.
     """
     import numpy as np
 

@@ -1,7 +1,6 @@
-"""A first run compiles in two processes: its own, which draws, and one beside it, which reads pictures.
+"""A first run compiles in two processes: its own renders, and a second one runs estimators and fusion.
 
-What each method asks of pictures, and what makes a belief of it, shares hardly a kernel with what draws them, and takes
-half of the time.
+Estimators and fusion share hardly a kernel with rendering, and take half of the time.
 """
 
 import importlib
@@ -22,19 +21,14 @@ PACKAGES = ("fogsim.vision.", "fogsim.estimators.", "fogsim.fusion.")
 """Modules whose kernels the other process compiles."""
 
 _ENDS_WITHIN = 5.0
-"""Time that the other process is given to end when it is not wanted any more [s]."""
+"""Time that the other process has to end when it is no longer needed [s]."""
 
 
 @contextmanager
 def compiling_beside() -> Iterator[Callable[["Scenario"], None]]:
-    """Start another process, if nothing of what it compiles is kept on the disk yet.
+    """Start the second process, if its kernels are not cached yet; yield a function that passes it a scenario.
 
-    It is started before a scenario is loaded, so that it has loaded what it needs when it hears of one.
-
-    Yields
-    ------
-    tell : callable
-        Gets the scenario that is about to be run: what its methods and its fusion need is compiled there.
+    It is started before a scenario is loaded, so that its imports are done when the scenario arrives.
     """
     process = _started()
     if process is None:
@@ -48,7 +42,7 @@ def compiling_beside() -> Iterator[Callable[["Scenario"], None]]:
         def tell(scenario: "Scenario") -> None:
             methods = _methods(scenario)
             if not methods or not _is_first():
-                # Nothing for it to do in this run, however long that is.
+                # It has nothing to do in this run, however long the run is.
                 _end(process)
                 return
             stack.enter_context(BESIDE.compiles(lambda: process.poll() is not None, PACKAGES))
@@ -58,7 +52,7 @@ def compiling_beside() -> Iterator[Callable[["Scenario"], None]]:
 
 
 def _started() -> "subprocess.Popen[bytes] | None":
-    """Start the other process; None if there is nothing for it to do, or no room for it."""
+    """Start the other process; None if it has nothing to do, or no resources."""
     import fogsim.vision.light.pixel_kernels  # noqa: F401 - what methods need first; it loads little
 
     if not _is_first():
@@ -68,12 +62,12 @@ def _started() -> "subprocess.Popen[bytes] | None":
     try:
         return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=quiet, stderr=quiet)  # noqa: S603 - this module's own
     except OSError:
-        # Too little memory or too many processes: this one compiles all by itself, as it would on one processor.
+        # Too little memory or too many processes: this one compiles alone, as on a single processor.
         return None
 
 
 def _send(process: "subprocess.Popen[bytes]", told: Mapping[str, Any]) -> None:
-    """Tell the other process what to compile; it may have died, and then this one compiles alone."""
+    """Pass the other process what to compile; if it has died, this one compiles alone."""
     if (pipe := process.stdin) is not None:
         with suppress(OSError), pipe:
             pipe.write(json.dumps(told).encode())
@@ -88,7 +82,7 @@ def _end(process: "subprocess.Popen[bytes]") -> None:
 
 
 def _methods(scenario: "Scenario") -> dict[str, Any]:
-    """Names and parameters of those methods of the scenario, and its fusion, that are FogSim's; {} without methods."""
+    """Names and parameters of FogSim's own methods and fusion of the scenario; {} without methods."""
     from fogsim.estimators import ESTIMATORS
     from fogsim.fusion import FUSIONS
 
@@ -100,30 +94,25 @@ def _methods(scenario: "Scenario") -> dict[str, Any]:
 
 
 def _is_first() -> bool:
-    """Whether no kernel of those modules was ever compiled here, and such can be kept."""
+    """Whether no kernel of those modules was ever compiled here, and kernels can be cached."""
     from fogsim.jit import is_kept, processors
 
-    # With the methods all that they are made of was imported.
+    # Everything that the methods use was imported with them.
     modules = [module for name, module in tuple(sys.modules.items()) if name.startswith(PACKAGES)]
     kept = [is_kept(value) for module in modules for value in vars(module).values()]
     return processors() > 1 and False in kept and True not in kept
 
 
 def read_pictures(parent: int) -> None:
-    """Let methods read pictures, and fuse what they say, until all that they need is on the disk.
+    """Run estimators and a fusion on images until their kernels are cached: the second process's part.
 
-    The other process's part. What it is to do comes as JSON on its standard input: size of the pictures, methods with
-    their parameters, and a fusion.
-
-    Parameters
-    ----------
-    parent : int
-        Process for which it is done: nobody needs it any more when that has ended.
+    Standard input has JSON: size of the images, methods with their parameters, and a fusion. It ends when the process
+    `parent` has ended.
     """
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     from fogsim.cli.compile import fuse_estimates, read_foggy_road, read_own_beams
 
-    # What methods and fusions are made of is loaded while the scenario is.
+    # Modules of methods and fusions are imported while the scenario is loaded.
     for name in ("fogsim.estimators", "fogsim.fusion"):
         importlib.import_module(name)
     if not (told := sys.stdin.read()):
@@ -139,7 +128,7 @@ def read_pictures(parent: int) -> None:
 
 
 def _end_with(parent: int) -> None:
-    """End this process once its parent is gone."""
+    """End this process after its parent."""
     while os.getppid() == parent:
         time.sleep(1.0)
     os._exit(1)

@@ -30,17 +30,7 @@ PACKAGES = (
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """The result of one check.
-
-    Attributes
-    ----------
-    subject : str
-        What was checked.
-    works : bool
-        True if FogSim can use it.
-    detail : str
-        Version, or what is wrong and how to mend it.
-    """
+    """Result of one check; `detail` is the version, or what is wrong and how to mend it."""
 
     subject: str
     works: bool

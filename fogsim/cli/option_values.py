@@ -1,4 +1,4 @@
-"""What the options of all commands have in common: numbers lie within a range, and paths are not empty."""
+"""Checks of all commands' options: numbers are within a range, and paths are not empty."""
 
 import math
 from collections.abc import Callable
@@ -13,13 +13,13 @@ from fogsim.cli.printing import BAD_INPUT, print_error
 from fogsim.errors import InputError, shown
 
 LARGEST = 2**63 - 1
-"""Bound of numbers whose option has none, as of seeds in scenario files."""
+"""Bound of numbers whose option has none, like that of seeds in scenario files."""
 
 
 def check_values(app: typer.Typer) -> None:
-    """Let every command refuse numbers outside ``min`` and ``max`` of their option, NaN among them, and empty paths.
+    """Make every command refuse numbers outside ``min`` and ``max`` of their option, NaN included, and empty paths.
 
-    An empty string, as from an unset variable of a shell, would otherwise be the current directory.
+    An empty string, as from an unset shell variable, would otherwise be the current directory.
     """
     for command in app.registered_commands:
         for parameter in signature(command.callback or check_values).parameters.values():
@@ -40,18 +40,18 @@ def _name(parameter: str, info: OptionInfo | ArgumentInfo) -> str:
     """Name of an option as users write it, or of an argument as in the help."""
     if isinstance(info, ArgumentInfo):
         return info.metavar or parameter.upper()
-    # typer holds the first name of an annotation as the default.
+    # typer treats the first name of an annotation as the default.
     names = [one for one in (info.default, *(info.param_decls or ())) if str(one).startswith("--")]
     return str(names[0]) if names else "--" + parameter.replace("_", "-")
 
 
 def _flat(annotation: Any) -> set[Any]:
-    """All types that an annotation is made of."""
+    """All types in an annotation."""
     return {annotation, *(inner for part in get_args(annotation) for inner in _flat(part))}
 
 
 def _parser(name: str, types: set[Any], info: OptionInfo | ArgumentInfo) -> Callable[[Any], Any] | None:
-    """Reader of a value; None where typer's own will do."""
+    """Reader of a value; None for typer's own."""
     if Path in types:
         return _text_parser(Path, name, "a path")
     if str in types and isinstance(info, ArgumentInfo):
@@ -95,13 +95,7 @@ def _refuse(name: str, expected: str, given: object) -> NoReturn:
 
 
 def pixel_values(text: str) -> tuple[float, ...]:
-    """Value of ``--airlight``: a pixel value, or three with commas between them.
-
-    Raises
-    ------
-    InputError
-        If it is something else.
-    """
+    """Value of ``--airlight``: a pixel value, or three separated by commas."""
     try:
         values = tuple(float(part) for part in text.split(","))
     except ValueError:

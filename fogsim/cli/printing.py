@@ -1,6 +1,6 @@
-"""What the commands print, where, and with which exit codes; text that a user's files can have a say in is made safe.
+"""Output of the commands and their exit codes; text that can come from users' files is escaped.
 
-Results go to stdout, all else to stderr.
+Results go to stdout, everything else to stderr.
 """
 
 import contextlib
@@ -12,7 +12,7 @@ from rich.markup import escape as escape_markup
 from fogsim.errors import printable
 
 FAILED = 1
-"""Exit code if an expectation was not met, or a user's method failed."""
+"""Exit code if an expectation or a user's method failed."""
 
 BAD_INPUT = 2
 """Exit code of bad input."""
@@ -25,42 +25,18 @@ stderr = Console(stderr=True, highlight=False, emoji=False)
 
 
 def escape(text: object, *, in_one_line: bool = False) -> str:
-    """`printable` text that is no markup for rich either.
-
-    Parameters
-    ----------
-    text : object
-        Any text, or what ``str`` makes text of.
-    in_one_line : bool
-        Escape ends of lines, too.
-    """
+    """`printable` text without rich markup; `in_one_line` also escapes line ends."""
     return escape_markup(printable(str(text), in_one_line=in_one_line))
 
 
 def print_error(error: object) -> None:
-    """Print an error on stderr.
-
-    Parameters
-    ----------
-    error : object
-        The error, or its message.
-    """
-    # The exit code counts, also where stderr takes no line.
+    """Print an error, or its message, on stderr."""
+    # The exit code matters even if stderr cannot be written.
     with contextlib.suppress(OSError):
         stderr.print(f"[bold red]error:[/] {escape(error)}", soft_wrap=True)
 
 
 def print_remarks(label: str, remarks: Iterable[object], *, in_one_line: bool = True) -> None:
-    """Print remarks on stderr.
-
-    Parameters
-    ----------
-    label : str
-        What they are: "warning", "assumed".
-    remarks : iterable of object
-        Their texts.
-    in_one_line : bool
-        Escape ends of lines in each.
-    """
+    """Print remarks on stderr under a label such as "warning"; `in_one_line` escapes line ends."""
     for remark in remarks:
         stderr.print(f"[yellow]{label}:[/] {escape(remark, in_one_line=in_one_line)}", soft_wrap=True)

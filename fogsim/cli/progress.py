@@ -17,17 +17,11 @@ STARTING = "starting; a first run compiles for some seconds"
 
 
 def progress_bar(console: Console, *, stays: bool = False) -> Progress:
-    """Bar, share, description and time left.
+    """Bar, share, description and time left; it `stays` when full, and is then printed even without a terminal.
 
-    Parameters
-    ----------
-    console : Console
-        Where it is drawn: that of stderr, since stdout is for results.
-    stays : bool
-        Whether it stays when it is full, and is printed once where there is no terminal; else nothing of it remains,
-        and nothing is drawn where there is no terminal.
+    Otherwise it disappears, and nothing is drawn without a terminal.
     """
-    # rich would lead stdout to its own console, which is stderr: fine on a terminal, and wrong for a pipe or a file.
+    # rich would redirect stdout to its own console, stderr: fine on a terminal, but wrong for a pipe or a file.
     to_terminal = sys.stdout.isatty()
     columns = (
         BarColumn(bar_width=20),
@@ -42,30 +36,14 @@ def progress_bar(console: Console, *, stays: bool = False) -> Progress:
 
 @contextlib.contextmanager
 def counting_bar(console: Console, description: str) -> Iterator[Callable[[int, int], None]]:
-    """Bar that is called with how many are done, and how many there are; nothing of it remains.
-
-    Parameters
-    ----------
-    console : Console
-        As for `progress_bar`.
-    description : str
-        What is counted.
-    """
+    """Bar that is called with the number of finished items and their total; it disappears at the end."""
     with progress_bar(console) as progress:
         task = progress.add_task(description, total=None)
         yield lambda done, total: progress.update(task, completed=done, total=total)
 
 
 class SimulationProgress:
-    """A bar over simulated time, with how fast it passes, and what the ego believes or how many drive.
-
-    Parameters
-    ----------
-    console : Console
-        Where it is drawn.
-    duration : float
-        Longest simulated time [s].
-    """
+    """A bar over simulated time up to `duration` [s], with its rate and the belief or number of vehicles."""
 
     def __init__(self, console: Console, duration: float) -> None:
         self._duration = duration
@@ -73,20 +51,14 @@ class SimulationProgress:
         self._task = self._progress.add_task(STARTING, total=duration)
 
     def show(self, step: "TrafficStep") -> None:
-        """Move the bar.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            The step that is finished.
-        """
+        """Advance the bar to a finished step."""
         from fogsim.values import Step
 
         task = self._progress.tasks[self._task]
         rate = step.time / task.elapsed if task.elapsed else 0.0
         found = f"V ≈ {step.belief.visibility:.0f} m" if isinstance(step, Step) else f"{len(step.traffic.ids)} vehicles"
         description = f"{step.time:.0f} of {self._duration:.0f} s, {rate:.1f}× real time, {found}"
-        # A run that is over is done, however much of its longest duration is left.
+        # A finished run is complete, however much of its longest duration is left.
         done = step.time if step.ending is None else self._duration
         self._progress.update(self._task, completed=done, description=description)
 

@@ -1,6 +1,6 @@
-"""For pytest: files ``*.fog.yaml`` are tests, an item for each expectation, and ``fogsim_run`` runs one case.
+"""Plugin for pytest: ``*.fog.yaml`` files are tests, an item per expectation; ``fogsim_run`` runs one case.
 
-Nothing of FogSim is imported before there is such a file or a test that asks for the fixture.
+FogSim is imported only for such a file or a test that requests the fixture.
 """
 
 from __future__ import annotations
@@ -21,13 +21,7 @@ _SUFFIX = ".fog.yaml"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the options.
-
-    Parameters
-    ----------
-    parser : Parser
-        pytest's.
-    """
+    """Add the options."""
     group = parser.getgroup("fogsim")
     group.addoption(
         "--fogsim-processes", type=int, default=None, metavar="N", help="Runs of *.fog.yaml at once. [one a core]"
@@ -35,31 +29,17 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> FogFile | None:
-    """Collect files of tests.
-
-    Parameters
-    ----------
-    file_path : Path
-        A file.
-    parent : Collector
-        What it is in.
-    """
+    """Collect test files."""
     return FogFile.from_parent(parent, path=file_path) if file_path.name.endswith(_SUFFIX) else None
 
 
 class FogFile(pytest.File):
-    """A scenario file with what it expects; its cases are run once, when the first of its items is."""
+    """A scenario file with expectations; its cases are run once, for the first of its items."""
 
     _tests: list[FogTest]
 
     def collect(self) -> Iterator[FogItem]:
-        """Give an item for each expectation.
-
-        Raises
-        ------
-        CollectError
-            If the file has mistakes.
-        """
+        """Yield an item for each expectation; CollectError if the file has mistakes."""
         from fogsim.errors import FogSimError
         from fogsim.testing import collect
 
@@ -73,7 +53,7 @@ class FogFile(pytest.File):
 
     @functools.cached_property
     def outcome(self) -> FileOutcome:
-        """What came of all cases."""
+        """Results of all cases."""
         from fogsim.testing import check_test
 
         (test,) = self._tests
@@ -82,28 +62,14 @@ class FogFile(pytest.File):
 
 
 class FogItem(pytest.Item):
-    """An expectation, over all cases of its file.
-
-    Parameters
-    ----------
-    test : FogTest
-        Its test.
-    **about
-        What pytest gives.
-    """
+    """An expectation, over all cases of its file."""
 
     def __init__(self, *, test: FogTest, **about: Any) -> None:
         super().__init__(**about)
         self._test = test
 
     def runtest(self) -> None:
-        """Fail if not every clause of it passed.
-
-        Raises
-        ------
-        NotPassedError
-            With what came.
-        """
+        """Raise NotPassedError unless every clause of it passed."""
         from fogsim.testing.wording import expectation_lines
 
         assert isinstance(self.parent, FogFile)  # noqa: S101 - nothing else makes items
@@ -116,35 +82,24 @@ class FogItem(pytest.Item):
         excinfo: pytest.ExceptionInfo[BaseException],
         style: Any = None,
     ) -> Any:
-        """What came, in place of a traceback.
-
-        Parameters
-        ----------
-        excinfo : ExceptionInfo
-            What was raised.
-        style : str or None
-            As of pytest.
-        """
+        """The result, in place of a traceback."""
         return str(excinfo.value) if isinstance(excinfo.value, NotPassedError) else super().repr_failure(excinfo, style)
 
     def reportinfo(self) -> tuple[Path, int, str]:
-        """Where it stands."""
+        """File and line of the expectation."""
         line = self._test.lines[self.name].rpartition(":")[2]
         return self.path, int(line) - 1 if line.isdecimal() else 0, f"{self.path.name}::{self.name}"
 
 
 class NotPassedError(Exception):
-    """An expectation has failed, was inconclusive, or its run went wrong."""
+    """An expectation failed or was inconclusive, or its run failed."""
 
 
 @pytest.fixture
 def fogsim_run(request: pytest.FixtureRequest) -> Callable[..., CaseResult]:
-    """Run one case of a scenario in this process, and tell what came of it: ``fogsim_run("a.fog.yaml", case="run=3")``.
+    """Run one case of a scenario in this process: ``fogsim_run("a.fog.yaml", case="run=3")``.
 
-    Parameters
-    ----------
-    request : FixtureRequest
-        The test; files are relative to its own.
+    Returns its `fogsim.testing.CaseResult`; paths are relative to the test's file.
     """
     from fogsim.testing import check_one_case
 

@@ -1,4 +1,4 @@
-"""``fogsim recover``: what a run that was killed has left."""
+"""``fogsim recover``: results of a run that was killed."""
 
 from pathlib import Path
 from typing import Annotated

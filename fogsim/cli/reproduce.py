@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _UNBROKEN = 200  # wider than any table [characters]
 
 ALL = "all"
-"""Stands for every paper."""
+"""Represents every paper."""
 
 
 def reproduce_command(
@@ -75,7 +75,7 @@ def _show(done: "Reproduction", *, as_json: bool) -> None:
         for record in (*done.records, *done.sweeps):
             typer.echo(json.dumps(record, allow_nan=False))
         return
-    # Files and pipes have no width that rows must be broken for.
+    # Files and pipes have no width at which rows must be broken.
     wide = stdout if stdout.is_terminal else Console(highlight=False, emoji=False, width=_UNBROKEN)
     for shown in done.all_tables:
         heading, *rows = shown.rows

@@ -59,7 +59,7 @@ SHOWN_OF_TRAFFIC = {
     "traffic_advised_time_share": ("time in which drivers had heard an advice", "%"),
     "traffic_advice_compliance_share": ("of it at the advice or slower", "%"),
 }
-"""What it shows of traffic alone; shares are of the time of all vehicles."""
+"""The same for traffic alone; shares are of the time of all vehicles."""
 
 
 def run_command(
@@ -140,7 +140,7 @@ def run_command(
 
 
 def _camera_processes(scenario: "Scenario", wanted: int | None) -> int:
-    """In how many processes cameras of other equipped vehicles are drawn, where there are any."""
+    """Number of processes that render the cameras of other equipped vehicles, if any."""
     if not scenario.traffic.has_equipped:
         return 0
     from fogsim.jit import processors
@@ -149,7 +149,7 @@ def _camera_processes(scenario: "Scenario", wanted: int | None) -> int:
 
 
 def _filmed(scenario: "Scenario", wanted: bool | None) -> bool:
-    """Whether there is a video: where nobody says, if there is a camera for it."""
+    """Whether to write a video: by default, if there is a camera for it."""
     if wanted and not scenario.traffic.has_ego:
         raise InputError(
             "--video shows what an ego's camera sees, and traffic.ego is none; leave it out, or name an ego"
@@ -158,7 +158,7 @@ def _filmed(scenario: "Scenario", wanted: bool | None) -> bool:
 
 
 def _print_result(result: "RecordedRun", shown: Mapping[str, tuple[str, str]]) -> None:
-    """Say how the run went and ended, what was not played, and which files there are."""
+    """Report how the run went and ended, what was not played, and which files exist."""
     _print_summary(result.summary.values, shown)
     written = "the results are partial and say so" if result.files else "before its first step; nothing was written"
     ended = result.ending.value if result.ending else f"{result.status.value}; {written}"

@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share, and the scenario that they stand for."""
+"""Arguments and options that several commands share, and the scenario that they select."""
 
 import json
 import math
@@ -38,12 +38,12 @@ MethodTimeout = Annotated[
 
 
 def with_timeout(settings: Sequence[str] | None, method_timeout: float | None) -> list[str]:
-    """Settings with the time limit for methods [s] that an option gives."""
+    """Settings with the time limit for methods [s] from an option."""
     return [*(settings or ()), *([] if method_timeout is None else [f"method_timeout_s={method_timeout!r}"])]
 
 
 class CodeNotice:
-    """Names each Python file beside a scenario once, before it is imported, and allows it."""
+    """Names each Python file beside a scenario once, before its import, and allows it."""
 
     def __init__(self) -> None:
         self._named: set[Path] = set()
@@ -59,25 +59,9 @@ class CodeNotice:
 def chosen_scenario(
     name: str | None, sumocfg: Path | None, ego: str | None, visibility: float | None, settings: Sequence[str] | None
 ) -> "Scenario":
-    """Scenario of a name or of a SUMO configuration: exactly one of them.
+    """Scenario of a name or of a SUMO configuration, exactly one; InputError if something is missing.
 
-    Parameters
-    ----------
-    name : str or None
-        Of the catalogue, a file or a folder.
-    sumocfg : Path or None
-        The SUMO configuration.
-    ego : str or None
-        Id of the ego, or ``none`` for traffic alone; the SUMO configuration needs one of them.
-    visibility : float or None
-        Meteorological visibility of homogeneous fog [m]; the SUMO configuration needs it, or a fog in the settings.
-    settings : sequence of str or None
-        ``key.path=value`` each.
-
-    Raises
-    ------
-    InputError
-        If neither or both are given, something is missing, or the scenario cannot be loaded.
+    The SUMO configuration also needs `ego` (``none`` for traffic alone) and a visibility [m] or a fog in the settings.
     """
     return chosen_case(name, sumocfg, ego, visibility, settings, "", None)[0]
 
@@ -91,22 +75,7 @@ def chosen_case(
     case: str,
     seed: int | None,
 ) -> "tuple[Scenario, Case]":
-    """Scenario of a name or of a SUMO configuration, and the case of it that is to be run.
-
-    Parameters
-    ----------
-    name, sumocfg, ego, visibility, settings
-        As of `chosen_scenario`.
-    case : str
-        Which case of a file that varies something, ``name=value`` with commas between; empty for the first.
-    seed : int or None
-        Seed of the run; None for the case's, which is 0 where a file varies no seeds.
-
-    Raises
-    ------
-    InputError
-        As of `chosen_scenario`, or if there is no such case, or it has another seed.
-    """
+    """Scenario as in `chosen_scenario`, and its case ``name=value`` ("" for the first), which `seed` must fit."""
     from fogsim.scenario import scenario_from_config
     from fogsim.scenario.loading import check_configuration, load_cases
     from fogsim.scenario.variation import Case

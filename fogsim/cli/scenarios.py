@@ -32,7 +32,7 @@ def list_command() -> None:
     stdout.print()
     stdout.print(f"[bold]study[/]: {escape(', '.join(shipped_studies()))}")
     for registry in (ESTIMATORS, FUSIONS, ADVISERS, LIGHTING_POLICIES, RENDERERS):
-        # FogSim's own in their order, then what installed packages announce.
+        # FogSim's own in order, then those of installed packages.
         names = ", ".join(dict.fromkeys((*registry, *registry.known)))
         stdout.print(f"[bold]{registry.kind}[/]: {escape(names)}")
 

@@ -1,4 +1,4 @@
-"""``fogsim new`` and ``fogsim schema``: the start of a scenario of one's own, and help for the editor."""
+"""``fogsim new`` and ``fogsim schema``: your own scenario from an existing one, and help for the editor."""
 
 import json
 from enum import StrEnum
@@ -11,7 +11,7 @@ from fogsim.cli.printing import escape, stdout
 
 
 class FileKind(StrEnum):
-    """Kinds of files that people write."""
+    """Types of files that people write."""
 
     SCENARIO = "scenario"
     STUDY = "study"

@@ -13,7 +13,7 @@ from fogsim.errors import InputError
 
 
 class EngineName(StrEnum):
-    """What `--engine` names."""
+    """Values of `--engine`."""
 
     POOL = "pool"
     RAY = "ray"

@@ -1,4 +1,4 @@
-"""``fogsim test``: scenario files with what they expect, run case by case and judged."""
+"""``fogsim test``: scenario files with expectations, run case by case and judged."""
 
 import os
 import time
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from fogsim.testing.artefacts import Kept
 
 NOTHING_COLLECTED = 5
-"""Exit code if there was no test, as of pytest."""
+"""Exit code without tests, as in pytest."""
 
 _COLOURS = {"passed": "green", "failed": "red", "inconclusive": "yellow", "error": "red"}
 _INDENT = " " * 15
@@ -100,7 +100,7 @@ def _asked_for(
     with counting_bar(stderr, "checking the scenario of each case") as watch:
         tests = collect(found, settings, case, asked, CodeNotice(), watch)
     noted = {} if failed_in is None else last_failed(failed_in)
-    # As of pytest: where nothing has failed, all is run.
+    # As in pytest: if nothing has failed, all tests run.
     tests = only_cases(tests, noted) or tests
     if not tests:
         stdout.print(f"No tests: none of {len(found)} files expects anything that was asked for.")
@@ -169,7 +169,7 @@ def _print_smallest(outcome: "FileOutcome", settings: Sequence[str], out: Path) 
 
 
 def _annotate(outcomes: "Sequence[FileOutcome]", settings: Sequence[str]) -> None:
-    """Tell GitHub, where it runs this, on which lines what did not pass stands."""
+    """Report failures to GitHub by file and line, if it runs this."""
     from fogsim.testing.annotations import annotations
 
     if os.environ.get("GITHUB_ACTIONS") == "true":

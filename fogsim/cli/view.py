@@ -1,4 +1,4 @@
-"""``fogsim view``: the world around the ego at an instant, in pyrender's viewer or as a picture."""
+"""``fogsim view``: the world around the ego at an instant, in pyrender's viewer or as an image."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -69,7 +69,7 @@ def _surrounding(scenario: "Scenario", at: float, seed: int) -> "Surrounding":
     from fogsim.scenario.build import check_ego
 
     check_ego(scenario, "fogsim view")
-    # The viewer needs an OpenGL context of its own kind, so frames are drawn without.
+    # The viewer needs its own type of OpenGL context, so no frames are rendered.
     drawn = scenario.model_copy(update={"renderer": "cpu"})
     policy = AdvisedDriving(drawn)
     with SimulationProgress(stderr, at) as progress, ClosedLoop(drawn) as loop:

@@ -1,4 +1,4 @@
-"""Whether a run can tell what a condition asks: what it needs, and the names that stand in it."""
+"""Whether a run can evaluate a condition: what it needs, and the names in it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,19 +14,7 @@ _LEADER = Reference("ego.leader")
 
 @dataclass(frozen=True, slots=True)
 class RunContent:
-    """What a run has that conditions may ask for.
-
-    Attributes
-    ----------
-    needs : frozenset of Need
-        What it has.
-    methods : tuple of str
-        Its estimators.
-    banks : int
-        Number of its fog banks.
-    events : tuple of str
-        What of its script can begin.
-    """
+    """What conditions can refer to in a run: its needs, estimators, number of fog banks, and script entries."""
 
     needs: frozenset[Need]
     methods: tuple[str, ...] = ()
@@ -35,15 +23,7 @@ class RunContent:
 
 
 def condition_mistakes(condition: Condition, content: RunContent) -> Iterator[str]:
-    """Say what of a condition a run cannot tell.
-
-    Parameters
-    ----------
-    condition : Condition
-        The condition.
-    content : RunContent
-        What the run has.
-    """
+    """Parts of a condition that a run cannot evaluate."""
     for reference in signals_of(condition):
         signal = SIGNALS[reference.signal]
         lacking = signal.needs - content.needs
@@ -61,24 +41,12 @@ def condition_mistakes(condition: Condition, content: RunContent) -> Iterator[st
 
 
 def vehicles_of(reference: Reference) -> tuple[str, ...]:
-    """Vehicles that a signal is about.
-
-    Parameters
-    ----------
-    reference : Reference
-        The signal.
-    """
+    """Vehicles that a signal refers to."""
     return _names(reference, Place.VEHICLE)
 
 
 def vehicles_in(condition: Condition) -> tuple[str, ...]:
-    """Vehicles that a condition names: those of its signals, and those that are compared with ``ego.leader``.
-
-    Parameters
-    ----------
-    condition : Condition
-        The condition.
-    """
+    """Vehicles that a condition names: those of its signals, and those that are compared with ``ego.leader``."""
     named = [name for reference in signals_of(condition) for name in vehicles_of(reference)]
     for one in comparisons_of(condition):
         if one.left == _LEADER and isinstance(one, Comparison | Edge) and isinstance(one.right, Word):
@@ -87,13 +55,7 @@ def vehicles_in(condition: Condition) -> tuple[str, ...]:
 
 
 def lights_of(condition: Condition) -> tuple[str, ...]:
-    """Traffic lights that a condition asks for.
-
-    Parameters
-    ----------
-    condition : Condition
-        The condition.
-    """
+    """Traffic lights that a condition refers to."""
     return tuple(name for reference in signals_of(condition) for name in _names(reference, Place.SIGNAL))
 
 

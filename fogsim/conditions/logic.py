@@ -1,4 +1,4 @@
-"""Logic of three values: true, false and not known (Kleene), and what compares with what."""
+"""Three-valued logic (Kleene): true, false and unknown; and comparisons of values."""
 
 import operator
 from collections.abc import Callable, Mapping
@@ -17,20 +17,7 @@ _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
 
 
 def combined(condition: Condition, inside: Callable[[Condition], bool | None]) -> bool | None:
-    """What ``and``, ``or`` or ``not`` makes of its parts; None if that is not known.
-
-    Parameters
-    ----------
-    condition : AllOf, AnyOf or Not
-        The condition.
-    inside : callable
-        Tells what a part is.
-
-    Raises
-    ------
-    TypeError
-        If it is another kind of condition.
-    """
+    """Value of ``and``, ``or`` or ``not`` from the values of its parts; None if unknown."""
     match condition:
         case Not(part):
             return _not(inside(part))
@@ -50,17 +37,7 @@ def _all(parts: list[bool | None]) -> bool | None:
 
 
 def compared(value: Value, relation: str, operand: Value) -> bool | None:
-    """Compare a signal's value; None if one of the two is not known.
-
-    Parameters
-    ----------
-    value : float, bool, str, frozenset, LanePlace or None
-        The value of the signal.
-    relation : str
-        ``<``, ``<=``, ``>``, ``>=``, ``==``, ``!=`` or ``include``, as the parser allows it for the signal.
-    operand : float, str or None
-        What it is compared with.
-    """
+    """Compare a signal's value by ``<``, ``<=``, ``>``, ``>=``, ``==``, ``!=`` or ``include``; None if unknown."""
     if value is None or operand is None:
         return None
     if isinstance(value, frozenset):
@@ -76,17 +53,7 @@ def compared(value: Value, relation: str, operand: Value) -> bool | None:
 
 
 def passed(before: Value, now: Value, how: str, operand: Value) -> bool | None:
-    """Whether a signal passes a value between two steps; None if that is not known.
-
-    Parameters
-    ----------
-    before, now : float, bool, str, frozenset, LanePlace or None
-        Its values at the two.
-    how : str
-        ``falls below``, ``rises above``, ``becomes`` or ``changes``.
-    operand : float, str or None
-        The value that it passes; None for ``changes``.
-    """
+    """Whether a signal ``falls below``, ``rises above``, ``becomes`` or ``changes`` between steps; None if unknown."""
     if how == "changes":
         return _without_count(before) != _without_count(now)
     relation = {"falls below": "<", "rises above": ">", "becomes": "=="}[how]
@@ -95,5 +62,5 @@ def passed(before: Value, now: Value, how: str, operand: Value) -> bool | None:
 
 
 def _without_count(value: Value) -> Value:
-    """A lane's number: on a road with more lanes it is the same lane."""
+    """A lane's number alone, which is the same lane on a wider road."""
     return value.number if isinstance(value, LanePlace) else value

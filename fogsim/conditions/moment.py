@@ -1,4 +1,4 @@
-"""A finished step as conditions look at it: with what has happened before, and with places along the route."""
+"""A finished step as conditions see it: with earlier events, and positions along the route."""
 
 import functools
 
@@ -7,23 +7,11 @@ from fogsim.values import Step, TrafficState, TrafficStep
 from fogsim.values.traffic import with_persons
 
 EGO = "ego"
-"""What the ego is called in conditions, whatever its id."""
+"""Name of the ego in conditions, whatever its id."""
 
 
 class Moment:
-    """One step of a run, and what is known of the ones before.
-
-    Parameters
-    ----------
-    step : TrafficStep
-        The step.
-    collisions : set of tuple of str
-        Pairs that have hit each other so far.
-    begun : set of str
-        What of the script has begun so far, by its names and by its places in the scenario.
-    route : Route or None
-        The way along which places count.
-    """
+    """One step of a run, with the collided pairs and begun script entries so far; positions count along `route`."""
 
     def __init__(
         self, step: TrafficStep, collisions: set[tuple[str, str]], begun: set[str], route: Route | None
@@ -44,36 +32,18 @@ class Moment:
         return with_persons(self.step.traffic)
 
     def vehicle_id(self, vehicle: str) -> str:
-        """Id of a vehicle: the ego's own for ``ego``.
-
-        Parameters
-        ----------
-        vehicle : str
-            As a condition has it.
-        """
+        """Id of a vehicle as conditions name it: the ego's own id for ``ego``."""
         step = self.ego_step
         return step.traffic.ids[step.ego] if step is not None and vehicle == EGO else vehicle
 
     def row(self, vehicle: str) -> int | None:
-        """Row of a vehicle or person in `traffic`; None if it is not on the road now.
-
-        Parameters
-        ----------
-        vehicle : str
-            As a condition has it.
-        """
+        """Row of a vehicle or person in `traffic`; None if it is not on the road now."""
         name = self.vehicle_id(vehicle)
         row = self.step.traffic.row(name)
         return self.traffic.row(name) if row is None and self.step.traffic.persons.ids else row
 
     def position(self, vehicle: str) -> float | None:
-        """How far along the route a vehicle's front bumper is [m], in the ego's own count; None if it is not there.
-
-        Parameters
-        ----------
-        vehicle : str
-            As a condition has it.
-        """
+        """Position of a vehicle's front bumper along the route [m], in the ego's count; None if it is not on it."""
         step = self.ego_step
         if step is not None and self.row(vehicle) == step.ego:
             return step.route_position
@@ -81,13 +51,7 @@ class Moment:
         return None if place is None else place.front
 
     def extent(self, vehicle: str) -> Extent | None:
-        """What a vehicle covers of the route; None if it is not there.
-
-        Parameters
-        ----------
-        vehicle : str
-            As a condition has it.
-        """
+        """The part of the route that a vehicle covers; None if it is not on it."""
         row, place = self.row(vehicle), self._place(vehicle)
         return None if row is None or place is None else extent_of(place, self.traffic, row)
 
@@ -103,12 +67,12 @@ class Moment:
         place = self._on_route(self._route, row)
         if step is None or place is None:
             return place
-        # SUMO counts the ego's way along its lanes, and the polyline is one of them: others are put into its count.
+        # SUMO counts the ego's position along its lanes, the polyline along one: convert others to SUMO's count.
         ego = self._on_route(self._route, step.ego)
         return None if ego is None else RoutePlace(place.front - ego.front + step.route_position, place.along)
 
     def _on_route(self, route: Route, row: int) -> RoutePlace | None:
-        """Place of a vehicle by the polyline alone."""
+        """Position of a vehicle along the polyline."""
         if row not in self._by_row:
             traffic, step = self.traffic, self.ego_step
             near = None if step is None else step.route_position
@@ -117,7 +81,7 @@ class Moment:
 
 
 class History:
-    """What conditions remember of a run, whichever they are; hands out moments, one a step."""
+    """Shared memory of a run's conditions, which creates one moment per step."""
 
     def __init__(self) -> None:
         self._collisions: set[tuple[str, str]] = set()
@@ -125,13 +89,7 @@ class History:
         self._route: Route | None = None
 
     def moment(self, step: TrafficStep) -> Moment:
-        """Take in the next step.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            The step.
-        """
+        """Add the next step and return its moment."""
         self._collisions |= {(hit.collider, hit.victim) for hit in step.collisions}
         begun = [one for one in step.begun if not one.is_over]
         self._begun |= {name for one in begun for name in (one.name, one.key)}

@@ -1,4 +1,4 @@
-"""Conditions as people write them: ``ego.speed > 90 km/h and gap(ego, slow) falls below 80 m``."""
+"""The syntax of conditions: ``ego.speed > 90 km/h and gap(ego, slow) falls below 80 m``."""
 
 import math
 import re
@@ -41,27 +41,14 @@ MOST_CHARACTERS = 1000
 """Longest condition that is read."""
 
 DEEPEST = 20
-"""Most brackets inside one another."""
+"""Maximum depth of brackets."""
 
 
 def parse_condition(written: object) -> Condition:
-    """Read a condition.
+    """Parse a condition; ValueError with what is allowed or nearest if it is malformed.
 
-    Parameters
-    ----------
-    written : str, mapping or sequence
-        Text; or a mapping from signals to the rest (``{"ego.speed": "> 90 km/h"}``), of which all must hold; or
-        ``all:``, ``any:`` with a list of conditions, ``not:`` with one. A list stands for all of its conditions.
-
-    Returns
-    -------
-    Condition
-        Whose `str` is the condition as text.
-
-    Raises
-    ------
-    ValueError
-        If it is none; with what is allowed, or nearest.
+    Text; or a mapping from signals to the rest (``{"ego.speed": "> 90 km/h"}``), all of which must hold; or ``all:``,
+    ``any:`` with a list of conditions, ``not:`` with one. A list stands for all of its conditions.
     """
     return _read(written, 0)
 
@@ -86,22 +73,17 @@ def _entry(key: object, value: object, depth: int) -> Condition:
     if value is None or isinstance(value, bool):
         told = _Text(str(key)).condition()
         return Not(told) if value is False else told
-    # What is neither text nor a number is refused as what it is when it is read as text.
+    # Anything other than text or a number is refused with its own message when it is parsed as text.
     rest = str(value).strip()
     relation = "" if _OPERATOR.match(rest) or _HOW.match(rest) else "== "
     return _Text(f"{key} {relation}{rest}").condition()
 
 
 def mended(written: Mapping[object, object]) -> dict[object, object]:
-    """A mapping in which what YAML has torn apart at commas is whole again.
+    """A mapping with the entries joined that YAML split at commas.
 
-    In ``{gap(ego, slow): "< 80 m"}`` YAML takes the comma for one between two entries, and so it does in
-    ``{always: gap(ego, slow) > 5 m}``.
-
-    Parameters
-    ----------
-    written : mapping
-        As YAML gives it.
+    In ``{gap(ego, slow): "< 80 m"}`` YAML reads the comma as one between two entries, and also in ``{always: gap(ego,
+    slow) > 5 m}``.
     """
     result: dict[object, object] = {}
     pending = deque(written.items())
@@ -121,14 +103,14 @@ def _is_closed(text: str) -> bool:
 
 
 def _joined(kind: type[AllOf] | type[AnyOf], parts: Sequence[Condition]) -> Condition:
-    """Conditions joined into one, those of the same kind inside it taken in."""
+    """Conditions joined into one, with nested ones of the same type merged."""
     if len(parts) == 1:
         return parts[0]
     return kind(tuple(inner for part in parts for inner in (part.parts if isinstance(part, kind) else (part,))))
 
 
 class _Text:
-    """Reads one text from its beginning to its end."""
+    """Parses one text."""
 
     def __init__(self, text: str) -> None:
         if len(text) > MOST_CHARACTERS:
@@ -136,7 +118,7 @@ class _Text:
         self._text, self._at, self._depth = text, 0, 0
 
     def condition(self) -> Condition:
-        """The whole of it."""
+        """Parse all of it."""
         result = self._any()
         if self._rest():
             raise self._wrong("'and', 'or', 'for' or the end")
@@ -245,7 +227,7 @@ class _Text:
         subject, dot, _ = written.rpartition(".")
         known = list(SIGNALS)
         if dot and "(" not in written:
-            # The names of one vehicle's signals are nearer to what was meant than all the others.
+            # Signals of one vehicle are likelier to be meant than all others.
             of_vehicle = {key.partition(".")[2] for key in SIGNALS if key.startswith(("X.", f"{subject}."))}
             known = [f"{subject}.{name}" for name in sorted(of_vehicle)]
             if subject in ("fog", "belief"):
@@ -304,7 +286,7 @@ class _Text:
         return self._text[self._at :].lstrip()
 
     def _take(self, pattern: re.Pattern[str]) -> str:
-        """What is next if it is of a pattern, else nothing."""
+        """The next token that matches a pattern; empty if none does."""
         match = pattern.match(self._rest())
         if match is None:
             return ""
@@ -321,7 +303,7 @@ def _refuse(told: str) -> Reference:
 
 
 def _allowed(kind: Kind) -> tuple[str, ...]:
-    """Relations that go with a kind of signal."""
+    """Relations that fit a type of signal."""
     return {
         Kind.NUMBER: (*OPERATORS, "falls below", "rises above", "becomes"),
         Kind.LANE: (*OPERATORS, "falls below", "rises above", "becomes"),

@@ -1,4 +1,4 @@
-"""Whether a condition can be true at all, and whether it can be false: by the values that its signals can have."""
+"""Whether a condition can be true, and whether it can be false, given the possible values of its signals."""
 
 import itertools
 import math
@@ -26,28 +26,21 @@ from fogsim.conditions.syntax import (
 from fogsim.conditions.watching import shown_value
 
 Limits = Mapping[str, tuple[float, float]]
-"""Least and greatest value that signals, by their keys in `SIGNALS`, can have in one run, in SI units."""
+"""Least and greatest possible values of signals in one run, by their keys in `SIGNALS`, in SI units."""
 
 NO_LIMITS: Limits = {}
 
 MOST_CASES = 20_000
-"""Cases that are gone through; a condition of more is held to be able to be true and false."""
+"""Maximum number of combinations; a condition with more counts as possibly true and possibly false."""
 
 _OTHER = "\0"
-"""A word that stands for all that are not named."""
+"""A word that represents all unnamed ones."""
 
 
 def outcomes(condition: Condition, limits: Limits = NO_LIMITS) -> frozenset[bool]:
-    """What a condition can be in some run: true, false or both.
+    """Values that a condition can have in some run: true, false or both; `limits` narrow the ranges of signals.
 
-    Every signal takes each value that makes a difference to the condition; signals are assumed to be independent.
-
-    Parameters
-    ----------
-    condition : Condition
-        The condition.
-    limits : mapping from str to (float, float)
-        Narrower ranges of signals in one run, for example of ``time``.
+    Each signal takes every value that makes a difference to the condition; signals are assumed to be independent.
     """
     asked = comparisons_of(condition)
     values = {signal: list(_values(signal, asked, limits)) for signal in _measured(asked)}
@@ -63,17 +56,7 @@ def outcomes(condition: Condition, limits: Limits = NO_LIMITS) -> frozenset[bool
 
 
 def pointless_parts(condition: Condition, limits: Limits = NO_LIMITS, ego: str = EGO) -> Iterator[str]:
-    """Say which parts of a condition compare something with itself, or can never be true, and why.
-
-    Parameters
-    ----------
-    condition : Condition
-        The condition.
-    limits : mapping from str to (float, float)
-        As for `outcomes`.
-    ego : str
-        Id of the ego, which conditions may also call ``ego``.
-    """
+    """Parts of a condition that compare a signal with itself or can never be true, with the reason."""
     for reference in signals_of(condition):
         vehicles = [EGO if name == ego else name for name in vehicles_of(reference)]
         if len(set(vehicles)) < len(vehicles):
@@ -106,12 +89,12 @@ def _range_text(reference: Reference, limits: Limits) -> str:
 
 
 def _measured(asked: Sequence[Comparison | Edge | Flag]) -> tuple[Reference, ...]:
-    """Signals that are compared with what is written."""
+    """Signals that are compared with constants."""
     return tuple(dict.fromkeys(one.left for one in asked if not _is_free(one)))
 
 
 def _is_free(part: Condition) -> bool:
-    """Whether a part's outcome is not that of a signal's value alone."""
+    """Whether a part's outcome depends on more than a signal's current value."""
     return isinstance(part, Edge | Held) or (isinstance(part, Comparison) and isinstance(part.right, Reference))
 
 
@@ -147,7 +130,7 @@ def _plain(operand: Operand) -> Value:
 
 
 def _values(reference: Reference, asked: Sequence[Comparison | Edge | Flag], limits: Limits) -> Iterator[Value]:
-    """Values of a signal that make all the differences that there are."""
+    """Values of a signal that cover all distinguishable outcomes."""
     signal = SIGNALS[reference.signal]
     least, most = _range(reference, limits)
     written = [_plain(one.right) for one in asked if isinstance(one, Comparison) and one.left == reference]
@@ -172,7 +155,7 @@ def _values(reference: Reference, asked: Sequence[Comparison | Edge | Flag], lim
 
 
 def _numbers(thresholds: Sequence[float], least: float, most: float) -> set[float]:
-    """Each threshold, what lies between them and beyond, and the ends of the range."""
+    """Each threshold, values between and beyond them, and the ends of the range."""
     finite = sorted({one for one in (*thresholds, least, most) if math.isfinite(one)}) or [0.0]
     between = {0.5 * (one + other) for one, other in itertools.pairwise(finite)}
     return {*thresholds, *between, finite[0] - 1.0, finite[-1] + 1.0, least, most}

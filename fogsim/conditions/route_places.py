@@ -1,4 +1,4 @@
-"""Where vehicles are along a route: places, extents, gaps and times between them."""
+"""Vehicles along a route: positions, extents, gaps and times between them."""
 
 import math
 from dataclasses import dataclass
@@ -10,36 +10,22 @@ from fogsim.jit import kernel
 from fogsim.values import TrafficState
 
 FARTHEST_ASIDE = 30.0
-"""Distance from the route up to which a vehicle has a place along it [m]: that of the other carriageway."""
+"""Largest lateral distance of a position on a route [m]; it includes the other carriageway."""
 
 _AS_NEAR = 1.0
-"""Where a route passes a place twice, its ways there lie this near to one another [m]."""
+"""Where a route passes a point twice, its parts there are at most this far apart [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class RoutePlace:
-    """Where a vehicle is along a route.
-
-    Attributes
-    ----------
-    front : float
-        Position of its front bumper [m].
-    along : float
-        Cosine of its heading to the route: 1 with it, −1 against it.
-    """
+    """Position of a vehicle's front bumper along a route [m], and the cosine of its heading to the route."""
 
     front: float
     along: float
 
 
 class Route:
-    """A polyline along which places count.
-
-    Parameters
-    ----------
-    points : (n, 3) float64
-        Its points [m], at least two.
-    """
+    """A polyline (n, 3) [m] along which positions count."""
 
     def __init__(self, points: NDArray[np.float64]) -> None:
         self.points, self._corners = points, np.array(points, np.float64)
@@ -50,17 +36,7 @@ class Route:
         self._at, self._aside = np.empty(len(steps)), np.empty(len(steps))
 
     def locate(self, position: NDArray[np.float64], heading: float, near: float | None = None) -> RoutePlace | None:
-        """Nearest place on the route; None if it is farther than `FARTHEST_ASIDE`.
-
-        Parameters
-        ----------
-        position : (3,) float64
-            Where it is [m].
-        heading : float
-            Direction of travel [rad].
-        near : float or None
-            A position along the route: of several places that are as near, the one nearest to it [m].
-        """
+        """Nearest place on the route, None beyond `FARTHEST_ASIDE`; of equally near ones, the closest to `near` [m]."""
         at, aside = self._at, self._aside
         nearest = nearest_piece(position, self._corners, self._direction, self._length, at, aside)
         if aside[nearest] > FARTHEST_ASIDE:
@@ -81,18 +57,10 @@ def nearest_piece(
     at: NDArray[np.float64],
     aside: NDArray[np.float64],
 ) -> int:
-    """Find the piece of a polyline that is nearest to a place, the first of several.
+    """Index of the first polyline piece nearest to a place (3,) [m].
 
-    Parameters
-    ----------
-    place : (3,) float64
-        The place [m].
-    points : (n + 1, 3) float64
-        Points of the polyline [m].
-    direction, length : (n, 3), (n,) float64
-        Unit vectors along its pieces, and their lengths [m].
-    at, aside : (n,) float64
-        Where on each piece its nearest point is, and how far from the place [m]; written to.
+    For pieces with unit vectors `direction` (n, 3) and lengths (n,) [m], writes the nearest point's position on each
+    piece to `at` and its distance from the place to `aside` [m].
     """
     nearest = 0
     for i in range(len(length)):
@@ -110,25 +78,16 @@ def nearest_piece(
 def piece_about(
     near: float, start: NDArray[np.float64], at: NDArray[np.float64], aside: NDArray[np.float64], nearest: int
 ) -> int:
-    """Find, of pieces that are about as near to a place as the nearest, the one that is nearest along the polyline.
+    """Of the pieces about as near as `nearest`, the index of the one closest to position `near` [m] along the polyline.
 
-    Parameters
-    ----------
-    near : float
-        A position along the polyline [m].
-    start : (n,) float64
-        Where its pieces begin along it [m].
-    at, aside : (n,) float64
-        From `nearest_piece`.
-    nearest : int
-        The nearest piece.
+    `start` is where each piece begins [m]; `at` and `aside` are from `nearest_piece`.
     """
     farthest, here, least = aside[nearest] + _AS_NEAR, -1, math.inf
     for i in range(len(start)):
         apart = abs(start[i] + at[i] - near)
         if aside[i] <= farthest and (here < 0 or apart < least):
             here, least = i, apart
-    # Points of one piece of the way are all as near: the nearest of those about this one is meant.
+    # Points of one piece are about as near: the nearest of those around this one is meant.
     found = here
     for i in range(len(start)):
         is_about = aside[i] <= farthest and abs(start[i] - start[here]) <= 2.0 * FARTHEST_ASIDE
@@ -139,15 +98,7 @@ def piece_about(
 
 @dataclass(frozen=True, slots=True)
 class Extent:
-    """The piece of a route that a vehicle covers, and how it moves along it.
-
-    Attributes
-    ----------
-    begin, end : float
-        Positions of its two bumpers, in the direction of the route [m].
-    velocity : float
-        Along the route [m/s]; negative for oncoming vehicles.
-    """
+    """The interval of a route between a vehicle's bumpers [m], and its velocity along it [m/s]."""
 
     begin: float
     end: float
@@ -155,17 +106,7 @@ class Extent:
 
 
 def extent_of(place: RoutePlace, traffic: TrafficState, row: int) -> Extent:
-    """What a vehicle covers of a route.
-
-    Parameters
-    ----------
-    place : RoutePlace
-        Where its front bumper is.
-    traffic : TrafficState
-        The traffic.
-    row : int
-        Its row.
-    """
+    """The part of a route that the vehicle in a row covers."""
     rear = place.front - float(traffic.length[row]) * place.along
     return Extent(min(rear, place.front), max(rear, place.front), float(traffic.speed[row]) * place.along)
 
@@ -173,25 +114,15 @@ def extent_of(place: RoutePlace, traffic: TrafficState, row: int) -> Extent:
 def gap_between(one: Extent, other: Extent) -> float:
     """Gap from one vehicle to another along the route, bumper to bumper [m].
 
-    Positive for another that is ahead in the direction of the route, negative for one behind, 0 for one beside.
-
-    Parameters
-    ----------
-    one, other : Extent
-        The two.
+    Positive for a vehicle ahead in the direction of the route, negative for one behind, 0 where they overlap.
     """
     return max(other.begin - one.end, 0.0) or min(other.end - one.begin, 0.0)
 
 
 def time_to_meet(one: Extent, other: Extent) -> float:
-    """Time until one vehicle and another are beside one another at constant speeds [s].
+    """Time until two vehicles overlap along the route at constant speeds [s].
 
-    ``inf`` if they do not approach; 0 while they are beside one another.
-
-    Parameters
-    ----------
-    one, other : Extent
-        The two.
+    ``inf`` if they do not approach; 0 while they overlap.
     """
     gap = gap_between(one, other)
     approach = math.copysign(1.0, gap) * (one.velocity - other.velocity)
@@ -199,13 +130,7 @@ def time_to_meet(one: Extent, other: Extent) -> float:
 
 
 def headway_between(one: Extent, other: Extent) -> float:
-    """Time that the one that is behind takes for the gap at its speed [s]; ``inf`` if it stands or drives away.
-
-    Parameters
-    ----------
-    one, other : Extent
-        The two.
-    """
+    """Time that the vehicle behind needs for the gap at its speed [s]; ``inf`` if it stops or moves away."""
     gap = gap_between(one, other)
     speed = one.velocity if gap >= 0.0 else other.velocity
     return abs(gap) / speed if speed > 0.0 else math.inf

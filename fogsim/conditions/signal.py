@@ -1,4 +1,4 @@
-"""What a signal of a run is: its unit, its range, what it needs, and how it is read from a moment."""
+"""A signal of a run: its unit, its range, its needs, and how to read it from a moment."""
 
 import math
 from collections.abc import Callable
@@ -9,7 +9,7 @@ from fogsim.conditions.moment import Moment
 
 
 class Kind(Enum):
-    """What a signal is."""
+    """Type of a signal."""
 
     NUMBER = "number"
     FLAG = "true or false"
@@ -23,40 +23,32 @@ class Need(StrEnum):
 
     EGO = "an ego"
     FRAMES = "frames"
-    """A camera and estimators, which need an ego, too."""
+    """A camera and estimators, which also need an ego."""
     ROUTE = "a route (traffic.along)"
-    """Of the ego, or ``traffic.along``."""
+    """The ego's, or ``traffic.along``."""
 
 
 @dataclass(frozen=True, slots=True)
 class LanePlace:
-    """A lane by its number from the right, and how many there are.
-
-    Attributes
-    ----------
-    number : int
-        From 0.
-    count : int or None
-        None where it is not known.
-    """
+    """A lane by its number from the right, from 0, and the number of lanes (None if unknown)."""
 
     number: int
     count: int | None
 
     @property
     def names(self) -> frozenset[str] | None:
-        """Which of "right" and "left" it is; None where the left one is not known."""
+        """Which of "right" and "left" it is; None if the left one is unknown."""
         if self.count is None:
             return frozenset({"right"}) if self.number == 0 else None
         return frozenset(name for name, at in (("right", 0), ("left", self.count - 1)) if self.number == at)
 
 
 Value = float | bool | str | frozenset[str] | LanePlace | None
-"""What a signal is now; None where it has no value."""
+"""Current value of a signal; None if it has none."""
 
 
 class Place(Enum):
-    """What stands in the place holders of a signal's name."""
+    """Type of an argument in a signal's name."""
 
     VEHICLE = "vehicle"
     BANK = "fog bank"
@@ -68,28 +60,11 @@ class Place(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Signal:
-    """A quantity of a run that conditions may ask for.
+    """A quantity of a run that conditions can refer to.
 
-    Attributes
-    ----------
-    meaning : str
-        One line on it.
-    value : callable
-        Takes it from a moment and what stands in the place holders.
-    kind : Kind
-        What it is.
-    unit : str
-        SI unit of a number; "" for a pure one.
-    shown_unit : str
-        Unit in which it is shown; "" for the SI one.
-    least, most : float
-        Range of a number; what lies outside cannot come.
-    words : tuple of str
-        What a word may be; empty where any may come.
-    places : tuple of Place
-        What stands in the place holders.
-    needs : frozenset of Need
-        What the run must have.
+    `value` reads it from a moment and the arguments of its place holders. `unit` is SI, and `shown_unit` the one in
+    messages ("" for the SI one). Values outside `least` … `most` cannot occur; `words` are the possible words (empty
+    for any).
     """
 
     meaning: str
@@ -105,18 +80,10 @@ class Signal:
 
     @property
     def told_in(self) -> str:
-        """Unit in which it is shown."""
+        """Unit in messages."""
         return self.shown_unit or self.unit
 
     def read(self, moment: Moment, arguments: tuple[str, ...]) -> Value:
-        """Value at a moment; None where there is none.
-
-        Parameters
-        ----------
-        moment : Moment
-            The moment.
-        arguments : tuple of str
-            What stands in the place holders.
-        """
+        """Value at a moment; None if it has none."""
         value: Value = self.value(moment, *arguments)
         return None if isinstance(value, float) and math.isnan(value) else value

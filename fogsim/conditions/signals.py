@@ -1,4 +1,4 @@
-"""Every signal that conditions may ask for, by the name in which X, Y, METHOD and the like stand for what is meant."""
+"""All signals of conditions, by names with the arguments X, Y, METHOD and so on."""
 
 import math
 from collections.abc import Callable
@@ -18,10 +18,10 @@ FASTEST = 500.0 / KMH_PER_MPS
 """No vehicle drives faster [m/s]."""
 
 HARDEST = 100.0
-"""No vehicle brakes or speeds up harder, in a collision neither [m/s²]."""
+"""Limit of accelerations, collisions included [m/s²]."""
 
 NO_LEADER = "none"
-"""Value of ``ego.leader`` where no vehicle is ahead."""
+"""Value of ``ego.leader`` without a vehicle ahead."""
 
 LAMP_WORDS = tuple(str(lamp.name).lower() for lamp in Lamp if lamp)
 """Lamps by their words."""
@@ -45,7 +45,7 @@ def _of_vehicle(read: Callable[[Moment, int], float]) -> Callable[[Moment, str],
 
 
 def _of_pair(between: Callable[[Extent, Extent], float]) -> Callable[[Moment, str, str], float | None]:
-    """Signal of two vehicles that have places along the route."""
+    """Signal of two vehicles with positions along the route."""
 
     def value(moment: Moment, one: str, other: str) -> float | None:
         first, second = moment.extent(one), moment.extent(other)
@@ -55,7 +55,7 @@ def _of_pair(between: Callable[[Extent, Extent], float]) -> Callable[[Moment, st
 
 
 def _ahead(time: Callable[[Extent, Extent], float]) -> Callable[[Moment, str, str, str], float | None]:
-    """Time of one vehicle and another that is ahead of it, by a length farther than their bumpers are."""
+    """Time between one vehicle and another ahead of it, with a gap that is longer by a length."""
 
     def value(moment: Moment, one: str, other: str, length: str) -> float | None:
         first, second = moment.extent(one), moment.extent(other)
@@ -77,7 +77,7 @@ def _speed_difference(moment: Moment, one: str, other: str) -> float | None:
 
 
 def _of_leader(read: Callable[[Leader, float], float]) -> Callable[[Moment], float | None]:
-    """Signal of the ego and the vehicle ahead of it; inf if there is none."""
+    """Signal of the ego and the vehicle ahead of it; inf without one."""
 
     def value(moment: Moment) -> float | None:
         step = moment.ego_step
@@ -94,7 +94,7 @@ def _of_step(read: Callable[[Step], _Read]) -> Callable[[Moment], _Read | None]:
 
 
 def _of_belief(read: Callable[[Step], float | None]) -> Callable[[Moment], float | None]:
-    """Signal of what is believed; without an estimate nobody has said anything."""
+    """Signal of the belief; None without an estimate."""
     return lambda moment: read(moment.ego_step) if moment.ego_step is not None and moment.ego_step.estimates else None
 
 
@@ -170,7 +170,7 @@ def _is_in_bank(moment: Moment, number: str, vehicle: str = "ego") -> bool | Non
 def _estimate(read: Callable[[Moment, Estimate], float | bool | None]) -> Callable[[Moment, str], float | bool | None]:
     def value(moment: Moment, method: str) -> float | bool | None:
         step = moment.ego_step
-        # A method's own name may be shorter than the one by which a scenario finds it, module and all.
+        # A method's own name may be shorter than its name in a scenario, which includes the module.
         names = {method, method.rpartition(":")[2]}
         found = (one for one in (() if step is None else step.estimates) if one.method in names)
         estimate = next(found, None)
@@ -180,7 +180,7 @@ def _estimate(read: Callable[[Moment, Estimate], float | bool | None]) -> Callab
 
 
 def _light(read: Callable[[SignalAhead], _Read]) -> Callable[[Moment, str], _Read | None]:
-    """Signal of the next traffic light, if it is the one that is asked for."""
+    """Signal of the next traffic light, if it has the given id."""
 
     def value(moment: Moment, name: str) -> _Read | None:
         ahead = None if moment.ego_step is None else moment.ego_step.signal_ahead
@@ -190,7 +190,7 @@ def _light(read: Callable[[SignalAhead], _Read]) -> Callable[[Moment, str], _Rea
 
 
 def _relative_error(visibility: float, truth: float) -> float | None:
-    """How far a visibility is from the true one, as a share of it; None in clear air, where there is no share."""
+    """Relative error of a visibility; None in clear air, where it is undefined."""
     return None if math.isinf(truth) else abs(visibility / truth - 1.0)
 
 
@@ -452,5 +452,5 @@ _OF_FOG = {
 SIGNALS: Registry[Signal] = Registry(
     "signal", {**_OF_RUN, **_OF_VEHICLES, **_OF_PAIRS_BEYOND, **_OF_EGO, **_OF_LIGHTS, **_OF_FOG}
 )
-"""Every signal by name. In a name, X and Y stand for vehicles (``ego`` for the ego), METHOD for an estimator of the
-scenario, ID for a traffic light, N for the number of a fog bank, EVENT for an entry of the timeline."""
+"""Every signal by name. In a name, X and Y are vehicles (``ego`` for the ego), METHOD an estimator of the
+scenario, ID a traffic light, N the number of a fog bank, EVENT an entry of the timeline."""

@@ -1,4 +1,4 @@
-"""What a condition is once it has been read: plain values, which say as text what was written."""
+"""Parsed conditions: plain values whose text is the condition as written."""
 
 import re
 from collections.abc import Iterator
@@ -7,15 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """A signal of a run, such as ``ego.speed`` or ``gap(ego, slow)``.
-
-    Attributes
-    ----------
-    signal : str
-        Key in `SIGNALS`: ``X.speed``, ``gap(X, Y)``.
-    arguments : tuple of str
-        Vehicles, methods, numbers that stand in its place holders.
-    """
+    """A signal of a run, such as ``ego.speed``: its key in `SIGNALS` (``X.speed``) and arguments."""
 
     signal: str
     arguments: tuple[str, ...] = ()
@@ -35,7 +27,7 @@ _PLAIN = re.compile(r"[\w:#@.\-]+")
 
 
 def _quoted(name: str) -> str:
-    """A name as a condition may have it, in quotation marks where it must."""
+    """A name as conditions need it, in quotation marks if necessary."""
     return name if _PLAIN.fullmatch(name) else _always_quoted(name)
 
 
@@ -45,15 +37,7 @@ def _always_quoted(name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A number to compare with.
-
-    Attributes
-    ----------
-    value : float
-        In SI units.
-    number, unit : str
-        As written: "70" and "km/h".
-    """
+    """A number to compare with: its SI value, and its number and unit as written."""
 
     value: float
     number: str
@@ -90,7 +74,7 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """A signal that passes a value now: ``falls below``, ``rises above``, ``becomes`` or, of any value, ``changes``."""
+    """A signal that passes a value now: ``falls below``, ``rises above``, ``becomes``, or ``changes`` (no value)."""
 
     left: Reference
     how: str
@@ -112,7 +96,7 @@ class Flag:
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """A condition that has been true without a break for some time [s]."""
+    """A condition that has been true without a break for a time [s]."""
 
     part: "Condition"
     duration: Quantity
@@ -144,7 +128,7 @@ class AllOf:
 
 @dataclass(frozen=True, slots=True)
 class AnyOf:
-    """Conditions of which one is true at least."""
+    """Conditions of which at least one is true."""
 
     parts: tuple["Condition", ...]
 
@@ -161,13 +145,7 @@ def _bracketed(part: Condition) -> str:
 
 
 def parts_of(condition: Condition) -> Iterator[Condition]:
-    """A condition and everything inside it, the innermost first.
-
-    Parameters
-    ----------
-    condition : Condition
-        The condition.
-    """
+    """A condition and all its parts, innermost first."""
     match condition:
         case AllOf(parts) | AnyOf(parts):
             for part in parts:
@@ -178,25 +156,13 @@ def parts_of(condition: Condition) -> Iterator[Condition]:
 
 
 def comparisons_of(condition: Condition) -> tuple[Comparison | Edge | Flag, ...]:
-    """What a condition asks of single signals, each once, in the order in which it is written.
-
-    Parameters
-    ----------
-    condition : Condition
-        The condition.
-    """
+    """Comparisons, edges and flags in a condition, each once, in written order."""
     asked = (part for part in parts_of(condition) if isinstance(part, Comparison | Edge | Flag))
     return tuple(dict.fromkeys(asked))
 
 
 def signals_of(condition: Condition) -> tuple[Reference, ...]:
-    """Signals that a condition asks for, each once, in the order in which they are written.
-
-    Parameters
-    ----------
-    condition : Condition
-        The condition.
-    """
+    """Signals in a condition, each once, in written order."""
     found: dict[Reference, None] = {}
     for asked in comparisons_of(condition):
         found[asked.left] = None

@@ -1,4 +1,4 @@
-"""Conditions from Python's operators on signals."""
+"""Conditions from Python operators on signals."""
 
 from dataclasses import dataclass
 
@@ -18,12 +18,12 @@ def _parsed(written: str | dict[str, object]) -> Condition:
 @checked_parameters
 @dataclass(frozen=True, slots=True)
 class SignalTerm:
-    """A signal of the run, of which conditions are made: ``signal("ego.ttc") >= "1.5 s"``.
+    """A signal of the run, from which conditions are built: ``signal("ego.ttc") >= "1.5 s"``.
 
     Attributes
     ----------
     text : str
-        The signal as files have it.
+        The signal as in files.
     """
 
     text: str
@@ -44,7 +44,7 @@ class SignalTerm:
         return condition(f"{self} >= {other}")
 
     def is_(self, word: str) -> Condition:
-        """It is a word, as a lane may be ``right``.
+        """The signal is a word, as a lane may be ``right``.
 
         Parameters
         ----------
@@ -54,7 +54,7 @@ class SignalTerm:
         return condition(f"{self} == {word}")
 
     def is_not(self, word: str) -> Condition:
-        """It is not a word.
+        """The signal is not a word.
 
         Parameters
         ----------
@@ -64,7 +64,7 @@ class SignalTerm:
         return condition(f"{self} != {word}")
 
     def includes(self, word: str) -> Condition:
-        """A word is among its words, as a lamp is among lit ones.
+        """A word is among the signal's words, as a lamp is among lit ones.
 
         Parameters
         ----------
@@ -74,7 +74,7 @@ class SignalTerm:
         return condition(f"{self} include {word}")
 
     def falls_below(self, quantity: str) -> Condition:
-        """It was not below a quantity a camera period before, and is now.
+        """The signal was not below a quantity one camera period before, and is now.
 
         Parameters
         ----------
@@ -84,7 +84,7 @@ class SignalTerm:
         return condition(f"{self} falls below {quantity}")
 
     def rises_above(self, quantity: str) -> Condition:
-        """It was not above a quantity a camera period before, and is now.
+        """The signal was not above a quantity one camera period before, and is now.
 
         Parameters
         ----------
@@ -94,7 +94,7 @@ class SignalTerm:
         return condition(f"{self} rises above {quantity}")
 
     def becomes(self, word: str) -> Condition:
-        """It was not a word a camera period before, and is now.
+        """The signal was not a word one camera period before, and is now.
 
         Parameters
         ----------
@@ -104,12 +104,12 @@ class SignalTerm:
         return condition(f"{self} becomes {word}")
 
     def changes(self) -> Condition:
-        """It is another than a camera period before."""
+        """The signal differs from its value one camera period before."""
         return condition(f"{self} changes")
 
 
 Comparand = str | SignalTerm
-"""What a signal is compared with: a quantity with its unit, or another signal."""
+"""The operand of a comparison: a quantity with its unit, or another signal."""
 
 
 def signal(text: str) -> SignalTerm:
@@ -134,7 +134,7 @@ def condition(text: str | SignalTerm) -> Condition:
     Raises
     ------
     InputError
-        If it is none.
+        If it is not a condition.
     """
     return _parsed(str(text))
 

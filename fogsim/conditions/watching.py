@@ -1,4 +1,4 @@
-"""Watches a condition over the steps of a run: true, false, or not known."""
+"""Evaluates a condition over the steps of a run: true, false, or unknown."""
 
 import math
 from collections.abc import Mapping
@@ -28,15 +28,10 @@ _TICK = 1e-6
 
 
 class Watch:
-    """Watches one condition, and remembers what it needs of earlier steps.
+    """Evaluates one condition step by step, with the state that it needs of earlier steps.
 
-    A comparison with a value that is not there now (the vehicle is not on the road, the estimator cannot tell) is not
-    known; what follows from the other parts all the same is: ``false and unknown`` is false.
-
-    Parameters
-    ----------
-    condition : Condition
-        From `parse_condition`.
+    A comparison with a missing value (the vehicle is not on the road, the estimate is invalid) is unknown, and so is
+    the condition unless its other parts decide it: ``false and unknown`` is false.
     """
 
     def __init__(self, condition: Condition) -> None:
@@ -50,23 +45,11 @@ class Watch:
         self.values: Mapping[Reference, Value] = {}
 
     def update(self, step: TrafficStep) -> bool | None:
-        """Take in the next step, and say whether the condition holds at it; None if that is not known.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            The step; each of a run, in their order.
-        """
+        """Add the next step and return whether the condition holds there; None if unknown."""
         return self.look(self._history.moment(step))
 
     def look(self, moment: Moment) -> bool | None:
-        """Do the same for a moment from a `History` that is shared with other watches.
-
-        Parameters
-        ----------
-        moment : Moment
-            The moment.
-        """
+        """Do the same for a moment of a `History` that is shared with other watches."""
         self.values = {signal: SIGNALS[signal.signal].read(moment, signal.arguments) for signal in self._signals}
         results: dict[Condition, bool | None] = {}
         for part in self._parts:
@@ -74,17 +57,11 @@ class Watch:
         return results[self.condition]
 
     def operands(self, comparison: Comparison) -> tuple[Value, Value]:
-        """What a comparison of the condition compared at the last step; None for what was not known.
-
-        Parameters
-        ----------
-        comparison : Comparison
-            The comparison.
-        """
+        """The two values that a comparison compared at the last step; None if unknown."""
         return self.values[comparison.left], self._operand(comparison.right)
 
     def told(self) -> str:
-        """Say what the signals of the condition were at the last step: ``gap(ego, slow) = 83.2 m``."""
+        """Values of the condition's signals at the last step: ``gap(ego, slow) = 83.2 m``."""
         return ", ".join(
             f"{signal} = {shown_value(signal, v, self._units[signal])}" for signal, v in self.values.items()
         )
@@ -129,7 +106,7 @@ class Watch:
 
 
 def _shown_units(parts: tuple[Condition, ...]) -> dict[Reference, str]:
-    """Units in which signals are told: those in which the condition compares them, else their own."""
+    """Units in which signals are shown: those of the condition's comparisons, otherwise their own."""
     units: dict[Reference, str] = {}
     for part in parts:
         if isinstance(part, Comparison | Edge | Flag):
@@ -142,17 +119,7 @@ def _shown_units(parts: tuple[Condition, ...]) -> dict[Reference, str]:
 
 
 def shown_value(signal: Reference, value: Value, unit: str = "") -> str:
-    """A signal's value as messages tell it.
-
-    Parameters
-    ----------
-    signal : Reference
-        The signal.
-    value : float, bool, str, frozenset, LanePlace or None
-        Its value, in SI units.
-    unit : str
-        The unit to tell it in; "" for the signal's own.
-    """
+    """A signal's value (SI) as messages show it, in `unit` ("" for the signal's own)."""
     if value is None:
         return "unknown"
     if isinstance(value, LanePlace):

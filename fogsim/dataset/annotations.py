@@ -1,4 +1,4 @@
-"""What is written about a frame: its entry in the COCO file, and its objects with their boxes."""
+"""Annotations of a frame: its entry in the COCO file, and its objects with their boxes."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -20,13 +20,7 @@ CATEGORIES = [
 
 
 def frame_record(step: Step) -> dict[str, Any]:
-    """Entry of one frame: what was true, and what the vehicle was told. Endless visibility is null.
-
-    Parameters
-    ----------
-    step : Step
-        The finished step.
-    """
+    """Entry of one frame: the ground truth and the vehicle's inputs; infinite visibility is null."""
     truth, observation = step.truth, step.observation
     return {
         "step": step.index,
@@ -58,21 +52,11 @@ def frame_record(step: Step) -> dict[str, Any]:
 
 
 def object_records(step: Step, instance: NDArray[np.uint16], transmission: NDArray[np.float32]) -> list[dict[str, Any]]:
-    """Objects of which a pixel is seen: box and area [px], how far they are and how much light comes through.
-
-    Parameters
-    ----------
-    step : Step
-        The step.
-    instance : (rows, cols) uint16
-        Its instance mask.
-    transmission : (rows, cols) float32
-        Its transmission.
-    """
+    """Objects with a visible pixel: box and area [px], distance, and transmission."""
     records = []
     for number, box, inside in _objects(instance):
         if number == step.ego + 1:
-            # The own bonnet is no object to be found.
+            # The own bonnet is not an object.
             continue
         rows, cols = box
         records.append(
@@ -103,7 +87,7 @@ def _objects(instance: NDArray[np.uint16]) -> Iterable[tuple[int, tuple[slice, s
 
 
 def _object(step: Step, number: int) -> dict[str, Any]:
-    """What is known of the object of a number in the instance mask."""
+    """Attributes of an object by its number in the instance mask."""
     row, vehicles = number - 1, len(step.traffic.ids)
     if row < vehicles:
         return {
@@ -124,15 +108,7 @@ def _object(step: Step, number: int) -> dict[str, Any]:
 
 
 def coco(information: Mapping[str, Any], records: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
-    """COCO file of frames in their order.
-
-    Parameters
-    ----------
-    information : mapping
-        What the file says about the data set.
-    records : iterable of mapping
-        Each with an "image" and its "annotations".
-    """
+    """COCO file of frames in order; each record has an "image" and its "annotations"."""
     images: list[dict[str, Any]] = []
     annotations: list[dict[str, Any]] = []
     for number, record in enumerate(records, start=1):

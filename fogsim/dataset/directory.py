@@ -1,4 +1,4 @@
-"""The directory of a data set: where its files are, whose it is, and what of it is there already."""
+"""The directory of a data set: its files, its identity, and its progress."""
 
 import json
 from collections.abc import Mapping
@@ -26,7 +26,7 @@ _RECORDS = "records"
 
 
 class _ImageEntry(BaseModel, strict=True):
-    """What continuing a data set, or a reader of its COCO file, needs of a frame's entry."""
+    """Fields of a frame's entry that a continued data set, or a reader of its COCO file, needs."""
 
     width: PositiveInt
     height: PositiveInt
@@ -43,22 +43,10 @@ class _Record(BaseModel, strict=True):
 
 
 class DatasetDirectory:
-    """The directory of one data set, new or to be continued.
+    """The directory of one data set, new or to be continued, with one writer at a time.
 
-    A frame is there when its record is, which is written after its images. It has one writer at a time, and replaces
-    no file but its own.
-
-    Parameters
-    ----------
-    path : Path
-        The directory; it is made with its parents if it is not there.
-    identity : mapping
-        What the data set is of; JSON values only.
-
-    Raises
-    ------
-    InputError
-        If the path is no directory, is written by another process, or holds something else than this data set.
+    A frame is complete when its record is written, after its images; only the data set's own files are replaced.
+    `identity` is JSON data, and InputError is raised if the directory holds anything else.
     """
 
     def __init__(self, path: Path, identity: Mapping[str, Any]) -> None:
@@ -68,7 +56,7 @@ class DatasetDirectory:
         self._lock = WriterLock(self.path)
         try:
             self._check(dict(identity))
-            # What is ours is told before anything is written.
+            # The data set's identity is written before anything else.
             write_json(self.path / IDENTITY, identity)
             for folder in (*LAYERS, _RECORDS):
                 (self.path / folder).mkdir(exist_ok=True)
@@ -77,7 +65,7 @@ class DatasetDirectory:
             raise
 
     def close(self) -> None:
-        """Let others write."""
+        """Release the lock."""
         self._lock.release()
 
     def __enter__(self) -> Self:
@@ -110,39 +98,18 @@ class DatasetDirectory:
             )
 
     def has(self, number: int) -> bool:
-        """Whether a frame has all its files and a record that is whole; otherwise it is made again."""
+        """Whether a frame has all its files and a complete record; otherwise it is made again."""
         return all(self._layer(layer, number).is_file() for layer in LAYERS) and self._found(number) is not None
 
     def beyond(self, frames: int) -> int:
-        """How many frames there are in all, where they are more than these; else 0.
-
-        Parameters
-        ----------
-        frames : int
-            How many are wanted.
-        """
+        """Number of all frames if there are more than `frames`, otherwise 0."""
         numbers = [int(p.stem) for p in (self.path / _RECORDS).glob("[0-9]*.json") if p.stem.isdecimal()]
         return len(numbers) if any(number >= frames for number in numbers) else 0
 
     def write(
         self, number: int, layers: Mapping[str, NDArray[np.uint8] | NDArray[np.uint16]], record: Mapping[str, Any]
     ) -> None:
-        """Write a frame: its images, and then its record with their names.
-
-        Parameters
-        ----------
-        number : int
-            Its place in the data set, from 0.
-        layers : mapping
-            An image for each of `LAYERS`.
-        record : mapping
-            Its "image" and "annotations".
-
-        Raises
-        ------
-        InputError
-            If one of its files is there and is another: it is not of this data set, or was changed.
-        """
+        """Write a frame: its images, then its record; InputError if one of its files exists with other content."""
         for layer in LAYERS:
             path, data = self._layer(layer, number), png(layers[layer])
             if path.exists() and read_bytes(path) != data:
@@ -153,20 +120,14 @@ class DatasetDirectory:
         write_json(self._record(number), {**record, "image": {**self._names(number), **record["image"]}})
 
     def record(self, number: int) -> dict[str, Any]:
-        """Record of a frame that `has` reports.
-
-        Raises
-        ------
-        InputError
-            If it has been damaged since.
-        """
+        """Record of a frame that `has` reports; InputError if it is damaged."""
         found = self._found(number)
         if found is None:
             raise InputError(f"{self._record(number)}: damaged; the same command makes its frame again")
         return found
 
     def _found(self, number: int) -> dict[str, Any] | None:
-        """Record of a frame; None if there is none, or it is damaged."""
+        """Record of a frame; None if it is missing or damaged."""
         try:
             found = read_json(self._record(number))
             entry = _Record.model_validate(found).image
@@ -176,17 +137,11 @@ class DatasetDirectory:
         return cast("dict[str, Any]", found) if is_own else None
 
     def _names(self, number: int) -> dict[str, str]:
-        """Files of a frame, as its record has them."""
+        """Files of a frame, from its record."""
         return {_key(layer): self._layer(layer, number).relative_to(self.path).as_posix() for layer in LAYERS}
 
     def write_annotations(self, annotations: Mapping[str, Any]) -> None:
-        """Write the COCO file, in place of one that is there.
-
-        Parameters
-        ----------
-        annotations : mapping
-            Its content; JSON values only.
-        """
+        """Write the COCO file, replacing an existing one."""
         write_json(self.path / ANNOTATIONS, annotations)
 
     def _layer(self, layer: str, number: int) -> Path:
@@ -202,7 +157,7 @@ def _key(layer: str) -> str:
 
 
 def _differences(there: Any, wanted: Any, place: str = "") -> list[str]:
-    """What two plain values differ in, in words."""
+    """Difference between two plain values, in words."""
     if isinstance(there, dict) and isinstance(wanted, dict):
         keys = sorted(there.keys() | wanted.keys())
         return [d for key in keys for d in _differences(there.get(key), wanted.get(key), f"{place}.{key}".lstrip("."))]

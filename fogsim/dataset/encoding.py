@@ -1,4 +1,4 @@
-"""Ground truth as PNG files: what their values mean, and how to read them back."""
+"""Ground truth as PNG files: the meaning of their values, and how to read them."""
 
 import contextlib
 from pathlib import Path
@@ -12,10 +12,10 @@ from fogsim.errors import FogSimError, InputError
 from fogsim.files.readers import read_bytes
 
 DEPTH_UNIT = 0.01
-"""Distance that one step of a depth image stands for [m]."""
+"""Distance per step of a depth image [m]."""
 
 TRANSMISSION_UNIT = 1.0 / 65_535
-"""Transmission that one step of a transmission image stands for [-]."""
+"""Transmission per step of a transmission image [-]."""
 
 _MOST = 65_535
 _COMPRESSION = 3  # of 9; more takes several times as long for a few per cent
@@ -32,7 +32,7 @@ def encoded_depth(distance: NDArray[np.float32]) -> NDArray[np.uint16]:
     Returns
     -------
     (rows, cols) uint16
-        1 … 65 534 centimetres; 0 for the sky; 65 535 for whatever is 655.35 m away or more.
+        1 … 65 534 centimetres; 0 for the sky; 65 535 for 655.35 m and more.
     """
     steps = np.clip(np.rint(np.minimum(distance, 1e6) / DEPTH_UNIT), 1, _MOST)
     return np.where(np.isinf(distance), 0, steps).astype(np.uint16)
@@ -44,12 +44,12 @@ def decoded_depth(values: NDArray[np.uint16]) -> NDArray[np.float64]:
     Parameters
     ----------
     values : (rows, cols) uint16
-        Values as of `encoded_depth`.
+        Values from `encoded_depth`.
 
     Returns
     -------
     (rows, cols) float64
-        Distance [m]; ``inf`` for the sky, and 655.35 for that and more.
+        Distance [m]; ``inf`` for the sky; 655.35 stands for that and more.
     """
     return np.where(values == 0, np.inf, values * DEPTH_UNIT)
 
@@ -71,24 +71,13 @@ def decoded_transmission(values: NDArray[np.uint16]) -> NDArray[np.float64]:
     Parameters
     ----------
     values : (rows, cols) uint16
-        Values as of `encoded_transmission`.
+        Values from `encoded_transmission`.
     """
     return np.asarray(values * TRANSMISSION_UNIT)
 
 
 def png(image: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
-    """PNG file of an image.
-
-    Parameters
-    ----------
-    image : (rows, cols) or (rows, cols, 3) uint8 or uint16
-        Pixel values, red first; all their bits are kept.
-
-    Raises
-    ------
-    FogSimError
-        If it cannot be encoded.
-    """
+    """PNG file of an image (rows, cols[, 3]), red first, with all its bits."""
     # OpenCV has blue first.
     pixels: NDArray[Any] = image if image.ndim == 2 else np.ascontiguousarray(image[..., ::-1])
     done, data = cv2.imencode(".png", pixels, [cv2.IMWRITE_PNG_COMPRESSION, _COMPRESSION])
@@ -113,7 +102,7 @@ def read_png(path: Path) -> NDArray[np.uint8] | NDArray[np.uint16]:
     Raises
     ------
     InputError
-        If it is no PNG file that can be read.
+        If it is not a readable PNG file.
     """
     data = np.frombuffer(read_bytes(Path(path)), np.uint8)
     image: NDArray[Any] | None = None

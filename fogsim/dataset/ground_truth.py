@@ -1,4 +1,4 @@
-"""What is truly seen in a step's frame: how much light comes through the air, and what each pixel belongs to."""
+"""Ground truth of a step's frame: the transmission of the air, and the object of each pixel."""
 
 import math
 from enum import IntEnum
@@ -17,7 +17,7 @@ from fogsim.values.scene import Instance
 
 
 class SemanticClass(IntEnum):
-    """What a pixel shows, as `semantic_mask` has it."""
+    """Classes of pixels in `semantic_mask`."""
 
     SKY = 0
     TERRAIN = 1
@@ -47,13 +47,7 @@ _OF_TYPE = {
 
 
 def vehicle_class(body: str) -> SemanticClass:
-    """Class of a vehicle by its body kind in the traffic state.
-
-    Parameters
-    ----------
-    body : str
-        One of `TrafficState.types`.
-    """
+    """Class of a vehicle by its body, one of `TrafficState.types`."""
     return _OF_TYPE.get(body, SemanticClass.OTHER_VEHICLE)
 
 
@@ -64,7 +58,7 @@ def depth(step: Step) -> NDArray[np.float32]:
     Parameters
     ----------
     step : Step
-        Of `fogsim.run` and its kin.
+        From `fogsim.run` or a similar function.
 
     Returns
     -------
@@ -81,7 +75,7 @@ def transmission(step: Step) -> NDArray[np.float32]:
     Parameters
     ----------
     step : Step
-        Of `fogsim.run` and its kin.
+        From `fogsim.run` or a similar function.
 
     Returns
     -------
@@ -107,7 +101,7 @@ def semantic_mask(step: Step) -> NDArray[np.uint8]:
     Parameters
     ----------
     step : Step
-        Of `fogsim.run` and its kin.
+        From `fogsim.run` or a similar function.
 
     Returns
     -------
@@ -128,7 +122,7 @@ def instance_mask(step: Step) -> NDArray[np.uint16]:
     Parameters
     ----------
     step : Step
-        Of `fogsim.run` and its kin.
+        From `fogsim.run` or a similar function.
 
     Returns
     -------
@@ -158,7 +152,7 @@ def sign_picture(step: Step, instance: NDArray[np.uint16]) -> NDArray[np.uint8]:
     Parameters
     ----------
     step : Step
-        Of `fogsim.run` and its kin.
+        From `fogsim.run` or a similar function.
     instance : (rows, cols) uint16
         From `instance_mask`.
 
@@ -191,7 +185,7 @@ def _places(view: View, truth: Truth, rows: NDArray[np.intp], cols: NDArray[np.i
 
 
 def _sign_of(points: NDArray[np.float64], truth: Truth) -> NDArray[np.intp]:
-    """Number of the sign whose face each point lies on; −1 for none."""
+    """Number of the sign whose face each point is on; −1 for none."""
     nearest = np.full(len(points), -1, dtype=np.intp)
     least = np.full(len(points), np.inf)
     low, high = points.min(axis=0), points.max(axis=0)

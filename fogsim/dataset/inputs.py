@@ -11,24 +11,9 @@ from fogsim.traffic.road.configuration import input_files
 
 
 def identity(scenario: Scenario, seed: int, every: int) -> dict[str, Any]:
-    """All that decides a data set's frames; JSON values only.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    seed : int
-        Seed of the first run.
-    every : int
-        One frame is taken of so many camera periods.
-
-    Raises
-    ------
-    InputError
-        If a file of the scenario cannot be read.
-    """
+    """Everything that determines a data set's frames, as JSON data; `every` counts camera periods per frame."""
     found = versions()
-    # The same frames are made on any machine.
+    # Any machine makes the same frames.
     del found["platform"]
     return {
         "seed": seed,
@@ -40,18 +25,7 @@ def identity(scenario: Scenario, seed: int, every: int) -> dict[str, Any]:
 
 
 def input_digests(scenario: Scenario) -> dict[str, str]:
-    """SHA-256 of each file of a scenario's simulation, by its name: net, routes, additional, SUMO configuration.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-
-    Raises
-    ------
-    InputError
-        If one cannot be read.
-    """
+    """SHA-256 of each SUMO file of a scenario, by name: net, routes, additional, configuration."""
     setup = build.traffic_setup(scenario)
     files = [*([] if setup.net is None else [setup.net]), *setup.routes, *setup.additional]
     if setup.config is not None:

@@ -28,16 +28,16 @@ Count = Annotated[int, Range(1, math.inf)]
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class WrittenDataset:
-    """What came of writing a data set.
+    """Result of writing a data set.
 
     Attributes
     ----------
     directory : Path
-        Where it is.
+        The directory.
     frames : int
-        How many frames it holds.
+        Number of frames in it.
     written : int
-        How many of them were written now; the others were there.
+        Number of frames that this call wrote.
     complete : bool
         False if it was interrupted; the same call again continues it.
     """
@@ -60,9 +60,9 @@ def write_dataset(
 ) -> WrittenDataset:
     """Write frames of a scenario with their ground truth, or continue where an earlier call stopped.
 
-    When a run is over before there are frames enough, another begins, with the next seed. A continued data set is
-    the same, byte for byte, as one that was written at once: the simulation is replayed from the start of the run in
-    which the first missing frame lies, and what is there is kept.
+    When a run ends before there are enough frames, another begins, with the next seed. A continued data set is
+    the same, byte for byte, as one that was written at once: the simulation is replayed from the start of the run with
+    the first missing frame, and existing files are kept.
 
     Parameters
     ----------
@@ -71,18 +71,18 @@ def write_dataset(
     out : Path or str
         Directory; new, empty, or of the same data set.
     frames : int
-        How many frames, at least 1.
+        Number of frames, at least 1.
     seed : int
         Seed of the first run.
     every : int
-        One frame is taken of so many camera periods, at least 1.
+        Camera periods per frame, at least 1.
     watch : callable
-        Called with the number of frames that are there, for a progress bar.
+        Called with the number of existing frames, for a progress bar.
 
     Returns
     -------
     WrittenDataset
-        Complete, or interrupted (KeyboardInterrupt, as from Ctrl-C); in both cases every file is whole.
+        Complete, or interrupted (KeyboardInterrupt, as from Ctrl-C); in both cases all files are complete.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def write_dataset(
 def _missing(
     scenario: Scenario, directory: DatasetDirectory, frames: int, seed: int, every: int
 ) -> Generator[tuple[int, int, Step | None], None, None]:
-    """Place, number of the run and step of each frame; None in place of the step of a frame that is there."""
+    """Index, number of the run and step of each frame; None in place of the step of an existing frame."""
     number, run_number = _resume(directory, frames)
     for there in range(number):
         yield there, 0, None
@@ -133,11 +133,11 @@ def _missing(
 
 
 def _pictures(loop: ClosedLoop, scenario: Scenario, seed: int, every: int) -> Iterator[Step]:
-    """One step in so many of a run, as far as it has a picture of its own."""
+    """Every n-th step of a run, if it has its own image."""
     policy = AdvisedDriving(scenario)
     step = loop.start(seed)
     while True:
-        # Of an ego that has left the network, what was last seen is only repeated.
+        # After the ego has left the network, its last frame is only repeated.
         if step.index % every == 0 and step.ending is not Ending.LEFT_NETWORK:
             yield step
         if step.ending is not None:
@@ -146,7 +146,7 @@ def _pictures(loop: ClosedLoop, scenario: Scenario, seed: int, every: int) -> It
 
 
 def _resume(directory: DatasetDirectory, frames: int) -> tuple[int, int]:
-    """First frame and number of the run in which the first missing frame lies, as far as can be told."""
+    """The first missing frame, and the number of its run, as far as known."""
     runs: list[int] = []
     while len(runs) < frames and directory.has(len(runs)):
         runs.append(directory.record(len(runs))["image"]["run"])
@@ -174,7 +174,7 @@ def _write_frame(directory: DatasetDirectory, number: int, step: Step, run_numbe
 
 
 def _write_annotations(directory: DatasetDirectory, scenario: Scenario, frames: int, seed: int, every: int) -> int:
-    """Write the COCO file over the frames that are there, and say how many they are."""
+    """Write the COCO file of the existing frames, and return their number."""
     records = [directory.record(number) for number in range(frames) if directory.has(number)]
     information = {
         "description": f"{scenario.name}: camera frames in fog with their ground truth",

@@ -1,1 +1,1 @@
-"""Files of results, written so that nothing finished is lost and nothing is half written under its final name."""
+"""Readers and writers of files: limits on what is read, and no half-written results."""

@@ -1,4 +1,4 @@
-"""Reading numpy's archives that someone else wrote (``.npz``)."""
+"""Reading untrusted archives of numpy arrays (``.npz``)."""
 
 import io
 import zipfile
@@ -16,13 +16,7 @@ MOST_UNPACKED = 2**28
 
 
 def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """Arrays of an archive by name; pickled objects are refused.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, or it is damaged, not an archive of arrays, or larger than `MOST_UNPACKED`.
-    """
+    """Arrays of an archive by name; pickled objects and more than `MOST_UNPACKED` bytes raise InputError."""
     file = io.BytesIO(read_bytes(path))
     try:
         with zipfile.ZipFile(file) as archive:

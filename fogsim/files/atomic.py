@@ -1,7 +1,7 @@
-"""Writing files so that none is ever half written under its final name.
+"""Write files so that no half-written file ever has its final name.
 
-A link is followed, so that its target is written and the link stays. Pipes and devices are never replaced: they get the
-content as it comes.
+Links are followed: the target is written and the link stays. Pipes and devices receive the content and are never
+replaced.
 """
 
 import contextlib
@@ -17,23 +17,17 @@ from typing import BinaryIO
 from fogsim.errors import InputError
 
 PARTIAL_SUFFIX = ".part"
-"""What the name of a file ends in until it is whole."""
+"""Suffix of a file's name until it is complete."""
 
 _LEAST_RESERVE = 2**18
-"""Room that a reserve keeps in any case [bytes]."""
+"""Minimum size of a reserve [bytes]."""
 
 _MOST_LINKS = 40
 """Links that Linux follows in one path."""
 
 
 def final_path(path: Path) -> Path:
-    """The file that a path stands for: links are followed, also to a file that does not exist yet.
-
-    Raises
-    ------
-    OSError
-        If the links lead to one another.
-    """
+    """The file that a path stands for, with links followed even to a file that does not exist yet."""
     if not path.is_symlink():
         return path
     final = Path(os.path.realpath(path))
@@ -43,25 +37,19 @@ def final_path(path: Path) -> Path:
 
 
 def partial_path(path: Path) -> Path:
-    """Where a file is written until it is whole: its name, or that of its link's target, with ``.part`` behind it."""
+    """Temporary path of an incomplete file: its name, or that of its link's target, with ``.part`` appended."""
     final = final_path(path)
     return final.with_name(final.name + PARTIAL_SUFFIX)
 
 
 def publish(path: Path) -> None:
-    """Give a file that is whole its final name; a file that it replaces passes on its permissions.
-
-    Raises
-    ------
-    InputError
-        If a pipe, a device or a folder has that name.
-    """
+    """Give a complete file its final name and the permissions of the file that it replaces."""
     part, final = partial_path(path), final_path(path)
     with contextlib.suppress(FileNotFoundError):
         replaced = final.stat()
         if not stat.S_ISREG(replaced.st_mode):
             raise InputError(f"{path} is not a regular file, and is not replaced")
-        # Who may not give files away keeps the new one.
+        # Without the right to change the owner, the new owner stays.
         with contextlib.suppress(PermissionError):
             os.chown(part, replaced.st_uid, replaced.st_gid)
         part.chmod(stat.S_IMODE(replaced.st_mode))
@@ -69,7 +57,7 @@ def publish(path: Path) -> None:
 
 
 def open_descriptor(path: Path) -> int | None:
-    """Number of the file, open in this process, that a path stands for, as /dev/stdout does; None for other paths."""
+    """Descriptor of this process that a path names, as /dev/stdout does; None for other paths."""
     for _ in range(_MOST_LINKS):
         # On Linux /dev/fd is a link to the former.
         folders = (os.path.realpath("/proc/self/fd"), "/dev/fd")
@@ -82,7 +70,7 @@ def open_descriptor(path: Path) -> int | None:
 
 
 def is_stream(path: Path) -> bool:
-    """Whether what is written to a path goes through it: a pipe, a terminal, another device, /dev/stdout."""
+    """Whether a path is written to directly: a pipe, a terminal, another device, /dev/stdout."""
     if open_descriptor(path) is not None:
         return True
     try:
@@ -94,13 +82,7 @@ def is_stream(path: Path) -> bool:
 
 @contextlib.contextmanager
 def whole_file(path: Path) -> Iterator[BinaryIO]:
-    """A file open for writing; it gets its name when the block ends, and leaves nothing if an error ends it.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written; the message names the file.
-    """
+    """A file open for writing that gets its name when the block ends; an error in the block leaves no file."""
     if is_stream(path):
         with naming(path), _opened_stream(path) as file:
             yield file
@@ -108,7 +90,7 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
     part = partial_path(path)
     try:
         with naming(part):
-            # It may be a link.
+            # The path may be a link.
             part.unlink(missing_ok=True)
             with part.open("wb") as file:
                 yield file
@@ -123,7 +105,7 @@ def _opened_stream(path: Path) -> BinaryIO:
     descriptor = open_descriptor(path)
     if descriptor is None:
         return path.open("wb")
-    # The file that stdout is redirected to would be cut off if it were opened by its name.
+    # Opening the file behind stdout by its name would truncate it.
     for printed in (sys.stdout, sys.stderr):
         if printed is not None:
             printed.flush()
@@ -132,18 +114,7 @@ def _opened_stream(path: Path) -> BinaryIO:
 
 @contextlib.contextmanager
 def naming(path: Path) -> Iterator[None]:
-    """Let an error of the operating system (a full disk) name the file.
-
-    Parameters
-    ----------
-    path : Path
-        The file that is worked on.
-
-    Raises
-    ------
-    OSError
-        The same error, with the file's name.
-    """
+    """Add the file's name to the operating system's errors, such as a full disk."""
     try:
         yield
     except OSError as error:
@@ -153,52 +124,18 @@ def naming(path: Path) -> Iterator[None]:
 
 
 def write_bytes(path: Path, data: bytes) -> None:
-    """Write a file, whole or not at all.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    data : bytes
-        Its content.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written; the message names the file.
-    """
+    """Write a file, whole or not at all."""
     with whole_file(path) as file:
         file.write(data)
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file, whole or not at all; what is no Unicode of file names is escaped, in JSON as JSON has it.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    text : str
-        Its content.
-    """
+    """Write a text file, whole or not at all; surrogates, as in undecodable names, become escapes."""
     write_bytes(path, text.encode("utf-8", "backslashreplace"))
 
 
 def write_json(path: Path, values: Mapping[str, object]) -> None:
-    """Write a JSON file, whole or not at all.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    values : mapping
-        Its content; JSON values only.
-
-    Raises
-    ------
-    InputError
-        If a value is not finite or nothing that JSON can hold.
-    """
+    """Write a JSON file, whole or not at all; NaN, infinity and other values that JSON lacks raise InputError."""
     try:
         text = json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False)
     except (TypeError, ValueError) as error:
@@ -209,34 +146,17 @@ def write_json(path: Path, values: Mapping[str, object]) -> None:
 
 
 class Reserve:
-    """Room on the disk that is given back when it is needed, so that files can be closed on a disk that is full.
-
-    Parameters
-    ----------
-    path : Path
-        The file that takes the room.
-
-    Raises
-    ------
-    OSError
-        If there is not as much room; the message names the file.
-    """
+    """Disk space that is held by a file and released when files must be closed on a full disk."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self.grow(_LEAST_RESERVE)
 
     def grow(self, size: int) -> None:
-        """Keep more room [bytes]; written, since a file with holes takes none.
-
-        Parameters
-        ----------
-        size : int
-            How much more [bytes].
-        """
+        """Hold `size` more bytes; they are written, since a sparse file holds no space."""
         with naming(self._path), self._path.open("ab") as file:
             file.write(bytes(size))
 
     def release(self) -> None:
-        """Give the room back; twice does nothing."""
+        """Release the space; may be called twice."""
         self._path.unlink(missing_ok=True)

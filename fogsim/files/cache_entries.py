@@ -1,4 +1,4 @@
-"""Entries of a cache, stored with a checksum: a damaged entry counts as missing, so its owner makes it again."""
+"""Cache entries with a checksum; a damaged entry counts as missing and is made again."""
 
 import contextlib
 import hashlib
@@ -14,7 +14,7 @@ _MOST_BYTES = 2**30
 
 
 def read_entry(path: Path) -> bytes | None:
-    """Content of an entry; None if it is missing, damaged or cannot be read."""
+    """Content of an entry; None if it is missing, damaged or unreadable."""
     try:
         stored = memoryview(read_bytes(path, _MOST_BYTES))
     except InputError:
@@ -25,12 +25,12 @@ def read_entry(path: Path) -> bytes | None:
 
 def write_entry(path: Path, content: bytes) -> None:
     """Write an entry; raises OSError if it cannot be written."""
-    # The checksum stands at the end, where pickle and zip ignore it: other readers of such files still work.
+    # The checksum is at the end, where pickle and zip ignore it: other readers of such files still work.
     replace_file(path, content + hashlib.sha256(content).digest())
 
 
 def replace_file(path: Path, content: bytes) -> None:
-    """Write a file in the cache in place of whatever has its name; several processes may do so at once."""
+    """Write a file of the cache, replacing an existing one; several processes may do so at once."""
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f"{path.name}.{os.urandom(8).hex()}.part")
     try:
@@ -43,7 +43,7 @@ def replace_file(path: Path, content: bytes) -> None:
 
 
 def keep_newest(folder: Path, most: int) -> None:
-    """Remove all files and folders in a folder of the cache but the `most` newest."""
+    """Remove all files and folders in a folder of the cache except the `most` newest."""
     with contextlib.suppress(OSError):
         for old in sorted(folder.iterdir(), key=lambda path: path.lstat().st_mtime)[:-most]:
             if old.is_dir() and not old.is_symlink():

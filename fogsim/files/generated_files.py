@@ -10,30 +10,12 @@ from fogsim.files.cache_entries import keep_newest, read_entry, replace_file, wr
 from fogsim.files.readers import read_bytes
 from fogsim.files.user_cache import VARIABLE, cache_directory
 
-_MOST_KEPT = 200  # of each kind; the oldest go
+_MOST_KEPT = 200  # of each type; the oldest are removed
 _LARGEST_SOURCE = 2**29  # [bytes]
 
 
 def write_generated(kind: str, texts: Mapping[str, str]) -> Path:
-    """Write files, unless they are in the cache with the same content.
-
-    Parameters
-    ----------
-    kind : str
-        Name of the folder in the cache directory in which their folder lies.
-    texts : mapping from str to str
-        Their names and texts.
-
-    Returns
-    -------
-    Path
-        Their folder.
-
-    Raises
-    ------
-    InputError
-        If nothing can be written there.
-    """
+    """Folder in the cache directory that holds these texts by file name; written unless it holds them already."""
     digest = hashlib.sha256("\0".join(texts.values()).encode()).hexdigest()[:24]
     folder = cache_directory() / kind / digest
     try:
@@ -60,24 +42,7 @@ def _holds(path: Path, content: bytes) -> bool:
 
 
 def kept_text(kind: str, source: Path, recipe: bytes, make: Callable[[], str]) -> str:
-    """Text made from a file, kept for the next time that a file with the same content comes.
-
-    Parameters
-    ----------
-    kind : str
-        Name of the folder in the cache directory.
-    source : Path
-        The file.
-    recipe : bytes
-        Identifies how it is made: another recipe makes another text.
-    make : callable
-        Makes the text.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or nothing can be written; what `make` raises.
-    """
+    """Text that `make` derives from a file, cached by the file's content and `recipe`, which identifies the method."""
     try:
         digest = hashlib.sha256(b"\0".join([recipe, read_bytes(source, _LARGEST_SOURCE)])).hexdigest()[:24]
         path = cache_directory() / kind / digest

@@ -1,4 +1,4 @@
-"""What output options name: a target that cannot be written is refused before the work begins."""
+"""Checks of output options: a target that cannot be written is refused before the work begins."""
 
 import contextlib
 import errno
@@ -23,27 +23,10 @@ def refuse_unwritable(
     makes_folder: bool = False,
     seeks: bool = False,
 ) -> None:
-    """Refuse a file that cannot be written.
+    """Raise InputError if a file cannot or must not be written; the message names `option`.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    option : str
-        The option that names it, if one does.
-    overwrite : bool
-        False to refuse a file that exists.
-    read : iterable of Path
-        Files that are read, none of which may be replaced.
-    makes_folder : bool
-        Whether its folder is made where it does not exist.
-    seeks : bool
-        Whether writing goes back in the file, which pipes and devices cannot do.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written, or must not be; the message names the option and the file.
+    `read` are input files, which must not be replaced; `makes_folder` allows a missing folder; `seeks` refuses pipes
+    and devices.
     """
     named = f"{option} {path}".lstrip()
     with _one_error(named):
@@ -64,13 +47,7 @@ def refuse_unwritable(
 
 
 def refuse_unwritable_folder(path: Path, option: str = "--out") -> None:
-    """Refuse a folder in which nothing can be written; one that does not exist is made later, with its parents.
-
-    Raises
-    ------
-    InputError
-        If it is a file, or cannot be made or written; the message names the option and the folder.
-    """
+    """Raise InputError if a folder cannot be written, or be created with its parents."""
     named = f"{option} {path}"
     with _one_error(named):
         if os.path.lexists(path) and not path.is_dir():
@@ -79,18 +56,7 @@ def refuse_unwritable_folder(path: Path, option: str = "--out") -> None:
 
 
 def refuse_clashes(files: Mapping[str, Path], folders: Mapping[str, Path]) -> None:
-    """Refuse outputs of which one would take the place of another.
-
-    Parameters
-    ----------
-    files, folders : mapping from str to Path
-        What the options name.
-
-    Raises
-    ------
-    InputError
-        If two are the same, or one is a file where another needs a folder.
-    """
+    """Raise InputError if two outputs are the same, or one is a file where another needs a folder."""
     named = {option: path for option, path in files.items() if not is_stream(path)}
     for (option, file), (other, path) in itertools.permutations({**named, **folders}.items(), 2):
         place = Path(os.path.realpath(path))
@@ -100,7 +66,7 @@ def refuse_clashes(files: Mapping[str, Path], folders: Mapping[str, Path]) -> No
 
 @contextlib.contextmanager
 def _one_error(named: str) -> Iterator[None]:
-    """Tell what the operating system refuses as an InputError."""
+    """Raise what the operating system refuses as an InputError."""
     try:
         yield
     except InputError:
@@ -127,7 +93,7 @@ def _refuse_unwritable_stream(path: Path, named: str, seeks: bool) -> None:
 
 
 def _refuse_unmakeable(target: Path, named: str, makes_folder: bool) -> None:
-    """Refuse a file whose folder cannot be made or written, or whose name is too long."""
+    """Refuse a file whose folder cannot be created or written, or whose name is too long."""
     there = next((one for one in target.parents if os.path.lexists(one)), Path())
     if not there.is_dir():
         raise InputError(f"{named}: {there} is not a folder")
@@ -138,6 +104,6 @@ def _refuse_unmakeable(target: Path, named: str, makes_folder: bool) -> None:
         raise OSError(errno.ENAMETOOLONG, os.strerror(errno.ENAMETOOLONG))
     with contextlib.suppress(FileNotFoundError):
         target.lstat()  # fails for a path that is too long
-    # Permissions do not tell of a file system that is read-only, or for root of any.
+    # Permissions do not show a read-only file system, and for root they show nothing.
     with tempfile.TemporaryFile(dir=there):
         pass

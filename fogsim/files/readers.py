@@ -1,4 +1,4 @@
-"""Reading files that someone else wrote: regular files only, of limited size, and one error for all that is wrong."""
+"""Reading untrusted files: regular files only, of limited size, with one error for all faults."""
 
 import json
 import math
@@ -11,20 +11,14 @@ from typing import Any, NoReturn
 from fogsim.errors import InputError, shown
 
 MOST_BYTES = 64 * 2**20
-"""Largest file that is read whole, unless a reader has a limit of its own [bytes]."""
+"""Default limit of files that are read whole [bytes]."""
 
 FARTHEST = 1e8
-"""Largest number that a file can hold where nothing narrower is known: coordinates of UTM reach 1e7 m."""
+"""Largest number in a file without a narrower limit: UTM coordinates reach 1e7 m."""
 
 
 def open_regular(path: Path) -> BufferedReader:
-    """Open a regular file for reading.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, or it is a pipe, a device or a folder (they may never end).
-    """
+    """Open a regular file for reading; pipes and devices, which may never end, and folders raise InputError."""
     try:
         # Opening a pipe would otherwise wait for a writer.
         descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
@@ -39,16 +33,10 @@ def open_regular(path: Path) -> BufferedReader:
 
 
 def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
-    """Content of a regular file of at most `most` bytes.
-
-    Raises
-    ------
-    InputError
-        As `open_regular`, or if it is larger.
-    """
+    """Content of a regular file of at most `most` bytes."""
     try:
         with open_regular(path) as file:
-            # Asking for `most` at once would allocate it.
+            # Reading `most` at once would allocate it.
             size = os.fstat(file.fileno()).st_size
             content = file.read(min(size, most) + 1)
             if len(content) > size:  # files in /proc have no size
@@ -61,13 +49,7 @@ def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
 
 
 def read_text(path: Path, most: int = MOST_BYTES) -> str:
-    """Text of a regular file in UTF-8, with or without a byte order mark.
-
-    Raises
-    ------
-    InputError
-        As `read_bytes`, or if it is not UTF-8; the message has the line and the byte.
-    """
+    """Text of a regular file in UTF-8, with or without a byte order mark; errors name the line and the byte."""
     content = read_bytes(path, most)
     try:
         return content.decode("utf-8-sig")
@@ -79,13 +61,7 @@ def read_text(path: Path, most: int = MOST_BYTES) -> str:
 
 
 def read_json(path: Path, most: int = MOST_BYTES) -> Any:
-    """Value of a JSON file; NaN and Infinity, which are not JSON, are refused.
-
-    Raises
-    ------
-    InputError
-        As `read_text`, or if it is not JSON or nested too deeply.
-    """
+    """Value of a JSON file; NaN, Infinity and deep nesting raise InputError."""
     text = read_text(path, most)
     try:
         return json.loads(text, parse_constant=_refuse_constant)
@@ -102,13 +78,7 @@ def _refuse_constant(name: str) -> NoReturn:
 
 
 def number_within(where: str, name: str, value: object, least: float = -FARTHEST, most: float = FARTHEST) -> float:
-    """The value, if it is a number from `least` to `most`.
-
-    Raises
-    ------
-    InputError
-        If it is not; NaN is none.
-    """
+    """The value as a number; InputError unless it is from `least` to `most`."""
     if isinstance(value, int | float) and not isinstance(value, bool) and least <= value <= most:
         return float(value)
     place = f"{where}: " if where else ""
@@ -116,13 +86,7 @@ def number_within(where: str, name: str, value: object, least: float = -FARTHEST
 
 
 def number_in_text(where: str, name: str, text: str, least: float = -FARTHEST, most: float = FARTHEST) -> float:
-    """Number that a text holds.
-
-    Raises
-    ------
-    InputError
-        If it is not a number from `least` to `most`.
-    """
+    """The number that a text holds; InputError unless it is from `least` to `most`."""
     try:
         number = float(text)
     except ValueError:

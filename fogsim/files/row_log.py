@@ -1,4 +1,4 @@
-"""Rows in a file that can be read however the process ends that writes it."""
+"""Rows in a file that stays readable however its process ends."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,21 +12,9 @@ from fogsim.files.atomic import Reserve, naming
 
 
 class RowLog:
-    """A file in Arrow's streaming format, which has no end that must be written to be read.
+    """A file in Arrow's streaming format, which is readable wherever it ends.
 
-    It keeps as much room on the disk as it takes itself, for the table that is made of it.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    schema : pyarrow.Schema
-        Its columns.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written; the message names the file.
+    It reserves as much disk space as it has written, for the table that is made from it.
     """
 
     def __init__(self, path: Path, schema: Any) -> None:
@@ -38,27 +26,16 @@ class RowLog:
         self._write(schema.serialize())
 
     def append(self, batch: Any) -> None:
-        """Write rows (a pyarrow.RecordBatch); they are safe from the end of the process when it returns.
-
-        Parameters
-        ----------
-        batch : pyarrow.RecordBatch
-            The rows.
-
-        Raises
-        ------
-        OSError
-            If the disk is full; none of the rows is in the file then, and it stays readable.
-        """
+        """Write rows (pyarrow.RecordBatch), which then survive the process; on a full disk, none of them is written."""
         data = batch.serialize()
         self._reserve.grow(data.size)
         self._write(data)
 
     def _write(self, data: Any) -> None:
         rest = memoryview(data)
-        # Not kept open: how a recorder is left is not in its hands.
+        # Not kept open, since a recorder may be abandoned at any time.
         with naming(self.path), self.path.open("r+b", buffering=0) as file:
-            # Whatever an interruption has left of the rows before is written over.
+            # Overwrites what an interruption left of earlier rows.
             file.seek(self._whole)
             try:
                 while rest:
@@ -69,48 +46,26 @@ class RowLog:
         self._whole += data.size
 
     def release_reserve(self) -> None:
-        """Give back the room that was kept."""
+        """Release the reserved space."""
         self._reserve.release()
 
     def remove(self) -> None:
-        """Remove the file; twice does nothing."""
+        """Remove the file; may be called twice."""
         self._reserve.release()
         self.path.unlink(missing_ok=True)
 
 
 def row_schema(path: Path) -> Any:
-    """Columns of a log, as a pyarrow.Schema.
-
-    Parameters
-    ----------
-    path : Path
-        The log.
-
-    Raises
-    ------
-    InputError
-        If it is no log.
-    """
+    """Columns of a log, as a pyarrow.Schema."""
     with path.open("rb") as file:
         return _reader(path, file).schema
 
 
 def row_batches(path: Path) -> Iterator[Any]:
-    """Batches of rows of a log (pyarrow.RecordBatch), as they were written, up to where it was cut off.
-
-    Parameters
-    ----------
-    path : Path
-        The log.
-
-    Raises
-    ------
-    InputError
-        If it is no log.
-    """
-    # Opened here, for Arrow takes no name that is not UTF-8.
+    """Batches of rows of a log (pyarrow.RecordBatch) up to where it was cut off."""
+    # Opened here, since Arrow accepts only names in UTF-8.
     with path.open("rb") as file:
-        # What cannot be read is the end of a log that was cut off.
+        # Unreadable data is the end of a log that was cut off.
         reader = _reader(path, file)
         while True:
             try:
@@ -128,25 +83,7 @@ def _reader(path: Path, file: IO[bytes]) -> Any:
 
 
 def read_rows(path: Path) -> Any:
-    """Rows of a log, also of one that was cut off in the middle of a row.
-
-    Of a row that was written more than once (by its column ``index``) the last one counts.
-
-    Parameters
-    ----------
-    path : Path
-        The log.
-
-    Returns
-    -------
-    pyarrow.Table
-        In the order of ``index``.
-
-    Raises
-    ------
-    InputError
-        If it is no log.
-    """
+    """Rows of a log as a pyarrow.Table sorted by ``index``; of rows with the same index, the last one counts."""
     schema = row_schema(path)
     table = pa.Table.from_batches(row_batches(path), schema=schema)
     index = table["index"].to_numpy()

@@ -1,20 +1,19 @@
-"""Standard streams of a process that was started without them, as daemons are and commands with ``>&-``."""
+"""Standard streams of a process that was started without them, such as a daemon or a command with ``>&-``."""
 
 import os
 import sys
 
 
 def open_standard_streams() -> None:
-    """Open /dev/null in place of each of the descriptors 0, 1 and 2 that is closed, and as ``sys.stdin`` and so on.
+    """Open /dev/null for each closed descriptor 0, 1 and 2, and as ``sys.stdin`` and so on.
 
-    Otherwise the next file that the process opens, or a pipe to a child, gets the number, and receives what libraries
-    print.
+    Otherwise the next file or pipe gets the number and receives what libraries print.
     """
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
         try:
             os.fstat(descriptor)
         except OSError:
-            # The lowest free number, which is this one; children inherit it like any standard stream.
+            # This is the lowest free number; children inherit it like any standard stream.
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
         if getattr(sys, name) is None:
             mode = "w" if descriptor else "r"

@@ -1,18 +1,18 @@
-"""Where what can be made again is kept between runs."""
+"""The cache directory of the user."""
 
 import os
 import sys
 from pathlib import Path
 
 VARIABLE = "FOGSIM_CACHE_DIR"
-"""Name of the environment variable that names another directory."""
+"""Environment variable with another directory."""
 
 
 def cache_directory() -> Path:
     """FogSim's folder in the user's cache directory, which may not exist yet.
 
-    That is `FOGSIM_CACHE_DIR` where it is set; else the folder ``fogsim`` in ``XDG_CACHE_HOME``, or where the operating
-    system has caches: ``~/.cache``, ``~/Library/Caches`` (macOS), ``%LOCALAPPDATA%`` (Windows).
+    ``FOGSIM_CACHE_DIR`` if set; otherwise ``fogsim`` in ``XDG_CACHE_HOME`` or in the system's cache folder:
+    ``~/.cache``, ``~/Library/Caches`` (macOS), ``%LOCALAPPDATA%`` (Windows).
     """
     named = os.environ.get(VARIABLE)
     if named:

@@ -1,4 +1,4 @@
-"""One directory, one writer: the lock, and which process holds it."""
+"""One directory, one writer: the lock and the process that holds it."""
 
 import dataclasses
 import fcntl
@@ -16,18 +16,9 @@ from fogsim.files.atomic import naming
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class WritingProcess:
-    """A process, told from a later one with the same number.
+    """A process, distinguished from a later one with the same id by its start.
 
-    Attributes
-    ----------
-    id : int
-        Its number.
-    host : str
-        Name of its machine.
-    boot : str
-        When that machine was started, as the system tells it; empty where it does not.
-    start_time : int or None
-        When the process was started, in clock ticks since then; None where the system does not tell it.
+    `boot` identifies the start of its machine ("" if unknown) and `start_time` is in clock ticks since then.
     """
 
     id: int
@@ -37,40 +28,34 @@ class WritingProcess:
 
     @classmethod
     def this(cls) -> Self:
-        """Process that asks."""
+        """The current process."""
         return cls(os.getpid(), platform.node(), _boot(), _start_time(os.getpid()))
 
     @classmethod
     def from_json(cls, values: object) -> Self | None:
-        """Process that a file tells of; None if it tells of none.
-
-        Parameters
-        ----------
-        values : object
-            What the file holds.
-        """
+        """The process that a file names; None if the file names none."""
         if not isinstance(values, Mapping) or not isinstance(values.get("id"), int):
             return None
         told: dict[str, Any] = {field.name: values.get(field.name) for field in dataclasses.fields(cls)}
         return cls(**told)
 
     def to_json(self) -> dict[str, object]:
-        """What a file tells of it."""
+        """The process as JSON data."""
         return dataclasses.asdict(self)
 
     def lives(self) -> bool:
-        """Tell whether it is known to run still, on this machine."""
+        """Whether it is known to be running on this machine."""
         there = (platform.node(), _boot(), _start_time(self.id))
         return self.start_time is not None and there == (self.host, self.boot, self.start_time)
 
 
 def _start_time(number: int) -> int | None:
     try:
-        # The second field is a program's name in brackets, which may hold brackets and blanks itself.
+        # The second field is a program's name in brackets, which may itself contain brackets and blanks.
         fields = Path(f"/proc/{number}/stat").read_text(encoding="ascii", errors="replace").rpartition(")")[2].split()
     except OSError:
         return None
-    # A zombie has ended; only its parent has not asked how.
+    # A zombie has ended; only its parent has not collected its exit code.
     return None if fields[0] in "ZX" else int(fields[19])
 
 
@@ -82,21 +67,13 @@ def _boot() -> str:
 
 
 LOCK_NAME = ".fogsim.lock"
-"""Name of the lock file, which is there while something is written."""
+"""Name of the lock file, which exists while a directory is written."""
 
 
 class WriterLock:
-    """A directory's lock; the operating system frees it when its process ends, however it ends.
+    """A directory's lock, which the operating system releases when its process ends.
 
-    Parameters
-    ----------
-    folder : Path
-        The directory.
-
-    Raises
-    ------
-    InputError
-        If another writer holds it; the message names its process.
+    InputError names the process that holds it.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -111,7 +88,7 @@ class WriterLock:
             raise
 
     def release(self) -> None:
-        """Let others write; twice does nothing."""
+        """Release the lock; may be called twice."""
         descriptor, self._descriptor = self._descriptor, -1
         if descriptor >= 0:
             self._path.unlink(missing_ok=True)
@@ -127,12 +104,12 @@ class WriterLock:
 
 
 def _locked(folder: Path, path: Path) -> int:
-    """Descriptor of the lock file, locked."""
+    """Descriptor of the locked file."""
     while True:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            # The writer before may have taken its lock file away since this one was opened: it would lock nothing.
+            # The previous writer may have removed its lock file after this one was opened: it would lock nothing.
             if _is(path, descriptor):
                 return descriptor
         except BlockingIOError:
@@ -156,7 +133,7 @@ def _is(path: Path, descriptor: int) -> bool:
 
 
 def _holder_name(content: bytes) -> str:
-    """Name the process that a lock file tells of."""
+    """Name the process in a lock file."""
     try:
         process = WritingProcess.from_json(json.loads(content))
     except ValueError:

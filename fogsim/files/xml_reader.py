@@ -1,6 +1,6 @@
-"""Reading XML that someone else wrote: limited in size and depth, without document types, in any encoding of Python's.
+"""Reading untrusted XML: limited in size and depth, without document types, in any encoding that Python knows.
 
-Every XML file is read here, packed by gzip or not; what is wrong with one is an `InputError` of one line.
+Every XML file is read here, compressed by gzip or not; faults are one-line InputErrors.
 """
 
 import codecs
@@ -24,21 +24,21 @@ MOST_ELEMENTS = 2_000_000
 """Most elements of a file that is kept as a tree; they take half a gigabyte."""
 
 DEEPEST, MOST_ATTRIBUTES = 100, 1000
-"""Most elements inside one another, and most attributes of one."""
+"""Maximum depth of elements, and of attributes per element."""
 
 LONGEST_TAG = 2**23
 """Longest tag or comment [bytes]; expat reads one again with each chunk."""
 
 _CHUNK = 2**16
 _HEAD = 2**12
-"""The first chunk is smaller, for those who want to know the first element only [bytes]."""
+"""The first chunk is smaller, for readers of only the first element [bytes]."""
 
 _MOST_BEFORE_ROOT = 2**20
 _MOST_SHOWN, _MOST_ROOTS_SHOWN = 80, 2  # characters of a tag in a message, and expected first elements
 _ENCODING = re.compile(rb"""(?:\xef\xbb\xbf)?<\?xml[^>]*?\sencoding\s*=\s*["']([^"'>]*)["']""")
 _BUILT_IN = frozenset(("utf-8", "utf-16", "iso-8859-1", "us-ascii"))
 _PROBE = rb"<a b='\u0041-1'/>"
-"""Bytes that an encoding must leave as they are, since the declaration that names it has been read as ASCII."""
+"""Bytes that an encoding must map to ASCII, since the declaration that names it was read as ASCII."""
 
 
 class ElementReader(Protocol):
@@ -46,7 +46,7 @@ class ElementReader(Protocol):
 
     @property
     def is_done(self) -> bool:
-        """True when the rest of the file does not matter."""
+        """True when the rest of the file is not needed."""
         ...
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
@@ -60,7 +60,7 @@ class ElementReader(Protocol):
 
 @contextmanager
 def open_unpacked(path: Path) -> Iterator[IO[bytes]]:
-    """Open a regular file, packed by gzip or not; damage found while it is read is an `InputError`."""
+    """Open a regular file, compressed by gzip or not; damage found while reading is an `InputError`."""
     with open_regular(path) as plain:
         is_packed = plain.read(2) == b"\x1f\x8b"
         plain.seek(0)
@@ -79,7 +79,7 @@ class XmlFile:
 
     @property
     def line(self) -> int:
-        """Line of the element that is being read."""
+        """Line of the current element."""
         return self._parser.CurrentLineNumber
 
     def read(
@@ -89,18 +89,7 @@ class XmlFile:
         most_elements: int | None = None,
         text: Callable[[str], object] | None = None,
     ) -> int:
-        """Read until the reader is done, or the file or the allowance ends.
-
-        Returns
-        -------
-        int
-            Bytes that have been read, unpacked; `most_bytes` if the end of the file was not reached.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be read, is not XML, has a document type or breaks a limit.
-        """
+        """Read until the reader is done or the file or the limit ends; return the unpacked bytes that were read."""
         done = given = 0
         with open_unpacked(self._path) as source:
             chunk = source.read(min(_HEAD, most_bytes))
@@ -134,13 +123,7 @@ class XmlFile:
         most_elements: int = MOST_ELEMENTS,
         text: Callable[[str], object] | None = None,
     ) -> None:
-        """Read the whole file.
-
-        Raises
-        ------
-        InputError
-            As `read`, or if the file is larger than `most_bytes`, unpacked.
-        """
+        """Read the whole file; InputError if it unpacks to more than `most_bytes`."""
         if self.read(reader, most_bytes, most_elements, text) >= most_bytes:
             raise InputError(f"{self._path}: cannot be read: larger than {most_bytes} bytes")
 
@@ -196,31 +179,19 @@ class XmlFile:
 
 
 def read_elements(path: Path, reader: ElementReader, most_bytes: int) -> int:
-    """Show the elements of a file to a reader; see `XmlFile.read`."""
+    """Pass the elements of a file to a reader; see `XmlFile.read`."""
     return XmlFile(path).read(reader, most_bytes)
 
 
 def read_tree(path: Path, *roots: str, most_bytes: int = MOST_BYTES) -> ET.Element:
-    """Root of a file, which must be one of `roots` if any are given; tags have no prefixes.
-
-    Raises
-    ------
-    InputError
-        As `XmlFile.read_all`, or if the root is another.
-    """
+    """Root of a file, which must be one of `roots` if any are given; tags lose their prefixes."""
     builder, file = _TreeBuilder(path, roots), XmlFile(path)
     file.read_all(builder, most_bytes, text=builder.tree.data)
     return builder.tree.close()
 
 
 def root_tag(path: Path, *roots: str) -> str:
-    """Tag of the first element, which must be one of `roots` if any are given; what follows it is not read.
-
-    Raises
-    ------
-    InputError
-        As `XmlFile.read`, or if it is another.
-    """
+    """Tag of the first element, which must be one of `roots` if any are given; the rest is not read."""
     reader = _RootReader(path, roots)
     read_elements(path, reader, _MOST_BEFORE_ROOT)
     if reader.tag is None:
@@ -229,7 +200,7 @@ def root_tag(path: Path, *roots: str) -> str:
 
 
 class _RootReader:
-    """Looks at the first element."""
+    """Reads only the first element."""
 
     def __init__(self, path: Path, roots: tuple[str, ...]) -> None:
         self._path = path
@@ -252,7 +223,7 @@ class _RootReader:
 
 
 class _TreeBuilder(_RootReader):
-    """Keeps all elements."""
+    """Builds a tree of all elements."""
 
     is_done = False
 

@@ -1,4 +1,4 @@
-"""Visibility from a person's own images and videos: what ``fogsim estimate`` does."""
+"""Visibility from your own images and videos: the API behind ``fogsim estimate``."""
 
 from fogsim.offline.camera_file import camera_text, load_calibration, write_camera
 from fogsim.offline.estimation import FrameEstimates, chosen_methods, estimate_images, estimates_of

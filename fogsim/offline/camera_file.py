@@ -1,4 +1,4 @@
-"""The calibration of a camera in a file, ``camera.yaml``, for images from disk: read, or written as guessed."""
+"""The calibration of a camera in a file, ``camera.yaml``, for images from disk: read, or written from a guess."""
 
 import math
 from dataclasses import dataclass
@@ -17,26 +17,17 @@ from fogsim.scenario.section import Number, PixelPlace, Pixels, Section, Whole
 from fogsim.values import Camera, Response
 
 MADE_TO_BE_LOOKED_AT = 8
-"""Bit depth of images whose values are for the eye; sensors' own, of more bits, are proportional to light."""
+"""Bit depth of images for viewing; sensor values with more bits are proportional to light."""
 
 Coefficient = Annotated[Number, Field(ge=-100, le=100)]
 
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """A camera as its owner knows it: what images from disk need before the methods can read them.
+    """Calibration of a real camera: a pinhole along the vehicle's axis, its lens distortion, and its yaw.
 
-    Attributes
-    ----------
-    camera : Camera
-        Size, focal length, principal point, mount height, pitch, roll, response and bits, as if the lens were a pinhole
-        and looked along the vehicle's axis.
-    distortion : tuple of float
-        Brown's coefficients of the lens k1, k2, p1, p2 as OpenCV has them [-]; empty for a pinhole.
-    yaw : float
-        Angle of the optical axis to the left of the vehicle's axis [rad].
-    remarks : tuple of str
-        What was assumed because the file does not say it.
+    `distortion` has Brown's coefficients k1, k2, p1, p2 as in OpenCV [-], empty for a pinhole; `yaw` is the angle of
+    the optical axis to the left of the vehicle's axis [rad]; `remarks` are assumptions where the file says nothing.
     """
 
     camera: Camera
@@ -45,13 +36,7 @@ class Calibration:
     remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse a camera that does not see where its vehicle drives.
-
-        Raises
-        ------
-        InputError
-            If the yaw turns the vehicle's axis out of the image.
-        """
+        """Raise InputError if the yaw turns the vehicle's axis out of the image."""
         u0, focal = self.camera.principal_point[0], self.camera.focal_length
         least, most = math.atan(-u0 / focal), math.atan((self.camera.width - 1 - u0) / focal)
         if self.yaw != 0.0 and not least <= self.yaw <= most:
@@ -62,7 +47,7 @@ class Calibration:
 
     @property
     def is_straight(self) -> bool:
-        """Whether images are as they must be: of a pinhole that looks along the vehicle's axis."""
+        """Whether images are already those of a pinhole along the vehicle's axis."""
         return self.yaw == 0.0 and not any(self.distortion)
 
 
@@ -108,42 +93,12 @@ class CameraFile(Section):
 
 
 def load_camera(path: Path) -> Camera:
-    """Read the file of a camera whose images need no straightening.
-
-    Parameters
-    ----------
-    path : Path
-        A YAML file with the keys of `CameraFile`.
-
-    Returns
-    -------
-    Camera
-        The calibration, in SI units and radians.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, a key does not fit (one line for each mistake), or there is a yaw or a distortion,
-        which a `Camera` cannot hold: see `load_calibration`.
-    """
+    """Read the file of a camera whose images need no rectification; InputError if it has a yaw or a distortion."""
     return straight_camera(load_calibration(path), path)
 
 
 def straight_camera(calibration: Calibration, path: Path) -> Camera:
-    """Camera of a calibration whose images need no straightening.
-
-    Parameters
-    ----------
-    calibration : Calibration
-        What was read.
-    path : Path
-        The file that it was read from.
-
-    Raises
-    ------
-    InputError
-        If there is a yaw or a distortion.
-    """
+    """Camera of a calibration; InputError if it has a yaw or a distortion."""
     if not calibration.is_straight:
         raise InputError(
             f"{path}: distortion and yaw_deg are undone by `fogsim estimate` alone (in Python load_calibration); "
@@ -197,7 +152,7 @@ def load_calibration(path: Path) -> Calibration:
 
 
 def camera_text(guess: CameraGuess) -> str:
-    """Text of a camera file, with comments that say what each value was taken from.
+    """Text of a camera file, with comments on the source of each value.
 
     Parameters
     ----------
@@ -230,12 +185,12 @@ def write_camera(path: Path, guess: CameraGuess, *, overwrite: bool = False) -> 
     guess : CameraGuess
         The calibration and its reasons.
     overwrite : bool
-        True to replace a file that is there.
+        True to replace an existing file.
 
     Raises
     ------
     InputError
-        If it is there already and not to be replaced, or cannot be written.
+        If it exists and must not be replaced, or cannot be written.
     """
     refuse_unwritable(path, "--camera", overwrite=overwrite)
     write_text(path, camera_text(guess))

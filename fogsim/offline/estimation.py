@@ -20,15 +20,15 @@ from fogsim.offline.source import Picture, Source
 from fogsim.values import Camera, Estimate, Frame, Observation, SignLook, SignSighting
 
 ALL = "all"
-"""Stands for every method of the registry."""
+"""Represents every method of the registry."""
 
 WHOLE_RANGE_BITS = 12
-"""Bit depth in which images that use all 16 bits are estimated; four more bits are noise in any camera."""
+"""Bit depth for estimating images that use all 16 bits; four more bits are noise in any camera."""
 
 
 @dataclass(frozen=True, slots=True)
 class FrameEstimates:
-    """What the methods say about one image.
+    """Estimates of the methods for one image.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class FrameEstimates:
 
 
 def chosen_methods(names: Sequence[str]) -> tuple[str, ...]:
-    """Methods that are meant by names, each once, "all" being all.
+    """Methods with the given names, each once; "all" stands for every method.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def chosen_methods(names: Sequence[str]) -> tuple[str, ...]:
     Raises
     ------
     UnknownNameError
-        If there is no such method; the message has the known ones and the nearest.
+        If a name is unknown; the message has the known ones and the nearest.
     """
     for name in names:
         if name != ALL and name not in ESTIMATORS:
@@ -76,7 +76,7 @@ def estimate_images(
     track: Path | None = None,
     night: NightDrive | None = None,
 ) -> Iterator[FrameEstimates]:
-    """Estimate the fog in a person's own images or video.
+    """Estimate the fog in your own images or video.
 
     Parameters
     ----------
@@ -84,23 +84,23 @@ def estimate_images(
         One video, or image files, folders and patterns; see `find_source`.
     camera : Camera or Calibration
         Their calibration (`fogsim.offline.load_calibration` reads it from a file). Images of a lens that distorts or of
-        a camera with yaw are straightened first; the result's pictures are the straightened ones.
+        a camera with yaw are rectified first, and the results contain the rectified images.
     methods : str or sequence of str
         Names in `fogsim.estimators.ESTIMATORS`, or "all".
     sequence : bool or None
-        Whether images follow one another in time, so that methods may use earlier ones; None to tell by their names.
+        Whether images follow one another in time, so that methods may use earlier ones; None to decide by their names.
     rate : float or None
         Images of a sequence in a second [1/s]; None for 10.
     signs, track : Path or None
         A map of signs, GeoJSON, and the positions of the drive from its first image on, GPX or CSV: both or neither;
         see `fogsim.offline.watch_signs`.
     night : NightDrive or None
-        Own lamps and calibrations of a drive by night; without it methods of the night take the low beams to be lit.
+        Own lamps and calibrations of a drive by night; without it, night methods assume the low beams.
 
     Yields
     ------
     FrameEstimates
-        For each image in turn; one that cannot be read has its reason in ``picture.error`` and no estimates.
+        For each image in turn; an unreadable one has its reason in ``picture.error`` and no estimates.
 
     Raises
     ------
@@ -126,8 +126,8 @@ def estimates_of(
 ) -> Iterator[FrameEstimates]:
     """Estimate the fog in the images of a source; see `estimate_images`.
 
-    An image that does not fit the camera is passed over like one that cannot be read, unless none has fitted before:
-    then it is the calibration that is of another camera.
+    An image that does not fit the camera is skipped like an unreadable one, unless none has fitted before:
+    then the calibration is of another camera.
 
     Parameters
     ----------
@@ -173,17 +173,7 @@ def _place(source: Source, picture: Picture) -> str:
 
 
 class _Bench:
-    """The estimators of several methods side by side, for each bit depth that occurs.
-
-    Parameters
-    ----------
-    camera : Camera
-        The assumed calibration.
-    methods : sequence of str
-        Names in the registry.
-    night : NightDrive or None
-        What they are told of a drive by night.
-    """
+    """Estimators of several methods, for each bit depth that occurs."""
 
     def __init__(self, camera: Camera, methods: Sequence[str], night: NightDrive | None) -> None:
         self._camera, self._night = camera, night
@@ -207,13 +197,7 @@ class _Bench:
         return (one for estimators in self._estimators.values() for one in estimators)
 
     def estimates(self, image: Pixels, time: float, signs: tuple[SignSighting, ...]) -> tuple[Estimate, ...]:
-        """Estimates of all methods from an image, and the signs that the map has ahead.
-
-        Raises
-        ------
-        InputError
-            If the image is not one of the camera.
-        """
+        """Estimates of all methods from an image and the signs ahead; InputError if it is not of the camera."""
         pixels, camera = _in_bits(image, self._camera)
         if pixels.shape[:2] != (camera.height, camera.width):
             rows, cols = pixels.shape[:2]
@@ -230,13 +214,7 @@ class _Bench:
 
 
 def _in_bits(image: Pixels, camera: Camera) -> tuple[Pixels, Camera]:
-    """Image and camera with the bit depth in which they are estimated.
-
-    Raises
-    ------
-    InputError
-        If the image has fewer bits than the camera.
-    """
+    """Image and camera with the bit depth of the estimation; InputError if the image has fewer bits than the camera."""
     if image.dtype == np.uint8 and camera.bits > 8:
         raise InputError(f"the image has 8 bits, the camera {camera.bits}; leave `bits` out of the camera file")
     if image.dtype == np.uint16 and camera.bits == 8:

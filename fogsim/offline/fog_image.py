@@ -1,4 +1,4 @@
-"""Fog on images from disk: Koschmieder's law on what the pixel values stand for, over a depth map."""
+"""Fog on images from disk: Koschmieder's law on linear light, with a depth map."""
 
 from pathlib import Path
 
@@ -21,11 +21,11 @@ from fogsim.values import Camera
 from fogsim.values.camera_response import exposure_of, respond
 
 LEAST_SKY = 0.001
-"""Share of the image that must be sky for the airlight to be taken from it; the brightest such share is taken else."""
+"""Least share of sky in an image from which its airlight is taken; otherwise, the brightest such share is used."""
 
 
 BRIGHTEST_ABOVE_ROAD = 0.2
-"""Share of what is above the horizon of a road without depth map that its airlight is taken from: woods are darker."""
+"""Share of the area above the horizon for the airlight of a road without depth map, since woods are darker."""
 
 
 def fog_image(
@@ -37,36 +37,12 @@ def fog_image(
     layer: FogLayer | None = None,
     sines: NDArray[np.float64] | None = None,
 ) -> Pixels:
-    """Put homogeneous fog on an image, L = L0 e^(−k d) + L∞ (1 − e^(−k d)) with k = ln 20 / V_met (Koschmieder 1924).
+    """Add homogeneous fog to an image, L = L0 e^(−k d) + L∞ (1 − e^(−k d)) with k = ln 20 / V_met (Koschmieder 1924).
 
-    Pixel values become light by the inverse of the camera's response and pixel values again behind the fog.
-
-    Parameters
-    ----------
-    image : (rows, cols) or (rows, cols, channels) uint8 or uint16
-        Pixel values; a fourth channel is opacity and is kept.
-    distance : (rows, cols) float64
-        Distance along the ray [m]; ``inf`` for the sky.
-    visibility : float
-        Meteorological visibility V_met [m]; ``inf`` gives the image back.
-    camera : Camera
-        Its response and, for images of 16 bits, its bit depth.
-    airlight : (channels,) float64
-        Pixel values of the airlight; with a layer, of what of it is seen level.
-    layer : FogLayer or None
-        Airlight by elevation and path; None for one that is the same everywhere.
-    sines : (rows, cols) float64 or None
-        Of the elevations of the pixels' rays, for a layer; None for those of the pinhole.
-
-    Returns
-    -------
-    array like `image`
-        Fogged pixel values.
-
-    Raises
-    ------
-    InputError
-        If the visibility is not positive, or the layer is not known.
+    `distance` (rows, cols) is along the ray [m], ``inf`` for sky. Pixel values become light by the inverse of the
+    camera's response, and pixel values again behind the fog; a fourth channel is opacity and is kept. `airlight`
+    (channels,) is in pixel values. With a layer it is the level airlight, and `sines` are of the elevations of the
+    pixels' rays (None for those of the pinhole).
     """
     if not visibility > 0:
         raise InputError(f"--visibility must be a positive length in metres, got {visibility!r}")
@@ -91,38 +67,16 @@ def fog_image(
 
 
 def full_scale(image: Pixels, camera: Camera) -> float:
-    """Largest pixel value that an image can have.
-
-    Parameters
-    ----------
-    image : (rows, cols[, channels]) uint8 or uint16
-        Pixel values.
-    camera : Camera
-        Its bit depth, for images of 16 bits.
-    """
+    """Largest pixel value of an image, by its type and the camera's bit depth."""
     if image.dtype == np.uint16 and camera.bits > 8:
         return float(2**camera.bits - 1)
     return float(np.iinfo(image.dtype).max)
 
 
 def airlight_of(image: Pixels, distance: NDArray[np.float64], share: float = 1.0) -> NDArray[np.float64]:
-    """Pixel values that an image itself suggests for its airlight.
+    """Pixel values (channels,) of the airlight, three at most, estimated from an image itself.
 
-    The median of the sky, or of its brightest part; of an image without sky, the mean of its brightest thousandth.
-
-    Parameters
-    ----------
-    image : (rows, cols) or (rows, cols, channels) uint8 or uint16
-        Pixel values.
-    distance : (rows, cols) float64
-        Distances [m]; ``inf`` for the sky.
-    share : float
-        Share of the sky, the brightest, whose median is taken [-].
-
-    Returns
-    -------
-    (channels,) float64
-        Pixel values, three at most.
+    The median of the sky, or of its brightest `share`; without sky, the mean of the image's brightest thousandth.
     """
     colours = image.reshape(-1, 1 if image.ndim == 2 else image.shape[2])[:, :3].astype(np.float64)
     sky = np.isinf(distance).reshape(-1)
@@ -137,19 +91,7 @@ def airlight_of(image: Pixels, distance: NDArray[np.float64], share: float = 1.0
 def in_layer(
     airlight: NDArray[np.float64], image: Pixels, camera: Camera, layer: FogLayer | None
 ) -> NDArray[np.float64]:
-    """Pixel values of the airlight seen level in a layer, from those of an even one.
-
-    Parameters
-    ----------
-    airlight : (channels,) float64
-        Pixel values.
-    image : (rows, cols[, channels]) uint8 or uint16
-        The image.
-    camera : Camera
-        Its response.
-    layer : FogLayer or None
-        None for an even airlight, which it stays.
-    """
+    """Pixel values of the level airlight in a layer, from those of a uniform one."""
     if layer is None:
         return airlight
     full = full_scale(image, camera)
@@ -168,36 +110,9 @@ def fog_file(
     layer: FogLayer | None = None,
     overwrite: bool = False,
 ) -> NDArray[np.float64]:
-    """Put homogeneous fog on an image file.
+    """Write an image file with homogeneous fog of V_met [m]; return the airlight in pixel values, red first.
 
-    Parameters
-    ----------
-    image : Path
-        The image, of the camera's size.
-    depth : DepthMap or RoadPlane
-        Its depth map, of the same size; or a flat road below the horizon and sky above it.
-    visibility : float
-        Meteorological visibility V_met [m].
-    camera : Camera
-        The calibration, whose response says what pixel values stand for.
-    out : Path
-        The fogged image.
-    airlight : tuple of float or None
-        Pixel value of the airlight: one, or red, green and blue; None to take it from the image (`airlight_of`).
-    layer : FogLayer or None
-        Airlight by elevation and path; None for one that is the same everywhere.
-    overwrite : bool
-        True to replace a file that is there.
-
-    Returns
-    -------
-    (channels,) float64
-        The airlight that was used, red first.
-
-    Raises
-    ------
-    InputError
-        If anything does not fit, or there is a file `out` that must not be replaced.
+    `airlight` has one pixel value or red, green and blue; None estimates it from the image (`airlight_of`).
     """
     read = (image, depth.path) if isinstance(depth, DepthMap) else (image,)
     refuse_unwritable_image(out, "--out", overwrite=overwrite, read=read)
@@ -217,22 +132,7 @@ def fog_file(
 
 
 def refuse_other_size(path: Path, size: tuple[int, int], camera: Camera) -> None:
-    """Refuse images of another size than their camera's.
-
-    Parameters
-    ----------
-    path : Path
-        The image or video.
-    size : tuple of int
-        Its columns and rows [px].
-    camera : Camera
-        The calibration.
-
-    Raises
-    ------
-    InputError
-        If they differ.
-    """
+    """Raise InputError if images have another size (columns, rows) than their camera's."""
     if size != (camera.width, camera.height):
         raise InputError(
             f"{path}: the image has {size[0]} × {size[1]} pixels, the camera {camera.width} × {camera.height}; "
@@ -241,24 +141,7 @@ def refuse_other_size(path: Path, size: tuple[int, int], camera: Camera) -> None
 
 
 def given_airlight(airlight: tuple[float, ...], colours: int, pixels: Pixels, camera: Camera) -> NDArray[np.float64]:
-    """Airlight that a user gives, blue first as images are stored.
-
-    Parameters
-    ----------
-    airlight : tuple of float
-        One pixel value, or one a colour, red first.
-    colours : int
-        How many colours the image has.
-    pixels : (rows, cols[, channels]) uint8 or uint16
-        The image.
-    camera : Camera
-        Its calibration.
-
-    Raises
-    ------
-    InputError
-        If they are not as many as colours, or beyond the image's pixel values.
-    """
+    """A user's airlight as pixel values, blue first as images are stored; InputError if number or range do not fit."""
     full = full_scale(pixels, camera)
     if len(airlight) not in (1, colours):
         raise InputError(f"--airlight must be one pixel value or {colours}, got {len(airlight)}")

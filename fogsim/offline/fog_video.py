@@ -32,36 +32,10 @@ def fog_video(
     layer: FogLayer | None = None,
     overwrite: bool = False,
 ) -> Generator[NDArray[np.float64]]:
-    """Put homogeneous fog on a video of a flat road; under its final name only when it is whole.
+    """Write a video of a flat road with homogeneous fog of V_met [m]; yield the airlight, red first, after each frame.
 
-    Parameters
-    ----------
-    video : VideoFile
-        The video, of the camera's size.
-    road : RoadPlane
-        The camera above its road.
-    visibility : float
-        Meteorological visibility V_met [m].
-    out : Path
-        The fogged video, ``.mp4``.
-    airlight : tuple of float or None
-        Pixel value of the airlight: one, or red, green and blue; None to take it from the first frame's sky, once for
-        all frames, lest it flicker.
-    layer : FogLayer or None
-        Airlight by elevation and path; None for one that is the same everywhere.
-    overwrite : bool
-        True to replace a file that is there.
-
-    Yields
-    ------
-    (3,) float64
-        The airlight that is used, red first, after each frame.
-
-    Raises
-    ------
-    InputError
-        If anything does not fit, there is a file `out` that must not be replaced, or, when `out` is written, the video
-        is cut off or damaged.
+    `airlight` has one pixel value or red, green and blue; None estimates it from the first frame's sky, once for all
+    frames to avoid flicker. The file has its final name only when complete.
     """
     camera = road.calibration.camera
     refuse_unfit_video(out, video.paths, camera, kind="fogged", overwrite=overwrite)
@@ -89,7 +63,7 @@ def _airlight(
     given: tuple[float, ...] | None,
     layer: FogLayer | None,
 ) -> NDArray[np.float64]:
-    """Airlight of a video, as given or from the sky of its first frame, red first."""
+    """Airlight of a video, given or from the sky of its first frame, red first."""
     if given is not None:
         return np.asarray(given_airlight(given, 3, first, camera)[::-1])
     return in_layer(airlight_of(first, distance, BRIGHTEST_ABOVE_ROAD), first, camera, layer)

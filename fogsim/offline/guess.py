@@ -1,4 +1,4 @@
-"""A first calibration of a camera from its images and what its owner knows."""
+"""A first calibration of a camera from its images and its known dimensions."""
 
 import math
 from collections.abc import Iterator
@@ -16,13 +16,13 @@ from fogsim.vision.lines.segments import segment_vanishing_point
 from fogsim.vision.lines.vanishing_point import VanishingPoint
 
 ASSUMED_FIELD_OF_VIEW = math.radians(60.0)
-"""Horizontal field of view of a camera of which nothing is known [rad]."""
+"""Default horizontal field of view of an unknown camera [rad]."""
 
 ASSUMED_MOUNT_HEIGHT = 1.3
-"""Height of a dash camera in a passenger car of which nothing is known [m]."""
+"""Default height of a dash camera in a passenger car [m]."""
 
 MOST_IMAGES = 100
-"""Images that are looked at, spread over all there are."""
+"""Maximum number of images that are used, spread over the source."""
 
 SURE_PITCH = math.radians(0.1)
 """Standard deviation of the pitch above which a guess is called uncertain [rad]: 10 % of V at 100 m."""
@@ -31,10 +31,10 @@ SURE_COUNT = 5
 """Images with a vanishing point below which a guess is called uncertain."""
 
 SYSTEMATIC = 0.5
-"""Standard deviation of a vanishing point that more images of the same road do not lessen [px]."""
+"""Standard deviation of a vanishing point that more images of the same road do not reduce [px]."""
 
 ASIDE = math.radians(3.0)
-"""Angle to the side from which on the camera is said not to look along the road [rad]."""
+"""Angle to the side above which the camera is reported not to look along the road [rad]."""
 
 _FULL_FRAME_DIAGONAL_MM = 43.27
 _EXIF_IFD, _EXIF_FOCAL_LENGTH_35MM = 0x8769, 0xA405
@@ -42,14 +42,14 @@ _EXIF_IFD, _EXIF_FOCAL_LENGTH_35MM = 0x8769, 0xA405
 
 @dataclass(frozen=True, slots=True)
 class CameraGuess:
-    """A calibration and where it comes from.
+    """A calibration and the sources of its values.
 
     Attributes
     ----------
     camera : Camera
         The calibration.
     reasons : dict from str to str
-        For each key of a camera file, what its value was taken from.
+        Source of the value for each key of a camera file.
     warnings : tuple of str
         What is uncertain about it.
     """
@@ -68,8 +68,8 @@ def guess_camera(
 ) -> CameraGuess:
     """Guess the calibration of the camera that made images.
 
-    The image's middle is taken for the principal point, and the pitch follows from the row in which the lines of the
-    road meet, θ = arctan((v0 − v_h) / α). What the images cannot say is asked for or assumed, and said.
+    The image's middle is assumed as the principal point, and the pitch follows from the row in which the lines of the
+    road meet, θ = arctan((v0 − v_h) / α). Other values are arguments or assumptions, and reported.
 
     Parameters
     ----------
@@ -78,9 +78,9 @@ def guess_camera(
     mount_height : float or None
         Height of the camera above the road [m].
     field_of_view : float or None
-        Horizontal field of view [rad]; else by the focal length that the first image's metadata state, if they do.
+        Horizontal field of view [rad]; None for the focal length in the first image's metadata, if present.
     horizon_row : float or None
-        Row of the horizon [px], in place of the vanishing point.
+        Row of the horizon [px], instead of the vanishing point.
 
     Returns
     -------
@@ -159,7 +159,7 @@ def _refuse_other_size(picture: Picture, image: Pixels, size: tuple[int, ...], n
 
 
 def _focal_length(source: Source, cols: int, rows: int, field_of_view: float | None) -> tuple[float, str, list[str]]:
-    """Focal length [px], what it was taken from, and warnings."""
+    """Focal length [px], its source, and warnings."""
     if field_of_view is not None:
         reason = f"a field of view of {math.degrees(field_of_view):g}° as stated"
         return 0.5 * cols / math.tan(0.5 * field_of_view), reason, []
@@ -176,12 +176,12 @@ def _focal_length(source: Source, cols: int, rows: int, field_of_view: float | N
 
 
 def _stated_focal_length(path: Path) -> float | None:
-    """Focal length on 35 mm film that an image's metadata state [mm]."""
+    """Focal length on 35 mm film in an image's metadata [mm]."""
     try:
         with Image.open(path) as image:
             value = image.getexif().get_ifd(_EXIF_IFD).get(_EXIF_FOCAL_LENGTH_35MM)
     except (OSError, UnidentifiedImageError, ValueError, SyntaxError):
-        # No image for Pillow, such as a video: then there are no metadata either.
+        # No image for Pillow, such as a video, and so without metadata.
         return None
     return float(value) if isinstance(value, int | float) and value > 0 else None
 
@@ -189,7 +189,7 @@ def _stated_focal_length(path: Path) -> float | None:
 def _horizon(
     pictures: list[Pixels], response: Response, focal: float, stated: float | None
 ) -> tuple[float, str, list[str]]:
-    """Row of the horizon [px], what it was taken from, and warnings."""
+    """Row of the horizon [px], its source, and warnings."""
     if stated is not None:
         return stated, f"the horizon on row {stated:g} as stated", []
     seen = (segment_vanishing_point(image, response, _bits(image)) for image in pictures)
@@ -214,12 +214,12 @@ def _median_row(points: list[VanishingPoint]) -> tuple[float, float]:
     row = float(np.median(rows))
     scatter = 1.4826 * float(np.median(np.abs(rows - row)))
     single = float(np.median([point.row_deviation for point in points]))
-    # A median is a quarter less sure than a mean.
+    # A median is a quarter less certain than a mean.
     return row, math.hypot(1.25 * max(scatter, single) / math.sqrt(len(points)), SYSTEMATIC)
 
 
 def _warnings_of(points: list[VanishingPoint], row: float, deviation: float, focal: float, cols: int) -> list[str]:
-    """What is uncertain about a horizon from vanishing points."""
+    """Uncertainty of a horizon from vanishing points, in words."""
     found = []
     if len(points) < SURE_COUNT:
         found.append(f"the pitch comes from {len(points)} image{'s' if len(points) > 1 else ''} alone: give more")

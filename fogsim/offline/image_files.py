@@ -20,10 +20,10 @@ from fogsim.files.readers import read_bytes
 from fogsim.values import Camera
 
 DEPTH_KINDS = ("planar", "range")
-"""What a depth map may hold: distance along the optical axis, or along the viewing ray."""
+"""Types of a depth map: distance along the optical axis, or along the viewing ray."""
 
 CHECKED_FORMATS = ("JPEG", "PNG", "BMP", "PPM")
-"""Pillow's names of formats of which OpenCV may show as much as there is of a file."""
+"""Pillow's names of formats whose truncated files OpenCV may read as far as they go."""
 
 MOST_BYTES = 2**31
 """Largest file of an image or a depth map [bytes]."""
@@ -32,18 +32,7 @@ Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
 
 def read_image(path: Path) -> Pixels:
-    """Read an image of 8 or 16 bits as it is stored, colours in OpenCV's order.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Raises
-    ------
-    InputError
-        If there is none, or it is of another kind.
-    """
+    """Read an image of 8 or 16 bits as it is stored, with colours in OpenCV's order."""
     image = _decoded(path)
     if image.dtype not in (np.uint8, np.uint16) or (image.ndim == 3 and image.shape[2] not in (1, 3, 4)):
         channels = 1 if image.ndim == 2 else image.shape[2]
@@ -56,7 +45,7 @@ def _decoded(path: Path) -> NDArray[np.generic]:
     if not data:
         raise InputError(f"{path}: the file is empty")
     _refuse_damaged(path, data)
-    # OpenCV would print lines of its own about what is told below.
+    # OpenCV would also print its own messages about errors that are reported below.
     level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
@@ -70,7 +59,7 @@ def _decoded(path: Path) -> NDArray[np.generic]:
 
 
 def _refuse_damaged(path: Path, data: bytes) -> None:
-    """Refuse what OpenCV would fill up, or take all memory for, without a word."""
+    """Refuse images that OpenCV would silently fill up, or that would exhaust memory."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -87,16 +76,9 @@ def _refuse_damaged(path: Path, data: bytes) -> None:
 
 
 class DepthMap(NamedTuple):
-    """A depth map on disk.
+    """A ``.npy`` file of numbers or a 16-bit image with ``"planar"`` or ``"range"`` depth.
 
-    Attributes
-    ----------
-    path : Path
-        A ``.npy`` file of numbers, or an image of 16 bits.
-    kind : str
-        ``"planar"`` or ``"range"``.
-    scale : float or None
-        Metres in one unit of the file; an image must have it, a ``.npy`` file is in metres without it.
+    `scale` is metres per unit of the file: required for an image, 1 by default for ``.npy``.
     """
 
     path: Path
@@ -105,25 +87,7 @@ class DepthMap(NamedTuple):
 
 
 def read_distance(depth_map: DepthMap, camera: Camera) -> NDArray[np.float64]:
-    """Read a depth map as distances along the rays.
-
-    Parameters
-    ----------
-    depth_map : DepthMap
-        The file.
-    camera : Camera
-        The calibration.
-
-    Returns
-    -------
-    (rows, cols) float64
-        Distances [m]; ``inf`` where the file has 0 or ``inf``, the sky.
-
-    Raises
-    ------
-    InputError
-        If the file, its size or a value does not fit.
-    """
+    """Distances along the rays (rows, cols) [m] from a depth map; ``inf`` (sky) where it has 0 or ``inf``."""
     path, kind, scale = depth_map
     if kind not in DEPTH_KINDS:
         raise UnknownNameError("depth kind", kind, DEPTH_KINDS)
@@ -177,7 +141,7 @@ def _refuse_impossible(path: Path, depth: NDArray[np.float64]) -> None:
 def refuse_unwritable_image(
     path: Path, option: str = "", *, overwrite: bool = True, read: Iterable[Path] = (), makes_folder: bool = False
 ) -> None:
-    """Refuse a file as `refuse_unwritable` does, and one whose ending is no image's."""
+    """Refuse a file as `refuse_unwritable` does, and one without the suffix of an image."""
     ending = path.suffix.lower()
     if not ending or not cv2.haveImageWriter(f"image{ending}"):
         named = f"{option} {path}".lstrip()
@@ -186,20 +150,7 @@ def refuse_unwritable_image(
 
 
 def write_image(path: Path, image: Pixels) -> None:
-    """Write an image, whole or not at all; the ending of the name says how.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    image : (rows, cols[, channels]) uint8 or uint16
-        Pixel values, colours in OpenCV's order.
-
-    Raises
-    ------
-    InputError
-        If images are not written with that ending or that bit depth, or the file cannot be written.
-    """
+    """Write an image in the format of its suffix, whole or not at all; colours are in OpenCV's order."""
     refuse_unwritable_image(path)
     ending = path.suffix.lower()
     if image.dtype == np.uint16 and ending not in {".png", ".tif", ".tiff"}:
@@ -211,15 +162,7 @@ def write_image(path: Path, image: Pixels) -> None:
 
 
 def range_from_planar(depth: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:
-    """Distance along the ray from distance along the optical axis.
-
-    Parameters
-    ----------
-    depth : (rows, cols) float64
-        Planar depth z [m].
-    camera : Camera
-        The calibration.
-    """
+    """Distance along the ray from the planar depth z (rows, cols) [m]."""
     u0, v0 = camera.principal_point
     across = (np.arange(camera.width) - u0) / camera.focal_length
     down = (np.arange(camera.height) - v0) / camera.focal_length

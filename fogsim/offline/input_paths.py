@@ -1,4 +1,4 @@
-"""From what stands on a command line to the images that are meant."""
+"""From paths on a command line to images."""
 
 import glob
 import itertools
@@ -11,19 +11,19 @@ from fogsim.errors import InputError, suggest
 from fogsim.offline.source import ImageFiles, Source, VideoFile
 
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".pgm", ".ppm")
-"""Endings of the files that are taken from a folder."""
+"""Suffixes of the images that are taken from a folder."""
 
 VIDEO_ENDINGS = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".ts", ".wmv", ".flv", ".3gp")
-"""Endings of files that are videos."""
+"""Suffixes of videos."""
 
 SEQUENCE_RATE = 10.0
-"""Images of a numbered sequence that are taken to make up a second [1/s]."""
+"""Default number of images of a numbered sequence per second [1/s]."""
 
 
 def find_source(
     inputs: Sequence[str | Path] | str | Path, *, sequence: bool | None = None, rate: float | None = None
 ) -> Source:
-    """Find the images that a person means.
+    """Find the images of paths, folders and patterns.
 
     Parameters
     ----------
@@ -32,19 +32,19 @@ def find_source(
         patterns like ``"drive/*.png"``.
     sequence : bool or None
         Whether images follow one another in time. None: a video does, and so do images whose names differ in one
-        number that counts on in equal steps.
+        number that grows in equal steps.
     rate : float or None
         Images of a sequence in a second [1/s]; None for 10.
 
     Returns
     -------
     Source
-        What was found; the images themselves are read later.
+        The source; its images are read later.
 
     Raises
     ------
     InputError
-        If a file is not there, a folder or pattern has no images, the rate is not positive, or there is a video among
+        If a file does not exist, a folder or pattern has no images, the rate is not positive, or there is a video among
         others.
     """
     given = [inputs] if isinstance(inputs, str | Path) else list(inputs)
@@ -64,13 +64,7 @@ def find_source(
 
 
 def is_video(path: Path) -> bool:
-    """Whether a file is a video by its ending.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    """
+    """Whether a file is a video, by its suffix."""
     return path.suffix.lower() in VIDEO_ENDINGS
 
 
@@ -92,7 +86,7 @@ def _paths(given: str) -> list[Path]:
 
 
 def _nearest(path: Path) -> str:
-    """Which file of the folder was probably meant, if one is near."""
+    """The nearest file name in the folder, if one is near."""
     if not path.parent.is_dir():
         return ""
     told = suggest(path.name, sorted(one.name for one in path.parent.iterdir()))
@@ -110,13 +104,7 @@ def _ordered(paths: Iterable[Path]) -> list[Path]:
 
 
 def is_sequence(paths: Sequence[Path]) -> bool:
-    """Whether files are a numbered sequence: names that differ in one number, which grows in equal steps.
-
-    Parameters
-    ----------
-    paths : sequence of Path
-        The files in their order.
-    """
+    """Whether files are a numbered sequence: names that differ in one number, which grows in equal steps."""
     if len(paths) < 2:
         return False
     # The last number counts: "drive2_cam1_0007.png".

@@ -1,4 +1,4 @@
-"""Where a vehicle's front lamps are and how they shine, in a file, ``lamps.yaml``."""
+"""Positions and beams of a vehicle's front lamps in a file, ``lamps.yaml``."""
 
 from pathlib import Path
 from typing import Annotated
@@ -48,18 +48,7 @@ class LampFile(Section):
 
 
 def load_lamps(path: Path) -> LampMount:
-    """Read a file of lamps.
-
-    Parameters
-    ----------
-    path : Path
-        A YAML file with the keys of `LampFile`.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, a key does not fit (one line for each mistake), or a table of intensities cannot be read.
-    """
+    """Read a YAML file with the keys of `LampFile`; InputError has one line for each mistake."""
     document = read_document(path)
     try:
         read = LampFile.model_validate(document.data)

@@ -17,27 +17,13 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class FogLayer:
-    """Fog between land and an overcast sky.
-
-    Attributes
-    ----------
-    ground_albedo : float
-        Albedo of the land [-], 0 … 1.
-    height : float
-        Height of the layer [m].
-    """
+    """Fog between land of an albedo [-] and an overcast sky, up to a height [m]."""
 
     ground_albedo: float
     height: float
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be.
-
-        Raises
-        ------
-        InputError
-            If a number is out of range.
-        """
+        """Raise InputError if a number is out of range."""
         if not 0.0 <= self.ground_albedo <= 1.0:
             raise InputError(f"--ground-albedo must lie within 0 … 1, got {self.ground_albedo!r}")
         if not 0.0 < self.height < np.inf:
@@ -49,29 +35,11 @@ class FogLayer:
         return airlight_share(self.ground_albedo)
 
     def light(self, distance: Floats, sine: Floats, visibility: float, mount_height: float) -> tuple[Floats, Floats]:
-        """What becomes of light on lines of sight.
+        """Share of the fog-free light that is left, and added airlight over its level value [-], both (rows, cols).
 
-        Parameters
-        ----------
-        distance : (rows, cols) float64
-            Distance along the ray [m]; ``inf`` for the sky.
-        sine : (rows, cols) float64
-            Of the rays' elevations [-].
-        visibility : float
-            V_met [m].
-        mount_height : float
-            Height of the camera above the road [m].
-
-        Returns
-        -------
-        tuple of (rows, cols) float64
-            What of the light without fog is left, of the sky's with what makes it brighter above fog than without; and
-            the airlight that is added, over its level [-].
-
-        Raises
-        ------
-        InputError
-            If the camera is above the layer, or so dense a layer is not known.
+        From distance along the ray [m] (``inf`` for sky), sine of its elevation, V_met and camera height [m]. The sky's
+        share includes what makes it brighter above fog than without. InputError if the camera is above the layer or the
+        fog is too dense.
         """
         extinction = extinction_from_visibility(visibility)
         field = FogField(extinction, (0.0, 0.0, 0.0), top=self.height, ground_albedo=self.ground_albedo)
@@ -83,13 +51,7 @@ class FogLayer:
 
 
 def elevation_sines(camera: Camera) -> Floats:
-    """Sines of the elevations of a pinhole's rays, (rows, cols).
-
-    Parameters
-    ----------
-    camera : Camera
-        The calibration.
-    """
+    """Sines of the elevations of a pinhole's rays, (rows, cols)."""
     rows, columns = np.indices((camera.height, camera.width), dtype=np.float64)
     rays = ray_from_pixel(camera, CameraPose((0.0, 0.0, camera.mount_height), 0.0))
     x, y, z = (rays[axis, 0] * columns + rays[axis, 1] * rows + rays[axis, 2] for axis in range(3))

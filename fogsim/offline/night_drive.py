@@ -1,4 +1,4 @@
-"""What is known of a drive by night beside its images: which own lamps were lit, and what was calibrated."""
+"""Known facts about a drive by night: the own lamps that were lit, and calibrations."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from fogsim.parameters import accepted_parameters
 from fogsim.values import Lamp
 
 NIGHT_METHODS = ("gallen2014", "gallen2014_halo", "gallen2014_veil", "night_road", "night_glow")
-"""Methods that read lamplight."""
+"""Methods that use lamplight."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +21,7 @@ class NightDrive:
     lamps : Lamp
         Own head lamps that were lit.
     setback : float
-        Distance of the camera behind the front bumper [m]; 0 where it is not told: then that of the references' file,
+        Distance of the camera behind the front bumper [m]; 0 if unknown: then that of the references' file,
         or 1.9 m.
     veil : Path or None
         File of ``fogsim calibrate veil``; None for a car's usual lamps.
@@ -35,7 +35,7 @@ class NightDrive:
     halos: Path | None = None
 
     def parameters_of(self, method: str) -> Mapping[str, object]:
-        """What of it a method takes as parameters.
+        """Parameters of a method for this drive.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""An image with what the methods found in it drawn over it; a video of such images, or a picture of a single one."""
+"""Images with the methods' results drawn over them, as a video or a single image."""
 
 import io
 import math
@@ -26,10 +26,10 @@ from fogsim.values import Camera, Estimate
 from fogsim.values.camera_response import eight_bit
 
 WIDEST, NARROWEST = 1280, 640
-"""Columns that an image is scaled to if it has more or fewer [px]."""
+"""Width to which narrower and wider images are scaled [px]."""
 
 LOOKED_AT = 20
-"""Constant rate factor of a video that is made to be looked at."""
+"""Constant rate factor of a video for viewing."""
 
 _LINE = 30
 """Height of a line below the image [px]."""
@@ -41,15 +41,7 @@ _APART = 3.0
 
 
 class Overlay:
-    """Draws images of one camera, all in the same size.
-
-    Parameters
-    ----------
-    camera : Camera
-        The assumed calibration.
-    methods : sequence of str
-        Names of the methods, each of which has its line below the image.
-    """
+    """Draws images of one camera in the same size, with a line for each method below the image."""
 
     def __init__(self, camera: Camera, methods: Sequence[str]) -> None:
         self._bits = camera.bits
@@ -61,18 +53,7 @@ class Overlay:
         self.size = (width, height + _LINE * (len(methods) + 1))
 
     def draw(self, result: FrameEstimates) -> Image.Image:
-        """Draw an image and its estimates.
-
-        Parameters
-        ----------
-        result : FrameEstimates
-            Of an image that could be read.
-
-        Returns
-        -------
-        PIL image
-            RGB, of this overlay's ``size``.
-        """
+        """Draw an image and its estimates, as RGB."""
         canvas = Image.new("RGB", self.size, GROUND)
         if result.picture.image is not None:
             shown = _shown(result.picture.image, self._bits)
@@ -95,7 +76,7 @@ class Overlay:
             draw.rectangle(corners, outline=self._colours[estimate.method], width=2)
 
     def _draw_rows(self, draw: ImageDraw.ImageDraw, estimates: Sequence[Estimate], name: str, *, dashed: bool) -> None:
-        """Draw one kind of row of all methods; where some lie upon one another, their colours take turns along it."""
+        """Draw one type of row for all methods; where some coincide, their colours alternate along it."""
         found = {e.method: row for e in estimates if (row := found_row(e, f"{name}_row")) is not None}
         for place, (method, row) in enumerate(found.items()):
             together = [other for other, its in found.items() if abs(its - row) * self._scale < _APART]
@@ -124,7 +105,7 @@ class Overlay:
         length = width if whole else _DASH if dashed else _DASH + _GAP
         for start in range(0 if whole else rank * (_DASH + _GAP), width, width if whole else sharers * (_DASH + _GAP)):
             draw.line([(start, y), (min(start + length, width), y)], fill=colour, width=2)
-        # The horizon lies above the inflection, so their labels never meet.
+        # The horizon is above the inflection, so their labels never overlap.
         place = (width - 8, y - 4 if dashed else y + 4)
         anchor = "rs" if dashed else "rt"
         draw.text(place, label, fill=colour, font=font(13), anchor=anchor, stroke_width=2, stroke_fill=GROUND)
@@ -160,13 +141,13 @@ def _shown(image: Pixels, bits: int) -> NDArray[np.uint8]:
 
 
 PICTURE_FORMATS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG"}
-"""Endings of pictures and what they are called in Pillow."""
+"""Suffixes of images, and their names in Pillow."""
 
 
 class OverlayFile:
     """Writes overlays under a temporary name, which becomes the file's own when all are written.
 
-    A context manager; left by an error, it leaves no file. Images that could not be used are not in it.
+    A context manager; after an error it leaves no file. Images that could not be used are left out.
 
     Parameters
     ----------
@@ -179,12 +160,12 @@ class OverlayFile:
     methods : sequence of str
         Names of the methods in the order of the estimates.
     overwrite : bool
-        Replace a file that is there.
+        True to replace an existing file.
 
     Raises
     ------
     InputError
-        If the ending is another or does not suit the source, or the file cannot be written or must not be replaced.
+        If the suffix does not suit the source, or the file cannot be written or must not be replaced.
     """
 
     def __init__(

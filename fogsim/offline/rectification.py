@@ -1,4 +1,4 @@
-"""Images of a lens that distorts, or of a camera that looks aside, as a pinhole along the vehicle's axis sees them."""
+"""Rectification: images as a pinhole along the vehicle's axis would see them, without distortion and yaw."""
 
 import math
 from collections.abc import Iterator
@@ -20,14 +20,14 @@ from fogsim.values.pinhole import camera_axes
 
 Floats = NDArray[np.float64]
 Maps = tuple[NDArray[np.int16], NDArray[np.uint16]]
-"""Where each pixel of a straightened image comes from, in OpenCV's fixed-point form."""
+"""Source of each pixel of a rectified image, in OpenCV's fixed-point form."""
 
 
 class Straightener:
-    """Undoes lens distortion and yaw in the images of one camera.
+    """Removes lens distortion and yaw from the images of one camera.
 
-    A pixel of the straightened image is a ray of a pinhole of the same focal length, pitch and roll without yaw. The
-    ray is turned into the axes of the camera as it is, bent by Brown's model of the lens,
+    A pixel of the rectified image is a ray of a pinhole of the same focal length, pitch and roll without yaw. The
+    ray is rotated into the axes of the real camera, bent by Brown's model of the lens,
     x″ = x′ (1 + k1 r² + k2 r⁴) + 2 p1 x′y′ + p2 (r² + 2 x′²) and y″ alike (OpenCV's `initUndistortRectifyMap`), and the
     image is interpolated there by cubics, which keep detail better than straight lines do. The principal point moves
     sideways by α tan(yaw), so that the image keeps showing what it showed. What it did not show repeats its border.
@@ -35,12 +35,12 @@ class Straightener:
     Parameters
     ----------
     calibration : Calibration
-        The camera as it is.
+        The real camera.
 
     Attributes
     ----------
     camera : Camera
-        The pinhole that the straightened images are of.
+        The pinhole of the rectified images.
 
     Raises
     ------
@@ -58,24 +58,18 @@ class Straightener:
             self._maps = _maps(calibration, self.camera)
 
     def __call__(self, image: Pixels) -> Pixels:
-        """Straighten an image; one of another size than the camera's is given back as it is.
-
-        Parameters
-        ----------
-        image : (rows, cols) or (rows, cols, 3) uint8 or uint16
-            Pixel values.
-        """
+        """Rectify an image; one of another size than the camera's is returned unchanged."""
         if self._maps is None or image.shape[:2] != self._size:
             return image
         places, fractions = self._maps
-        # OpenCV keeps the type of the pixels, which its annotations do not say.
+        # OpenCV keeps the type of the pixels, contrary to its annotations.
         straight: Any = cv2.remap(image, places, fractions, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
         return cast("Pixels", straight)
 
 
 @dataclass(frozen=True, slots=True)
 class StraightenedSource:
-    """The pictures of a source, straightened."""
+    """The images of a source, rectified."""
 
     source: Source
     straightener: Straightener
@@ -106,7 +100,7 @@ class StraightenedSource:
         return self.source.paths
 
     def pictures(self) -> Iterator[Picture]:
-        """Read and straighten the images."""
+        """Read and rectify the images."""
         for picture in self.source.pictures():
             yield picture if picture.image is None else replace(picture, image=self.straightener(picture.image))
 
@@ -119,7 +113,7 @@ def straightened(source: Source, calibration: Calibration) -> tuple[Source, Came
     source : Source
         Images of the camera.
     calibration : Calibration
-        The camera as it is; without yaw and distortion the source stays the same.
+        The real camera; without yaw and distortion the source is unchanged.
 
     Raises
     ------
@@ -154,7 +148,7 @@ def _matrix(camera: Camera) -> Floats:
 
 
 def _radius(straight: Camera, turned: Floats) -> Floats:
-    """Tangent of the angle between each straightened pixel's ray and the optical axis; behind it, endless."""
+    """Tangent of the angle between each rectified pixel's ray and the optical axis; infinite behind it."""
     rows, columns = np.indices((straight.height, straight.width), dtype=np.float64)
     u0, v0 = straight.principal_point
     right, under = (columns - u0) / straight.focal_length, (rows - v0) / straight.focal_length
@@ -164,18 +158,18 @@ def _radius(straight: Camera, turned: Floats) -> Floats:
 
 
 def _fold(distortion: tuple[float, ...]) -> float:
-    """Radius at which r (1 + k1 r² + k2 r⁴) ceases to grow; endless if it never does [-]."""
+    """Radius at which r (1 + k1 r² + k2 r⁴) stops growing; infinite if it never does [-]."""
     if not distortion:
         return math.inf
     k1, k2 = distortion[:2]
-    # Its derivative is 1 + 3 k1 r² + 5 k2 r⁴; the greatest 1 / r² at which that is zero is the nearest fold.
+    # Its derivative is 1 + 3 k1 r² + 5 k2 r⁴; the greatest root 1 / r² is the nearest fold.
     square = 9.0 * k1**2 - 20.0 * k2
     greatest = 0.5 * (math.sqrt(square) - 3.0 * k1) if square >= 0.0 else 0.0
     return math.sqrt(1.0 / greatest) if greatest > 0.0 else math.inf
 
 
 def _refuse_folded(calibration: Calibration, fold: float) -> None:
-    """Refuse a lens that cannot show what is in the middle of the nearest of the image's sides."""
+    """Refuse a lens that cannot show the middle of the nearest side of the image."""
     if math.isinf(fold):
         return
     camera, (k1, k2) = calibration.camera, calibration.distortion[:2]

@@ -20,32 +20,16 @@ from fogsim.values import Camera, Estimate
 from fogsim.values.camera_response import respond
 
 ESTIMATOR = "joint_road"
-"""What tells the extinction where no visibility is given."""
+"""Method that estimates the extinction if no visibility is given."""
 
 
 @dataclass(frozen=True, slots=True)
 class RestorationWish:
-    """How images are to be restored.
+    """How to restore images.
 
-    Attributes
-    ----------
-    method : str
-        A name in `fogsim.restoration.METHODS`.
-    visibility : float or None
-        Meteorological visibility V_met [m], ``inf`` for none to undo; None to estimate it, by methods that use it.
-    most_gain : float
-        Most by which light is amplified [-].
-    airlight : tuple of float or None
-        Pixel value of the airlight: one, or red, green and blue; None to take it from the images.
-    tone_map : bool
-        Whether results are made to be looked at.
-    beside : bool
-        Whether the image as it was stands to the left of the restored one.
-
-    Raises
-    ------
-    InputError
-        If there is no such method, or the visibility is not positive or of no use to the method.
+    `visibility` is V_met [m] (``inf`` for nothing to undo; None to estimate it), `most_gain` limits the amplification
+    of light [-], and `airlight` has one pixel value or red, green and blue (None to take it from the images).
+    `tone_map` makes results for viewing, `beside` puts the original to the left.
     """
 
     method: str = "planar"
@@ -56,7 +40,7 @@ class RestorationWish:
     beside: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be restored."""
+        """Refuse an invalid restoration."""
         needs = METHODS.find(self.method).needs_extinction
         if self.visibility is None:
             return
@@ -73,20 +57,9 @@ class RestorationWish:
 
 @dataclass(frozen=True, slots=True)
 class Restored:
-    """What came of one image.
+    """Result for one image; `image` is None and `reason` not empty if it could not be restored.
 
-    Attributes
-    ----------
-    picture : Picture
-        The image as it was, or why it could not be read.
-    image : (rows, cols[, 3]) uint8 or uint16, or None
-        The restored image, the original beside it if that is wished; None if it could not be restored.
-    extinction : float or None
-        Extinction coefficient that it was restored with [1/m]; None by methods without.
-    reason : str
-        Why it could not be restored, else empty.
-    held : bool
-        Whether the extinction is that of an earlier image, since this one tells none.
+    `extinction` [1/m] is None for methods without it, and `held` if it is that of an earlier image.
     """
 
     picture: Picture
@@ -97,28 +70,9 @@ class Restored:
 
 
 def restored_images(source: Source, camera: Camera, wish: RestorationWish) -> Iterator[Restored]:
-    """Restore the images of a source.
+    """Restore the images of a source in turn.
 
-    The extinction is estimated by `joint_road` in each image; in a sequence the last that it was sure of holds.
-
-    Parameters
-    ----------
-    source : Source
-        The images.
-    camera : Camera
-        Their calibration.
-    wish : RestorationWish
-        How.
-
-    Yields
-    ------
-    Restored
-        For each image in turn.
-
-    Raises
-    ------
-    InputError
-        If the images are not of the camera, or airlight or gain are impossible.
+    `joint_road` estimates the extinction of each image; in a sequence, the last valid estimate is kept.
     """
     last: Estimate | None = None
     for picture, estimate in _estimated(source, camera, wish):
@@ -136,7 +90,7 @@ def restored_images(source: Source, camera: Camera, wish: RestorationWish) -> It
 
 
 def _estimated(source: Source, camera: Camera, wish: RestorationWish) -> Iterator[tuple[Picture, Estimate | None]]:
-    """Images, with their estimates where some are wanted."""
+    """Images, with their estimates if needed."""
     if wish.estimates:
         for result in estimates_of(source, camera, (ESTIMATOR,)):
             yield result.picture, next(iter(result.estimates), None)
@@ -170,7 +124,7 @@ def _restored(
 def _airlight(
     image: Pixels, camera: Camera, wish: RestorationWish, estimate: Estimate | None
 ) -> NDArray[np.float64] | None:
-    """Pixel values of the airlight that is given, or of the picture's own with the estimate's luminance."""
+    """Pixel values of the given airlight, or of the image's own with the estimate's luminance."""
     if wish.airlight is not None:
         return np.array(wish.airlight)
     told = None if estimate is None else estimate.diagnostics.get("airlight")
@@ -187,31 +141,7 @@ def _airlight(
 def restore_files(
     source: Source, camera: Camera, wish: RestorationWish, out: Path, *, overwrite: bool = False
 ) -> Generator[Restored]:
-    """Restore image files: one into a file, several into a folder, by their own names.
-
-    Parameters
-    ----------
-    source : Source
-        The images.
-    camera : Camera
-        Their calibration.
-    wish : RestorationWish
-        How.
-    out : Path
-        The file, or for several images the folder, which is made if it is not there.
-    overwrite : bool
-        True to replace files that are there.
-
-    Yields
-    ------
-    Restored
-        For each image in turn, after it was written.
-
-    Raises
-    ------
-    InputError
-        If a file must not or cannot be written, or anything does not fit.
-    """
+    """Restore image files and yield each after it was written: one into a file, several into a folder by name."""
     targets = _targets(source.paths, out)
     is_folder = len(targets) > 1
     if is_folder:
@@ -228,13 +158,7 @@ def restore_files(
 
 
 def _targets(paths: tuple[Path, ...], out: Path) -> tuple[Path, ...]:
-    """Where each image goes.
-
-    Raises
-    ------
-    InputError
-        If two would go to the same file.
-    """
+    """Output path of each image; InputError if two are the same."""
     if len(paths) == 1:
         return (out,)
     names = [path.name for path in paths]
@@ -247,32 +171,9 @@ def _targets(paths: tuple[Path, ...], out: Path) -> tuple[Path, ...]:
 def restore_video(
     source: Source, camera: Camera, wish: RestorationWish, out: Path, *, overwrite: bool = False
 ) -> Generator[Restored]:
-    """Restore a video frame by frame; under its final name only when it is whole.
+    """Restore a video frame by frame; the file has its final name only when complete.
 
-    Frames before the first in which fog is found are kept as they are.
-
-    Parameters
-    ----------
-    source : Source
-        The video.
-    camera : Camera
-        Its calibration.
-    wish : RestorationWish
-        How.
-    out : Path
-        The restored video, ``.mp4``.
-    overwrite : bool
-        True to replace a file that is there.
-
-    Yields
-    ------
-    Restored
-        For each frame in turn.
-
-    Raises
-    ------
-    InputError
-        If anything does not fit, fog is found in no frame, or, when `out` is written, the video is cut off or damaged.
+    Frames before the first in which fog is found are kept as they are; InputError if fog is found in none.
     """
     refuse_unfit_video(out, source.paths, camera, kind="restored", overwrite=overwrite)
     found, reason, damage = False, "", ""

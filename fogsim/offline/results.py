@@ -1,4 +1,4 @@
-"""Estimates as text: JSON, one object a line, and lines of a table that can be printed one by one."""
+"""Estimates as text: JSON, one object per line, and table rows that can be printed one by one."""
 
 import json
 import math
@@ -10,28 +10,16 @@ from fogsim.offline.source import Source
 from fogsim.values import Estimate, SignLook
 
 ENDLESS = 10_000.0
-"""Visibility from which on one speaks of clear air [m]."""
+"""Visibility from which the air is called clear [m]."""
 
 
 def metres(visibility: float) -> str:
-    """Visibility [m] with its unit; "clear" from ten kilometres on.
-
-    Parameters
-    ----------
-    visibility : float
-        Visibility [m].
-    """
+    """Visibility [m] with its unit; "clear" from ten kilometres on."""
     return "clear" if visibility >= ENDLESS else f"{visibility:.0f} m"
 
 
 def interval_text(estimate: Estimate) -> str:
-    """Give the 90 % interval of a valid estimate's visibility.
-
-    Parameters
-    ----------
-    estimate : Estimate
-        A valid one.
-    """
+    """The 90 % interval of a valid estimate's visibility."""
     low, high = estimate.visibility_interval
     if high >= ENDLESS:
         return f"> {low:.0f} m"
@@ -94,7 +82,7 @@ def _record(name: str | int, estimate: Estimate) -> dict[str, object]:
 
 
 def _along_the_road(estimate: Estimate) -> dict[str, object]:
-    """How the fog varies ahead, of a method that tells."""
+    """How the fog varies ahead, for methods that estimate it."""
     curve = estimate.optical_depths
     if curve is None:
         return {}
@@ -107,25 +95,19 @@ def _along_the_road(estimate: Estimate) -> dict[str, object]:
 
 
 def denser_text(estimate: Estimate) -> str:
-    """Say where much denser fog is ahead; empty if nowhere.
-
-    Parameters
-    ----------
-    estimate : Estimate
-        The estimate.
-    """
+    """Where much denser fog is ahead; empty if nowhere."""
     return "" if estimate.denser is None else f"denser beyond {estimate.denser.distance:.0f} m"
 
 
 def _number(value: object) -> float | None:
-    """Value with the digits that are shown; None for what JSON has no number for, such as an endless visibility."""
+    """Value with the shown digits; None for values without a JSON number, such as infinite visibility."""
     if not isinstance(value, int | float) or not math.isfinite(value):
         return None
     return float(f"{value:.{DIGITS}g}")
 
 
 _MOST_NAME = 48
-"""Columns that a file's name may take; a longer one loses its beginning."""
+"""Width of the column of file names; a longer name loses its beginning."""
 
 
 def table_heading(source: Source, methods: Sequence[str]) -> str:
@@ -164,12 +146,12 @@ def table_rows(source: Source, methods: Sequence[str], result: FrameEstimates) -
 
 
 def summary_rows(signs: Iterable[SignSummary]) -> Iterator[str]:
-    """Table of the signs of a drive; nothing where there were none.
+    """Table of the signs of a drive; empty without signs.
 
     Parameters
     ----------
     signs : iterable of SignSummary
-        What became of each.
+        Summary of each sign.
     """
     for number, sign in enumerate(signs):
         if number == 0:

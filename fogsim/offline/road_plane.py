@@ -1,4 +1,4 @@
-"""Distances to the flat road below the horizon, which stand in for a depth map of an open road."""
+"""Distances to the flat road below the horizon, in place of a depth map of an open road."""
 
 import math
 from dataclasses import dataclass
@@ -18,38 +18,23 @@ from fogsim.values.pinhole import camera_axes
 Floats = NDArray[np.float64]
 
 MOST_UNBENT = 1e-3
-"""How far from its pixel a ray may come out that is bent by the lens again [px]; beyond it no ray is the pixel's."""
+"""Largest error of a ray after the lens model [px]; above it the pixel has no ray."""
 
 MOST_STEPS = 30
-"""Steps of Newton's method; some five are enough for lenses of cameras on vehicles."""
+"""Steps of Newton's method; about five are enough for lenses of vehicle cameras."""
 
 
 @dataclass(frozen=True, slots=True)
 class RoadPlane:
-    """A flat road without end under a camera, and nothing else before the sky.
-
-    Attributes
-    ----------
-    calibration : Calibration
-        The camera: its mount height, pitch, roll and lens tell where the road is; its yaw changes no distance.
-    """
+    """An infinite flat road under a camera, with only sky above the horizon; the yaw changes no distance."""
 
     calibration: Calibration
 
     def distance(self) -> Floats:
-        """Distance along each pixel's ray to the road.
+        """Distance along each pixel's ray to the road (rows, cols) [m]; ``inf`` at and above the horizon.
 
-        A ray d of unit length that points down meets the road at H / −d_z.
-
-        Returns
-        -------
-        (rows, cols) float64
-            Distances [m]; ``inf`` at and above the horizon.
-
-        Raises
-        ------
-        InputError
-            If the horizon is not within the image, or the lens shows some pixel by no ray.
+        A ray d of unit length that points down meets the road at H / −d_z. InputError if the horizon is outside the
+        image, or the lens has no ray for a pixel.
         """
         camera, sine = self.calibration.camera, self.sines()
         road = sine < 0.0
@@ -62,13 +47,7 @@ class RoadPlane:
         return np.where(road, camera.mount_height / np.where(road, -sine, 1.0), math.inf)
 
     def sines(self) -> Floats:
-        """Sines of the elevations of the pixels' rays, (rows, cols).
-
-        Raises
-        ------
-        InputError
-            If the lens shows some pixel by no ray.
-        """
+        """Sines of the elevations of the pixels' rays, (rows, cols); InputError if the lens has no ray for a pixel."""
         camera = self.calibration.camera
         right, down = _unbent_rays(self.calibration)
         across, lower, ahead = camera_axes(camera, CameraPose((0.0, 0.0, camera.mount_height), 0.0))[:, 2].tolist()
@@ -76,7 +55,7 @@ class RoadPlane:
 
 
 def _unbent_rays(calibration: Calibration) -> tuple[Floats, Floats]:
-    """Each pixel's ray in the camera's axes, to the right and down of 1 along the axis, without the lens's bending."""
+    """Each pixel's ray in the camera's axes, right and down per 1 along the axis, without the lens's bending."""
     camera = calibration.camera
     u0, v0 = camera.principal_point
     rows, columns = np.indices((camera.height, camera.width), dtype=np.float64)
@@ -89,7 +68,7 @@ def _unbent_rays(calibration: Calibration) -> tuple[Floats, Floats]:
         bent, (same, mixed, other) = _bent(right, down, calibration.distortion)
         off = (bent[0] - seen[0], bent[1] - seen[1])
         determinant = same * other - mixed * mixed
-        with np.errstate(all="ignore"):  # where the lens folds the image, which is told below
+        with np.errstate(all="ignore"):  # where the lens folds the image, which is reported below
             right = right - (other * off[0] - mixed * off[1]) / determinant
             down = down - (same * off[1] - mixed * off[0]) / determinant
     with np.errstate(all="ignore"):
@@ -107,7 +86,7 @@ def _unbent_rays(calibration: Calibration) -> tuple[Floats, Floats]:
 def _bent(
     right: Floats, down: Floats, distortion: tuple[float, ...]
 ) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats, Floats]]:
-    """Rays behind the lens by Brown's model, as `Straightener` has it, and their derivatives (a symmetric matrix)."""
+    """Rays behind the lens by Brown's model, as in `Straightener`, and their derivatives (a symmetric matrix)."""
     k1, k2, p1, p2 = distortion
     square = right**2 + down**2
     radial, growth = 1.0 + square * (k1 + k2 * square), 2.0 * (k1 + 2.0 * k2 * square)
@@ -124,23 +103,9 @@ def _bent(
 
 
 def told_camera(image: Path, horizon_row: float, focal_length: float, mount_height: float) -> Calibration:
-    """Calibration of a pinhole without roll of which the least is known that a flat road needs.
+    """Minimal calibration for a flat road: a pinhole without roll, its principal point in the image's middle.
 
-    Parameters
-    ----------
-    image : Path
-        An image or a video of the camera, which tells the size; its middle is taken for the principal point.
-    horizon_row : float
-        Row of the horizon [px].
-    focal_length : float
-        Focal length [px].
-    mount_height : float
-        Height of the camera above the road [m].
-
-    Raises
-    ------
-    InputError
-        If the image cannot be read or a value is impossible.
+    The image or video gives the size; horizon row and focal length are in px, mount height above the road in m.
     """
     for option, value, unit in (("--focal-length", focal_length, "pixels"), ("--mount-height", mount_height, "metres")):
         if not (value > 0.0 and math.isfinite(value)):

@@ -1,4 +1,4 @@
-"""A person's own map of signs: GeoJSON, points in WGS 84."""
+"""Your own map of signs: GeoJSON, points in WGS 84."""
 
 import math
 from collections import Counter
@@ -14,30 +14,18 @@ from fogsim.scene import SIGN_KINDS
 from fogsim.units import KMH_PER_MPS
 
 USUAL_HEIGHT, USUAL_DIAMETER = 2.2, 0.6
-"""Height of the middle of a face above the road, and its size, where the map tells none [m]."""
+"""Default height of a face's middle above the road, and its default size [m]."""
 
 WGS84 = ("CRS84", "4326")
-"""What names of the coordinate frame end in that GeoJSON may be in."""
+"""Suffixes of the names of coordinate frames that GeoJSON may use."""
 
 
 @dataclass(frozen=True, slots=True)
 class GeographicSign:
-    """A sign of the map.
+    """A sign of the map at a WGS 84 position [rad]; `height` of its middle above the road and `diameter` are in m.
 
-    Attributes
-    ----------
-    sign_id, kind : str
-        Its id, and its kind.
-    value : float
-        What it says, for a speed limit the speed [m/s].
-    longitude, latitude : float
-        Where it stands, WGS 84 [rad].
-    height : float
-        Middle of its face above the road [m].
-    diameter : float
-        Size of its face [m].
-    heading : float or None
-        Direction of travel of those it speaks to, counterclockwise from east [rad]; None if the map does not tell.
+    `value` is the speed of a speed limit [m/s]; `heading` is the direction of travel that it applies to,
+    counterclockwise from east [rad], None if the map does not give it.
     """
 
     sign_id: str
@@ -52,17 +40,7 @@ class GeographicSign:
 
 @dataclass(frozen=True, slots=True)
 class SignFile:
-    """A map, and what was assumed about it.
-
-    Attributes
-    ----------
-    path : Path
-        The file.
-    signs : tuple of GeographicSign
-        At least one, each with an id of its own.
-    remarks : tuple of str
-        What was assumed or passed over.
-    """
+    """A map with at least one sign, each with a unique id, and remarks on what was assumed or skipped."""
 
     path: Path
     signs: tuple[GeographicSign, ...]
@@ -70,21 +48,10 @@ class SignFile:
 
 
 def load_sign_file(path: Path) -> SignFile:
-    """Read a map of signs: a GeoJSON FeatureCollection of points, as ``fogsim signs`` writes it where it has WGS 84.
+    """Read a map of signs: a GeoJSON FeatureCollection of points, as ``fogsim signs`` writes it with WGS 84.
 
-    Properties: ``kind`` (needed), ``height_m``, ``diameter_m``, ``heading_deg`` (clockwise from north, the direction of
-    travel of those whom the sign is for), ``speed_limit_kmh``. Features that are no points are passed over.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, it is no GeoJSON, its coordinates are no degrees of WGS 84, it has no signs, a sign
-        has no kind or an impossible number, or two have one id.
+    Properties: ``kind`` (required), ``height_m``, ``diameter_m``, ``heading_deg`` (clockwise from north, the direction
+    of travel that the sign applies to), ``speed_limit_kmh``. Features other than points are skipped.
     """
     told = _read(path)
     _refuse_other_frames(path, told)
@@ -113,7 +80,7 @@ def _kind_of(told: Mapping[str, Any]) -> str:
 
 
 def _refuse_other_frames(path: Path, told: Mapping[str, Any]) -> None:
-    """Refuse a map that says itself that it is not in longitude and latitude."""
+    """Refuse a map that declares other coordinates than longitude and latitude."""
     if told.get("coordinates") == NET:
         raise InputError(
             f"{path}: its points are x and y of a SUMO network, which tells no projection; expected longitude and "
@@ -171,7 +138,7 @@ def _place(where: str, told: Any) -> tuple[float, float]:
 
 
 def _number(where: str, told: Mapping[str, Any], key: str, usual: float, least: float, most: float) -> float:
-    """Number of a property; the usual one where it is missing."""
+    """Number of a property; the default if it is missing."""
     value = told.get(key)
     return usual if value is None else number_within(where, key, value, least, most)
 

@@ -1,4 +1,4 @@
-"""Signs of a person's own map along their own drive: where each image should show them, and which it does."""
+"""Signs of your own map along your own drive: where each image should show them, and whether it does."""
 
 import math
 from collections.abc import Iterator
@@ -21,27 +21,27 @@ from fogsim.sensors import signs_ahead
 from fogsim.values import Camera, Frame, Observation, Sign, SignLook, SignMap, SignSighting
 
 REACH = 250.0
-"""Distance ahead as far as which signs are looked for [m]."""
+"""Distance ahead up to which signs are searched [m]."""
 
 OWN_DRIVE = PoseDeviation(position=2.0, height=0.4, heading=math.radians(1.0), pitch=math.radians(0.3))
-"""How well places are known by a receiver in a car and a map that was drawn from pictures."""
+"""Accuracy of positions from a receiver in a car and a map that was drawn from images."""
 
 FAR_AWAY = 10_000.0
-"""Distance between track and map from which on they are in different frames, or of different drives [m]."""
+"""Distance between track and map above which they are in different frames, or of different drives [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class SignSummary:
-    """What became of a sign on a drive.
+    """Result for a sign of a drive.
 
     Attributes
     ----------
     sign_id, kind : str
-        The sign by the map.
+        The sign's id and type in the map.
     first_seen : float or None
         Distance at which it was first detected [m]; None if it never was, or once only.
     detections, misses : int
-        Images that showed it, and that should have and did not.
+        Images that showed it, and that should have but did not.
     """
 
     sign_id: str
@@ -52,9 +52,9 @@ class SignSummary:
 
 
 class SignWatch:
-    """Signs of a map along a track, looked for in image after image.
+    """Signs of a map along a track, searched in image after image.
 
-    The track is taken to be the camera's, and the road before it to be a plane.
+    The track is assumed to be the camera's, and the road ahead to be a plane.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class SignWatch:
         self._images = self._outside = 0
 
     def sightings(self, time: float) -> tuple[SignSighting, ...] | None:
-        """Signs ahead by the map; None where the track does not tell the place.
+        """Signs ahead by the map; None if the track has no position.
 
         Parameters
         ----------
@@ -99,7 +99,7 @@ class SignWatch:
         return signs_ahead(self._around(pose), np.zeros(3), pose.heading, REACH)
 
     def look(self, image: Pixels, time: float, sightings: tuple[SignSighting, ...]) -> tuple[SignLook, ...]:
-        """Look for signs in an image.
+        """Search for signs in an image.
 
         Parameters
         ----------
@@ -113,18 +113,18 @@ class SignWatch:
         Returns
         -------
         tuple of SignLook
-            One for each sign of which the image may show something.
+            One for each sign that the image may show.
         """
         watched = self._watch.look(Observation(Frame(time, image, self._camera), signs=sightings))
         self._passed += watched.passed
         return sign_looks(watched, self._watch.tracks)
 
     def summary(self) -> Iterator[SignSummary]:
-        """What became of each sign, in the order in which they came."""
+        """Result for each sign, in order of appearance."""
         known: dict[str, SignSummary] = {}
         for track in (*self._passed, *self._watch.tracks):
             sign, first = track.sign.sighting, track.first_seen if track.confirmed else None
-            # A sign at the border of what can be seen may come more than once.
+            # A sign at the border of the visible area may appear more than once.
             was = known.get(sign.sign_id) or SignSummary(sign.sign_id, sign.kind, None, 0, 0)
             first = first if was.first_seen is None else was.first_seen
             counts = (was.detections + track.detections, was.misses + track.misses)
@@ -132,7 +132,7 @@ class SignWatch:
         yield from known.values()
 
     def remarks(self) -> Iterator[str]:
-        """What is wrong with map, track and camera, by what came of it."""
+        """Faults of map, track and camera, judged by the results."""
         signs = list(self.summary())
         if self._outside:
             times = self._track.time[[0, -1]] - self._offset
@@ -152,7 +152,7 @@ class SignWatch:
             )
 
     def _around(self, pose: GeographicPose) -> SignMap:
-        """Signs within reach in the plane that touches the ellipsoid at a pose, whose origin that is."""
+        """Signs within reach in the tangent plane of the ellipsoid at a pose, which is the origin."""
         east, north = metres_per_radian(pose.latitude)
         x = east * np.remainder(self._longitude - pose.longitude + math.pi, 2.0 * math.pi) - east * math.pi
         y = north * (self._latitude - pose.latitude)
@@ -167,13 +167,7 @@ class SignWatch:
         return Sign(sign.sign_id, sign.kind, sign.value, (float(x), float(y), sign.height), heading, sign.diameter)
 
     def _nearest_positions(self, path: Path) -> NDArray[np.intp]:
-        """Number of the track's position nearest to each sign.
-
-        Raises
-        ------
-        InputError
-            If no sign is near any position.
-        """
+        """Index of the track position nearest to each sign; InputError if no sign is near the track."""
         distance, nearest = _apart(self._track, self._longitude, self._latitude)
         if distance.min() > REACH:
             swapped, _ = _apart(self._track, self._latitude, self._longitude)
@@ -192,7 +186,7 @@ class SignWatch:
 def _apart(
     track: Track, longitude: NDArray[np.float64], latitude: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Least distance of each sign to the track's positions [m], and the number of that position."""
+    """Least distance of each sign to the track's positions [m], and the index of that position."""
     distance, nearest = np.empty(len(longitude)), np.empty(len(longitude), np.intp)
     east, north = metres_per_radian(float(track.latitude.mean()))
     for number, (one, other) in enumerate(zip(longitude, latitude, strict=True)):
@@ -228,7 +222,7 @@ def watch_signs(
     Returns
     -------
     tuple of SignWatch and of str
-        For `estimates_of`, and what was assumed about the map.
+        For `estimates_of`, and the assumptions about the map.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What images come from: image files and videos."""
+"""Sources of images: image files and videos."""
 
 import re
 import subprocess
@@ -23,13 +23,13 @@ class Picture:
     Attributes
     ----------
     name : str or int
-        The file's path as it was given, or the number of the frame in its video, counted from 0.
+        The file's path as given, or the index of the frame in its video, from 0.
     time : float
         Its instant from the source's start [s].
     image : (rows, cols) or (rows, cols, 3) uint8 or uint16, or None
         Pixel values, red first; None if it cannot be read.
     error : str
-        Why it cannot be read or used, else empty.
+        Why it cannot be read or used, otherwise empty.
     """
 
     name: str | int
@@ -39,7 +39,7 @@ class Picture:
 
 
 class Source(Protocol):
-    """Images one after another."""
+    """A series of images."""
 
     @property
     def period(self) -> float:
@@ -53,12 +53,12 @@ class Source(Protocol):
 
     @property
     def count(self) -> int:
-        """How many images there are; of a video, about how many."""
+        """Number of images; approximate for a video."""
         ...
 
     @property
     def description(self) -> str:
-        """What this is, in a few words."""
+        """Short description of the source."""
         ...
 
     @property
@@ -96,14 +96,14 @@ class ImageFiles:
 
     @property
     def description(self) -> str:
-        """How many, and whether they are taken as a sequence."""
+        """Number of files, and whether they are a sequence."""
         if self.count == 1:
             return "1 image"
         kind = f"a sequence of {1.0 / self.period:g} a second" if self.temporal else "stills, each on its own"
         return f"{self.count} images, taken as {kind}"
 
     def pictures(self) -> Iterator[Picture]:
-        """Read the files; one that cannot be read has its reason in ``error``."""
+        """Read the files; an unreadable one has its reason in ``error``."""
         for index, path in enumerate(self.paths):
             time = index * self.period if self.temporal else 0.0
             try:
@@ -113,7 +113,7 @@ class ImageFiles:
 
 
 def _red_first(stored: Pixels) -> Pixels:
-    """Grey as it is, colours from blue-green-red to red-green-blue, without opacity."""
+    """Grey unchanged, colours from blue-green-red to red-green-blue, without opacity."""
     if stored.ndim == 2:
         return stored
     if stored.shape[2] == 1:
@@ -125,13 +125,13 @@ _DURATION = re.compile(r"Duration: (\d+):(\d+):(\d+(?:\.\d+)?)")
 _RATE = re.compile(r"Video:.*?(\d+(?:\.\d+)?k?) (?:fps|tbr)")
 _ADDRESS = re.compile(r" @ 0x[0-9a-f]+")
 MOST_MISSING = 0.5
-"""Time by which a whole video's pictures may end before its header says, as where its sound lasts longer [s]."""
+"""Time by which a complete video's frames may end before its header's duration, as with longer sound [s]."""
 
 MOST_SAID = 100_000
 """Bytes of ffmpeg's messages that are read."""
 
 CONTAINERS = "mov,matroska,avi,mpeg,mpegvideo,mpegts,asf,flv,m4v,h264,hevc"
-"""ffmpeg's names of the formats that are read: none that opens further files or addresses, such as a playlist."""
+"""ffmpeg's names of the allowed formats: none that opens further files or addresses, such as a playlist."""
 
 MOST_PIXELS = 16_384**2 // 2
 """Most pixels of a frame [px]."""
@@ -148,13 +148,13 @@ class VideoFile:
     path : Path
         The file.
     temporal : bool
-        Whether its frames are looked at in their order; False takes each on its own.
+        Whether its frames are used in order; False treats each separately.
     size : tuple of int
         Columns and rows [px].
     period : float
         Time between two frames [s].
     duration : float
-        Its length as its header has it [s]; 0 if that says nothing.
+        Its length from its header [s]; 0 if unknown.
     """
 
     path: Path
@@ -172,7 +172,7 @@ class VideoFile:
         path : Path
             The file.
         temporal : bool
-            Whether its frames are taken as a sequence.
+            Whether its frames are a sequence.
 
         Raises
         ------
@@ -213,14 +213,14 @@ class VideoFile:
 
     @property
     def paths(self) -> tuple[Path, ...]:
-        """The video alone."""
+        """The path of the video."""
         return (self.path,)
 
     def pictures(self) -> Iterator[Picture]:
-        """Read the frames; where the file is damaged, ffmpeg conceals or leaves out what it cannot decode.
+        """Read the frames; where the file is damaged, ffmpeg conceals or skips what it cannot decode.
 
-        After the frames of a damaged video, or of one that ends before its time, comes a picture without image, whose
-        ``error`` has the number of frames that were read and what ffmpeg said first.
+        After the frames of a damaged video, or of one that ends early, a picture without image follows, whose
+        ``error`` has the number of frames that were read and ffmpeg's first message.
         """
         read = 0
         # A file, not a pipe, which could fill up while frames are read.
@@ -281,5 +281,5 @@ def _frames(pipe: IO[bytes]) -> Iterator[NDArray[np.uint8]]:
         data = pipe.read(3 * cols * rows)
         if len(data) < 3 * cols * rows:
             return
-        # A copy, since kernels are compiled anew for an array that cannot be written.
+        # A copy, since kernels would be compiled again for a read-only array.
         yield np.frombuffer(data, np.uint8).reshape(rows, cols, 3).copy()

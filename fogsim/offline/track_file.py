@@ -1,4 +1,4 @@
-"""Where a vehicle was: GPX or CSV, WGS 84."""
+"""Positions of a vehicle: GPX or CSV, WGS 84."""
 
 import csv
 import io
@@ -20,32 +20,24 @@ SEMI_MAJOR, FLATTENING = 6_378_137.0, 1.0 / 298.257223563
 """Ellipsoid of WGS 84: semi-major axis [m], flattening [-] (NIMA TR8350.2, 2000, table 3.1)."""
 
 LONGEST_GAP = 5.0
-"""Time without a position after which the track is taken to be interrupted [s]."""
+"""Time without a position after which the track counts as interrupted [s]."""
 
 LONGEST_TIME = 1e12
 """Largest number in a track: time in seconds since 1970 is about 2e9."""
 
 MOVING, MOST_LOOKED_AT = 10.0, 100
-"""Way over which a direction of travel is told from positions [m], and among how many of them before and after."""
+"""Distance over which a direction is derived from positions [m], and number of positions before and after."""
 
 COLUMNS: Mapping[str, tuple[str, ...]] = {
     "time": ("time_s", "time"),
     "latitude": ("latitude", "lat"),
     "longitude": ("longitude", "lon"),
 }
-"""Columns of a CSV file, and how each may be called."""
+"""Columns of a CSV file, and their possible names."""
 
 
 class GeographicPose(NamedTuple):
-    """Where the camera is and which way it drives.
-
-    Attributes
-    ----------
-    longitude, latitude : float
-        WGS 84 [rad].
-    heading : float
-        Direction of travel, counterclockwise from east [rad].
-    """
+    """WGS 84 position [rad] and direction of travel, counterclockwise from east [rad], of the camera."""
 
     longitude: float
     latitude: float
@@ -54,18 +46,9 @@ class GeographicPose(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """A drive's positions.
+    """Positions of a drive, each (n,): increasing time [s], WGS 84 [rad], and direction of travel [rad].
 
-    Attributes
-    ----------
-    path : Path
-        The file.
-    time : (n,) float64
-        Increasing [s].
-    longitude, latitude : (n,) float64
-        WGS 84 [rad].
-    heading : (n,) float64
-        Direction of travel without jumps, counterclockwise from east [rad].
+    The direction is counterclockwise from east and has no jumps.
     """
 
     path: Path
@@ -75,13 +58,7 @@ class Track:
     heading: NDArray[np.float64]
 
     def pose_at(self, time: float) -> GeographicPose | None:
-        """Pose at an instant between two positions; None where the track does not have it.
-
-        Parameters
-        ----------
-        time : float
-            Instant in the track's time [s].
-        """
+        """Pose at an instant of the track's time [s], interpolated; None outside the track."""
         after = int(np.searchsorted(self.time, time))
         if time < self.time[0] or after == len(self.time):
             return None
@@ -93,20 +70,10 @@ class Track:
 
 
 def metres_per_radian(latitude: float) -> tuple[float, float]:
-    """Way east and north for an angle of longitude and latitude on the ellipsoid of WGS 84.
+    """Distance east and north per angle of longitude and latitude on the ellipsoid of WGS 84 [m/rad].
 
-    The radii of curvature are M = a (1 − e²) / (1 − e² sin²φ)^1.5 along the meridian and N = a / √(1 − e² sin²φ)
-    across it, so that the way east is N cos φ.
-
-    Parameters
-    ----------
-    latitude : float
-        Latitude φ [rad].
-
-    Returns
-    -------
-    tuple of float
-        East and north [m/rad].
+    The radii of curvature at latitude φ [rad] are M = a (1 − e²) / (1 − e² sin²φ)^1.5 along the meridian and N = a /
+    √(1 − e² sin²φ) across it, so that the distance east is N cos φ.
     """
     square = FLATTENING * (2.0 - FLATTENING)
     share = 1.0 - square * math.sin(latitude) ** 2
@@ -114,22 +81,11 @@ def metres_per_radian(latitude: float) -> tuple[float, float]:
 
 
 def load_track(path: Path) -> Track:
-    """Read the positions of a drive.
+    """Read the positions of a drive from ``.gpx`` or ``.csv``.
 
     GPX: the points of all tracks, whose time counts from the first. CSV with a heading line: ``time_s`` (or ``time`` as
-    ISO 8601, which counts from the first), ``latitude`` and ``longitude`` in degrees, and perhaps ``heading_deg``,
-    clockwise from north. Without headings they follow from positions at least `MOVING` apart.
-
-    Parameters
-    ----------
-    path : Path
-        The file: ``.gpx`` or ``.csv``.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, it is of another kind or broken, has fewer than two positions, its time goes back, or
-        it never moves and tells no headings.
+    ISO 8601, which counts from the first), ``latitude`` and ``longitude`` in degrees, and optionally ``heading_deg``,
+    clockwise from north. Missing headings follow from positions at least `MOVING` apart.
     """
     readers = {".gpx": _gpx_points, ".csv": _csv_points}
     if path.suffix.lower() not in readers:
@@ -147,7 +103,7 @@ def load_track(path: Path) -> Track:
 
 
 Point = tuple[float, float, float, float]
-"""Time [s], latitude, longitude, and heading clockwise from north [deg], NaN if it is not told."""
+"""Time [s], latitude, longitude, and heading clockwise from north [deg], NaN if missing."""
 
 
 def _gpx_points(path: Path) -> Iterator[Point]:
@@ -207,7 +163,7 @@ def _float(where: str, name: str, told: str | None) -> float:
 def _headings(
     path: Path, longitude: NDArray[np.float64], latitude: NDArray[np.float64], told: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Directions of travel: as they are told, else by the way from the position before to the one after."""
+    """Directions of travel: as given, otherwise from the position before to the one after."""
     if not np.isnan(told).any():
         return np.unwrap(np.radians(90.0 - told))
     east, north = metres_per_radian(float(latitude.mean()))

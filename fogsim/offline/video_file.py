@@ -1,4 +1,4 @@
-"""Videos that are written frame by frame, and are there only when they are whole."""
+"""Videos that are written frame by frame, and get their names when complete."""
 
 from pathlib import Path
 from types import TracebackType
@@ -12,20 +12,13 @@ from fogsim.recorders.video import Encoder, encoder_command
 from fogsim.values import Camera
 
 RATE_FACTOR = 12
-"""Constant rate factor: what is left of the road far away in fog is a few pixel values, and is to be kept."""
+"""Constant rate factor: distant road in fog differs by only a few pixel values, which must be kept."""
 
 
 class VideoWriter:
-    """Writes a video; as a context it takes its name at the end, and leaves nothing if an error ends it.
+    """Writes a video with frames `period` [s] apart; as a context, it names the file only after success.
 
-    Parameters
-    ----------
-    out : Path
-        The video, ``.mp4``.
-    period : float
-        Time between two frames [s].
-    rate_factor : int
-        libx264's constant rate factor, 0 … 51 [-].
+    `rate_factor` is libx264's constant rate factor, 0 … 51.
     """
 
     def __init__(self, out: Path, period: float, rate_factor: int = RATE_FACTOR) -> None:
@@ -33,26 +26,20 @@ class VideoWriter:
         self._encoder: Encoder | None = None
 
     def write(self, frame: Pixels) -> None:
-        """Add a frame.
-
-        Parameters
-        ----------
-        frame : (rows, cols, 3) uint8
-            Pixel values, red first; of the first frame's size.
-        """
+        """Add a frame (rows, cols, 3), red first, of the first frame's size."""
         if self._encoder is None:
             size = frame.shape[1], frame.shape[0]
             self._encoder = Encoder(encoder_command(partial_path(self._out), self._period, size, self._rate_factor))
         self._encoder.write(frame.tobytes())
 
     def __enter__(self) -> Self:
-        """Begin; the file is made with the first frame."""
+        """Begin; the file is created with the first frame."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Give the video its name, or leave none."""
+        """Give the video its name, or remove it."""
         try:
             if self._encoder is not None:
                 self._encoder.finish()
@@ -63,26 +50,7 @@ class VideoWriter:
 
 
 def refuse_unfit_video(out: Path, read: tuple[Path, ...], camera: Camera, *, kind: str, overwrite: bool) -> None:
-    """Refuse what cannot be written as a video of a camera's frames.
-
-    Parameters
-    ----------
-    out : Path
-        The video to be written.
-    read : tuple of Path
-        What is read.
-    camera : Camera
-        The camera.
-    kind : str
-        What video it is: "fogged".
-    overwrite : bool
-        True to replace a file that is there.
-
-    Raises
-    ------
-    InputError
-        If it does not end in ``.mp4``, must not be written, or has frames of an odd size.
-    """
+    """Raise InputError unless `out` is a writable ``.mp4`` and the camera's size is even; `kind` is for messages."""
     if out.suffix.lower() != ".mp4":
         raise InputError(f"--out {out}: a {kind} video is written as .mp4, got {out.suffix or 'no ending'}")
     refuse_unwritable(out, "--out", overwrite=overwrite, read=read, seeks=True)

@@ -1,4 +1,4 @@
-"""ASAM OpenSCENARIO XML 1.x: files as scenarios of FogSim, whose own language then plays them."""
+"""ASAM OpenSCENARIO XML 1.x: files as FogSim scenarios, played in its own language."""
 
 from fogsim.openscenario.reading import ScenarioData, is_openscenario, read_openscenario
 

@@ -15,7 +15,7 @@ from fogsim.openscenario.xml_tree import Node
 from fogsim.units import KMH_PER_MPS
 
 SHAPES = {"step": "step", "linear": "linear", "sinusoidal": "sinusoidal", "cubic": "sinusoidal"}
-"""Shapes of dynamics and the one in FogSim that is nearest."""
+"""Shapes of dynamics, and the nearest one in FogSim."""
 
 LAMPS = {
     "daytimeRunningLights": ("daytime",),
@@ -29,7 +29,7 @@ LAMPS = {
     "indicatorRight": ("indicator_right",),
     "warningLights": ("indicator_left", "indicator_right"),
 }
-"""Lamps of each kind of light."""
+"""Lamps of each type of light."""
 
 _UNLIT = ("licensePlateIllumination", "reversingLights", "specialPurposeLights")
 _STAY = 1e5  # Time for which a vehicle stays in the lane that it has changed to [s]
@@ -38,24 +38,14 @@ _NEAR = 0.05  # Difference at which a speed has been reached [m/s]
 
 @dataclass
 class Effect:
-    """What an event does.
-
-    Attributes
-    ----------
-    do : dict
-        Blocks of an entry of the timeline, by their subjects.
-    lasts : float
-        How long that takes, as far as a time is given [s].
-    ends : list of str
-        Conditions that hold when the rest is over.
-    """
+    """What an event does: timeline blocks by subject, their known duration [s], and conditions that end the rest."""
 
     do: dict[str, dict[str, Any]] = field(default_factory=dict)
     lasts: float = 0.0
     ends: list[str] = field(default_factory=list)
 
     def add(self, subject: str, **blocks: Any) -> None:
-        """Let a subject do something more."""
+        """Add an action of a subject."""
         mine = self.do.setdefault(subject, {})
         for key, block in blocks.items():
             mine[key] = {**mine.get(key, {}), **block} if key == "lamps" else block
@@ -63,19 +53,7 @@ class Effect:
 
 @dataclass
 class Actions:
-    """Reads actions.
-
-    Attributes
-    ----------
-    vehicles : mapping from str to Vehicle
-        The vehicles.
-    catalogs : Catalogs
-        Where environments may be.
-    positions : Positions
-        Knows the map, and where everybody begins.
-    called : callable
-        A vehicle's name in conditions.
-    """
+    """Reads actions; `called` gives a vehicle's name in conditions."""
 
     vehicles: Mapping[str, Vehicle]
     catalogs: Catalogs
@@ -84,21 +62,11 @@ class Actions:
 
     @property
     def findings(self) -> Findings:
-        """Takes what cannot be done."""
+        """Receives what cannot be done."""
         return self.catalogs.findings
 
     def take(self, action: Node, actors: list[str], effect: Effect) -> None:
-        """Add what an action does.
-
-        Parameters
-        ----------
-        action : Node
-            A ``PrivateAction``, a ``GlobalAction``, or what holds one.
-        actors : list of str
-            Who does it, if it is private.
-        effect : Effect
-            Takes it.
-        """
+        """Add an action (``PrivateAction``, ``GlobalAction``, or their parent) of some actors to an effect."""
         for one in action.all():
             if one.tag in ("PrivateAction", "GlobalAction", "LongitudinalAction", "LateralAction", "AppearanceAction"):
                 self.take(one, actors, effect)
@@ -217,7 +185,7 @@ class Actions:
             return
         mode = self.findings.word(state, "mode", ("on", "off", "flashing"))
         for key in ("luminousIntensity", "flashingOnDuration", "flashingOffDuration"):
-            # Lamps shine as their kind does, and indicators flash as the law has it.
+            # Lamps shine as their type does, and indicators flash as the law requires.
             state.get(key)
         for colour in state.all("Color"):
             self.findings.leave_out(colour, "lamps have the colour of their kind")
@@ -255,4 +223,4 @@ ACTIONS: Mapping[str, str] = {
     "EnvironmentAction": "`fog` and `light`.",
     **{tag: inspect.getdoc(action) or "" for tag, action in _PRIVATE.items()},
 }
-"""Actions that are read, and what becomes of each."""
+"""Actions that are read, and their translation."""

@@ -15,22 +15,12 @@ LOCATIONS = {
     "ControllerCatalog": "Controller",
     "ManeuverCatalog": "Maneuver",
 }
-"""Kinds of catalogs that are read, and what is in them."""
+"""Types of catalogs that are read, and their elements."""
 
 
 @dataclass
 class Catalogs:
-    """The catalogs that a file names.
-
-    Attributes
-    ----------
-    folder : Path
-        Folder to which their places are relative: the file's.
-    locations : Node or None
-        The element ``CatalogLocations``.
-    findings : Findings
-        Takes what cannot be found.
-    """
+    """The catalogs that a file names, relative to its folder."""
 
     folder: Path
     locations: Node | None
@@ -38,13 +28,7 @@ class Catalogs:
     _read: dict[Path, Node] = field(default_factory=dict)
 
     def entry(self, reference: Node) -> Node | None:
-        """What a ``CatalogReference`` refers to, with its parameters; None if there is none, which is noted.
-
-        Parameters
-        ----------
-        reference : Node
-            The reference.
-        """
+        """The element that a ``CatalogReference`` refers to, with its parameters; None, and a finding, if missing."""
         catalog, name = reference.get("catalogName"), reference.get("entryName")
         given = {
             one.get("parameterRef"): one.get("value")
@@ -58,7 +42,7 @@ class Catalogs:
                 if one.attributes.get("name") == name:
                     whole = one.copy()
                     own = declared(whole, {}, self.findings)
-                    # What the reference gives goes before what the entry has.
+                    # Values of the reference take precedence over those of the entry.
                     whole.children = [child for child in whole.children if child.tag != "ParameterDeclarations"]
                     put_parameters(whole, {**own, **given}, self.findings)
                     whole.is_read = True
@@ -75,7 +59,7 @@ class Catalogs:
                 except InputError as error:
                     self.findings.refused.append(str(error))
                     self._read[file] = Node("", {}, file, 1)
-            # Whoever has copied a catalog may not have changed the name inside.
+            # A copied catalog may still have its old name inside.
             yield from (
                 one
                 for one in self._read[file].children

@@ -1,4 +1,4 @@
-"""Where the sun stands, and how bright it makes the ground."""
+"""Elevation of the sun, and illuminance of the ground."""
 
 import datetime as dt
 import math
@@ -6,7 +6,7 @@ import math
 from numpy.polynomial import polynomial
 
 USUAL_LATITUDE = math.radians(50.0)
-"""Latitude where a map tells none [rad]."""
+"""Latitude if a map gives none [rad]."""
 
 _BRANCHES = (
     (20.0, (3.74, 3.97, -4.07, 1.47)),
@@ -20,17 +20,11 @@ _BRANCHES = (
 
 
 def sun_elevation(moment: dt.datetime, latitude: float | None, longitude: float | None) -> float:
-    """Elevation of the sun's middle above the horizon, without refraction [rad].
+    """Elevation of the sun's centre above the horizon, without refraction [rad], at a place [rad, east and north].
 
     Declination and equation of time after Spencer (Fourier series representation of the position of the sun, Search
-    2(5), 1971), good to some minutes of arc.
-
-    Parameters
-    ----------
-    moment : datetime
-        Date and time with its distance to UTC; without one, or without a longitude, the time is mean solar time.
-    latitude, longitude : float or None
-        Of the place [rad], north and east positive; None for 50° N, and for the time zone's middle.
+    2(5), 1971), accurate to some minutes of arc. A time without a time zone, or without a longitude, is mean solar
+    time; without a latitude, 50° N is assumed.
     """
     hour = moment.hour + moment.minute / 60.0 + moment.second / 3600.0
     offset = moment.utcoffset()
@@ -52,15 +46,10 @@ def sun_elevation(moment: dt.datetime, latitude: float | None, longitude: float 
 
 
 def clear_sky_illuminance(elevation: float) -> float:
-    """Horizontal illuminance by sun and clear sky, in twilight and at night too [lx].
+    """Horizontal illuminance by sun and clear sky, also in twilight and at night [lx].
 
-    Seidelmann (ed.), Explanatory Supplement to the Astronomical Almanac, 1992, p. 491: cubics in elevation / 90° of
-    log10 lx, from −18° on; below, starlight is as bright as there.
-
-    Parameters
-    ----------
-    elevation : float
-        Of the sun [rad].
+    Seidelmann (ed.), Explanatory Supplement to the Astronomical Almanac, 1992, p. 491: cubics in elevation [rad] / 90°
+    of log10 lx, from −18° on; below, starlight is as bright as there.
     """
     degrees = min(max(math.degrees(elevation), _BRANCHES[-1][0]), 90.0)
     coefficients = next(one for lowest, one in _BRANCHES if degrees >= lowest)
@@ -69,13 +58,5 @@ def clear_sky_illuminance(elevation: float) -> float:
 
 
 def through_clouds(illuminance: float, oktas: float) -> float:
-    """Horizontal illuminance under clouds [lx] (Kasten & Czeplak, Solar Energy 24, 1980: 1 − 0.75 (N/8)^3.4).
-
-    Parameters
-    ----------
-    illuminance : float
-        By clear sky [lx].
-    oktas : float
-        Eighths of the sky that clouds cover, 0 … 8.
-    """
+    """Horizontal illuminance [lx] under 0 … 8 oktas (Kasten & Czeplak, Solar Energy 24, 1980: 1 − 0.75 (N/8)^3.4)."""
     return illuminance * (1.0 - 0.75 * math.pow(min(oktas, 8.0) / 8.0, 3.4))

@@ -25,22 +25,9 @@ _EGO_NAMES = ("ego", "hero", "ego_vehicle", "egovehicle")
 
 @dataclass(frozen=True, slots=True)
 class Vehicle:
-    """A vehicle.
+    """A vehicle: its size [m] and limits [m/s, m/s²].
 
-    Attributes
-    ----------
-    name : str
-        Its id.
-    node : Node
-        Where it is described.
-    category : str
-        OpenSCENARIO's.
-    length, width, height : float
-        Size [m].
-    front : float
-        From the reference point, the middle of the rear axle, to the front bumper [m].
-    top_speed, acceleration, deceleration : float
-        What it can do [m/s, m/s²].
+    `front` is the distance from its reference point, the middle of the rear axle, to the front bumper [m].
     """
 
     name: str
@@ -61,15 +48,7 @@ class Vehicle:
 
 
 def read_vehicles(entities: Node, catalogs: Catalogs) -> dict[str, Vehicle]:
-    """Vehicles by name; what is none is noted.
-
-    Parameters
-    ----------
-    entities : Node
-        The element ``Entities``.
-    catalogs : Catalogs
-        Where it may refer to.
-    """
+    """Vehicles by name; other entities become findings."""
     found: dict[str, Vehicle] = {}
     for entity in entities.all("ScenarioObject"):
         name = entity.get("name")
@@ -129,11 +108,5 @@ def _vehicle(name: str, node: Node, catalogs: Catalogs) -> Vehicle:
 
 
 def ego_of(vehicles: dict[str, Vehicle]) -> str:
-    """Which vehicle is the ego: one that is called so (``Ego``, ``hero``), else the first.
-
-    Parameters
-    ----------
-    vehicles : dict from str to Vehicle
-        They.
-    """
+    """Name of the ego: a vehicle with a usual name (``Ego``, ``hero``), otherwise the first."""
     return next((name for name in vehicles if name.lower() in _EGO_NAMES), next(iter(vehicles), "ego"))

@@ -15,10 +15,10 @@ from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes
 
 _CLOUDS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
 _OLD_CLOUDS = {"free": 0.0, "cloudy": 4.0, "overcast": 8.0, "rainy": 8.0, "skyOff": 0.0}
-"""Oktas of the words that OpenSCENARIO 1.0 has for the sky."""
+"""Oktas of the words for the sky in OpenSCENARIO 1.0."""
 
 BRIGHTEST = 200_000.0
-_STEP = 1.0  # of a route that is looked at for where a box begins [m]
+_STEP = 1.0  # along a route, in the search for the start of a box [m]
 _EDGE = 1.0  # of a box of fog, whose border is sharp [m]
 
 
@@ -32,23 +32,16 @@ class Box:
     height: float
 
     def covers(self, points: Any) -> Any:
-        """Which points (n, 2) it covers."""
+        """Which of the points (n, 2) are inside."""
         away = np.abs(np.asarray(points) - np.array(self.centre[:2]))
         return (away[:, 0] <= 0.5 * self.length) & (away[:, 1] <= 0.5 * self.width)
 
 
 @dataclass(frozen=True, slots=True)
 class Environment:
-    """What an environment says.
+    """Fog and light of an environment: V_met [m], extent and illuminance of the ground [lx], None if not given.
 
-    Attributes
-    ----------
-    visibility : float or None
-        Meteorological visibility [m]; None if it says nothing of fog.
-    box : Box or None
-        Where the fog is; None for everywhere.
-    illuminance : float or None
-        Of the ground [lx]; None if it says nothing of light.
+    A `box` of None is fog everywhere.
     """
 
     visibility: float | None = None
@@ -57,17 +50,7 @@ class Environment:
 
 
 def environment_of(action: Node, catalogs: Catalogs, lanes: OpenDriveLanes) -> Environment:
-    """What an ``EnvironmentAction`` says.
-
-    Parameters
-    ----------
-    action : Node
-        The action.
-    catalogs : Catalogs
-        Where it may refer to.
-    lanes : OpenDriveLanes
-        The map, which may tell where on earth it is.
-    """
+    """Fog and light of an ``EnvironmentAction``; the map may give its geographic position."""
     findings, reference = catalogs.findings, action.one("CatalogReference")
     node = catalogs.entry(reference) if reference else action.one("Environment")
     if node is None:
@@ -114,7 +97,7 @@ def _illuminance(node: Node, weather: Node | None, lanes: OpenDriveLanes, findin
     told = next((key for key in ("illuminance", "intensity") if sun and sun.get(key)), None)
     moment = None if time is None else _moment(time, findings)
     if sun is not None:
-        # The direction is of no matter in fog.
+        # In fog the direction does not matter.
         sun.get("azimuth")
         elevation = findings.number(sun, "elevation", math.nan) if sun.get("elevation") else None
         if told:
@@ -159,14 +142,7 @@ def _leave_out_weather(weather: Node, findings: Findings) -> None:
 def fog_block(environment: Environment, route: Any, lowest: float) -> dict[str, Any]:
     """The block ``fog`` of a scenario.
 
-    Parameters
-    ----------
-    environment : Environment
-        What the file says at the beginning.
-    route : (n, 2) float64
-        Middle of the ego's way [m].
-    lowest : float
-        Height of its lowest point, from which heights of fog count [m].
+    `route` (n, 2) is the middle of the ego's route, and heights of fog count from `lowest` [m].
     """
     visibility = math.inf if environment.visibility is None else environment.visibility
     box = environment.box
@@ -186,7 +162,7 @@ def fog_block(environment: Environment, route: Any, lowest: float) -> dict[str, 
 
 
 def _stretches(route: Any, box: Box) -> list[tuple[float, float]]:
-    """Where along a way a box covers it [m]."""
+    """Intervals of a route inside a box [m]."""
     steps = np.diff(route, axis=0)
     ends = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
     along = np.linspace(0.0, ends[-1], max(int(ends[-1] / _STEP) + 1, 2))

@@ -1,4 +1,4 @@
-"""What of a file FogSim cannot do, and what it leaves out: each told once, with its path and line."""
+"""What FogSim cannot do of a file, and what it leaves out: each reported once, with its path and line."""
 
 import math
 import warnings
@@ -22,67 +22,33 @@ PASSED_OVER = {
     "UsedArea": "part of the map that is used",
     "ConstraintGroup": "limits of parameters",
 }
-"""Elements that change nothing in FogSim, and what they are."""
+"""Elements without effect in FogSim, and what they are."""
 
 ATTRIBUTES_PASSED_OVER = frozenset(
     {"name", "model3d", "mass", "role", "animation", "maximumExecutionCount", "atmosphericPressure", "temperature"}
 )
-"""Attributes that change nothing in FogSim."""
+"""Attributes without effect in FogSim."""
 
 
 @dataclass
 class Findings:
-    """Collects what does not go.
-
-    Attributes
-    ----------
-    refused, left_out : list of str
-        Lines about what cannot be done, and what is left out.
-    """
+    """Collects lines about what FogSim cannot do and what it leaves out."""
 
     refused: list[str] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
 
     def refuse(self, node: Node, told: str) -> None:
-        """Note what FogSim cannot do.
-
-        Parameters
-        ----------
-        node : Node
-            Which element.
-        told : str
-            Why.
-        """
+        """Record an element that FogSim cannot do, and why."""
         _seen(node)
         self._add(self.refused, f"{node.where}: {told}")
 
     def leave_out(self, node: Node, told: str) -> None:
-        """Note what FogSim leaves out.
-
-        Parameters
-        ----------
-        node : Node
-            Which element.
-        told : str
-            What that means.
-        """
+        """Record an element that FogSim leaves out, and what that means."""
         _seen(node)
         self._add(self.left_out, f"{node.where}: {told}")
 
     def number(self, node: Node, key: str, default: float | None = None, *, is_finite: bool = True) -> float:
-        """Number of an attribute; one that is none is noted.
-
-        Parameters
-        ----------
-        node : Node
-            The element.
-        key : str
-            The attribute.
-        default : float or None
-            What stands for it where it is missing; None if it must be there.
-        is_finite : bool
-            Whether it must be finite.
-        """
+        """Number of an attribute; an invalid one, or a missing one without default, becomes a finding."""
         text = node.get(key)
         if not text and default is not None:
             return default
@@ -96,17 +62,7 @@ class Findings:
         return value
 
     def word(self, node: Node, key: str, allowed: tuple[str, ...], default: str = "") -> str:
-        """Word of an attribute; one that is not allowed is noted.
-
-        Parameters
-        ----------
-        node, key
-            As of `number`.
-        allowed : tuple of str
-            What it may be.
-        default : str
-            What stands for it where it is missing.
-        """
+        """Word of an attribute; one that is not allowed becomes a finding."""
         text = node.get(key) or default
         if text not in allowed:
             self._add(self.refused, f"{node.where}: {key}: unknown value {shown(text)}; {suggest(text, allowed)}")
@@ -114,13 +70,7 @@ class Findings:
         return text
 
     def look_for_unread(self, root: Node) -> None:
-        """Note what nobody has looked at.
-
-        Parameters
-        ----------
-        root : Node
-            The whole file, or a part of a catalog.
-        """
+        """Record elements and attributes that were not read."""
         if root.tag in PASSED_OVER:
             return
         if not root.is_read:
@@ -133,18 +83,7 @@ class Findings:
             self.look_for_unread(child)
 
     def close(self, path: Path) -> None:
-        """Tell everything.
-
-        Parameters
-        ----------
-        path : Path
-            The file.
-
-        Raises
-        ------
-        InputError
-            If there is something that cannot be done.
-        """
+        """Report all findings; InputError if FogSim cannot do something."""
         if self.refused:
             raise InputError("\n".join(self.refused))
         if self.left_out:
@@ -157,7 +96,7 @@ class Findings:
 
 
 def _seen(node: Node) -> None:
-    """Mark it and what is in it, so that it is told once."""
+    """Mark an element and its children as read, so that it is reported once."""
     for one in node.walk():
         one.is_read = True
         one.read.update(one.attributes)

@@ -1,4 +1,4 @@
-"""The beginning: where vehicles are, how fast they drive, their lamps, the fog and the light."""
+"""The initial state: positions, speeds and lamps of vehicles, fog and light."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -12,19 +12,7 @@ from fogsim.traffic.road.opendrive_lanes import Spot
 
 @dataclass
 class Beginning:
-    """How everything begins.
-
-    Attributes
-    ----------
-    spots : dict from str to Spot
-        Reference points of the vehicles.
-    speeds : dict from str to float
-        Their speeds, as far as they are told [m/s].
-    environment : Environment
-        Fog and light.
-    effect : Effect
-        What else is done at once.
-    """
+    """Initial state: reference points and speeds [m/s] of vehicles, fog and light, and further effects."""
 
     spots: dict[str, Spot] = field(default_factory=dict)
     speeds: dict[str, float] = field(default_factory=dict)
@@ -33,17 +21,7 @@ class Beginning:
 
 
 def read_beginning(init: Node | None, vehicles: Mapping[str, Vehicle], actions: Actions) -> Beginning:
-    """What ``Init`` says.
-
-    Parameters
-    ----------
-    init : Node or None
-        The element.
-    vehicles : mapping from str to Vehicle
-        The vehicles.
-    actions : Actions
-        Reads what is done beyond places, speeds, fog and light.
-    """
+    """Initial state from the element ``Init``."""
     begin = Beginning(actions.positions.entities)
     blocks = init.all("Actions") if init else []
     for block in blocks:
@@ -76,7 +54,7 @@ def _take_global(action: Node, begin: Beginning, actions: Actions) -> None:
 
 
 def _place(private: list[Node], vehicles: Mapping[str, Vehicle], actions: Actions) -> None:
-    """Place vehicles, those last whose place is relative to another's."""
+    """Place vehicles; those relative to another one last."""
     wanted: dict[str, Node] = {}
     for one in private:
         name = one.get("entityRef")
@@ -105,7 +83,7 @@ def _take_private(action: Node, name: str, begin: Beginning, actions: Actions) -
     done = effect.do.get(name, {})
     speed = done.pop("speed", None)
     if speed is not None:
-        # At the beginning there is nothing that a speed could change from.
+        # At the start there is no earlier speed to change from.
         begin.speeds[name] = _speed(speed, begin.speeds)
     if done:
         begin.effect.add(name, **done)
@@ -122,19 +100,7 @@ Along = Callable[[str | Node], float | None]
 
 
 def along_route(route: tuple[str, ...], begin: Beginning, vehicles: Mapping[str, Vehicle], actions: Actions) -> Along:
-    """Position along the ego's route: of a vehicle's front bumper at the beginning, or of a position.
-
-    Parameters
-    ----------
-    route : tuple of str
-        Edges of the ego's route.
-    begin : Beginning
-        The beginning.
-    vehicles : mapping from str to Vehicle
-        The vehicles.
-    actions : Actions
-        Finds positions.
-    """
+    """Position along the ego's route: of a vehicle's front bumper at the beginning, or of a position."""
     lengths = {lane.edge: lane.length for lane in actions.positions.lanes.lanes}
     starts = {edge: sum(lengths[before] for before in route[:number]) for number, edge in enumerate(route)}
 

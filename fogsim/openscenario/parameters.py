@@ -1,4 +1,4 @@
-"""Parameters of a file put in place of ``$name`` and ``${expression}``."""
+"""Values of a file's parameters in place of ``$name`` and ``${expression}``."""
 
 import ast
 import math
@@ -14,7 +14,7 @@ _NAME = re.compile(r"\$([A-Za-z_][A-Za-z0-9_.]*)")
 _EXPRESSION = re.compile(r"\$\{([^{}]*)\}")
 _LONGEST = 500
 _FREE_TEXT = ("name", "description", "author", "license")
-"""Attributes in which a ``$`` that means nothing does no harm."""
+"""Attributes in which a ``$`` without meaning does no harm."""
 
 _UNARY: Mapping[type[ast.AST], Callable[[float], float]] = {
     ast.USub: operator.neg,
@@ -53,17 +53,7 @@ Parameters = Mapping[str, str]
 
 
 def put_parameters(node: Node, known: Parameters, findings: Findings) -> None:
-    """Put values in place of parameters in an element and all in it, which may declare some of their own.
-
-    Parameters
-    ----------
-    node : Node
-        The element; it is changed.
-    known : mapping from str to str
-        Parameters declared around it.
-    findings : Findings
-        Takes what cannot be evaluated.
-    """
+    """Replace parameters by values in an element and its children, which may declare more."""
     for key, text in node.attributes.items():
         if "$" not in text:
             continue
@@ -79,13 +69,7 @@ def put_parameters(node: Node, known: Parameters, findings: Findings) -> None:
 
 
 def declared(node: Node, known: Parameters, findings: Findings) -> Parameters:
-    """Parameters known in an element: those around it, and those that it declares.
-
-    Parameters
-    ----------
-    node, known, findings
-        As of `put_parameters`.
-    """
+    """Parameters known in an element: those around it, and those that it declares."""
     inside = dict(known)
     for block in (child for child in node.children if child.tag == "ParameterDeclarations"):
         put_parameters(block, known, findings)
@@ -104,20 +88,7 @@ def _value_of(declaration: Node, known: Parameters, findings: Findings) -> str:
 
 
 def evaluated(text: str, known: Parameters) -> str:
-    """A text with values in place of parameters.
-
-    Parameters
-    ----------
-    text : str
-        ``$name``, or with ``${expression}`` in it.
-    known : mapping from str to str
-        Parameters.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is not known, or an expression cannot be evaluated.
-    """
+    """A text with ``$name`` and ``${expression}`` replaced by values; ValueError if one is unknown or invalid."""
     if (match := _NAME.fullmatch(text.strip())) is not None:
         return _parameter(match[1], known)
     return _EXPRESSION.sub(lambda match: _result(match[1], known), text)

@@ -1,4 +1,4 @@
-"""Where the positions of a file are on the lanes of the network."""
+"""Positions of a file on the lanes of the network."""
 
 import inspect
 import math
@@ -12,40 +12,18 @@ from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, Spot
 
 @dataclass
 class Positions:
-    """Finds positions.
-
-    Attributes
-    ----------
-    lanes : OpenDriveLanes
-        The lanes.
-    findings : Findings
-        Takes what cannot be found.
-    entities : dict from str to Spot
-        Where entities begin, as far as that is known: relative positions refer to it.
-    """
+    """Finds positions; relative ones refer to the known initial positions `entities`."""
 
     lanes: OpenDriveLanes
     findings: Findings
     entities: dict[str, Spot] = field(default_factory=dict)
 
     def refers_to(self, position: Node) -> str | None:
-        """Entity to which a position is relative; None for a position of its own.
-
-        Parameters
-        ----------
-        position : Node
-            The element ``Position``.
-        """
+        """Entity to which a ``Position`` is relative; None for an absolute one."""
         return next((one.attributes.get("entityRef") for one in position.children), None)
 
     def spot(self, position: Node) -> Spot | None:
-        """Place of a position; None where it cannot be, which is noted.
-
-        Parameters
-        ----------
-        position : Node
-            The element ``Position``.
-        """
+        """Place of a ``Position``; None, and a finding, if it cannot be placed."""
         one = next(iter(position.all()), None)
         if one is None or one.tag not in _KINDS:
             told = f"positions are read of {', '.join(_KINDS)}"
@@ -125,4 +103,4 @@ _KINDS: Mapping[str, Callable[[Positions, Node], Spot]] = {
 }
 
 POSITIONS: Mapping[str, str] = {tag: inspect.getdoc(kind) or "" for tag, kind in _KINDS.items()}
-"""Kinds of positions that are read, and which place each is."""
+"""Types of positions that are read, with the place of each."""

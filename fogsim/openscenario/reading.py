@@ -1,4 +1,4 @@
-"""An OpenSCENARIO file as the plain data of a scenario file, and SUMO's files that go with it."""
+"""An OpenSCENARIO file as the plain data of a scenario file, with its SUMO files."""
 
 import re
 import warnings
@@ -28,60 +28,32 @@ from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, read_opendrive_l
 from fogsim.units import KMH_PER_MPS
 
 USUAL_DURATION = 120.0
-"""Longest simulated time of a file whose stop trigger names none [s]."""
+"""Longest simulated time of a file whose stop trigger has no time [s]."""
 
 NEAR_THE_END = 10.0
-"""How near to the end of its route the ego has arrived [m]."""
+"""Distance to the end of its route at which the ego has arrived [m]."""
 
 Key = tuple[str | int, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class ScenarioData:
-    """Plain data of a scenario.
-
-    Attributes
-    ----------
-    data : dict
-        As a scenario file in YAML holds it.
-    lines : mapping from key path to int
-        Lines on which what keys stand for is written.
-    """
+    """Plain data of a scenario, as a YAML file would hold it, and the lines of the elements behind its keys."""
 
     data: dict[str, Any]
     lines: Mapping[Key, int] = field(default_factory=dict)
 
 
 def is_openscenario(path: Path) -> bool:
-    """Tell whether a file is OpenSCENARIO XML, by its name.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    """
+    """Whether a file is OpenSCENARIO XML, by its name."""
     return path.suffix.lower() == ".xosc"
 
 
 def read_openscenario(path: Path) -> ScenarioData:
-    """Read an OpenSCENARIO XML 1.x file.
+    """Read an OpenSCENARIO XML 1.x file as the data of a scenario file.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    ScenarioData
-        What a scenario file in YAML would hold; the network and the route file lie in the user's cache directory.
-
-    Raises
-    ------
-    InputError
-        If it is none, or has what FogSim cannot do: a line for each, with file, line and path of the element.
-    MissingDependencyError
-        If its roads cannot be read, for netconvert is missing.
+    The network and the route file go to the user's cache directory. InputError has a line for each element that FogSim
+    cannot do; MissingDependencyError if netconvert is missing.
     """
     root, findings = read_xml(path), Findings()
     if root.tag != "OpenSCENARIO":
@@ -136,7 +108,7 @@ class _Reader:
         actions = story.actions
         begin = read_beginning(self.storyboard.one("Init"), self.vehicles, actions)
         if ego not in begin.spots:
-            # Without a route there is nothing along which anything could be measured.
+            # Without a route, no position along it can be measured.
             self.findings.refuse(
                 self.root, f"no vehicle that could be the ego has a place; there are {len(self.vehicles)}"
             )
@@ -196,17 +168,7 @@ def _called(name: str, ego: str) -> str:
 
 
 def begin_at_once(entries: list[tuple[Node, dict[str, Any]]], begin: Beginning, ego: str) -> None:
-    """Let speeds that are ordered for the very beginning be those with which vehicles begin.
-
-    Parameters
-    ----------
-    entries : list of (Node, dict)
-        The timeline; what has been done is taken out of it.
-    begin : Beginning
-        Takes the speeds.
-    ego : str
-        The ego.
-    """
+    """Move speeds that are ordered for the very beginning from the timeline to the initial state."""
     for _, block in entries:
         for vehicle, done in block["do"].items() if block["when"] == "time >= 0 s" and "delay_s" not in block else ():
             speed = done.get("speed") if isinstance(done, dict) else None
@@ -223,7 +185,7 @@ def begin_at_once(entries: list[tuple[Node, dict[str, Any]]], begin: Beginning, 
 
 
 def _initial(begin: Beginning, ego: str) -> dict[str, Any]:
-    """Entry of the timeline that holds what holds from the beginning: the speeds of all but the ego, and lamps."""
+    """Entry of the timeline for the initial state: the speeds of all vehicles but the ego, and lamps."""
     for name in begin.spots:
         speed = begin.speeds.get(name, 0.0)
         if name != ego or speed <= STANDS:

@@ -17,21 +17,7 @@ _PARTS = ("Story", "Act", "ManeuverGroup", "Maneuver", "Event", "Action")
 
 @dataclass
 class Entry:
-    """An event as an entry of the timeline.
-
-    Attributes
-    ----------
-    name : str
-        Its name there.
-    node : Node
-        The event.
-    actors : list of str
-        Who acts.
-    effect : Effect
-        What it does.
-    trigger : Trigger
-        When it begins; `NEVER` until it is known.
-    """
+    """An event as an entry of the timeline; its trigger is `NEVER` until it is known."""
 
     name: str
     node: Node
@@ -42,17 +28,7 @@ class Entry:
 
 @dataclass
 class Storyboard:
-    """Reads stories.
-
-    Attributes
-    ----------
-    catalogs : Catalogs
-        Where maneuvers may be.
-    actions : Actions
-        Reads what events do.
-    entries : dict from int to Entry
-        Events by the identity of their elements.
-    """
+    """Reads stories; `entries` has the events by the identity of their elements."""
 
     catalogs: Catalogs
     actions: Actions
@@ -64,17 +40,11 @@ class Storyboard:
 
     @property
     def findings(self) -> Findings:
-        """Takes what cannot be played."""
+        """Receives what cannot be played."""
         return self.catalogs.findings
 
     def find_events(self, storyboard: Node) -> None:
-        """Find every event and what it does; when comes later, for events refer to one another.
-
-        Parameters
-        ----------
-        storyboard : Node
-            The element.
-        """
+        """Find all events and their effects; triggers follow later, since events refer to one another."""
         self._stories = storyboard.all("Story")
         for group in self._groups():
             actors = group.one("Actors")
@@ -112,7 +82,7 @@ class Storyboard:
             self.actions.take(action, actors, entry.effect)
 
     def timeline(self) -> list[tuple[Node, dict[str, Any]]]:
-        """Entries of the timeline, each with the element that it stands for."""
+        """Entries of the timeline, each with its element."""
         triggers = self._need_triggers()
         for story in self._stories:
             for act in story.all("Act"):
@@ -133,7 +103,7 @@ class Storyboard:
         return self.triggers
 
     def _act_begins(self, act: Node, triggers: Triggers) -> Trigger:
-        """When an act begins; what is more than a time is remembered by a mark."""
+        """When an act begins; a trigger that is more than a time becomes a mark."""
         begins = triggers.trigger(act.one("StartTrigger")) or AT_ONCE
         if begins.at is not None or not begins.condition:
             return begins
@@ -146,13 +116,7 @@ class Storyboard:
         return both(self._acts[id(act)], own)
 
     def state(self, node: Node) -> Trigger:
-        """Condition for a state of an element of the storyboard.
-
-        Parameters
-        ----------
-        node : Node
-            A ``StoryboardElementStateCondition``.
-        """
+        """Trigger for a ``StoryboardElementStateCondition``."""
         kind = node.get("storyboardElementType")
         kind = "ManeuverGroup" if kind == "maneuverGroup" else kind[:1].upper() + kind[1:]
         name, state = node.get("storyboardElementRef"), node.get("state")
@@ -184,7 +148,7 @@ class Storyboard:
         return self._acts[id(act)]
 
     def _over(self, part: Node) -> Trigger:
-        """When all events in it are over."""
+        """When all events in an element are over."""
         inner = {id(event): event for act in self._all_acts() for event in _events(act)}
         if part.tag == "Action":
             events = [self._entry(part).node]
@@ -215,7 +179,7 @@ def _is_called(node: Node, kind: str, name: str) -> bool:
 
 
 def _free_name(wanted: str, taken: set[str]) -> str:
-    """A name for an entry of the timeline: letters, digits and _, not taken yet."""
+    """A name for an entry of the timeline: letters, digits and _, and unique."""
     name = re.sub(r"\W", "_", wanted, flags=re.ASCII)[:80] or "event"
     name = name if name[0].isalpha() or name[0] == "_" else f"_{name}"
     number = 1
@@ -227,7 +191,7 @@ def _free_name(wanted: str, taken: set[str]) -> str:
 
 
 def _until(stop: Trigger | None, triggers: Triggers, node: Node) -> str:
-    """What must hold beside an event's own trigger while its act has not been stopped."""
+    """Condition for an event in addition to its trigger: its act has not been stopped."""
     if stop is None or not stop.condition:
         return ""
     if stop.at is not None:

@@ -22,21 +22,14 @@ RULES = {
 
 _EDGES = ("none", "rising", "falling", "risingOrFalling")
 _WORD = re.compile(r"[A-Za-z_][\w:#@\-]*")
-_STILL = 0.1  # Speed below which a vehicle stands [m/s]
+_STILL = 0.1  # Speed below which a vehicle counts as stopped [m/s]
 
 
 @dataclass(frozen=True, slots=True)
 class Trigger:
-    """When something begins.
+    """When something begins: a condition in FogSim's language ("" for never), and a delay after it [s].
 
-    Attributes
-    ----------
-    condition : str
-        In FogSim's language; "" for never.
-    delay : float
-        Time from then [s].
-    at : float or None
-        Time that the condition stands for, if it asks for nothing else [s]; below zero for at once.
+    `at` is the time if the condition is only a time [s]; below zero for the start.
     """
 
     condition: str
@@ -46,17 +39,7 @@ class Trigger:
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """An entry of the timeline that says that something has been.
-
-    Attributes
-    ----------
-    name : str
-        Its name.
-    trigger : Trigger
-        When.
-    node : Node
-        The element for whose sake it is there.
-    """
+    """A timeline entry without action that records that something has happened, for an element."""
 
     name: str
     trigger: Trigger
@@ -82,20 +65,8 @@ class _Test:
 class Triggers:
     """Reads triggers.
 
-    Attributes
-    ----------
-    vehicles : mapping from str to Vehicle
-        The vehicles.
-    ego : str
-        Which of them is the ego.
-    positions : Positions
-        Finds positions.
-    along : callable
-        Position of a spot along the ego's route [m], by an entity or a position; None beside it.
-    states : callable
-        Condition for a state of an element of the storyboard, from the condition's element.
-    marks : list of Mark
-        What must be remembered; they become entries of the timeline that do nothing.
+    `along` is the position of an entity or position along the ego's route [m], None off the route; `states` gives the
+    trigger of a storyboard state condition; `marks` become timeline entries without action.
     """
 
     vehicles: Mapping[str, Vehicle]
@@ -107,17 +78,11 @@ class Triggers:
 
     @property
     def findings(self) -> Findings:
-        """Takes what cannot be asked for."""
+        """Receives what conditions cannot express."""
         return self.positions.findings
 
     def trigger(self, node: Node | None) -> Trigger | None:
-        """What a ``StartTrigger`` or ``StopTrigger`` stands for; None if there is none.
-
-        Parameters
-        ----------
-        node : Node or None
-            It. Without groups it never begins.
-        """
+        """Trigger of a ``StartTrigger`` or ``StopTrigger``; None without one, never without groups."""
         if node is None:
             return None
         groups = [self._group(group) for group in node.all("ConditionGroup")]
@@ -192,20 +157,14 @@ class Triggers:
         if test.signal and test.rule in ("<", "<=", ">", ">="):
             how = "rises above" if (test.rule[0] == ">") == is_rising else "falls below"
             return f"{test.signal} {how} {test.value}"
-        # What was otherwise before is so now.
+        # An edge: the condition was different before.
         name = f"before_{len(self.marks)}"
         now, before = (test.text, f"not ({test.text})") if is_rising else (f"not ({test.text})", test.text)
         self.mark(name, Trigger(before), node)
         return f"happened({name}) and ({now})"
 
     def mark(self, name: str, trigger: Trigger, node: Node) -> None:
-        """Have something remembered.
-
-        Parameters
-        ----------
-        name, trigger, node
-            As of `Mark`.
-        """
+        """Add a mark."""
         self.marks.append(Mark(name, trigger, node))
 
     def _is_known(self, node: Node, name: str) -> bool:
@@ -214,13 +173,7 @@ class Triggers:
         return name in self.vehicles
 
     def called(self, vehicle: str) -> str:
-        """A vehicle as conditions name it.
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        """
+        """A vehicle as conditions name it."""
         return "ego" if vehicle == self.ego else vehicle if _WORD.fullmatch(vehicle) else f'"{vehicle}"'
 
     def _compared(self, node: Node, signal: str, unit: str, shift: float = 0.0) -> _Test:
@@ -376,30 +329,16 @@ CONDITIONS: Mapping[str, str] = {
     "the actions take.",
     **{tag: inspect.getdoc(test) or "" for tag, test in _TESTS.items()},
 }
-"""Conditions that are read, and what becomes of each."""
+"""Conditions that are read, and their translation."""
 
 
 def at_time(time: float) -> Trigger:
-    """Trigger of a time alone.
-
-    Parameters
-    ----------
-    time : float
-        When [s].
-    """
+    """Trigger at a time [s]."""
     return AT_ONCE if time <= 0.0 else Trigger(f"time >= {time:g} s", at=time)
 
 
 def both(first: Trigger, then: Trigger) -> Trigger:
-    """What begins by its own trigger once another has begun, which is remembered for it.
-
-    Parameters
-    ----------
-    first : Trigger
-        The other: of a time alone, or of an entry that has begun.
-    then : Trigger
-        Its own.
-    """
+    """Trigger `then` once `first`, a time or an entry that has begun, has fired."""
     if not first.condition or not then.condition:
         return NEVER
     if first.at is not None and then.at is not None:

@@ -1,4 +1,4 @@
-"""SUMO's route file of the vehicles of a file."""
+"""SUMO's route file for the vehicles of a file."""
 
 from collections.abc import Mapping
 
@@ -8,41 +8,16 @@ from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, Spot
 from fogsim.traffic.templates.xml_text import element
 
 STANDS = 0.1
-"""Speed below which a vehicle has none that its driver could wish to keep [m/s]."""
+"""Speed below which a vehicle has no desired speed to keep [m/s]."""
 
 
 def front_spot(vehicle: Vehicle, spot: Spot, lanes: OpenDriveLanes) -> Spot:
-    """Place of a vehicle's front bumper.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        The vehicle.
-    spot : Spot
-        Its reference point.
-    lanes : OpenDriveLanes
-        The lanes.
-
-    Raises
-    ------
-    ValueError
-        If the road ends before.
-    """
+    """Place of a vehicle's front bumper from its reference point; ValueError if the road ends before it."""
     return lanes.along(spot, vehicle.front)
 
 
 def vehicles_text(vehicles: Mapping[str, Vehicle], begin: Beginning, lanes: OpenDriveLanes) -> str:
-    """Text of the route file: each vehicle is there from the beginning, at its place and speed.
-
-    Parameters
-    ----------
-    vehicles : mapping from str to Vehicle
-        The vehicles.
-    begin : Beginning
-        Where they are, and how fast.
-    lanes : OpenDriveLanes
-        The lanes.
-    """
+    """Text of the route file: every vehicle is present from the start, with its initial position and speed."""
     lines = []
     for name, vehicle in vehicles.items():
         front = front_spot(vehicle, begin.spots[name], lanes)
@@ -60,7 +35,7 @@ def vehicles_text(vehicles: Mapping[str, Vehicle], begin: Beginning, lanes: Open
                 departLane=front.lane.index,
                 departPos=f"{front.position:.3f}",
                 departSpeed=f"{speed:.4f}",
-                # Where the file has it, however near to the next one.
+                # Exactly where the file has it, however near to the next vehicle.
                 insertionChecks="collision",
             ),
         ]
@@ -68,7 +43,7 @@ def vehicles_text(vehicles: Mapping[str, Vehicle], begin: Beginning, lanes: Open
 
 
 def _type(vehicle: Vehicle, speed: float, limit: float) -> dict[str, object]:
-    """Attributes of a type of its own; its driver wishes to keep the speed that it begins with."""
+    """Attributes of a separate type; its driver's desired speed is the initial one."""
     return {
         "vClass": CLASSES[vehicle.category],
         "length": f"{vehicle.length:g}",

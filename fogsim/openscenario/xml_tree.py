@@ -1,4 +1,4 @@
-"""Elements of an XML file with their lines and paths, and who has looked at what of them."""
+"""Elements of an XML file with their lines and paths, and a record of what was read."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -7,31 +7,14 @@ from pathlib import Path
 from fogsim.files.xml_reader import XmlFile
 
 MOST_BYTES, MOST_ELEMENTS = 20_000_000, 500_000
-"""Largest file that is read [bytes], and most elements in it."""
+"""Largest file that is read [bytes], and its maximum number of elements."""
 
 
 @dataclass(slots=True)
 class Node:
-    """An element.
+    """An element, with its file and line; `label` is its tag with its name in brackets.
 
-    Attributes
-    ----------
-    tag : str
-        Its name.
-    attributes : dict
-        Its attributes.
-    file : Path
-        Where it stands.
-    line : int
-        On which line.
-    label : str
-        Its tag, and in brackets the name that it has in the file.
-    above : Node or None
-        The element that it is in.
-    children : list of Node
-        Elements in it.
-    is_read, read : bool, set of str
-        Whether it has been looked at, and which of its attributes.
+    `is_read` and `read` record whether the element and which of its attributes were used.
     """
 
     tag: str
@@ -46,7 +29,7 @@ class Node:
 
     @property
     def path(self) -> str:
-        """Elements around it and itself, ``/OpenSCENARIO/Storyboard/Story[name]``."""
+        """Path of the element, ``/OpenSCENARIO/Storyboard/Story[name]``."""
         return f"{self.above.path if self.above else ''}/{self.label}"
 
     @property
@@ -55,25 +38,13 @@ class Node:
         return f"{self.file}:{self.line}: {self.path}"
 
     def get(self, key: str, default: str = "") -> str:
-        """Value of an attribute.
-
-        Parameters
-        ----------
-        key, default : str
-            Its name, and what stands for it where it is missing.
-        """
+        """Value of an attribute."""
         self.is_read = True
         self.read.add(key)
         return self.attributes.get(key, default).strip()
 
     def all(self, *tags: str) -> list["Node"]:
-        """Elements in it that have one of some names.
-
-        Parameters
-        ----------
-        *tags : str
-            The names; none for every element.
-        """
+        """Child elements with one of these tags, or all."""
         self.is_read = True
         found = [child for child in self.children if child.tag in tags or not tags]
         for child in found:
@@ -81,53 +52,30 @@ class Node:
         return found
 
     def one(self, *tags: str) -> "Node | None":
-        """First element in it that has one of some names.
-
-        Parameters
-        ----------
-        *tags : str
-            The names.
-        """
+        """First child element with one of these tags."""
         return next(iter(self.all(*tags)), None)
 
     def within(self, *path: str) -> "Node | None":
-        """Element that is found by going from one to the next.
-
-        Parameters
-        ----------
-        *path : str
-            Their names.
-        """
+        """Element at the end of a path of tags."""
         node: Node | None = self
         for tag in path:
             node = None if node is None else node.one(tag)
         return node
 
     def copy(self) -> "Node":
-        """It and everything in it, to be changed; it stays below the same element."""
+        """An independent copy of it and all its descendants, with the same parent."""
         children = [child.copy() for child in self.children]
         return replace(self, attributes=dict(self.attributes), children=children, read=set(self.read))
 
     def walk(self) -> Iterator["Node"]:
-        """It and everything in it."""
+        """The element and all its descendants."""
         yield self
         for child in self.children:
             yield from child.walk()
 
 
 def read_xml(path: Path) -> Node:
-    """Read a file; nothing outside it is fetched, and it may not define entities.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, is too large, is not XML, or has a document type.
-    """
+    """Read a file; nothing outside it is loaded, and document types raise InputError."""
     builder = _Builder(path)
     builder.file.read_all(builder, MOST_BYTES, MOST_ELEMENTS)
     return builder.root

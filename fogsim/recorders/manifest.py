@@ -14,7 +14,7 @@ _DISTRIBUTIONS = ("fogsim", "numpy", "libsumo", "pyrender", "opencv-python-headl
 
 
 class Status(StrEnum):
-    """How far a run has come."""
+    """Status of a run."""
 
     RUNNING = "running"
     COMPLETE = "complete"
@@ -25,34 +25,11 @@ class Status(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Manifest:
-    """What a manifest says.
+    """Content of a run's manifest.
 
-    Attributes
-    ----------
-    status : Status
-        How far the run has come.
-    seed : int
-        Its seed.
-    scenario : mapping
-        The scenario as it was run, every default filled in; JSON values only.
-    started : datetime
-        Wall-clock time at the start, with its time zone.
-    ended : datetime or None
-        Wall-clock time at the end.
-    ending : Ending or None
-        Why the simulated run was over, None if it was cut short.
-    unplayed : Unplayed
-        What of the script was not played, empty if it was cut short.
-    command_line : sequence of str
-        How it was started, empty if not from the command line.
-    process : WritingProcess
-        Who writes.
-    message : str
-        What went wrong, if anything.
-    failed_recorders : mapping from str to str
-        Recorders that failed, and why.
-    own_methods : mapping from str to str
-        Methods of the user's own, and their versions.
+    `scenario` is the scenario as it was run, with every default, as JSON data; `started` has its time zone; `ending` is
+    None and `unplayed` empty if the run was cut short; `command_line` is empty for runs from Python; `own_methods` are
+    the users' methods and their versions.
     """
 
     status: Status
@@ -69,7 +46,7 @@ class Manifest:
     own_methods: Mapping[str, str] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, object]:
-        """What ``manifest.json`` says, without the names of files."""
+        """Contents of ``manifest.json``, without the names of files."""
         return {
             "status": self.status.value,
             "message": self.message,
@@ -88,7 +65,7 @@ class Manifest:
 
 
 def versions() -> dict[str, str | None]:
-    """Versions of FogSim, Python, the libraries that decide results, and the platform; None where not installed."""
+    """Versions of FogSim, Python, the libraries that affect results, and the platform; None if not installed."""
     found: dict[str, str | None] = {name: _version(name) for name in _DISTRIBUTIONS}
     return {**found, "python": platform.python_version(), "platform": platform.platform()}
 

@@ -25,32 +25,16 @@ from fogsim.recorders.trajectories import write_trajectory_table
 
 
 def recover_run(path: Path, overwrite: bool = False) -> list[str]:
-    """Make readable what a run has left that was killed, or could not close its table.
+    """Recover the readable results of a run that was killed or could not close its table; return the files' names.
 
     Its rows become ``steps.parquet``, ``events.parquet`` and ``trajectories.parquet``, marked as partial, and its
-    manifest says "dead"; video and report are lost.
-
-    Parameters
-    ----------
-    path : Path
-        The run's directory.
-    overwrite : bool
-        True to let the results take the place of those of an earlier run.
-
-    Returns
-    -------
-    list of str
-        Names of the result files.
-
-    Raises
-    ------
-    InputError
-        If nothing is to be recovered, the run is not over, or earlier results must not be overwritten.
+    manifest says "dead"; video and report are lost. Raises InputError if there is nothing to recover, the run is not
+    over, or earlier results must not be overwritten.
     """
     folder = path / UNFINISHED
     manifest = read_manifest(folder)
     if not manifest and folder.exists() and read_manifest(path):
-        # Its process was killed when all results were in their places.
+        # Its process was killed when all results were in place.
         with WriterLock(path):
             shutil.rmtree(folder)
         return whole_files(path)
@@ -60,7 +44,7 @@ def recover_run(path: Path, overwrite: bool = False) -> list[str]:
         refuse_living(folder)
         dead = manifest["status"] == Status.RUNNING.value
         earlier = whole_files(path)
-        # A run that was over had been told to replace them.
+        # A run that was over had permission to replace them.
         if dead and earlier and not overwrite:
             raise InputError(
                 f"{path} holds results of an earlier run ({', '.join(earlier)}), which would give way; "
@@ -76,9 +60,9 @@ def recover_run(path: Path, overwrite: bool = False) -> list[str]:
 
 
 def _make_readable(folder: Path) -> None:
-    """Make tables of the rows in a folder."""
+    """Make tables from the rows in a folder."""
     rows, trajectories, events = folder / ROW_LOG, folder / TRAJECTORY_LOG, folder / EVENT_LOG
-    # A log without a head is of a process that was killed as it began.
+    # A log without a header is of a process that was killed at its start.
     if rows.exists():
         with contextlib.suppress(InputError):
             write_table(folder / "steps.parquet", read_rows(rows), complete=False)

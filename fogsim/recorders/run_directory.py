@@ -1,4 +1,4 @@
-"""The directory that the results of one run go to."""
+"""The directory of one run's results."""
 
 import shutil
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ UNFINISHED = "unfinished"
 """Folder in the directory that holds the results of a run until its end."""
 
 LOG_SUFFIX = ".arrows"
-"""What names of files of rows in the unfinished folder end in, until they are made ``….parquet``."""
+"""Suffix of the unfinished folder's row files, until they become ``….parquet``."""
 
 ROW_LOG = "steps" + LOG_SUFFIX
 """Rows of ``steps.parquet``."""
@@ -29,7 +29,7 @@ EVENT_LOG = "events" + LOG_SUFFIX
 """Rows of ``events.parquet``."""
 
 SUMO_OUTPUTS = "sumo_outputs"
-"""Folder of the files that SUMO itself has written; ``sumo_outputs.part`` until the end of the run."""
+"""Folder of SUMO's own outputs; ``sumo_outputs.part`` until the end of the run."""
 
 _NAMES = {
     "manifest": "manifest.json",
@@ -47,23 +47,10 @@ _RESERVE = "reserve"
 
 
 class RunDirectory:
-    """The directory of one run and the names of the files in it; it has one writer at a time.
+    """The directory of one run and the names of its files; it has one writer at a time.
 
-    Files are written into its folder ``unfinished``, which is there from the first step (`begin`) to the end of the run
-    (`finish`), when they take the place of earlier results in one go. Until then earlier results stay as they are.
-
-    Parameters
-    ----------
-    path : Path
-        The directory; it is made with its parents if it is not there.
-    overwrite : bool
-        True to replace results of an earlier run: the files that FogSim writes, and never another.
-
-    Raises
-    ------
-    InputError
-        If the path is not a directory, cannot be made, is written by another process, or holds results and must not be
-        overwritten.
+    Files are written into its folder ``unfinished`` from the first step (`begin`) to the end of the run (`finish`),
+    when they replace earlier results at once. `overwrite` allows replacing FogSim's own files, never others.
     """
 
     def __init__(self, path: Path, overwrite: bool = False) -> None:
@@ -83,7 +70,7 @@ class RunDirectory:
             raise
 
     def _unmake(self) -> None:
-        """Remove the directories that were made, as far as nothing is in them."""
+        """Remove the created directories that are empty."""
         for folder in self._made:
             if not folder.is_dir() or any(folder.iterdir()):
                 break
@@ -100,7 +87,7 @@ class RunDirectory:
             raise InputError(f"{outputs} is not of an earlier run; move it, or choose another directory with --out")
         if overwrite:
             return
-        # Without a manifest it is what a run left that was killed when all its results were in their places.
+        # Without a manifest, a run was killed when all its results were in place.
         if self.manifest.exists():
             raise InputError(
                 f"{self.path} holds rows of a run that did not come to its end: {_fate_of_run(self.unfinished)}. "
@@ -114,28 +101,22 @@ class RunDirectory:
 
     @property
     def earlier(self) -> list[str]:
-        """Names of results that are there, of an earlier run until `finish`; also those that were left half written."""
+        """Names of existing results, of an earlier run until `finish`, including incomplete ones."""
         whole = [self.path / name for name in _NAMES.values()]
         return [name.name for name in whole + [partial_path(name) for name in whole] if name.is_file()]
 
     @property
     def unfinished(self) -> Path:
-        """Folder of what is being written."""
+        """Folder of unfinished results."""
         return self.path / UNFINISHED
 
     @property
     def sumo_outputs(self) -> Path:
-        """Folder of what SUMO itself writes, from before the first step on."""
+        """Folder of SUMO's own outputs, from before the first step on."""
         return partial_path(self.path / SUMO_OUTPUTS)
 
     def clear_sumo_outputs(self) -> None:
-        """Remove what SUMO has written for a run that never came to its end.
-
-        Raises
-        ------
-        InputError
-            If it cannot be removed.
-        """
+        """Remove SUMO's outputs of a run that never finished."""
         try:
             if self.sumo_outputs.exists():
                 shutil.rmtree(self.sumo_outputs)
@@ -143,18 +124,7 @@ class RunDirectory:
             raise InputError(f"cannot remove {self.sumo_outputs}: {error.strerror}") from error
 
     def begin(self, manifest: Mapping[str, object]) -> None:
-        """Make the folder for what is written, in place of that of a run that was never finished.
-
-        Parameters
-        ----------
-        manifest : mapping
-            What is known of the run; JSON values only.
-
-        Raises
-        ------
-        OSError
-            If there is no room for it; nothing is lost then.
-        """
+        """Create the folder of unfinished results, replacing an unfinished run's; OSError if the disk is full."""
         new = partial_path(self.unfinished)
         shutil.rmtree(new, ignore_errors=True)
         try:
@@ -168,30 +138,19 @@ class RunDirectory:
         new.rename(self.unfinished)
 
     def write_metrics(self, metrics: Mapping[str, object]) -> None:
-        """Write ``metrics.json``; the room kept for it and the manifest is given back first.
-
-        Parameters
-        ----------
-        metrics : mapping
-            JSON values only.
-        """
+        """Write ``metrics.json``, after releasing the space reserved for it and the manifest."""
         (self.unfinished / _RESERVE).unlink(missing_ok=True)
         write_json(self.unfinished / _NAMES["metrics"], metrics)
 
     def finish(self, manifest: Mapping[str, object]) -> None:
-        """Write the manifest and let the new results take the place of the earlier ones, none of which stays.
+        """Write the manifest, with the names of the files, and replace all earlier results by the new ones.
 
-        If rows are left that could not be made a table, the earlier results and the folder of the new ones stay.
-
-        Parameters
-        ----------
-        manifest : mapping
-            What it says; the names of the files are added.
+        If rows are left that could not be made into a table, the earlier results and the folder of the new ones stay.
         """
         finish_folder(self.path, manifest)
 
     def close(self) -> None:
-        """Let others write; directories that were made stay if something is in them."""
+        """Release the lock; created directories stay if they are not empty."""
         self._lock.release()
         self._unmake()
 
@@ -215,17 +174,17 @@ class RunDirectory:
 
     @property
     def table(self) -> Path:
-        """One row a step."""
+        """A row per step."""
         return self.unfinished / _NAMES["table"]
 
     @property
     def trajectories(self) -> Path:
-        """One row a vehicle and step."""
+        """A row per vehicle and step."""
         return self.unfinished / _NAMES["trajectories"]
 
     @property
     def events(self) -> Path:
-        """One row an event."""
+        """A row per event."""
         return self.unfinished / _NAMES["events"]
 
     @property
@@ -240,44 +199,32 @@ class RunDirectory:
 
     @property
     def video(self) -> Path:
-        """What the camera saw, with a panel beside it."""
+        """Camera frames, with a panel next to them."""
         return self.unfinished / _NAMES["video"]
 
     @property
     def restored_video(self) -> Path:
-        """The same with half of the picture restored."""
+        """The same with half of each frame restored."""
         return self.unfinished / _NAMES["restored_video"]
 
     @property
     def report(self) -> Path:
-        """Report to read."""
+        """HTML report."""
         return self.unfinished / _NAMES["report"]
 
     def files(self) -> list[str]:
-        """Names of the whole result files of a finished run, sorted."""
+        """Sorted names of the complete result files of a finished run."""
         return whole_files(self.path)
 
 
 def whole_files(folder: Path) -> list[str]:
-    """Names of the whole result files in a folder, and of that of SUMO's outputs, sorted.
-
-    Parameters
-    ----------
-    folder : Path
-        The folder.
-    """
+    """Sorted names of the complete result files in a folder and of its folder of SUMO's outputs."""
     files = [name for name in _NAMES.values() if (folder / name).is_file()]
     return sorted([*files, *([SUMO_OUTPUTS] if (folder / SUMO_OUTPUTS).is_dir() else [])])
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Manifest in a folder; empty if there is none, or it is damaged.
-
-    Parameters
-    ----------
-    folder : Path
-        The folder.
-    """
+    """Manifest in a folder; empty if it is missing or damaged."""
     try:
         content = read_json(folder / _NAMES["manifest"])
     except InputError:
@@ -286,18 +233,10 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 
 def finish_folder(path: Path, manifest: Mapping[str, object]) -> None:
-    """Finish a run directory: see `RunDirectory.finish`. When it is cut off, the next call completes it.
-
-    Parameters
-    ----------
-    path : Path
-        The run directory.
-    manifest : mapping
-        What it says; the names of the files are added.
-    """
+    """Finish a run directory: see `RunDirectory.finish`. The next call completes an interrupted one."""
     folder = path / UNFINISHED
     (folder / _RESERVE).unlink(missing_ok=True)
-    # What a call before this one has moved already is named by the manifest that it wrote.
+    # Files that an earlier call has moved already are named in the manifest that it wrote.
     names = {_NAMES["manifest"], *whole_files(folder), *_listed(folder)}
     outputs = partial_path(path / SUMO_OUTPUTS)
     if outputs.is_dir() and any(outputs.iterdir()):
@@ -305,7 +244,7 @@ def finish_folder(path: Path, manifest: Mapping[str, object]) -> None:
     write_json(folder / _NAMES["manifest"], {**manifest, "files": sorted(names)})
     if any((folder / log).exists() for log in (ROW_LOG, TRAJECTORY_LOG)):
         return
-    # Without a manifest the directory claims nothing while old files give way to new ones.
+    # Without a manifest the directory claims nothing while new files replace old ones.
     (path / _NAMES["manifest"]).unlink(missing_ok=True)
     for name in _NAMES.values():
         partial_path(path / name).unlink(missing_ok=True)
@@ -321,7 +260,7 @@ def finish_folder(path: Path, manifest: Mapping[str, object]) -> None:
 
 
 def _place_sumo_outputs(path: Path, there_are: bool) -> None:
-    """Let what SUMO has written take the place of that of an earlier run; where it wrote nothing, nothing stays."""
+    """Replace an earlier run's SUMO outputs; without new ones, the old ones are removed."""
     outputs, final = partial_path(path / SUMO_OUTPUTS), path / SUMO_OUTPUTS
     if outputs.exists() or not there_are:
         shutil.rmtree(final, ignore_errors=True)
@@ -338,13 +277,7 @@ def _listed(folder: Path) -> list[str]:
 
 
 def refuse_living(folder: Path) -> None:
-    """Refuse a folder of a process that lives: a second way to know it, should its lock have been removed.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of unfinished results.
-    """
+    """Refuse a folder whose process is alive, in case its lock was removed."""
     manifest = read_manifest(folder)
     process = WritingProcess.from_json(manifest.get("process"))
     if process is None or manifest.get("status") != "running" or process == WritingProcess.this():
@@ -357,7 +290,7 @@ def refuse_living(folder: Path) -> None:
 
 
 def _fate_of_run(folder: Path) -> str:
-    """Say what has become of the run of an unfinished folder."""
+    """Status of the run of an unfinished folder."""
     manifest = read_manifest(folder)
     process = WritingProcess.from_json(manifest.get("process"))
     if process is not None and manifest.get("status") == "running":

@@ -1,4 +1,4 @@
-"""A registry: one mapping from names to factories per kind; docs, command line and schema read it."""
+"""A registry: one mapping from names to factories per type; docs, command line and schema read it."""
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -24,22 +24,11 @@ T = TypeVar("T")
 
 
 class Registry(Mapping[str, T]):
-    """Named factories of one kind; a duplicate is refused and an unknown name answers with the known ones.
+    """Named factories of one type; duplicates are refused, and unknown names raise an error that lists the known ones.
 
-    It also finds what users bring: ``module:Class`` in a module beside their scenario, and what installed packages
-    announce as entry points. Such a class is given back guarded, so that its constructor and methods raise nothing but
-    `MethodError` and KeyboardInterrupt.
-
-    Parameters
-    ----------
-    kind : str
-        What the names stand for, as it is to appear in messages ("estimator").
-    entries : mapping
-        The factories by name.
-    group : str
-        Group of entry points by which packages announce further ones; "" if users can bring none.
-    methods : sequence of str
-        Methods that a user's class must have; one of those with "|" between them.
+    It also finds users' classes: ``module:Class`` beside a scenario, and entry points of the group `group` in installed
+    packages. They must have `methods` ("a|b" for either) and are guarded: they raise only `MethodError` and
+    KeyboardInterrupt.
     """
 
     def __init__(self, kind: str, entries: Mapping[str, T], group: str = "", methods: Sequence[str] = ()) -> None:
@@ -49,32 +38,13 @@ class Registry(Mapping[str, T]):
         self._methods = tuple(methods)
 
     def register(self, name: str, factory: T) -> None:
-        """Add a factory under a new name.
-
-        Parameters
-        ----------
-        name : str
-            A name that is free.
-        factory : callable
-            What makes one of the kind.
-
-        Raises
-        ------
-        ValueError
-            If the name is taken.
-        """
+        """Add a factory; ValueError if the name is taken."""
         if name in self._entries:
             raise ValueError(f"{self.kind} {name!r} is registered already")
         self._entries[name] = factory
 
     def registered(self, name: str) -> Callable[[T], T]:
-        """Class decorator that adds a factory under a new name: ``@ADVISERS.registered("cautious")``.
-
-        Parameters
-        ----------
-        name : str
-            A name that is free.
-        """
+        """Class decorator that adds a factory under a new name: ``@ADVISERS.registered("cautious")``."""
 
         def add(factory: T) -> T:
             self.register(name, factory)
@@ -84,27 +54,14 @@ class Registry(Mapping[str, T]):
 
     @property
     def known(self) -> list[str]:
-        """Names of all entries, and of what installed packages announce; sorted."""
+        """Sorted names of all entries and of installed packages' entry points."""
         return sorted({*self._entries, *(announced(self._group) if self._group else ())})
 
     def find(self, name: str, folder: Path | None = None, time_limit: float | None = None) -> T:
-        """A factory by its name.
+        """The factory of a name, an entry point or ``module:Class`` in `folder` (None for the working directory).
 
-        Parameters
-        ----------
-        name : str
-            Of an entry, of one that an installed package announces, or ``module:Class``.
-        folder : Path or None
-            Where the module lies; None for the working directory.
-        time_limit : float or None
-            Longest time that one call of a user's method may take [s]; None for any.
-
-        Raises
-        ------
-        UnknownNameError
-            If there is none of this name.
-        InputError
-            If it cannot be imported, or is not of this kind.
+        `time_limit` bounds each call of a user's method [s]. Raises UnknownNameError, or InputError if the import fails
+        or the class does not fit.
         """
         try:
             return self._entries[name]
@@ -118,13 +75,7 @@ class Registry(Mapping[str, T]):
         return self._guarded(name, load_announced(further[name]), time_limit)
 
     def find_if_allowed(self, name: str, folder: Path | None, may_import: MayImport = import_anything) -> T | None:
-        """As `find`; None for a class beside the scenario whose file may not be imported, and defines it.
-
-        Raises
-        ------
-        UnknownNameError, InputError
-            As `find`.
-        """
+        """As `find`, but None for a user's class whose file defines it and may not be imported."""
         is_beside = bool(self._group) and name not in self._entries and is_class_name(name)
         if is_beside and not may_import(module_file(name, folder)):
             check_source(name, folder)
@@ -132,7 +83,7 @@ class Registry(Mapping[str, T]):
         return self.find(name, folder)
 
     def version(self, name: str, folder: Path | None = None) -> str | None:
-        """Version of a user's method; None for FogSim's, and for those that a program has registered itself."""
+        """Version of a user's method; None for FogSim's own and for registered ones."""
         return None if name in self._entries else version_of(name, self._group, folder)
 
     def _guarded(self, name: str, cls: Any, time_limit: float | None) -> T:
@@ -169,13 +120,7 @@ def _has_method(cls: type, name: str) -> bool:
 
 
 def parameters(factory: Callable[..., object]) -> dict[str, object]:
-    """Names and defaults of the parameters that a factory may be given by keyword and need not be given.
-
-    Parameters
-    ----------
-    factory : callable
-        A class or function.
-    """
+    """Names and defaults of a factory's optional parameters."""
     return {
         parameter.name: parameter.default
         for parameter in inspect.signature(factory).parameters.values()
@@ -184,26 +129,7 @@ def parameters(factory: Callable[..., object]) -> dict[str, object]:
 
 
 def make(registry: Registry[Callable[..., T]], name: str, *arguments: object, **options: object) -> T:
-    """Call a registered factory.
-
-    Parameters
-    ----------
-    registry : Registry
-        The registry.
-    name : str
-        A name in it.
-    *arguments : object
-        What every factory of the kind is given.
-    **options : object
-        Parameters of this one.
-
-    Raises
-    ------
-    UnknownNameError
-        If the registry has no such name.
-    InputError
-        If the factory has no such parameter, or its annotations do not allow the value.
-    """
+    """Call a registered factory; InputError if it has no such parameter or the value does not fit its annotation."""
     factory = registry[name]
     by_place = list(inspect.signature(factory).parameters)[: len(arguments)]
     mistakes = [f"{option}: {told}" for option, told in parameter_mistakes(factory, options, by_place)]

@@ -1,4 +1,4 @@
-"""The one guard around users' methods: whatever they raise becomes an error that names the method and their line."""
+"""The guard around users' methods: their errors become one error that names the method and their line."""
 
 import functools
 import inspect
@@ -13,24 +13,13 @@ from fogsim.registry.user_code import described
 
 @functools.cache
 def guarded(cls: type, who: str, methods: tuple[str, ...], limit: float | None = None) -> type:
-    """Subclass of a user's class that raises nothing but MethodError where FogSim calls or reads it.
+    """Subclass of a user's class that raises only MethodError from its attributes and `methods`.
 
-    KeyboardInterrupt passes, so that Ctrl-C ends a run. SystemExit does not: the exit codes of FogSim's commands come
-    from the outcomes of their runs.
-
-    Parameters
-    ----------
-    cls : type
-        The class.
-    who : str
-        Names the method in messages, such as "estimator 'mine:Fade'".
-    methods : tuple of str
-        Methods that FogSim calls; those that the class lacks are ignored.
-    limit : float or None
-        Longest time that one call may take [s]; None for any.
+    KeyboardInterrupt passes, so that Ctrl-C ends a run. SystemExit does not: exit codes come from the outcomes of runs.
+    `who` names the class in messages ("estimator 'mine:Fade'"); `limit` bounds each call [s].
     """
     guard = functools.partial(_guarded_call, file=_source(cls), limit=limit)
-    # A named tuple, say, is made by __new__ and inherits an __init__ that takes no arguments.
+    # A named tuple, for example, is made by __new__ and inherits an __init__ without arguments.
     own = [name for name in ("__init__", "__new__") if getattr(cls, name) is not getattr(object, name)]
     constructor = own[0] if own else "__init__"
     body: dict[str, Any] = {"__module__": cls.__module__, "__qualname__": cls.__qualname__, "__doc__": cls.__doc__}
@@ -41,7 +30,7 @@ def guarded(cls: type, who: str, methods: tuple[str, ...], limit: float | None =
             body[name] = found.getter(guard(found.fget, f"{who}: {name}"))
         elif name in methods and callable(getattr(cls, name)):
             call = guard(getattr(cls, name), f"{who}: {name}()")
-            # Only a plain function is given the instance; static and class methods are bound already.
+            # Only a plain function gets the instance; static and class methods are bound already.
             body[name] = staticmethod(call) if isinstance(found, staticmethod | classmethod) else call
     made: type = type(cls)(cls.__name__, (cls,), body)
     return made
@@ -55,7 +44,7 @@ def _source(cls: type) -> Path | None:
 
 
 def _definition(call: Any) -> str:
-    """Where a function is defined, for errors in calling it; empty where Python does not know."""
+    """Source file of a function, for call errors; empty if Python does not know it."""
     code = getattr(inspect.unwrap(call), "__code__", None)
     return "" if code is None else f"{code.co_filename}:{code.co_firstlineno}"
 

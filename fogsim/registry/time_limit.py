@@ -11,23 +11,18 @@ from fogsim.errors import InputError
 
 
 class TimeLimitError(BaseException):
-    """A call took too long; no `except Exception` of the code that is called stops it."""
+    """A call took too long; `except Exception` in the called code does not catch it."""
 
 
 _GRACE = 5.0
-"""Time after a limit at which a process ends that compiled code keeps from raising an error [s]."""
+"""Grace period after a limit before a process ends in which compiled code blocks the error [s]."""
 
 
 @contextlib.contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """Raise an error within a block that takes longer; where compiled code keeps it from being raised, end the process.
+    """Raise TimeLimitError in a block that takes longer, each time the limit passes; main thread only.
 
-    Raises
-    ------
-    TimeLimitError
-        When the time is over, and again each time it is over once more.
-    InputError
-        Outside the main thread, which alone can be interrupted.
+    Where compiled code prevents the error, the process ends.
     """
     if threading.current_thread() is not threading.main_thread():
         raise InputError("a time limit for methods needs the main thread of Python; run without one, or run there")
@@ -41,7 +36,7 @@ def time_limit(seconds: float) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        # Its own alarm, by which a lost signal comes again, goes on.
+        # Its alarm, which repeats a lost signal, continues.
         raise
     except BaseException:
         signal.setitimer(signal.ITIMER_REAL, 0.0)

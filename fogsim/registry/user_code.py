@@ -1,4 +1,4 @@
-"""Methods that users bring: a class in a module beside the scenario, or one that an installed package announces."""
+"""Users' methods: a class in a module beside the scenario, or an entry point of an installed package."""
 
 import ast
 import contextlib
@@ -19,34 +19,30 @@ from typing import Any
 from fogsim.errors import InputError, shown, suggest
 
 MayImport = Callable[[Path], bool]
-"""Decides whether a Python file beside a scenario may be imported, and so run; called before it is."""
+"""Decides before an import whether a Python file beside a scenario may be imported, and so run."""
 
 _NAME = re.compile(r"(?P<module>[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*):(?P<object>[A-Za-z_]\w*)\Z")
 
 
 def import_anything(_: Path) -> bool:
-    """Let every file be imported, as Python programs do that load a scenario."""
+    """Allow every import, as for Python programs that load a scenario."""
     return True
 
 
 def import_nothing(_: Path) -> bool:
-    """Let no file be imported."""
+    """Allow no import."""
     return False
 
 
 def is_class_name(name: object) -> bool:
-    """Whether a name stands for a class in a module, ``module:Class``."""
+    """Whether a name is a class in a module, ``module:Class``."""
     return isinstance(name, str) and _NAME.match(name) is not None
 
 
 def module_file(name: str, folder: Path | None) -> Path:
-    """File of the module in ``module:Class``; it lies in the scenario's folder, None for the working directory.
+    """File of the module in ``module:Class`` in the scenario's folder (None for the working directory).
 
-    Raises
-    ------
-    InputError
-        If there is no such file. Neither the standard library nor installed packages are searched: a scenario file
-        alone must not be able to run any of their functions.
+    Neither the standard library nor installed packages are searched: a scenario file must not run their functions.
     """
     module = _match(name)["module"]
     home = (folder or Path.cwd()).resolve()
@@ -62,13 +58,7 @@ def module_file(name: str, folder: Path | None) -> Path:
 
 
 def check_source(name: str, folder: Path | None) -> None:
-    """Check that the module of ``module:Class`` defines the class, without running it.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, it is not Python, or it has no such name.
-    """
+    """Raise InputError unless the module of ``module:Class`` defines the class; the module is not run."""
     file = module_file(name, folder)
     try:
         body = ast.parse(file.read_bytes(), str(file)).body
@@ -81,7 +71,7 @@ def check_source(name: str, folder: Path | None) -> None:
 
 
 def _names_bound(statement: ast.stmt) -> Iterator[str]:
-    """Names that a module's statement binds, `*` for those of another module."""
+    """Names that a statement of a module binds, `*` for those of another module."""
     if isinstance(statement, ast.ClassDef | ast.FunctionDef):
         yield statement.name
     elif isinstance(statement, ast.Import | ast.ImportFrom):
@@ -92,13 +82,7 @@ def _names_bound(statement: ast.stmt) -> Iterator[str]:
 
 
 def import_class(name: str, folder: Path | None = None) -> type:
-    """Import the class ``module:Class`` from a module in a folder, None for the working directory.
-
-    Raises
-    ------
-    InputError
-        If there is no such module or class, its import fails, or it is not defined in that folder.
-    """
+    """Import the class ``module:Class`` from a module in a folder, None for the working directory."""
     file = module_file(name, folder)
     home = (folder or Path.cwd()).resolve()
     module, wanted = _module(name, file, home), _match(name)["object"]
@@ -138,7 +122,7 @@ def _module(name: str, file: Path, home: Path) -> ModuleType:
 
 @functools.cache
 def _imported(module: str, file: Path, home: Path) -> ModuleType:
-    """A module of a folder; a single file goes by a name of its own, as another folder may have one of that name."""
+    """A module of a folder; a single file gets a unique name, since other folders may have a file of the same name."""
     if file.parent != home:
         with _found_first(home):
             package = importlib.import_module(module)
@@ -157,7 +141,7 @@ def _imported(module: str, file: Path, home: Path) -> ModuleType:
 
 @contextlib.contextmanager
 def _found_first(folder: Path) -> Iterator[None]:
-    """Let modules of a folder find one another while they are imported."""
+    """Let modules of a folder import one another."""
     sys.path.insert(0, str(folder))
     try:
         yield
@@ -166,7 +150,7 @@ def _found_first(folder: Path) -> Iterator[None]:
 
 
 def described(error: BaseException, file: Path | None, otherwise: str = "") -> str:
-    """An error of a user's code in one line: its class, its text, and where in their file, or otherwise, it arose."""
+    """An error of a user's code in one line: its class, its text, and its place in their file or elsewhere."""
     text = " ".join(f"{type(error).__name__}: {error}".split())
     if isinstance(error, SyntaxError) and error.filename:
         return f"{text}, at {error.filename}:{error.lineno}"
@@ -182,18 +166,12 @@ def announced(group: str) -> Mapping[str, metadata.EntryPoint]:
 
 @functools.cache
 def _announced(group: str, _: tuple[str, ...]) -> Mapping[str, metadata.EntryPoint]:
-    """Entry points of a group, read again where packages are searched elsewhere."""
+    """Entry points of a group, read again after a change of the search path."""
     return {point.name: point for point in metadata.entry_points(group=group)}
 
 
 def load_announced(point: metadata.EntryPoint) -> Any:
-    """Import what an installed package announces.
-
-    Raises
-    ------
-    InputError
-        If its import fails.
-    """
+    """Import the object of an installed package's entry point."""
     try:
         return point.load()
     except KeyboardInterrupt:
@@ -205,7 +183,7 @@ def load_announced(point: metadata.EntryPoint) -> Any:
 
 
 def version_of(name: str, group: str, folder: Path | None = None) -> str | None:
-    """Version of a user's method: of its package, or a digest of its file; None for FogSim's own methods."""
+    """Version of a user's method: of its package, or a digest of its file; None for FogSim's methods."""
     if is_class_name(name):
         return f"sha256:{hashlib.sha256(module_file(name, folder).read_bytes()).hexdigest()[:16]}"
     point = announced(group).get(name)

@@ -1,4 +1,4 @@
-"""A YAML file as plain data that remembers on which line each key stands; single keys put in place of the file's."""
+"""A YAML file as plain data with the line of each key, and overrides of single keys."""
 
 import copy
 from collections.abc import Iterable, Mapping
@@ -19,15 +19,15 @@ TAKES_THE_PLACE_OF = {
     ("traffic", "config"): ("net", "routes", "additional"),
     ("traffic", "net"): ("config",),
 }
-"""Setting the key on the left leaves out those beside it that exclude it: ``--set fog.visibility_m=80`` makes the fog
-homogeneous whatever kind the file has."""
+"""Setting the key on the left removes the keys that exclude it: ``--set fog.visibility_m=80`` makes any fog
+homogeneous."""
 
 _FOREIGN, _TIMELINE = "scenario", "timeline"
 
 _SET = "--set "
 
 _LONGEST_SHOWN = 200
-"""Most characters of an override that a message repeats."""
+"""Maximum length of an override in messages."""
 
 
 def _shown_override(text: str) -> str:
@@ -36,7 +36,7 @@ def _shown_override(text: str) -> str:
 
 
 def _override_path(text: str) -> KeyPath:
-    """Key path of a well-formed override; a number in it is a place in a list."""
+    """Key path of a well-formed override; a number in it is a list index."""
     return tuple(int(key) if _is_place(key) else key for key in text.partition("=")[0].strip().split("."))
 
 
@@ -45,18 +45,7 @@ def _is_place(key: str) -> bool:
 
 
 def parse_override(text: str) -> tuple[tuple[str, ...], Any]:
-    """Split ``key.path=value``; the value is read as YAML.
-
-    Parameters
-    ----------
-    text : str
-        The override.
-
-    Raises
-    ------
-    InputError
-        If there is no key or no ``=``, or the value is no YAML.
-    """
+    """Split ``key.path=value``; the value is parsed as YAML."""
     key, equals, value = text.partition("=")
     path = tuple(key.strip().split("."))
     if not equals or not all(path):
@@ -70,20 +59,7 @@ def parse_override(text: str) -> tuple[tuple[str, ...], Any]:
 
 
 def apply_overrides(data: dict[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
-    """Copy of plain data with overrides applied in order.
-
-    Parameters
-    ----------
-    data : dict
-        Content of a scenario file.
-    overrides : iterable of str
-        Each ``key.path=value``; a number in the path is a place in a list.
-
-    Raises
-    ------
-    InputError
-        If a path leads through something that has no keys, or beyond a list's end.
-    """
+    """Copy of plain data with ``key.path=value`` overrides in order; a number in a path is a list index."""
     result = copy.deepcopy(data)
     for text in overrides:
         path, value = parse_override(text)
@@ -99,7 +75,7 @@ def _set(data: dict[str, Any], path: tuple[str, ...], value: object, text: str) 
     block: Any = data
     for depth, key in enumerate(path[:-1]):
         place = key if isinstance(block, dict) else _place(block, key, path[: depth + 1], text)
-        # A block of which the file has but the name is an empty one.
+        # A block without content is an empty one.
         if isinstance(block, dict) and block.get(key) is None:
             block[key] = {}
         block = block[place]
@@ -112,13 +88,7 @@ def _set(data: dict[str, Any], path: tuple[str, ...], value: object, text: str) 
 
 
 def same_quantity(key: str, other: str) -> bool:
-    """Tell whether two keys differ by a unit at the end alone, which one of them has: ``speed`` and ``speed_kmh``.
-
-    Parameters
-    ----------
-    key, other : str
-        The keys.
-    """
+    """Whether two keys differ only by a unit suffix on one of them: ``speed`` and ``speed_kmh``."""
     shorter, longer = sorted((key, other), key=len)
     stem, _, suffix = longer.rpartition("_")
     return stem == shorter and suffix in UNIT_OF_SUFFIX
@@ -139,30 +109,14 @@ def _place(block: object, key: str, path: tuple[str, ...], text: str) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """Plain data from a file.
-
-    Attributes
-    ----------
-    path : Path
-        The file.
-    data : dict
-        Its content.
-    origins : mapping from key path to str
-        Where each key stands: ``file:line``, or the override that set it.
-    """
+    """Plain data from a file; `origins` has each key's ``file:line``, or the override that set it."""
 
     path: Path
     data: dict[str, Any]
     origins: Mapping[KeyPath, str]
 
     def where(self, key_path: KeyPath) -> str:
-        """Where a key stands, or the nearest block around it that has a place.
-
-        Parameters
-        ----------
-        key_path : KeyPath
-            The key, from the outermost block on.
-        """
+        """Origin of a key, or of the nearest enclosing block that has one."""
         for length in range(len(key_path), 0, -1):
             origin = self.origins.get(key_path[:length])
             if origin is not None:
@@ -170,23 +124,18 @@ class Document:
         return str(self.path)
 
     def is_overridden(self, key_path: KeyPath) -> bool:
-        """Whether a key's value is that of an override."""
+        """Whether an override set a key."""
         return self.where(key_path).startswith(_SET)
 
     def is_written(self, key_path: KeyPath) -> bool:
-        """Whether a key stands in a file of FogSim's or an override, not in an OpenSCENARIO file or a program."""
+        """Whether a key is from a file of FogSim's or an override, not from an OpenSCENARIO file or a program."""
         origin = self.where(key_path)
         return origin != str(self.path) and not is_openscenario(Path(origin.rpartition(":")[0]))
 
     def overridden(self, overrides: Iterable[str]) -> "Document":
-        """Copy in which the keys that overrides set, and all below them, stand where the overrides do.
+        """Copy in which overridden keys, and all below them, have the overrides as origins.
 
-        Blocks around them stand at both places.
-
-        Parameters
-        ----------
-        overrides : iterable of str
-            ``key.path=value`` each, known to be well formed.
+        Blocks around them have both origins.
         """
         origins = dict(self.origins)
         for text in overrides:
@@ -201,17 +150,7 @@ class Document:
 def read_scenario_document(path: Path) -> Document:
     """Read a scenario's YAML file, or an OpenSCENARIO file (``.xosc``) as the same data.
 
-    A YAML file with ``scenario: FILE.xosc`` has what stands there, and beside it, or in its place, its own.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Raises
-    ------
-    InputError
-        As of `read_document`, or if the OpenSCENARIO file does not fit.
+    A YAML file with ``scenario: FILE.xosc`` starts from that file and adds or replaces keys.
     """
     if is_openscenario(path):
         return _read_openscenario(path)
@@ -220,19 +159,7 @@ def read_scenario_document(path: Path) -> Document:
 
 
 def read_document(path: Path) -> Document:
-    """Read a YAML file.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, is no regular file of UTF-8 text, is too large (see `plain_yaml`), is no YAML, has a key
-        twice, or is no mapping.
-    """
+    """Read a YAML file, within the limits of `plain_yaml`; it must hold a mapping."""
     try:
         data, lines = parse_yaml(read_text(path, MOST_BYTES))
     except PlainYamlError as error:
@@ -249,7 +176,7 @@ def _read_openscenario(path: Path) -> Document:
 
 
 def _upon_openscenario(document: Document) -> Document:
-    """A document upon the OpenSCENARIO file that it names; its timeline comes after that of the file."""
+    """A document on top of the OpenSCENARIO file that it names; its timeline follows that of the file."""
     named = document.data[_FOREIGN]
     path = document.path.parent / str(named)
     if not isinstance(named, str) or not is_openscenario(path):
@@ -266,14 +193,14 @@ def _upon_openscenario(document: Document) -> Document:
                 origins[(block, first + place, *rest)] = origin
             case _:
                 origins[key] = origin
-    # What a file asks for by itself is that its events come; a test says what it asks for.
+    # The file's own expectation is that its events happen; a test states its own.
     data = _laid_upon({**below.data, "expect": {}}, own)
     data[_TIMELINE] = [*below.data[_TIMELINE], *further] if isinstance(further, list) else further
     return Document(document.path, data, origins)
 
 
 def _laid_upon(below: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
-    """Blocks of which the upper ones' keys count; a fog is another fog as a whole."""
+    """Merge blocks, with the keys of the upper ones first; a fog is replaced as a whole."""
     data = dict(below)
     for key, value in own.items():
         under = data.get(key)

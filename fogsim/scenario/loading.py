@@ -1,4 +1,4 @@
-"""From a scenario file to a checked `Scenario`; a mistake is told with file, line, key, value and what is allowed."""
+"""From a scenario file to a checked `Scenario`; mistakes name file, line, key, value and what is allowed."""
 
 import json
 import math
@@ -32,7 +32,7 @@ _PACKAGE = Path(__file__).resolve().parent.parent
 
 
 def catalogue() -> dict[str, Path]:
-    """Names and files of the scenarios that come with FogSim: in the wheel, or beside it in a checkout."""
+    """Names and files of the scenarios that come with FogSim: in the wheel, or next to it in a checkout."""
     for folder in (_PACKAGE / "_scenarios", _PACKAGE.parent / "scenarios"):
         files = sorted(folder.glob(f"*/{SCENARIO_FILE}"))
         if files:
@@ -41,20 +41,9 @@ def catalogue() -> dict[str, Path]:
 
 
 def scenario_file(name_or_path: str | Path) -> Path:
-    """File of a scenario.
-
-    Parameters
-    ----------
-    name_or_path : str or Path
-        A name in the catalogue, a scenario file, or a folder that holds ``scenario.yaml``.
-
-    Raises
-    ------
-    InputError
-        If there is nothing of that name; `UnknownNameError` for an unknown name of the catalogue.
-    """
+    """File of a catalogue name, a scenario file, or a folder that holds ``scenario.yaml``."""
     path = Path(name_or_path)
-    # Without a name, the path is that of the working directory.
+    # Without a name, the path would be the working directory.
     if _is_folder(path) and str(name_or_path):
         path = path / SCENARIO_FILE
     if _exists(path) and not path.is_dir():
@@ -68,7 +57,7 @@ def scenario_file(name_or_path: str | Path) -> Path:
 
 
 def _exists(path: Path) -> bool:
-    """Whether there is something of a name; a name that none can have is not there."""
+    """Whether a path exists; False for impossible names."""
     try:
         return path.exists()
     except OSError:
@@ -76,23 +65,21 @@ def _exists(path: Path) -> bool:
 
 
 def _is_folder(path: Path) -> bool:
-    """Whether there is a folder of a name; a name that none can have is none."""
     return _exists(path) and path.is_dir()
 
 
 def _is_file(path: Path) -> bool:
-    """Whether there is a regular file of a name; a name that none can have is none."""
     return _exists(path) and path.is_file()
 
 
 BESIDE = (BLOCK, *KEYS)
-"""Blocks that stand in scenario files beside the keys of the schema."""
+"""Blocks of scenario files in addition to the keys of the schema."""
 
 LONG_RUN = 600.0
-"""Longest run of a simulation that is the user's own [s]."""
+"""Longest run of the user's own simulation [s]."""
 
 DAY = 86_400.0
-"""Simulated time within which the ego of a simulation of the user's own must appear [s]."""
+"""Simulated time within which the ego of the user's own simulation must appear [s]."""
 
 
 @checked_parameters
@@ -103,18 +90,18 @@ def load_scenario(
     others_add_vehicles: bool = False,
     may_import: MayImport = import_anything,
 ) -> Scenario:
-    """Load and check a scenario; of a file that varies something, its first case.
+    """Load and check a scenario; for a file with cases, the first one.
 
     Parameters
     ----------
     name_or_path : str or Path
         A name in the catalogue, a scenario file, or a folder that holds ``scenario.yaml``.
     overrides : iterable of str
-        ``key.path=value`` each, put in place of the file's values.
+        ``key.path=value`` each, replacing the file's values.
     others_add_vehicles : bool
-        True if vehicles may come that are not in the route files, as in a simulation that has other clients.
+        True if vehicles may come that are not in the route files, as in a simulation with other clients.
     may_import : callable
-        Decides, given its path, whether a Python file beside the scenario is imported, which runs it; where it is not,
+        Decides, from its path, whether a Python file beside the scenario is imported, which runs it; otherwise,
         the parameters of its methods are not checked.
 
     Returns
@@ -133,41 +120,20 @@ def load_scenario(
 def scenario_reader(
     name_or_path: str | Path, *, others_add_vehicles: bool = False, may_import: MayImport = import_anything
 ) -> Callable[[Iterable[str]], Scenario]:
-    """Read a scenario file once, for scenarios that differ in their overrides.
-
-    Parameters
-    ----------
-    name_or_path, others_add_vehicles, may_import
-        As for `load_scenario`.
-
-    Returns
-    -------
-    callable
-        Makes a scenario of overrides, as `load_scenario` does.
-    """
+    """Read a scenario file once and return a function from overrides to scenarios, as `load_scenario` gives."""
     path = scenario_file(name_or_path)
     document, context = read_scenario_document(path), _context(path.parent, may_import)
     return lambda overrides: _checked(document, overrides, context, closed_demand=not others_add_vehicles)
 
 
 def _context(folder: Path, may_import: MayImport = import_anything) -> dict[str, Any]:
-    """What the schema's validators of methods are given; the folder is also where file names are relative to."""
+    """Context of the schema's validators of methods; file names are relative to the same folder."""
     return {"folder": folder, "may_import": may_import}
 
 
 @dataclass(frozen=True, slots=True)
 class ScenarioCases:
-    """Cases of a scenario file.
-
-    Attributes
-    ----------
-    document : Document
-        What was read.
-    variation : Variation
-        What the file varies.
-    cases : tuple of (Case, Scenario)
-        Those that were asked for.
-    """
+    """The requested cases of a scenario file, and everything that it varies."""
 
     document: Document
     variation: Variation
@@ -175,7 +141,7 @@ class ScenarioCases:
 
 
 CountWatch = Callable[[int, int], None]
-"""Called with how many are done, and how many there are."""
+"""Called with the number of finished items and their total."""
 
 
 def load_cases(
@@ -187,27 +153,10 @@ def load_cases(
     *,
     may_import: MayImport = import_anything,
 ) -> ScenarioCases:
-    """Load and check the cases of a scenario file; one that varies nothing has one.
+    """Load and check the cases of a scenario file; a file that varies nothing has one.
 
-    Parameters
-    ----------
-    name_or_path : str or Path
-        As of `load_scenario`.
-    overrides : iterable of str
-        As of `load_scenario`.
-    wanted : str
-        Which cases, ``name=value`` with commas between; empty for all.
-    seed : int or None
-        Seed of the runs; None for those of the cases.
-    watch : callable or None
-        Called after each case with the number of cases that are checked, and how many there are.
-    may_import : callable
-        As of `load_scenario`.
-
-    Raises
-    ------
-    InputError
-        As of `load_scenario`, with the first case in which something does not fit; or if there is no such case.
+    `wanted` selects cases by comma-separated ``name=value`` ("" for all), `seed` replaces their seeds, and `watch`
+    receives the number of checked cases and their total. InputError describes the first case that does not fit.
     """
     path = scenario_file(name_or_path)
     document = _overridden(read_scenario_document(path), overrides)
@@ -217,7 +166,7 @@ def load_cases(
     chosen = chosen_cases(variation, wanted, path, seed)
     for done, case in enumerate(chosen, 1):
         put = with_case(document, case)
-        # What differs in its seed alone is the same scenario.
+        # Cases that differ only in their seed share a scenario.
         key = json.dumps(put.data)
         if key not in checked:
             checked[key] = _checked_case(put, case, _context(path.parent, may_import))
@@ -228,13 +177,7 @@ def load_cases(
 
 
 def check_configuration(config: Path) -> None:
-    """Check by its first element that a file is a SUMO configuration.
-
-    Raises
-    ------
-    InputError
-        If it is missing, with the nearest name in its folder, or another file.
-    """
+    """Raise InputError unless a file's first element is that of a SUMO configuration."""
     if not _is_file(config):
         raise InputError(_no_file(Document(config, {}, {}), config.parent, ("traffic", "config"), Path(config.name)))
     check_sumo_file("config", config)
@@ -259,7 +202,7 @@ def scenario_from_config(
     overrides : iterable of str
         ``key.path=value`` each; the fog must be among them.
     others_add_vehicles, may_import
-        As of `load_scenario`.
+        As in `load_scenario`.
 
     Raises
     ------
@@ -273,20 +216,7 @@ def scenario_from_config(
 
 
 def attached_scenario(ego: str, overrides: Iterable[str]) -> Scenario:
-    """Make a scenario of a simulation that runs already, so that it names no files.
-
-    Parameters
-    ----------
-    ego : str
-        Id of the vehicle that becomes the ego.
-    overrides : iterable of str
-        ``key.path=value`` each; the fog must be among them.
-
-    Raises
-    ------
-    InputError
-        If anything does not fit.
-    """
+    """Scenario of a running simulation, which names no files; the overrides must set the fog."""
     document = Document(Path("attached"), _bare("attached", {"ego": ego}), {})
     return _checked(document, overrides, _context(Path()), named_files=False)
 
@@ -303,63 +233,26 @@ def override(
     others_add_vehicles: bool = False,
     may_import: MayImport = import_anything,
 ) -> Scenario:
-    """Copy of a scenario with single keys changed.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    overrides : iterable of str
-        ``key.path=value`` each.
-    others_add_vehicles, may_import
-        As of `load_scenario`.
-
-    Raises
-    ------
-    InputError
-        If the changed scenario does not fit.
-    """
+    """Copy of a scenario with ``key.path=value`` overrides; InputError if it does not fit."""
     document = Document(scenario.directory / SCENARIO_FILE, resolved(scenario), {})
     context = _context(scenario.directory, may_import)
     return _checked(document, overrides, context, closed_demand=not others_add_vehicles)
 
 
 def clock_settings(step: float, camera: float, decision: float) -> list[str]:
-    """Overrides that set the clocks.
-
-    Parameters
-    ----------
-    step : float
-        Time between two traffic steps [s].
-    camera : float
-        Time between two frames [s].
-    decision : float
-        Time between two decisions [s].
-    """
+    """Overrides that set the traffic step, the camera period and the decision period [s]."""
     times = {"traffic_step": step, "camera_period": camera, "decision_period": decision}
     return [f"clocks.{key}_s={time!r}" for key, time in times.items()]
 
 
 def resolved(scenario: Scenario) -> dict[str, Any]:
-    """A scenario as plain data with every default filled in, fit for JSON; endless visibility is written "inf".
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """A scenario as JSON-compatible data with every default filled in; infinite visibility becomes "inf"."""
     data: dict[str, Any] = _without_infinities(scenario.model_dump(mode="json", exclude_none=True))
     return data
 
 
 def as_written(scenario: Scenario) -> dict[str, Any]:
-    """A scenario as plain data, without what is as it is by default.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """A scenario as plain data without its defaults."""
     data: dict[str, Any] = _without_infinities(scenario.model_dump(mode="json", exclude_none=True, exclude_unset=True))
     return data
 
@@ -385,7 +278,7 @@ def _checked(
 
 
 def _overridden(document: Document, overrides: Iterable[str]) -> Document:
-    """Copy of a document with overrides, in which the keys of ``sut`` stand by themselves."""
+    """Copy of a document with overrides, without the block ``sut`` around its keys."""
     if isinstance(overrides, str):
         raise InputError(f"overrides must be a list of key.path=value each, got the text {shown(overrides)}")
     document, overrides = without_sut(document), tuple(without_sut_in_path(text) for text in overrides)
@@ -396,7 +289,7 @@ def _overridden(document: Document, overrides: Iterable[str]) -> Document:
 def _checked_case(
     document: Document, case: Case, context: Mapping[str, Any], named_files: bool = True, closed_demand: bool = True
 ) -> Scenario:
-    """A scenario; a mistake in it is told with the case in which it is one."""
+    """Scenario of a case; its mistakes name the case."""
     try:
         return _checked_scenario(document, context, named_files, closed_demand)
     except InputError as error:
@@ -418,7 +311,7 @@ def _checked_scenario(
         scenario = scenario.model_copy(update={"directory": context["folder"]})
     except ValidationError as error:
         raise InputError(mistake_lines(document, Scenario, error, mistakes, BESIDE)) from error
-    # A simulation that runs already, or is none of SUMO's, keeps its own time.
+    # A running simulation, or one of another simulator, keeps its own time.
     uncountable = step_mistake(scenario.clocks) if named_files else None
     if uncountable:
         key_path = ("clocks", "traffic_step_s")
@@ -442,12 +335,12 @@ _TRAFFIC = "it is required, or road (a road by template) in its place"
 
 
 def _unnamed_files(document: Document, data: dict[str, Any]) -> list[str]:
-    """Say which files a scenario does not name, and must; the schema knows no keys of which either one or others do."""
+    """Required files that a scenario does not name; the schema cannot express alternatives of keys."""
     traffic = data.get("traffic")
     if data.get("road") is not None:
         return []
     if "traffic" not in data:
-        # A key whose name is misspelt is told as such, and not as missing.
+        # A misspelt key is reported as such, and not as missing.
         if any(nearest(key, Scenario.model_fields) == "traffic" for key in data):
             return []
         return [f"{document.where(('traffic',))}: traffic: this key is missing; {_TRAFFIC}"]

@@ -1,4 +1,4 @@
-"""What the check of a file has found, in lines that name file, line, key, value and what is allowed."""
+"""Mistakes in a file, in lines with file, line, key, value and what is allowed."""
 
 import types
 from collections.abc import Iterator, Sequence
@@ -13,7 +13,7 @@ from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.section import MISTAKE
 
 MOST_TOLD = 50
-"""Most mistakes of a file that are listed one by one."""
+"""Maximum number of mistakes that are listed one by one."""
 
 WORDED = {
     "model_type": "must be a block of keys",
@@ -22,31 +22,23 @@ WORDED = {
     "too_short": "must have at least one entry",
     "path_type": "must be a path",
 }
-"""Messages of pydantic in the words of a file's reader."""
+"""pydantic's messages in words for users."""
 
 _INPUT = "input should be "
 
 _KEY = "[key]"
-"""How pydantic calls a key of a block by name that is not fit to be one."""
+"""pydantic's name for a key that does not fit a block of named entries."""
 
 
 class Mistake(NamedTuple):
-    """One mistake in a file.
-
-    Attributes
-    ----------
-    path : KeyPath
-        Where it is, in the file's own keys.
-    text : str
-        What is wrong, in one line.
-    """
+    """One mistake in a file, at a path in the file's own keys, described in one line."""
 
     path: KeyPath
     text: str
 
 
 class _Found(NamedTuple):
-    """A mistake as pydantic reports it; its path in the file's own keys; whether it is that of one of several types."""
+    """A mistake as pydantic reports it, with its path in the file and whether it is that of one type of a union."""
 
     detail: ErrorDetails
     path: KeyPath
@@ -61,21 +53,7 @@ def mistake_lines(
     further: Sequence[str] = (),
     beside: Sequence[str] = (),
 ) -> str:
-    """Every mistake in a line of its own.
-
-    Parameters
-    ----------
-    document : Document
-        What was checked.
-    model : type
-        Its schema.
-    error : ValidationError
-        What was found.
-    further : sequence of str
-        Lines about what else was found.
-    beside : sequence of str
-        Keys that the file may have in addition to those of its schema.
-    """
+    """One line for each mistake, followed by `further` lines; `beside` are top-level keys outside the schema."""
     found = mistakes_in(model, error, document.data, beside)
     told = [
         ": ".join((document.where(path), *([dotted(path)] if path else []), text)) for path, text in found[:MOST_TOLD]
@@ -88,19 +66,8 @@ def mistake_lines(
 def mistakes_in(schema: object, error: ValidationError, data: object, beside: Sequence[str] = ()) -> list[Mistake]:
     """Every mistake once, without those that only follow from another.
 
-    A list whose entries are wrong is not too short, a key whose name is misspelt is not missing, and a value that fits
-    none of several types is one mistake.
-
-    Parameters
-    ----------
-    schema : type or annotation
-        What the data must be.
-    error : ValidationError
-        What was found.
-    data : object
-        What was checked.
-    beside : sequence of str
-        Keys that may stand at the top in addition to those of the schema.
+    A list with wrong entries is not too short, a misspelt key is not missing, and a value that fits none of several
+    types is one mistake. `beside` are top-level keys outside the schema.
     """
     details = error.errors(include_url=False)
     blocks = {detail["loc"][:length] for detail in details for length in range(len(detail["loc"]))}
@@ -111,7 +78,7 @@ def mistakes_in(schema: object, error: ValidationError, data: object, beside: Se
     by_path: dict[KeyPath, list[_Found]] = {}
     for one in found:
         if one.detail["type"] != "missing" or one.path not in meant:
-            # What fits none of several types is one mistake; other mistakes at one key are told apart.
+            # A value that fits none of several types is one mistake; other mistakes at one key stay separate.
             at = (*one.path, *(() if one.is_of_union else (len(by_path),)))
             by_path.setdefault(at, []).append(one)
     return [Mistake(those[0].path, _text(those, beside)) for those in by_path.values()]
@@ -152,7 +119,7 @@ def _text(those: Sequence[_Found], beside: Sequence[str]) -> str:
     message = ", or ".join([messages[0], *(text.removeprefix(_INPUT) for text in messages[1:])])
     value = detail["input"]
     if isinstance(value, dict | BaseModel):
-        # A message about a whole block names the values that it is about itself.
+        # A message about a whole block names its values itself.
         return f"{message}; got a block of keys" if detail["type"].endswith("_type") else message
     return f"{message}; got {shown(value)}"
 
@@ -163,23 +130,14 @@ def _message(detail: ErrorDetails) -> str:
 
 
 def _discriminator(context: dict[str, Any]) -> str:
-    """Key by which blocks of a list are told apart, as pydantic names it."""
+    """Key by which blocks of a list are distinguished, in pydantic's spelling."""
     return str(context["discriminator"]).strip("'")
 
 
 def _own_path(schema: object, location: Sequence[str | int], data: object) -> tuple[KeyPath, tuple[Any, ...], bool]:
-    """Path of a mistake in the file's own keys, types that the schema allows there, and whether one of several failed.
+    """Path of a mistake in the file's own keys, the types allowed there, and whether a union failed.
 
-    pydantic puts what it tried into its locations, too: the type in a union, the tag of a block, ``[key]``.
-
-    Parameters
-    ----------
-    schema : type or annotation
-        What the data must be.
-    location : sequence of str or int
-        From pydantic.
-    data : object
-        What was checked.
+    pydantic's locations also contain what it tried: the type in a union, the tag of a block, ``[key]``.
     """
     allowed: tuple[Any, ...] = tuple(_alternatives(schema))
     path: list[str | int] = []
@@ -188,7 +146,7 @@ def _own_path(schema: object, location: Sequence[str | int], data: object) -> tu
         tagged: tuple[Any, ...] = tuple(one for one in allowed if _is_model(one) and key in _tags(one))
         is_there = (isinstance(data, dict) and key in data) or (isinstance(data, list | tuple) and isinstance(key, int))
         is_field = any(_is_model(one) and key in _fields(one) for one in allowed)
-        # Keys of a block by name that a validator has made are not in the file as such.
+        # Keys of named blocks that a validator has made are not in the file.
         is_made = key != _KEY and allowed != () and all(get_origin(one) is dict for one in allowed)
         if tagged and len(allowed) > 1:
             allowed = tagged
@@ -208,7 +166,7 @@ def _value(data: object, key: str | int) -> object:
 
 
 def _alternatives(annotation: object) -> Iterator[Any]:
-    """Types of which a value may be one: ``X | None`` is ``X`` and ``None``."""
+    """Possible types of a value: ``X | None`` is ``X`` and ``None``."""
     if get_origin(annotation) is Annotated:
         yield from _alternatives(get_args(annotation)[0])
     elif get_origin(annotation) in (Union, types.UnionType):
@@ -219,7 +177,7 @@ def _alternatives(annotation: object) -> Iterator[Any]:
 
 
 def _inside(annotation: Any, key: str | int) -> Iterator[Any]:
-    """Types that a value at a key of another may be."""
+    """Possible types of the value at a key."""
     arguments = get_args(annotation)
     if _is_model(annotation):
         field = _fields(annotation).get(key)
@@ -236,13 +194,13 @@ def _is_model(annotation: object) -> bool:
 
 
 def _fields(model: type[BaseModel]) -> dict[str | int, Any]:
-    """Types of a model's fields, by the keys that files have for them."""
+    """Types of a model's fields, by their keys in files."""
     named = model.model_fields.items()
     return {field.alias or name: field.annotation for name, field in named if not field.exclude}
 
 
 def _tags(model: type[BaseModel]) -> tuple[str, ...]:
-    """Names by which pydantic tells a model in a union: its own, or its tags."""
+    """Names that pydantic gives a model in a union: its own, or its tags."""
     literals = [annotation for annotation in _fields(model).values() if get_origin(annotation) is Literal]
     return (model.__name__, *(tag for literal in literals for tag in get_args(literal)))
 

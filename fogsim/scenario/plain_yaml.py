@@ -1,4 +1,4 @@
-"""YAML to plain data in which numbers are what they look like, within limits of size, depth and count."""
+"""YAML to plain data, with numbers as they are written, within limits of size, depth and count."""
 
 import re
 from typing import Any
@@ -14,28 +14,20 @@ MOST_BYTES = 1_000_000
 """Largest text that is read."""
 
 MOST_NODES = 20_000
-"""Most keys and values, those that aliases repeat counted every time."""
+"""Maximum number of keys and values, with repetitions by aliases."""
 
 DEEPEST = 40
-"""Most blocks and lists inside one another."""
+"""Maximum depth of blocks and lists."""
 
 MOST_DIGITS = 300
-"""Most characters of a number."""
+"""Maximum length of a number."""
 
 MERGE = "tag:yaml.org,2002:merge"
 TEXT = "tag:yaml.org,2002:str"
 
 
 class PlainYamlError(Exception):
-    """Text that is no YAML, or holds what plain data does not.
-
-    Parameters
-    ----------
-    problem : str
-        What is wrong.
-    line : int or None
-        On which line, counted from 1.
-    """
+    """Text that is not YAML, or holds more than plain data; `line` counts from 1."""
 
     def __init__(self, problem: str, line: int | None = None) -> None:
         super().__init__(problem)
@@ -67,7 +59,7 @@ def _whole_number(_: yaml.SafeLoader, node: yaml.ScalarNode) -> int | float:
     return int(node.value)
 
 
-# Those of YAML 1.1 would come first.
+# Those of YAML 1.1 would take precedence.
 _Loader.yaml_implicit_resolvers = {}
 _Loader.add_implicit_resolver(
     "tag:yaml.org,2002:bool", re.compile(r"(?i:yes|no|true|false|on|off)\Z"), list("yYnNtTfFoO")
@@ -86,20 +78,10 @@ _Loader.add_constructor("tag:yaml.org,2002:int", _whole_number)
 
 
 def parse_yaml(text: str) -> tuple[Any, dict[KeyPath, int]]:
-    """Plain data of a text, and the line of each key and list entry.
+    """Plain data of a YAML text, and the line of each key and list entry.
 
-    All keys are text. Nothing but null, truth values, numbers, text, lists and mappings comes out.
-
-    Parameters
-    ----------
-    text : str
-        YAML.
-
-    Raises
-    ------
-    PlainYamlError
-        If it is no YAML, has a key twice, is larger, deeper or longer than the limits, repeats itself without end, or
-        has tags.
+    All keys become text; only null, booleans, numbers, text, lists and mappings are allowed. Duplicate keys, tags, and
+    texts beyond the limits raise PlainYamlError.
     """
     try:
         loader = _Loader(text)
@@ -119,7 +101,7 @@ def parse_yaml(text: str) -> tuple[Any, dict[KeyPath, int]]:
 
 
 class _Walk:
-    """Every node as often as aliases show it: notes the lines of keys and makes all keys text."""
+    """Visit every node as often as aliases repeat it: record the lines of keys and convert all keys to text."""
 
     def __init__(self, lines: dict[KeyPath, int]) -> None:
         self._lines, self._nodes = lines, 0
@@ -160,13 +142,7 @@ def _line(node: yaml.Node) -> int:
 
 
 def dotted(key_path: KeyPath) -> str:
-    """Key path as it is written after ``--set``; keys that are no names are quoted, and long ones cut.
-
-    Parameters
-    ----------
-    key_path : KeyPath
-        The key, from the outermost block on.
-    """
+    """Key path as ``--set`` accepts it; unusual keys are quoted, and long ones shortened."""
     return ".".join(_readable(str(key)) for key in key_path)
 
 

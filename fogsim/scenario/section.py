@@ -1,8 +1,8 @@
-"""What every block of a scenario file shares: how strict it is, the types and ranges of its values, and named methods.
+"""What all blocks of a scenario file share: strictness, types and ranges of values, and named methods.
 
-The ranges are wide, but physical: what lies beyond them is a slip of the pen, or another unit. Truth values are no
-numbers, text is neither, and only what says so may be infinite. The parameters of methods are checked against the
-constructors that they will be handed to.
+The ranges are wide but physical: a value beyond them is a typing mistake or in another unit. Booleans are not numbers,
+text is neither, and values are finite unless declared otherwise. Parameters of methods are checked against their
+constructors.
 """
 
 import math
@@ -138,10 +138,10 @@ class Section(BaseModel):
 
 
 GIVEN_BY_THE_LOOP = frozenset({"camera"})
-"""Constructor arguments that the loop hands in, so no scenario sets them."""
+"""Constructor arguments that the loop passes, so that no scenario sets them."""
 
 MISTAKE = "parameter"
-"""Type of the errors of parameters, whose messages say all."""
+"""Type of the errors of parameters, whose messages are complete."""
 
 
 class Method(BaseModel):
@@ -154,16 +154,7 @@ class Method(BaseModel):
 
 
 def method_of(registry: Registry[Callable[..., Any]]) -> BeforeValidator:
-    """Validator of one registry's methods.
-
-    A method may be written as its bare name; names that the registry does not know are refused, and so are parameters
-    that the method does not have, and values that its annotations do not allow.
-
-    Parameters
-    ----------
-    registry : Registry
-        The methods of one kind.
-    """
+    """Validator of a registry's methods, written as a name or with parameters, which must fit the constructor."""
 
     def check(value: object, info: ValidationInfo) -> object:
         written = {"method": value} if isinstance(value, str) else value
@@ -171,7 +162,7 @@ def method_of(registry: Registry[Callable[..., Any]]) -> BeforeValidator:
             try:
                 factory = registry.find_if_allowed(written["method"], **(info.context or {"folder": None}))
             except InputError as error:
-                # Only a plain ValueError is a message to pydantic's user.
+                # pydantic shows only a plain ValueError's message.
                 raise ValueError(str(error)) from None
             if factory is not None:
                 _check_parameters(factory, written.get("parameters"))

@@ -1,4 +1,4 @@
-"""A scenario of one's own, begun from one that is there."""
+"""Creating a scenario of your own from an existing one."""
 
 import re
 import shutil
@@ -20,32 +20,11 @@ _HEAD = """\
 """
 
 SCHEMA_FILE = "fogsim.schema.json"
-"""File by which editors complete and check a scenario's keys."""
+"""File with which editors complete and check a scenario's keys."""
 
 
 def begin_scenario(name: str, source: str, parent: Path) -> tuple[Path, ...]:
-    """Copy a scenario with its SUMO files and comments into a folder of its own.
-
-    Parameters
-    ----------
-    name : str
-        Name of the new scenario, and of its folder.
-    source : str
-        A scenario of the catalogue, a file, or a folder.
-    parent : Path
-        Where the folder is made.
-
-    Returns
-    -------
-    tuple of Path
-        The files, the scenario's own first.
-
-    Raises
-    ------
-    InputError
-        If the name is none for a scenario, or stands for something that is there already, or the source is wrong,
-        or the folder cannot be made.
-    """
+    """Copy a scenario with its SUMO files and comments into a new folder; return the files, the scenario's first."""
     if not re.fullmatch(r"[A-Za-z0-9_.-]{1,100}", name) or set(name) == {"."}:
         raise InputError(f"a scenario's name has letters, digits, '_', '.' and '-', up to 100; got {shown(name)}")
     refuse_unwritable_folder(parent, "--in")

@@ -1,4 +1,4 @@
-"""What of a scenario SUMO cannot play: its traffic step, and vehicles, roads and banks that its files do not have."""
+"""What SUMO cannot play of a scenario: its traffic step, and vehicles, roads and banks missing from its files."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -26,19 +26,14 @@ from fogsim.traffic import (
 from fogsim.traffic.sumo.loaded_files import CLOCK_TICK
 from fogsim.traffic.sumo.options import option_mistakes
 
-_ROUNDING = 1e-6  # of a tick: what writing a number in decimals may cost
-_LONGER, _ASIDE = 1.05, 50.0  # by which SUMO may count a route longer than its middle lanes are [-], [m]
+_ROUNDING = 1e-6  # of a tick: possible rounding of a number in decimals
+_LONGER, _ASIDE = 1.05, 50.0  # by which SUMO may measure a route longer than its middle lanes are [-], [m]
 
 
 def step_mistake(clocks: Clocks) -> str | None:
-    """Say why SUMO cannot make a traffic step, and the nearest that it can; None if it can.
+    """Why SUMO cannot make a traffic step, and the nearest possible one; None if it can.
 
-    SUMO would make a step of whole milliseconds in its place, and times and speeds would disagree from then on.
-
-    Parameters
-    ----------
-    clocks : Clocks
-        The clocks of a scenario.
+    SUMO would round the step to whole milliseconds, and times and speeds would disagree from then on.
     """
     step, camera = clocks.traffic_step_s / CLOCK_TICK, clocks.camera_period_s / CLOCK_TICK
     if step > 0.5 and _is_whole(step):
@@ -60,17 +55,7 @@ def _is_whole(ticks: float) -> bool:
 
 
 def option_lines(document: Document, scenario: Scenario, *, own_simulation: bool) -> list[str]:
-    """Say which of a scenario's options of SUMO it does not take, each in one line.
-
-    Parameters
-    ----------
-    document : Document
-        Where its keys stand.
-    scenario : Scenario
-        The scenario.
-    own_simulation : bool
-        False if SUMO runs already, and not as the scenario has it.
-    """
+    """One line for each SUMO option of a scenario that it does not accept."""
     options = scenario.traffic.sumo_options
     if own_simulation:
         told = option_mistakes(options)
@@ -81,39 +66,19 @@ def option_lines(document: Document, scenario: Scenario, *, own_simulation: bool
 
 
 def trigger_mistakes(document: Document, scenario: Scenario) -> list[str]:
-    """Say which triggers can never come, whatever the network is, each in one line.
-
-    Parameters
-    ----------
-    document : Document
-        Where its keys stand.
-    scenario : Scenario
-        The scenario.
-    """
+    """One line for each trigger that can never fire, whatever the network is."""
     found = pointless_triggers(document, scenario, {"time": (0.0, last_time(scenario))})
     return [f"{document.where(at)}: {dotted(at)}: {text}" for at, text in found]
 
 
 MOST_SHOWN = 10
-"""Most names that a message lists."""
+"""Maximum number of names in a message."""
 
 
 def demand_mistakes(document: Document, scenario: Scenario) -> list[str]:
-    """Say what of a scenario its route files and network can't have, each in one line.
+    """One line for each vehicle, edge or lane that a scenario names and its route files or network lack.
 
-    Nothing is claimed where vehicles may come from elsewhere, ways are not written out, or files are very large.
-
-    Parameters
-    ----------
-    document : Document
-        Where its keys stand.
-    scenario : Scenario
-        The scenario, whose files are there.
-
-    Raises
-    ------
-    InputError
-        If ``traffic.config`` is no SUMO configuration.
+    Nothing is reported where vehicles may come from elsewhere, routes are not written out, or files are very large.
     """
     named = dict(_named_vehicles(scenario))
     others = departing_vehicles(scenario.timeline) | {EGO}
@@ -153,7 +118,7 @@ def _demand(scenario: Scenario, wanted: frozenset[str]) -> Demand:
 
 
 def _edges(scenario: Scenario, demand: Demand) -> NetEdges | None:
-    """Edges of the network, if anything is to be said about them."""
+    """Edges of the network, if a check needs them."""
     traffic, folder = scenario.traffic, scenario.directory
     changes = any(isinstance(event, ChangeLane) for event in traffic.events)
     if not (demand.routes or changes or traffic.along or scenario.timeline or scenario.expect or scenario.end_when):
@@ -163,13 +128,13 @@ def _edges(scenario: Scenario, demand: Demand) -> NetEdges | None:
 
 
 def _way(scenario: Scenario, demand: Demand) -> tuple[str, ...]:
-    """Edges along which places count; none where they are not known."""
+    """Edges along which positions count; empty if unknown."""
     way = demand.routes.get(scenario.traffic.ego)
     return scenario.traffic.along if way is None else tuple(way.edges)
 
 
 def _unknown_edges(scenario: Scenario, edges: NetEdges) -> dict[KeyPath, str]:
-    """Edges along which places are to count, and which the network does not have."""
+    """Edges of ``traffic.along`` that the network does not have."""
     return {
         ("traffic", "along", i): f"the net has no edge {shown(edge)}; {_suggested(edge, edges.lanes)}"
         for i, edge in enumerate(scenario.traffic.along)
@@ -178,7 +143,7 @@ def _unknown_edges(scenario: Scenario, edges: NetEdges) -> dict[KeyPath, str]:
 
 
 def _unknown_signals(scenario: Scenario, edges: NetEdges) -> dict[KeyPath, str]:
-    """Traffic lights that the timeline sets or conditions ask for, and the net does not have."""
+    """Traffic lights that the timeline or conditions name, and the net does not have."""
     known = edges.signals
     return {
         at: f"the net has no traffic lights {shown(signal)}; {suggest(signal, known) if known else 'it has none'}"
@@ -219,7 +184,7 @@ def _unfit_way(vehicle: str, way: VehicleRoute, edges: NetEdges) -> str | None:
 
 
 def _wide_changes(scenario: Scenario, demand: Demand, edges: NetEdges) -> dict[KeyPath, str]:
-    """Changes over more lanes than any road on the vehicle's way has."""
+    """Changes over more lanes than any road on the vehicle's route has."""
     told: dict[KeyPath, str] = {}
     for i, event in enumerate(scenario.traffic.events):
         way = demand.routes.get(event.vehicle)
@@ -243,7 +208,7 @@ def _limits(scenario: Scenario, way: tuple[str, ...], edges: NetEdges) -> Limits
 
 
 def _pointless(document: Document, scenario: Scenario, limits: Limits) -> dict[KeyPath, str]:
-    """Conditions that can never come, or decide nothing, on this network."""
+    """Conditions that can never be true, or never matter, on this network."""
     told: dict[KeyPath, str] = {}
     for name, expectation in scenario.expect.items():
         told |= {("expect", name, key): text for key, text in expectation.pointless(limits, scenario.traffic.ego)}
@@ -251,7 +216,7 @@ def _pointless(document: Document, scenario: Scenario, limits: Limits) -> dict[K
 
 
 def _places_aside(scenario: Scenario, way: tuple[str, ...], edges: NetEdges) -> Mapping[KeyPath, str]:
-    """Places along the ego's route that lie beyond its end, or before its beginning."""
+    """Positions before the start or beyond the end of the ego's route."""
     if not way or not all(edges.axes.get(edge) for edge in way):
         return {}
     length, drivers = edges.route_length(way), scenario.drivers
@@ -270,7 +235,7 @@ def _places_aside(scenario: Scenario, way: tuple[str, ...], edges: NetEdges) -> 
 
 
 def _banks_aside(scenario: Scenario, length: float) -> dict[KeyPath, str]:
-    """Banks wholly before the start or beyond the end of the ego's route; no wind brings them in."""
+    """Banks entirely before the start or beyond the end of the ego's route; no wind brings them in."""
     told: dict[KeyPath, str] = {}
     for i, bank in enumerate(scenario.fog.banks):
         if bank.start_m - bank.edge_m > length:
@@ -283,7 +248,7 @@ def _banks_aside(scenario: Scenario, length: float) -> dict[KeyPath, str]:
 
 
 def _suggested(name: str, known: tuple[str, ...] | Mapping[str, int]) -> str:
-    """The nearest of many names, and some of the others."""
+    """The nearest of many names, and some others."""
     near = nearest(name, known)
     some = [*([near] if near else []), *(one for one in known if one != near)][:MOST_SHOWN]
     return suggest(name, some) + (f", … ({len(known)} in all)" if len(known) > len(some) else "")

@@ -1,4 +1,4 @@
-"""Scenarios without an ego (``traffic.ego: none``): what they leave out, and what they have in place of its camera."""
+"""Scenarios without an ego (``traffic.ego: none``): keys that they lack, and what replaces its camera."""
 
 import math
 from collections.abc import Iterator
@@ -11,24 +11,13 @@ from fogsim.scenario.plain_yaml import KeyPath
 from fogsim.scenario.section import MISTAKE
 
 NO_EGO = "none"
-"""What stands for an ego's id where there is none."""
+"""Placeholder for the id of a missing ego."""
 
 _NEEDS = "needs an ego, and traffic.ego is none"
 
 
 def without_ego(written: object) -> object:
-    """Fill in what follows from there being no ego, and refuse what needs one; other scenarios stay as they are.
-
-    Parameters
-    ----------
-    written : object
-        What stands in a scenario file.
-
-    Raises
-    ------
-    ValidationError
-        One mistake for each key that needs an ego.
-    """
+    """Fill in defaults of a scenario without an ego and refuse keys that need one; other data is unchanged."""
     traffic = written.get("traffic") if isinstance(written, dict) else None
     if not isinstance(written, dict) or not isinstance(traffic, dict) or traffic.get("ego") != NO_EGO:
         return written
@@ -57,7 +46,7 @@ def _advice(written: dict[str, Any]) -> object:
 
 
 def _of_camera(written: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
-    """What goes by an ego's camera, or lights its lamps."""
+    """Keys that need an ego's camera or lights."""
     if written.get("renderer", NO_EGO) != NO_EGO:
         yield ("renderer",), f"drawing frames {_NEEDS}; leave it out, or write none"
     if written.get("estimators"):
@@ -79,12 +68,12 @@ def _of_camera(written: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
 
 
 def _has_way(written: dict[str, Any]) -> bool:
-    """Whether there is a way along which places count: what is named, or that of a road by template."""
+    """Whether there is a route along which positions count: a given one, or a template's road."""
     return bool(written["traffic"].get("along") or written.get("road"))
 
 
 def _of_place(written: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
-    """What lies along an ego's route, or is told by it."""
+    """Keys that need an ego's route."""
     drivers, fog = written.get("drivers"), written.get("fog")
     advised = drivers.get("advised") if isinstance(drivers, dict) else None
     if advised == "ego":

@@ -34,7 +34,7 @@ __all__ = [
 
 
 Watch = Callable[[int, str | None], None]
-"""Called with the number of runs that are done, and with what went wrong with the last one or None."""
+"""Called with the number of completed runs, and with the error of the last one or None."""
 
 
 def _unwatched(_: int, __: str | None) -> None:
@@ -50,7 +50,7 @@ def run_study(
     engine: Engine | None = None,
     watch: Watch = _unwatched,
 ) -> list[Row]:
-    """Run what a directory has no result of yet, and write its table, comparison and report.
+    """Run what a directory has no results of yet, and write its table, comparison and report.
 
     Parameters
     ----------
@@ -58,13 +58,13 @@ def run_study(
         From `load_study`.
     out : Path
         Directory: ``study.parquet`` and ``study.csv`` (a row for each run: factors, seed, metrics), ``comparison.csv``,
-        ``report.html``, ``figures/`` (SVG and CSV); ``runs/`` holds a file for each run, by which a study is continued.
+        ``report.html``, ``figures/`` (SVG and CSV); ``runs/`` has a file for each run, from which a study is continued.
     processes : int or None
-        Runs at once in processes of this machine; None for one a core.
+        Concurrent processes on this machine; None for one per core.
     engine : Engine or None
-        What runs in their place: `RayCluster`.
+        Replaces the processes: `RayCluster`.
     watch : callable
-        Called at the beginning and after each run, with the number of runs that are done, and with what went wrong with
+        Called at the beginning and after each run, with the number of completed runs, and with the error of
         the last one or None.
 
     Returns
@@ -76,14 +76,14 @@ def run_study(
     ------
     InputError
         If the directory holds something else, another study, or is written by another process; if both processes and
-        an engine are given; if a metric of your own has the name of a factor; or if a Ray cluster does not answer or
+        an engine are given; if one of your metrics has the name of a factor; or if a Ray cluster does not answer or
         cannot run the study.
     MissingDependencyError
-        If Ray is asked for and not installed.
+        If Ray is needed and not installed.
     OSError
-        If something cannot be written, as on a full disk: runs that were done are kept, and the same call goes on.
+        If something cannot be written, as on a full disk: completed runs are kept, and the same call resumes.
     KeyboardInterrupt
-        On Ctrl-C: all runs that were done are kept, and the same call goes on.
+        On Ctrl-C: all completed runs are kept, and the same call resumes.
     """
     if engine is not None and processes is not None:
         raise InputError("processes are this machine's: give either processes or an engine")

@@ -1,7 +1,7 @@
 """Differences to the baseline: the same seeds under two policies, with intervals and a paired test.
 
-Every comparison changes the levels of the factors that the baseline names, and leaves all others as they are. Runs of
-the same seed have the same traffic and the same noise, so that the difference is taken run by run.
+Every comparison changes the levels of the factors that the baseline names and keeps all others. Runs of the same seed
+have the same traffic and noise, so the difference is taken run by run.
 """
 
 import math
@@ -19,7 +19,7 @@ RESAMPLES = 9_999
 """Resamples of bootstraps and permutation tests."""
 
 SATURATED_SHARE = 0.9
-"""A metric whose extreme value this share of all runs has says little about the rest [-]."""
+"""Share of runs at a metric's extreme value above which it shows little about the rest [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,21 +31,21 @@ class Difference:
     metric : str
         The metric; its name ends in its unit.
     levels : mapping from str to str
-        Levels of all factors of what is compared.
+        Levels of all factors of the compared policy.
     baseline_mean, mean : float
         Means under the baseline and here, in the metric's unit.
     difference : float
         Mean of the differences of runs with the same seed.
     low, high : float or None
-        Ends of its bootstrap interval (BCa; Efron 1987); None where no two differences differ.
+        Ends of its bootstrap interval (BCa; Efron 1987); None if all differences are equal.
     p_value : float or None
-        Of a paired permutation test of no difference, two-sided; None where no run differs, or there is but one.
+        Of a paired permutation test of no difference, two-sided; None if no run differs, or there is only one.
     pairs : int
-        Seeds of which both runs have a value.
+        Number of seeds with a value in both runs.
     seeds_for_half_width : int or None
-        Seeds that an interval of the study's wanted half-width would need, by the normal law.
+        Seeds needed for an interval of the study's wanted half-width, by the normal distribution.
     adjusted_p_value : float or None
-        The p-value for a family of comparisons (Benjamini & Hochberg 1995), once `adjust_p_values` has found it.
+        The p-value adjusted for a family of comparisons (Benjamini & Hochberg 1995), once `adjust_p_values` has run.
     """
 
     metric: str
@@ -61,10 +61,10 @@ class Difference:
     adjusted_p_value: float | None = None
 
     def is_shown(self, confidence: float) -> bool:
-        """Whether the data show that there is a difference: the interval excludes 0, and the test agrees.
+        """Whether the data show a difference: the interval excludes 0, and the test agrees.
 
-        A difference that is the same in every run has no interval, and goes by the test. Of few seeds, the bootstrap
-        alone would claim too much: three differences of one sign exclude 0, and happen by chance in one case of four.
+        A difference that is the same in every run has no interval; only the test counts. With few seeds, the bootstrap
+        alone would claim too much: three differences of one sign exclude 0, and occur by chance in one case of four.
 
         Parameters
         ----------
@@ -77,48 +77,19 @@ class Difference:
 
 
 def numeric_metrics(rows: Sequence[Row], factors: Iterable[str]) -> list[str]:
-    """Metrics that are numbers in at least one run.
-
-    Parameters
-    ----------
-    rows : sequence of Row
-        The table.
-    factors : iterable of str
-        Columns that are no metrics, beside the run's own.
-    """
+    """Columns other than `factors` and the run's own that are numbers in at least one run."""
     others = {*factors, "run", "seed", "status", "message"}
     names = dict.fromkeys(key for row in rows for key, v in row.items() if number_of(v) is not None)
     return [name for name in names if name not in others]
 
 
 def number_of(value: object) -> float | None:
-    """Value of a cell as a number; None if it is none.
-
-    Parameters
-    ----------
-    value : object
-        The cell.
-    """
+    """Value of a cell as a number; None if it is not one."""
     return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
 
 
 def compare_to_baseline(study: Study, rows: Sequence[Row], metrics: Sequence[str]) -> list[Difference]:
-    """Compare every policy to the baseline.
-
-    Parameters
-    ----------
-    study : Study
-        What was planned.
-    rows : sequence of Row
-        Its table.
-    metrics : sequence of str
-        What is compared.
-
-    Returns
-    -------
-    list of Difference
-        By metric, then in the order of the grid; none for pairs of which no seed has both values.
-    """
+    """Compare every policy to the baseline, by metric and in grid order, without pairs that share no seed."""
     by_cell: dict[tuple[str, ...], dict[int, Row]] = {}
     for row in rows:
         cell = tuple(str(row[name]) for name in study.factors)
@@ -161,12 +132,7 @@ def _difference(
 def adjust_p_values(differences: Sequence[Difference]) -> list[Difference]:
     """Adjust the p-values of a family of comparisons to their number, by Benjamini & Hochberg (1995).
 
-    Of the differences whose adjusted value is at most 0.05, one in twenty is expected to be none.
-
-    Parameters
-    ----------
-    differences : sequence of Difference
-        The family.
+    Of the differences with an adjusted value of at most 0.05, one in twenty is expected to be false.
     """
     found = [one.p_value for one in differences if one.p_value is not None]
     adjusted = iter(stats.false_discovery_control(found).tolist() if found else [])
@@ -174,15 +140,7 @@ def adjust_p_values(differences: Sequence[Difference]) -> list[Difference]:
 
 
 def mean_interval(values: NDArray[np.float64], confidence: float) -> tuple[float | None, float | None]:
-    """Bootstrap interval of a mean (BCa); (None, None) where resampling gives but one value.
-
-    Parameters
-    ----------
-    values : (n,) float64
-        One for each seed.
-    confidence : float
-        Confidence of the interval, 0 … 1.
-    """
+    """Bootstrap interval (BCa) of the mean of values, one per seed; (None, None) if resampling is degenerate."""
     if len(values) < 2 or np.ptp(values) == 0.0:
         return None, None
     ends = stats.bootstrap(
@@ -192,7 +150,7 @@ def mean_interval(values: NDArray[np.float64], confidence: float) -> tuple[float
 
 
 def _p_value(differences: NDArray[np.float64]) -> float | None:
-    """Two-sided paired permutation test: under no difference each sign is as likely as the other."""
+    """Two-sided paired permutation test: without a difference, both signs are equally likely."""
     if len(differences) < 2 or not differences.any():
         return None
     test = stats.permutation_test(
@@ -214,15 +172,7 @@ def _seeds_wanted(differences: NDArray[np.float64], half_width: float, confidenc
 
 
 def uninformative(rows: Sequence[Row], metrics: Sequence[str]) -> dict[str, str]:
-    """Metrics that cannot tell policies apart, and why: they do not vary, or nearly all runs are at their end.
-
-    Parameters
-    ----------
-    rows : sequence of Row
-        The table.
-    metrics : sequence of str
-        What is looked at.
-    """
+    """Metrics that cannot distinguish policies, and why: constant, or nearly all runs at their limit."""
     said = {}
     for metric in metrics:
         values = np.array([v for row in rows if (v := number_of(row.get(metric))) is not None])

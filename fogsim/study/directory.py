@@ -1,4 +1,4 @@
-"""The directory of a study: what it is about, and a file for each run that is done."""
+"""The directory of a study: its plan, and a file for each completed run."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -21,7 +21,7 @@ _MOST_TOLD = 5
 
 
 class _Manifest(BaseModel):
-    """What `study.json` says, as far as it is compared."""
+    """Contents of `study.json` that are compared."""
 
     versions: dict[str, str | None]
     files: dict[str, str]
@@ -29,24 +29,10 @@ class _Manifest(BaseModel):
 
 
 class StudyDirectory:
-    """Where a study's results are; one that is there is continued if it is of the same study.
+    """Directory of a study's results, created if missing and continued if it is of the same study.
 
-    Parameters
-    ----------
-    path : Path
-        The directory; it is made where it is not there.
-    study : Study
-        The study.
-
-    Attributes
-    ----------
-    results : Path
-        Folder of the runs that are done.
-
-    Raises
-    ------
-    InputError
-        If the directory holds something else, or a study with other runs; the message names the differences.
+    InputError if it holds something else, or a study with other runs. Results of completed runs are in the folder
+    `results`.
     """
 
     def __init__(self, path: Path, study: Study) -> None:
@@ -58,7 +44,7 @@ class StudyDirectory:
         if manifest.exists():
             self._check_same(manifest, described)
         else:
-            # A process that was killed there, or a full disk, may have left as much.
+            # A process that was killed there, or a full disk, may have left this much.
             begun = {partial_path(manifest)}
             if path.exists() and set(path.iterdir()) - begun:
                 raise InputError(f"--out {path} holds something else than a study; choose another directory")
@@ -74,7 +60,7 @@ class StudyDirectory:
                 f"{manifest}: not the description of a study; choose another directory with --out, or remove the file "
                 "and the results beside it"
             ) from error
-        # The baseline and the number of seeds may change: runs that are done stay what they are.
+        # The baseline and the number of seeds may change: completed runs stay valid.
         now = {**described, "versions": _deciding_versions(versions())}
         before = {**there, "versions": _deciding_versions(there["versions"])}
         kinds = ("versions", "files", "cells")
@@ -87,18 +73,18 @@ class StudyDirectory:
             )
 
     def missing(self) -> list[StudyRun]:
-        """Runs without a whole result; those that failed are tried again."""
+        """Runs without a complete result; failed ones are tried again."""
         return [run for run in self._study.runs if not isinstance(self._result(run), CompleteRun)]
 
     def _result(self, run: StudyRun) -> CompleteRun | FailedRun | None:
         return read_run(result_file(self.results, run), STUDY_RUN)
 
     def rows(self) -> list[Row]:
-        """The table: a row for each run, those without a result included."""
+        """The table: a row for each run, including those without a result."""
         return [self._row(run) for run in self._study.runs]
 
     def profiles(self) -> Iterator[tuple[Mapping[str, str], int, Profiles]]:
-        """Levels, seed and profiles of each run that is done."""
+        """Levels, seed and profiles of each completed run."""
         for run in self._study.runs:
             found = self._result(run)
             if isinstance(found, CompleteRun):
@@ -108,7 +94,7 @@ class StudyDirectory:
         found = self._result(run)
         metrics = found.metrics if isinstance(found, CompleteRun) else {}
         if not run.scenario.estimators:
-            # Without a camera what is believed is but where beliefs begin: no error to compare.
+            # Without a camera the belief stays at its prior: there is no error to compare.
             metrics = {key: None if key.startswith("belief_") else value for key, value in metrics.items()}
         about = {
             "seed": run.seed,
@@ -121,12 +107,12 @@ class StudyDirectory:
 
 
 def _deciding_versions(found: Mapping[str, str | None]) -> dict[str, str | None]:
-    """Versions with which runs may not be mixed: those of FogSim and of SUMO."""
+    """Versions whose runs must not be mixed: those of FogSim and of SUMO."""
     return {f"version of {name}": found.get(name) for name in ("fogsim", "libsumo")}
 
 
 def _changes(before: object, now: object, place: Sequence[str] = ()) -> Iterator[str]:
-    """What differs between two trees of plain data, in words."""
+    """Differences between two trees of plain data, in words."""
     if isinstance(before, dict) and isinstance(now, dict):
         for key in dict.fromkeys((*before, *now)):
             if key not in before or key not in now:

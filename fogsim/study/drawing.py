@@ -1,4 +1,4 @@
-"""How a study's figures look: panels, colours and markers for people who see colours differently, SVG and CSV."""
+"""Style of a study's figures: panels, colours and markers that colour-blind readers can distinguish, SVG and CSV."""
 
 import io
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,7 +20,7 @@ WIDTH = 7.2
 """Width of a figure over both columns of a page [in]."""
 
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#882255", "#999933")
-"""Okabe & Ito's colours (2008), the two that white paper swallows replaced by two of Tol's; black is the baseline's."""
+"""Okabe & Ito's colours (2008), the two that are faint on white replaced by two of Tol's; black is the baseline's."""
 
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">")
 _DASHES: Sequence[tuple[int, tuple[float, ...]]] = ((0, ()), (0, (5, 1.5)), (0, (1.5, 1.5)), (0, (6, 1.5, 1.5, 1.5)))
@@ -28,21 +28,7 @@ _DASHES: Sequence[tuple[int, tuple[float, ...]]] = ((0, ()), (0, (5, 1.5)), (0, 
 
 @dataclass(frozen=True, slots=True)
 class StudyFigure:
-    """A figure and the numbers in it.
-
-    Attributes
-    ----------
-    name : str
-        Name of its files, without ending.
-    caption : str
-        What it shows.
-    svg : str
-        The figure.
-    columns : sequence of str
-        Columns of its table.
-    rows : sequence of sequences
-        Rows of its table.
-    """
+    """A figure as SVG, and the table of the numbers in it; `name` is that of its files, without suffix."""
 
     name: str
     caption: str
@@ -52,15 +38,7 @@ class StudyFigure:
 
 
 class Look(NamedTuple):
-    """How a policy is drawn.
-
-    Attributes
-    ----------
-    colour, marker : str
-        Colour and marker.
-    dashes : (float, tuple of float)
-        Style of its lines.
-    """
+    """Colour, marker and line style of a policy."""
 
     colour: str
     marker: str
@@ -68,13 +46,7 @@ class Look(NamedTuple):
 
 
 class Grid:
-    """A study's grid as figures lay it out: a policy is a colour, all other factors together are panels.
-
-    Parameters
-    ----------
-    study : Study
-        The study; its baseline's first factor is that of the policies.
-    """
+    """Layout of a study's figures: a colour for each policy, a panel for each combination of the other factors."""
 
     def __init__(self, study: Study) -> None:
         self.study = study
@@ -93,30 +65,12 @@ class Grid:
             self.looks[policy] = Look(_COLOURS[i % len(_COLOURS)], marker, dashes)
 
     def cell(self, policy: str, panel: tuple[str, ...]) -> tuple[str, ...]:
-        """Levels of all factors, in their order.
-
-        Parameters
-        ----------
-        policy : str
-            Level of the policies' factor.
-        panel : tuple of str
-            Levels of the others.
-        """
+        """Levels of all factors in order, from a policy and the others' levels."""
         others = iter(panel)
         return tuple(policy if name == self.policy_factor else next(others) for name in self.study.factors)
 
     def figure(self, height: float, across: int = 2, *, same_axes: bool = True) -> tuple[Figure, "PanelAxes"]:
-        """Make a figure with a panel for each cell of the other factors.
-
-        Parameters
-        ----------
-        height : float
-            Height of a panel [in].
-        across : int
-            Most panels beside one another.
-        same_axes : bool
-            Whether all panels have the same axes.
-        """
+        """Figure with a panel of `height` [in] for each combination of the other factors, at most `across` in a row."""
         number = len(self.panels)
         columns = min(number, across)
         rows = -(-number // columns)
@@ -135,13 +89,7 @@ class Grid:
 
 
 class PanelAxes:
-    """The panels of a figure.
-
-    Parameters
-    ----------
-    panels : sequence of (tuple of str, Axes)
-        Levels and axes of each.
-    """
+    """The panels of a figure, as levels and axes."""
 
     def __init__(self, panels: Sequence[tuple[tuple[str, ...], Axes]]) -> None:
         self._panels = panels
@@ -151,13 +99,7 @@ class PanelAxes:
 
 
 def dress(axes: Axes) -> None:
-    """Give axes the looks of all.
-
-    Parameters
-    ----------
-    axes : Axes
-        The axes.
-    """
+    """Apply the common style to axes."""
     axes.grid(visible=True, color=GRID, linewidth=0.6)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
@@ -166,15 +108,7 @@ def dress(axes: Axes) -> None:
 
 
 def label_figure(figure: Figure, across: str, upwards: str) -> None:
-    """Name the axes of the lowest and the leftmost panels, and list the policies below all.
-
-    Parameters
-    ----------
-    figure : Figure
-        With its panels; lines and markers that have a label.
-    across, upwards : str
-        What the axes show, with units.
-    """
+    """Label the axes of the lowest and the leftmost panels, and list the policies below all."""
     shown: dict[str, Artist] = {}
     for axes in figure.axes:
         place = axes.get_subplotspec()
@@ -198,15 +132,7 @@ def label_figure(figure: Figure, across: str, upwards: str) -> None:
 
 
 def svg_of(figure: Figure, name: str) -> str:
-    """A figure as SVG; the same study gives the same bytes.
-
-    Parameters
-    ----------
-    figure : Figure
-        The figure.
-    name : str
-        From which the names of its parts are made.
-    """
+    """A figure as SVG; the same study gives the same bytes, since ids of elements derive from `name`."""
     text = io.StringIO()
     FigureCanvasSVG(figure)
     with mpl.rc_context({"svg.hashsalt": name}):
@@ -215,13 +141,7 @@ def svg_of(figure: Figure, name: str) -> str:
 
 
 def padded(values: NDArray[np.float64]) -> tuple[float, float]:
-    """Limits of an axis around values, with a little room, and never of no length.
-
-    Parameters
-    ----------
-    values : (n,) float64
-        What is drawn.
-    """
+    """Limits of an axis around values, with a margin and never of zero length."""
     low, high = float(values.min()), float(values.max())
     room = 0.06 * (high - low) or 0.06 * abs(high) or 1.0
     return low - room, high + room

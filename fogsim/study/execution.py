@@ -1,4 +1,4 @@
-"""One run of a study: its metrics in a row of plain values, and its profiles."""
+"""One run of a study: its metrics as a row of plain values, and its profiles."""
 
 import traceback
 import warnings
@@ -18,23 +18,7 @@ from fogsim.values import TrafficStep
 
 
 def measure_run(scenario: Scenario, seed: int, sumo_outputs: Path | None = None) -> dict[str, Any]:
-    """Metrics and profiles of one run.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        What is run.
-    seed : int
-        Its seed.
-    sumo_outputs : Path or None
-        Folder of what SUMO writes, as of `run`.
-
-    Returns
-    -------
-    dict
-        ``metrics``, flat: those of a method have its name before theirs, with a point between; and ``profiles``, of
-        `RunProfiles.to_json`.
-    """
+    """Run a scenario and return its ``metrics``, from `flat_metrics`, and ``profiles``, from `RunProfiles.to_json`."""
     standard, profiles = build.safety_standard(scenario), RunProfiles()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnplayedWarning)
@@ -58,13 +42,7 @@ def _watched(steps: Iterable[_AnyStep], metrics: MetricsOfRun[_AnyStep], profile
 
 
 def flat_metrics(values: Mapping[str, object]) -> dict[str, Value]:
-    """Metrics without levels: those of a method have its name before theirs, with a point between.
-
-    Parameters
-    ----------
-    values : mapping
-        Of ``RunSummary.to_json``.
-    """
+    """Metrics without levels: those of a method become ``method.metric``."""
     return dict(_flat(values))
 
 
@@ -79,27 +57,12 @@ def _flat(values: Mapping[str, object], prefix: str = "") -> list[tuple[str, Val
 
 
 def run_outcome(scenario: Scenario, seed: int, sumo_outputs: Path) -> dict[str, Any]:
-    """Run, and return the content of the run's file, which also says what went wrong with the run.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        What is run.
-    seed : int
-        Its seed.
-    sumo_outputs : Path
-        Folder of what SUMO writes, as of `run`.
-
-    Returns
-    -------
-    dict
-        ``status``, and what `measure_run` gives or a ``message``.
-    """
+    """Run, and return the content of the run's file, which also reports failures."""
     return outcome_of(lambda: measure_run(scenario, seed, sumo_outputs))
 
 
 def outcome_of(measure: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """What a run gave with its ``status``, or the ``message`` of what ended it, which must not end the others.
+    """Result of a run with its ``status``, or the ``message`` of its error, which must not end other runs.
 
     Not even SystemExit passes: the exit code of a study or test comes from its outcomes.
     """
@@ -115,37 +78,14 @@ def outcome_of(measure: Callable[[], dict[str, Any]]) -> dict[str, Any]:
 
 
 def failure(message: str) -> dict[str, Any]:
-    """Outcome of a run that failed.
-
-    Parameters
-    ----------
-    message : str
-        What went wrong.
-    """
+    """Outcome of a failed run."""
     return {"status": "failed", "message": message}
 
 
 def run_to_file(scenario: Scenario, seed: int, result: Path) -> str | None:
-    """Run, and write the outcome into a file.
+    """Run and write the outcome to `result`; return the error of the run, if any.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        What is run.
-    seed : int
-        Its seed.
-    result : Path
-        The file, written whole or not at all; what SUMO writes is in a folder of its name beside it.
-
-    Returns
-    -------
-    str or None
-        What went wrong, if anything did.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written, as on a full disk.
+    SUMO's outputs go to a folder of the same name next to it.
     """
     outcome = run_outcome(scenario, seed, result.with_suffix(""))
     write_json(result, outcome)

@@ -12,17 +12,7 @@ from fogsim.study.table import Row
 
 
 def differences_figure(study: Study, metric: str, differences: Sequence[Difference]) -> StudyFigure:
-    """Differences of one metric to the baseline with their intervals: a line each policy, a panel each fog.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    metric : str
-        The metric.
-    differences : sequence of Difference
-        Of this metric, at least one.
-    """
+    """Differences of one metric to the baseline with their intervals: a line per policy, a panel per fog."""
     grid, words = Grid(study), metric_words(metric)
     by_cell = {tuple(one.levels.values()): one for one in differences}
     compared = [
@@ -63,17 +53,7 @@ def differences_figure(study: Study, metric: str, differences: Sequence[Differen
 
 
 def trade_off_figure(study: Study, rows: Sequence[Row], across: str, upwards: str) -> StudyFigure:
-    """Means of two metrics with their intervals: a point each policy, a panel each fog.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    rows : sequence of Row
-        Its table, of runs that are done.
-    across, upwards : str
-        Metrics of the horizontal and the vertical axis.
-    """
+    """Means of two metrics of completed runs with their intervals: a point per policy, a panel per fog."""
     grid = Grid(study)
     by_cell: dict[tuple[str, ...], list[Row]] = {}
     for row in rows:
@@ -102,7 +82,7 @@ def trade_off_figure(study: Study, rows: Sequence[Row], across: str, upwards: st
                 label=policy,
             )
         if not any(axes.dataLim.intervaly):
-            # Around nothing but zeros matplotlib would show negative numbers, which there are none of.
+            # Around only zeros matplotlib would show negative numbers, which do not occur.
             axes.set_ylim(-0.05, 1.0)
     label_figure(figure, metric_words(across).axis, metric_words(upwards).axis)
     name = f"trade_off_{upwards}"
@@ -124,7 +104,7 @@ def _mean_and_interval(
 
 
 def _errors(mean: float | None, ends: Sequence[float | None], scale: float) -> list[list[float]] | None:
-    """Lengths of the two bars at a point, as matplotlib takes them."""
+    """Lengths of the two error bars at a point, as matplotlib needs them."""
     low, high = ends
     if mean is None or low is None or high is None:
         return None

@@ -1,4 +1,4 @@
-"""Metrics that a study's report shows first, in words; and which metrics there are to choose from."""
+"""Metrics that a study's report shows first, in words, and all that it can choose from."""
 
 from collections.abc import Iterable
 from typing import Literal, NamedTuple
@@ -7,23 +7,11 @@ from fogsim.errors import suggest
 from fogsim.metrics import metric_keys
 
 METHODS_KEY = "estimators"
-"""Key under which each estimator has metrics of its own, ``estimators.METHOD.KEY``."""
+"""Key of the estimators' own metrics, ``estimators.METHOD.KEY``."""
 
 
 class MetricWords(NamedTuple):
-    """A metric as a paper would name it.
-
-    Attributes
-    ----------
-    label : str
-        Its name.
-    unit : str
-        Unit in which it is shown.
-    scale : float
-        Factor from the metric's own unit to that.
-    better : str
-        Which is better, ``less`` or ``more``; ``neither`` where that depends.
-    """
+    """A metric as a paper would name it; `scale` converts the metric's own unit to `unit`."""
 
     label: str
     unit: str
@@ -52,38 +40,26 @@ MAIN_METRICS = {
     "above_advice_time_share": MetricWords("The ego's time above the advice", "%", 100.0),
     "belief_median_error_percent": MetricWords("Median error of believed visibility", "%"),
 }
-"""What is shown where a study file chooses nothing, as far as the table has it, in this order."""
+"""Default metrics, in this order, if the table has them."""
 
 SAFETY_METRICS = (
     ("collisions",),
     ("traffic_conflicts_per_vehicle_km", "traffic_exposed_time_share"),
     ("traffic_overdriving_time_share", "negative_margin_time_share"),
 )
-"""Vertical axes of trade-off figures: of each group the first that the table has and that varies."""
+"""Vertical axes of trade-off figures: from each group the first that the table has and that varies."""
 
 DELAY_METRICS = ("traffic_delay_s_per_vehicle_km", "traffic_mean_speed_mps", "mean_speed_mps")
-"""Their horizontal axis, likewise."""
+"""Their horizontal axes, chosen in the same way."""
 
 
 def metric_words(metric: str) -> MetricWords:
-    """A metric in words; its own name, which ends in its unit, where it has none.
-
-    Parameters
-    ----------
-    metric : str
-        Column of the table.
-    """
+    """Label and unit of a metric; by default its own name, which ends in its unit."""
     return MAIN_METRICS.get(metric) or MetricWords(metric, "", better="neither")
 
 
 def unknown_metrics(names: Iterable[str]) -> list[str]:
-    """What is wrong with names of metrics, a line each.
-
-    Parameters
-    ----------
-    names : iterable of str
-        What was chosen.
-    """
+    """What is wrong with names of metrics, one line each."""
     known = [key for key in metric_keys() if key != "ending"]
     return [
         f"unknown metric {name!r}; {suggest(name, known)}"
@@ -93,28 +69,12 @@ def unknown_metrics(names: Iterable[str]) -> list[str]:
 
 
 def main_metrics(chosen: Iterable[str], known: Iterable[str]) -> list[str]:
-    """Metrics that the report shows first.
-
-    Parameters
-    ----------
-    chosen : iterable of str
-        Of the study file; empty for the default.
-    known : iterable of str
-        Columns of the table that are numbers.
-    """
+    """Metrics that the report shows first: those that the study file chose, or the default ones that exist."""
     there = set(known)
     return [name for name in tuple(chosen) or MAIN_METRICS if name in there]
 
 
 def signed(value: float, digits: int = 3) -> str:
-    """A difference with its sign, to some digits.
-
-    Parameters
-    ----------
-    value : float
-        The difference.
-    digits : int
-        Digits that count.
-    """
+    """A difference with its sign, to `digits` significant digits."""
     text = f"{value:+.{digits}g}"
     return (f"{value:+.0f}" if "e+" in text else text).replace("-", "−")

@@ -1,4 +1,4 @@
-"""A study file: a scenario, what is varied about it, how often, and what the rest is compared to."""
+"""A study file: a scenario, its variations, the number of seeds, and the baseline."""
 
 import functools
 import hashlib
@@ -112,15 +112,15 @@ class StudyRun:
     Attributes
     ----------
     number : int
-        Its place in the table, from 0.
+        Its index in the table, from 0.
     levels : mapping from str to str
         Level of each factor.
     seed : int
         Seed of the run.
     scenario : Scenario
-        What is run.
+        The scenario that is run.
     key : str
-        A digest of the scenario and the seed, by which its result is found again.
+        A digest of the scenario and the seed, which identifies its result.
     """
 
     number: int
@@ -141,7 +141,7 @@ class Study:
     factors : mapping from str to tuple of str
         Levels of each factor, in the order of the file.
     baseline : mapping from str to str
-        To what the others are compared.
+        Levels to which the others are compared.
     confidence : float
         Confidence of the intervals, 0 … 1.
     runs : tuple of StudyRun
@@ -149,9 +149,9 @@ class Study:
     metrics : tuple of str
         Metrics of the comparison and the report; empty for all, the main ones first.
     wanted_interval : float
-        Half-width of an interval, as a share of the baseline's mean, for which the seeds needed are told.
+        Half-width of an interval, as a share of the baseline's mean, for which the needed seeds are reported.
     level_settings : mapping from str to mapping
-        Settings that make each level of each factor.
+        Settings of each level of each factor.
     file : Path
         The study file.
     """
@@ -167,8 +167,8 @@ class Study:
     file: Path = Path("study.yaml")
 
     def description(self) -> dict[str, Any]:
-        """All that decides its runs, as JSON can hold it: each cell's scenario by its levels, and the seeds."""
-        # Runs of a cell share one scenario, and differ in their seed.
+        """Everything that determines its runs, as JSON data: each cell's scenario by its levels, and the seeds."""
+        # Runs of a cell share a scenario, and differ in their seed.
         of_cells = list({id(run.scenario): run for run in self.runs}.values())
         cells = {_label(run.levels): resolved(run.scenario) for run in of_cells}
         seeds = list(dict.fromkeys(run.seed for run in self.runs))
@@ -184,18 +184,7 @@ def _label(levels: Mapping[str, str]) -> str:
 
 
 def file_digests(scenario: Scenario) -> dict[str, str]:
-    """Digest of the content of each of SUMO's files that a scenario names, by its name.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-
-    Raises
-    ------
-    InputError
-        If one of them is not there.
-    """
+    """Digest of each SUMO file that a scenario names, by name; InputError if one is missing."""
     traffic, folder = scenario.traffic, scenario.directory
     named = [path for path in (traffic.config, traffic.net, *traffic.routes, *traffic.additional) if path is not None]
     files = [folder / path for path in named]
@@ -212,7 +201,7 @@ def file_digests(scenario: Scenario) -> dict[str, str]:
 
 @functools.lru_cache
 def _digest(path: Path, _: int) -> str:
-    """Digest of a file's content, asked for anew when the file has been written anew."""
+    """Digest of a file's content, computed again after the file has changed."""
     with open_regular(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()[:20]
 
@@ -231,11 +220,11 @@ def load_study(
     name_or_path : str or Path
         The file, or the name of a study that comes with FogSim (`fogsim.study.shipped_studies`).
     settings : iterable of str
-        ``key.path=value`` each, put in place of the scenario's in every run, after those of the file.
+        ``key.path=value`` each, replacing the scenario's values in every run, after those of the file.
     may_import : callable
-        As of `load_scenario`.
+        As in `load_scenario`.
     watch : callable or None
-        Called after each cell with the number of cells that are checked, and how many there are.
+        Called after each cell with the number of checked cells and their total.
 
     Raises
     ------
@@ -285,7 +274,7 @@ def _runs(
 
 
 def _loader(document: Document, written: StudyFile, may_import: MayImport) -> Callable[[Sequence[str]], Scenario]:
-    """Makes scenarios of settings, from files that are read once."""
+    """Makes scenarios from settings, from files that are read once."""
     folder = document.path.parent
     if written.sumocfg is not None:
         config, ego = folder / written.sumocfg, written.ego or NO_EGO
@@ -314,13 +303,7 @@ def _scenario(
 
 
 def needs_camera(scenario: Scenario) -> bool:
-    """Whether what the camera sees changes what happens: advice or lamps go by it.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """Whether advice or lamps depend on the camera."""
     deaf = scenario.advice.method in ("none", "fixed_speed"), scenario.lighting.method == "low_beam"
     methods = (scenario.advice, scenario.lighting)
     return any(m.informed_by == "belief" and not d for m, d in zip(methods, deaf, strict=True))

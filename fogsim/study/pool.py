@@ -1,4 +1,4 @@
-"""Runs of a study in parallel processes of this machine; whatever ends them, finished runs are kept."""
+"""Runs of a study in parallel processes of this machine; completed runs are kept however it ends."""
 
 import contextlib
 import multiprocessing
@@ -19,44 +19,22 @@ from fogsim.study.execution import failure, run_to_file
 from fogsim.study.plan import StudyRun
 
 Work = Callable[[Scenario, int, Path], str | None]
-"""Runs a scenario with a seed, writes the result into a file, and tells what went wrong, if anything did."""
+"""Runs a scenario with a seed, writes the result into a file, and returns the error, if any."""
 
 
 @dataclass(frozen=True, slots=True)
 class ProcessPool:
-    """Parallel processes of this machine.
+    """Parallel processes on this machine; `work` must be a function of a module.
 
-    A process that dies takes its run with it and no other: those that were under way are run again, each alone, and
-    the one that dies again is noted as failed.
-
-    Attributes
-    ----------
-    processes : int
-        How many run at once.
-    work : Work
-        What is done with each run, in another process; a function of a module.
+    When a process dies, the runs that were in progress are run again, each alone; the one that dies again counts as
+    failed.
     """
 
     processes: int
     work: Work = run_to_file
 
     def run(self, runs: Sequence[StudyRun], folder: Path, watch: RunWatch) -> None:
-        """Run what is given, each run's outcome in its `result_file`.
-
-        Parameters
-        ----------
-        runs : sequence of StudyRun
-            What is to be run.
-        folder : Path
-            Where the results go, ``KEY.json`` each.
-        watch : RunWatch
-            Who is told of each run that is done, in this process.
-
-        Raises
-        ------
-        OSError
-            If a result cannot be written, as on a full disk.
-        """
+        """Run studies' runs, each outcome into its `result_file`; `watch` is called in this process after each."""
         waiting = list(reversed(runs))
         while waiting:
             for suspect in _run_until_broken(waiting, folder, self.processes, watch, self.work):
@@ -70,7 +48,7 @@ class ProcessPool:
 def _run_until_broken(
     waiting: list[StudyRun], folder: Path, processes: int, watch: RunWatch, work: Work
 ) -> list[StudyRun]:
-    """Run from the end of a list, which becomes shorter; gives back what was under way when a process died."""
+    """Execute runs from the end of a list, removing them; return those in progress when a process died."""
     under_way: dict[Future[str | None], StudyRun] = {}
     try:
         with _pool(processes) as pool:
@@ -88,13 +66,7 @@ def _run_until_broken(
 
 
 def _submitted(pool: ProcessPoolExecutor, work: Work, run: StudyRun, result: Path) -> Future[str | None]:
-    """A run on its way to a process.
-
-    Raises
-    ------
-    BrokenProcessPool
-        Also if what has died is the server from which processes are forked; the next pool has a new one.
-    """
+    """Submit a run; BrokenProcessPool also if the fork server died, which the next pool starts again."""
     try:
         return pool.submit(work, run.scenario, run.seed, result)
     except (EOFError, ConnectionError) as error:
@@ -103,8 +75,8 @@ def _submitted(pool: ProcessPoolExecutor, work: Work, run: StudyRun, result: Pat
 
 @contextlib.contextmanager
 def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
-    # One SUMO a process, and none of this process's threads or contexts in it: all are forked from a process that has
-    # imported what they need and done nothing else.
+    # One SUMO per process, without threads or contexts of this one: all are forked from a process that has only
+    # imported what they need.
     open_standard_streams()
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["fogsim.study.execution"])
@@ -120,14 +92,14 @@ def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
 
 
 def _leave_signals_to_parent() -> None:
-    """Let Ctrl-C, which a terminal sends to all, end the process that waits for the runs, and it end this one."""
+    """Let Ctrl-C, which a terminal sends to all processes, end the one that waits for the runs, which ends this one."""
     for signum in (signal.SIGINT, signal.SIGHUP):
         signal.signal(signum, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
 def _end_with_parent() -> None:
-    """End this process when the one that waits for it is killed, so that nothing goes on unseen."""
+    """End this process when the one that waits for it is killed, so that it does not continue unnoticed."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()

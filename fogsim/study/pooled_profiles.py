@@ -1,4 +1,4 @@
-"""Profiles of all runs of a cell of the grid, added up."""
+"""Profiles of all runs of a cell of the grid, summed."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -17,18 +17,9 @@ _SUMS = ROAD_COLUMNS[1:]
 
 
 class CollisionPlace(NamedTuple):
-    """Where a collision was and how hard.
+    """Time [s], position (east, north) [m] and speed difference [m/s] of a collision.
 
-    Attributes
-    ----------
-    seed : int
-        Seed of its run.
-    time : float
-        Instant [s].
-    x, y : float or None
-        East and north [m]; None where neither vehicle was near the ego.
-    impact_speed : float
-        Difference of speeds [m/s].
+    x and y are None if neither vehicle was near the ego.
     """
 
     seed: int
@@ -40,20 +31,11 @@ class CollisionPlace(NamedTuple):
 
 @dataclass(slots=True)
 class PooledProfiles:
-    """What the profiles of some runs add up to.
+    """Sums of the profiles of some runs.
 
-    Attributes
-    ----------
-    vehicle_time : float
-        Time of all vehicles [s].
-    moving, queue : (n,) float64
-        That in each class of time to collision, with a leader that moves and with one that is slower than 5 m/s [s].
-    road : mapping from float to (6,) float64
-        By place along the road [m]: time, way and extinction over time of the ego, and of everybody.
-    path : (n, 2) float64
-        The road, or the longest way of an ego, in plan [m].
-    collisions : list of CollisionPlace
-        Those that were kept.
+    `moving` and `queue` are times [s] per class of time to collision, behind a leader that moves and behind one slower
+    than 5 m/s. `road` maps a position along the road [m] to time, distance and extinction over time, of the ego and of
+    all vehicles; `path` is the road in plan (n, 2) [m].
     """
 
     vehicle_time: float = 0.0
@@ -64,15 +46,7 @@ class PooledProfiles:
     collisions: list[CollisionPlace] = field(default_factory=list)
 
     def add(self, seed: int, profiles: Profiles) -> None:
-        """Add those of one run.
-
-        Parameters
-        ----------
-        seed : int
-            Its seed.
-        profiles : mapping
-            Of `RunProfiles.to_json`.
-        """
+        """Add the profiles of one run, from `RunProfiles.to_json`."""
         self.vehicle_time += profiles["vehicle_time_s"]
         classes, road, hits = profiles["time_to_collision"], profiles["road"], profiles["collisions"]
         self.moving += np.array(classes["moving_s"])
@@ -85,28 +59,25 @@ class PooledProfiles:
         self.collisions += [CollisionPlace(seed, *values) for values in zip(*columns, strict=True)]
 
     def survival(self) -> NDArray[np.float64]:
-        """Share of the time of all vehicles with a time to collision above the upper end of each class [-].
+        """Share of all vehicles' time with a time to collision above the upper end of each class [-].
 
-        Time behind leaders that are slower than 5 m/s, which is closing up to a queue, counts as above.
+        Time behind leaders slower than 5 m/s, which is closing up to a queue, counts as above.
         """
         if self.vehicle_time <= 0.0:
             return np.full(CLASSES, np.nan)
         return np.asarray(1.0 - np.cumsum(self.moving) / self.vehicle_time)
 
     def speeds(self, *, ego_only: bool = False) -> NDArray[np.float64]:
-        """Place along the road [m], mean speed there [m/s] and time on which it is based [s], as columns.
+        """Columns of position along the road [m], mean speed there [m/s] and observed time [s].
 
-        Parameters
-        ----------
-        ego_only : bool
-            Whether of the ego alone, in place of everybody on its road.
+        Of all vehicles on the ego's road, or of the ego only.
         """
         time, way = (0, 1) if ego_only else (3, 4)
         found = [(place, sums[way] / sums[time], sums[time]) for place, sums in self._road() if sums[time] > 0.0]
         return np.array(found).reshape(-1, 3)
 
     def extinctions(self) -> NDArray[np.float64]:
-        """Place along the road [m] and mean extinction there [1/m], as columns: at egos, else at everybody."""
+        """Columns of position along the road [m] and mean extinction there [1/m], at egos or else all vehicles."""
         time, fog = (0, 2) if any(sums[0] > 0.0 for sums in self.road.values()) else (3, 5)
         found = [(place, sums[fog] / sums[time]) for place, sums in self._road() if sums[time] > 0.0]
         return np.array(found).reshape(-1, 2)
@@ -116,13 +87,7 @@ class PooledProfiles:
 
 
 def pool_profiles(found: Iterable[tuple[Mapping[str, str], int, Profiles]]) -> dict[Cell, PooledProfiles]:
-    """Add up the profiles of all runs of each cell.
-
-    Parameters
-    ----------
-    found : iterable of (mapping, int, mapping)
-        Levels, seed and profiles of each run that is done.
-    """
+    """Sum the profiles of each cell, given as levels, seed and profiles of completed runs."""
     cells: dict[Cell, PooledProfiles] = {}
     for levels, seed, profiles in found:
         cells.setdefault(tuple(levels.values()), PooledProfiles()).add(seed, profiles)

@@ -1,4 +1,4 @@
-"""Figures of profiles: survival of time to collision, speed over the road, map of collisions."""
+"""Figures of profiles: survival of time to collision, speed along the road, map of collisions."""
 
 from collections.abc import Mapping
 
@@ -15,23 +15,16 @@ from fogsim.study.profiles import CLASS_WIDTH, CLASSES
 from fogsim.units import KMH_PER_MPS, visibility_from_extinction
 
 _EVEN = 1.15
-"""Fog whose extinction varies by less than this factor is even, and not shaded."""
+"""Fog whose extinction varies by less than this factor is uniform, and not shaded."""
 
 _LEAST_TIME = 5.0
-"""Time of vehicles from which a mean speed at a place is drawn [s]."""
+"""Least vehicle time for drawing a mean speed at a position [s]."""
 
 
 def survival_figure(study: Study, cells: Mapping[Cell, PooledProfiles]) -> StudyFigure:
     """Share of vehicle-time with a time to collision above a threshold, for all thresholds.
 
     One minus it is the time-exposed time to collision (TET; Minderhoud & Bovy 2001) as a share, at every threshold.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    cells : mapping from tuple of str to PooledProfiles
-        Profiles of each cell that has any.
     """
     grid = Grid(study)
     figure, panels = grid.figure(2.2)
@@ -61,7 +54,7 @@ def survival_figure(study: Study, cells: Mapping[Cell, PooledProfiles]) -> Study
 
 
 def _scale_near_hundred(axes: Axes, values: NDArray[np.float64]) -> None:
-    """Let the panels' common axis of 100 % minus a share [%] be logarithmic, and show the share: 90, 99, 99.9 % up."""
+    """Make the panels' common axis logarithmic in 100 % minus a share [%], labelled 90, 99, 99.9 % upwards."""
     above_zero = values[values > 0.0]
     least, most = (above_zero.min(), above_zero.max()) if len(above_zero) else (0.01, 10.0)
     axes.set_ylim(1.4 * most, least / 1.4)
@@ -72,16 +65,9 @@ def _scale_near_hundred(axes: Axes, values: NDArray[np.float64]) -> None:
 
 
 def speed_figure(study: Study, cells: Mapping[Cell, PooledProfiles]) -> StudyFigure | None:
-    """Mean speed of everybody along the road, over the fog that is there; None where no road is known.
+    """Mean speed of all vehicles along the road, over the fog there; None if no road is known.
 
-    It is the ego's route, or that of ``traffic.along`` without an ego.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    cells : mapping from tuple of str to PooledProfiles
-        Profiles of each cell that has any.
+    The road is the ego's route, or ``traffic.along`` without an ego.
     """
     if not any(len(pooled.speeds()) for pooled in cells.values()):
         return None
@@ -115,7 +101,7 @@ def _have_ego(cells: Mapping[Cell, PooledProfiles]) -> bool:
 
 
 def _with_gaps(table: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rows by place, with NaN between those that are not neighbours, so that no line is drawn across."""
+    """Rows by position, with NaN between distant ones, so that no line is drawn across."""
     if len(table) < 2:
         return table.reshape(-1, 3)
     breaks = np.flatnonzero(np.diff(table[:, 0]) > 1.5 * CELL_LENGTH) + 1
@@ -123,7 +109,7 @@ def _with_gaps(table: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _shade_fog(axes: Axes, pooled: list[PooledProfiles]) -> None:
-    """Shade the places of a road by the mean extinction that was found there, and say the least visibility."""
+    """Shade a road by the mean extinction at each position, and label the least visibility."""
     sums: dict[float, NDArray[np.float64]] = {}
     for one in pooled:
         for place, extinction in one.extinctions():
@@ -146,15 +132,7 @@ def _shade_fog(axes: Axes, pooled: list[PooledProfiles]) -> None:
 
 
 def collisions_figure(study: Study, cells: Mapping[Cell, PooledProfiles]) -> StudyFigure | None:
-    """Where the collisions were, over the ego's way in plan; None where none has a place.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    cells : mapping from tuple of str to PooledProfiles
-        Profiles of each cell that has any.
-    """
+    """Positions of the collisions over the ego's path in plan; None if none has a position."""
     rows = [[*cell, *hit] for cell, pooled in cells.items() for hit in pooled.collisions]
     hits = [(hit.x, hit.y) for pooled in cells.values() for hit in pooled.collisions if hit.x is not None]
     if not hits:

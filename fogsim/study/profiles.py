@@ -1,6 +1,6 @@
-"""Profiles of one run, which single numbers cannot hold: time by time to collision, speed over the road, collisions.
+"""Profiles of one run: time by time to collision, speed along the road, and collisions.
 
-All are sums over time, so that those of several runs add.
+All are sums over time, so that those of several runs add up.
 """
 
 import math
@@ -20,17 +20,17 @@ CLASS_WIDTH = 0.25
 """Width of a class of time to collision [s]."""
 
 CLASSES = 40
-"""Number of the classes; what is longer is in none."""
+"""Number of the classes; longer times are in none."""
 
 MOST_COLLISIONS = 100
-"""Collisions of which place and speed are kept; their number is a metric."""
+"""Maximum number of collisions with position and speed; their total is a metric."""
 
 COLLISION_COLUMNS = ("time_s", "x_m", "y_m", "impact_speed_mps", "collider", "victim")
 PATH_COLUMNS = ("place_m", "x_m", "y_m")
 
 
 class RunProfiles:
-    """Watches the steps of one run, and everybody in them as one of the watchers of its metrics."""
+    """Watches the steps of one run, and all vehicles in them as one of the watchers of its metrics."""
 
     def __init__(self) -> None:
         self._last: TrafficStep | None = None
@@ -41,13 +41,7 @@ class RunProfiles:
         self._collision_count = 0
 
     def update(self, step: TrafficStep) -> None:
-        """Take in one finished step; what was found at it is held to be true for the time since the one before.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            The step, before the metrics get it.
-        """
+        """Add a finished step, before the metrics get it; it stands for the time since the step before."""
         last, self._last = self._last, step
         if last is not None and last.index == step.index:
             return
@@ -62,13 +56,7 @@ class RunProfiles:
                 self._collisions.append((hit.time, x, y, hit.impact_speed, hit.collider, hit.victim))
 
     def add(self, span: TrafficSpan) -> None:
-        """Take in everybody in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The steps, which `update` has had.
-        """
+        """Add all vehicles of a span of steps that `update` has received."""
         self._vehicle_time += span.vehicle_time
         found = span.following
         remaining = time_to_collision(found.gap, found.speed, found.leader_speed)
@@ -79,16 +67,13 @@ class RunProfiles:
         self._road.add(span)
 
     def to_json(self) -> dict[str, Any]:
-        """Give the profiles as JSON can hold them, once the metrics have handed over all that they gathered.
+        """The profiles as JSON data, once the metrics have handed over everything that they gathered.
 
-        Returns
-        -------
-        dict
-            ``vehicle_time_s``; ``time_to_collision``: seconds of all vehicles in each class of `CLASS_WIDTH` seconds,
-            behind a leader that moves and behind one slower than 5 m/s; ``road``: columns ``place_m`` (middle of a
-            stretch along the road), time and way of the ego and of everybody on it there, and the sums of extinction
-            over these times; ``path``: the road in plan, columns ``place_m``, ``x_m``, ``y_m``; ``collisions``: a list
-            of columns for the first `MOST_COLLISIONS`.
+        ``vehicle_time_s``; ``time_to_collision``: seconds of all vehicles in each class of `CLASS_WIDTH` seconds,
+        behind a leader that moves and behind one slower than 5 m/s; ``road``: columns ``place_m`` (middle of a stretch
+        along the road), time and distance of the ego and of all vehicles there, and the sums of extinction over these
+        times; ``path``: the road in plan, columns ``place_m``, ``x_m``, ``y_m``; ``collisions``: columns for the first
+        `MOST_COLLISIONS`.
         """
         moving, queue = self._by_class
         columns = list(zip(*self._collisions, strict=True)) or [()] * 6
@@ -118,11 +103,11 @@ def _column(values: NDArray[np.float64]) -> list[object]:
 
 
 def _short(value: object) -> object:
-    """A number in the digits that a figure needs; None where it is undefined."""
+    """A number rounded to the digits that a figure needs; None if undefined."""
     if not isinstance(value, float):
         return value
     return float(f"{value:.6g}") + 0.0 if math.isfinite(value) else None
 
 
 Profiles = Mapping[str, Any]
-"""What `RunProfiles.to_json` gives."""
+"""Schema of the data from `RunProfiles.to_json`."""

@@ -25,26 +25,26 @@ from fogsim.study.execution import failure, run_outcome
 from fogsim.study.plan import StudyRun, file_digests
 
 _MOST_PROCESSES, _MOST_NODES = 2, 10
-"""Processes, and nodes, that a run may outlive before it has failed: a node's end is hardly a run's fault."""
+"""Lost processes, and lost nodes, after which a run has failed: a node's end is hardly a run's fault."""
 
 _CONNECTION_TIME, _ANSWER_TIME = 5.0, 15.0
-"""Within which a cluster's port must be open, and Ray must answer there [s]."""
+"""Time for a cluster's port to open, and for Ray to answer there [s]."""
 
 _SAME = "a study on Ray needs the same version of FogSim, and the scenario's files under the same path, on every node"
 
 Work = Callable[[Scenario, int, Path], dict[str, Any]]
-"""Runs a scenario with a seed, gives what the file of the run holds, and leaves SUMO's outputs in a folder."""
+"""Runs a scenario with a seed, returns the content of the run's file, and leaves SUMO's outputs in a folder."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Result:
-    """What comes back from a node: the outcome, and SUMO's outputs by name, or None where there are none."""
+    """Result from a node: the outcome, and SUMO's outputs by name, or None without outputs."""
 
     outcome: dict[str, Any]
     outputs: dict[str, bytes] | None
 
     def write(self, file: Path) -> None:
-        """Write SUMO's outputs into the folder of the result's name, then the result: with it all is there."""
+        """Write SUMO's outputs into the folder of the result's name, then the result, which completes the run."""
         if self.outputs is not None:
             folder = file.with_suffix("")
             folder.mkdir(exist_ok=True)
@@ -55,20 +55,20 @@ class _Result:
 
 @dataclass(frozen=True, slots=True)
 class RayCluster:
-    """A Ray cluster; each run is a task of one processor, in a process of a node.
+    """A Ray cluster; each run is a task on one processor, in a process of a node.
 
-    A process that dies takes its run with it and no other; that is run again, and has failed if its process dies again.
-    Runs of a node that dies are run on others.
+    A process that dies loses only its own run, which is run again, and fails if its process dies again.
+    Runs of a node that dies are moved to others.
 
     Attributes
     ----------
     address : str or None
         ``HOST:PORT`` of the cluster's head, "auto" for the one that this machine belongs to, or "local" for a new one
-        on this machine alone. None for ``RAY_ADDRESS`` of the environment or, without it, "local".
+        on this machine only. None for the environment variable ``RAY_ADDRESS`` or, without it, "local".
     at_once : int or None
-        Runs at once at most; None for as many as the cluster has processors for.
+        Maximum number of concurrent runs; None for one per processor of the cluster.
     work : Work
-        What is done with each run, on a node; a function of a module that the nodes have.
+        Function that executes each run on a node, from a module that the nodes have.
     """
 
     address: str | None = None
@@ -76,16 +76,16 @@ class RayCluster:
     work: Work = run_outcome
 
     def run(self, runs: Sequence[StudyRun], folder: Path, watch: RunWatch) -> None:
-        """Run what is given, each run's outcome in its `result_file`.
+        """Execute runs, each outcome into its `result_file`.
 
         Parameters
         ----------
         runs : sequence of StudyRun
-            What is to be run.
+            The runs to execute.
         folder : Path
-            Where the results go, ``KEY.json`` each; on this machine.
+            Folder of the results on this machine, one ``KEY.json`` each.
         watch : RunWatch
-            Who is told of each run that is done, in this process.
+            Called with each completed run, in this process.
 
         Raises
         ------
@@ -107,7 +107,7 @@ class RayCluster:
 
 
 class _Tasks:
-    """Runs as tasks of Ray: those that wait, those under way, and how often each lost its process or its node."""
+    """Runs as tasks of Ray: waiting ones, those in progress, and how often each lost its process or its node."""
 
     def __init__(self, ray: Any, runs: Sequence[StudyRun], at_once: int | None, work: Work) -> None:
         self._ray, self._work = ray, work
@@ -115,12 +115,12 @@ class _Tasks:
         self._at_once = at_once
         self._under_way: dict[Any, StudyRun] = {}
         self._lost_processes, self._lost_nodes = Counter[str](), Counter[str]()
-        # What is done again is decided here, since Ray's own retries count nodes and processes alike.
+        # Retries are decided here, since Ray's own count nodes and processes alike.
         self._task = ray.remote(max_retries=0, num_cpus=1)(_run_on_node)
         self._versions = _running_versions()
 
     def results(self) -> Iterator[tuple[StudyRun, _Result]]:
-        """Result of each run, as they come."""
+        """Results of the runs as they arrive."""
         while self._waiting or self._under_way:
             self._submit()
             done, _ = self._ray.wait(list(self._under_way))
@@ -133,7 +133,7 @@ class _Tasks:
                     yield run, result
 
     def _submit(self) -> None:
-        """Keep so many under way that no processor waits, nor a node that is still to come."""
+        """Keep enough tasks in progress that no processor waits, including nodes that are still starting."""
         limit = self._at_once or 2 * max(1, int(self._ray.cluster_resources().get("CPU", 1)))
         while self._waiting and len(self._under_way) < limit:
             run = self._waiting.pop()
@@ -141,7 +141,7 @@ class _Tasks:
             self._under_way[task] = run
 
     def _result(self, task: Any, run: StudyRun) -> _Result | None:
-        """Result of a task that has ended; None if it is to be run again."""
+        """Result of a finished task; None if it must be run again."""
         errors = self._ray.exceptions
         try:
             found = self._ray.get(task)
@@ -152,7 +152,7 @@ class _Tasks:
             self._lost_nodes[run.key] += 1
             return _failed("the nodes that ran it died") if self._lost_nodes[run.key] == _MOST_NODES else None
         except errors.RayError as error:
-            # FogSim is not there, or not to be imported: no run would end otherwise.
+            # FogSim is missing or cannot be imported: otherwise no run would end.
             last = str(error).strip().splitlines()[-1]
             raise InputError(f"a node of the Ray cluster cannot run FogSim: {last}; {_SAME}") from error
         if not isinstance(found, _Result):
@@ -167,7 +167,7 @@ def _failed(message: str) -> _Result:
 def _run_on_node(
     work: Work, scenario: Scenario, seed: int, files: Mapping[str, str], wanted: Mapping[str, str | None]
 ) -> _Result | str:
-    """Run in a process of a node; gives the result, or what makes the node unfit for it."""
+    """Run in a process of a node; return the result, or what makes the node unfit for it."""
     unfit = _unfitness(scenario, files, wanted)
     if unfit is not None:
         return unfit
@@ -179,7 +179,7 @@ def _run_on_node(
 
 
 def _unfitness(scenario: Scenario, files: Mapping[str, str], wanted: Mapping[str, str | None]) -> str | None:
-    """What this node lacks for a run to come out as it would elsewhere."""
+    """What this node lacks to produce the same results as elsewhere."""
     node = f"the node {platform.node()} of the Ray cluster"
     for name, version in _running_versions().items():
         if version != wanted[name]:
@@ -196,12 +196,12 @@ def _unfitness(scenario: Scenario, files: Mapping[str, str], wanted: Mapping[str
 
 
 def _running_versions() -> dict[str, str | None]:
-    """Versions on which a run's numbers depend."""
+    """Versions that a run's numbers depend on."""
     return {name: versions().get(name) for name in ("fogsim", "libsumo")}
 
 
 def _import_ray() -> Any:
-    # Nothing is told to Ray's makers.
+    # Send no usage statistics to Ray's makers.
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     try:
         import ray  # noqa: PLC0415 - an extra, and a second to import
@@ -212,7 +212,7 @@ def _import_ray() -> Any:
 
 @contextlib.contextmanager
 def _connection(ray: Any, address: str, processes: int | None) -> Iterator[None]:
-    """Connection to a cluster; its end ends the tasks that are under way."""
+    """Connection to a cluster; its end ends the running tasks."""
     local = address == "local"
     if not local:
         _refuse_silence(address)
@@ -227,7 +227,7 @@ def _connection(ray: Any, address: str, processes: int | None) -> Iterator[None]
         )
     except (ConnectionError, RuntimeError, ValueError) as error:
         raise InputError(f"no Ray cluster could be used at {shown(address)}: {_first_line(error)}") from error
-    # Ray takes SIGTERM for itself.
+    # Ray handles SIGTERM itself.
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, handler)
     try:
@@ -239,13 +239,7 @@ def _connection(ray: Any, address: str, processes: int | None) -> Iterator[None]
 
 
 def _refuse_silence(address: str) -> None:
-    """Refuse an address at which no Ray answers, which Ray itself would ask for two minutes and then end the process.
-
-    Raises
-    ------
-    InputError
-        If none does.
-    """
+    """Raise InputError if no Ray answers at an address; Ray itself would try for two minutes and end the process."""
     if address == "auto":
         return
     host, _, port = address.rpartition(":")

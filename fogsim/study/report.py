@@ -1,4 +1,4 @@
-"""A study as a page to read: what was compared, what came out, and how sure that is."""
+"""A study as a page to read: what was compared, the results, and their certainty."""
 
 import base64
 from collections.abc import Iterator, Mapping, Sequence
@@ -37,19 +37,7 @@ _MOST_FAILURES = 50
 
 @dataclass(frozen=True, slots=True)
 class _Findings:
-    """What the page shows.
-
-    Attributes
-    ----------
-    main : sequence of str
-        Metrics that are shown first.
-    differences : sequence of Difference
-        Of all metrics.
-    remarks : mapping from str to str
-        Metrics that cannot tell policies apart, and why.
-    figures : sequence of StudyFigure
-        All figures.
-    """
+    """Content of the report: metrics shown first, all differences, uninformative metrics with reasons, and figures."""
 
     main: Sequence[str]
     differences: Sequence[Difference]
@@ -64,19 +52,7 @@ class _Findings:
 
 
 def write_report(study: Study, rows: Sequence[Row], profiles: Mapping[Cell, PooledProfiles], folder: Path) -> None:
-    """Write ``comparison.csv``, ``report.html``, and the figures as SVG and CSV in ``figures``.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    rows : sequence of Row
-        Its table.
-    profiles : mapping from tuple of str to PooledProfiles
-        Profiles of each cell that has any.
-    folder : Path
-        Where they go.
-    """
+    """Write ``comparison.csv``, ``report.html``, and the figures as SVG and CSV in ``figures``."""
     done = [row for row in rows if row["status"] == "complete"]
     known = numeric_metrics(done, study.factors)
     main = main_metrics(study.metrics, known)
@@ -116,7 +92,7 @@ def _figures(
     profiles: Mapping[Cell, PooledProfiles],
     differences: Sequence[Difference],
 ) -> Iterator[StudyFigure]:
-    """All figures of which there is something to draw."""
+    """All figures with data."""
     drawable = [name for name in numeric_metrics(rows, study.factors) if remarks.get(name) != "does not vary"]
     across = next((name for name in DELAY_METRICS if name in drawable), None)
     for group in SAFETY_METRICS:
@@ -158,7 +134,7 @@ def _page(study: Study, rows: Sequence[Row], found: _Findings, folder: Path) -> 
 
 
 def _embedded(figure: StudyFigure) -> str:
-    """A figure as a picture of its own, so that names of parts within two figures do not meet."""
+    """A figure as a separate image, so that ids within two figures do not clash."""
     data = base64.b64encode(figure.svg.encode()).decode("ascii")
     caption = f'{escape(figure.caption)} <a href="figures/{escape(figure.name)}.svg">SVG</a> '
     caption += f'<a href="figures/{escape(figure.name)}.csv">CSV</a>'
@@ -187,7 +163,7 @@ def _failures(study: Study, failed: Sequence[Row]) -> list[str]:
 
 
 def _details(study: Study, found: _Findings) -> Iterator[str]:
-    """What few will want to read, folded."""
+    """Details, folded."""
     yield "<h2>All comparisons</h2>"
     for title, differences in (("Main metrics", found.of_main()), ("All other metrics", found.of_others())):
         if differences:

@@ -17,21 +17,7 @@ def main_tables(
     differences: Sequence[Difference],
     remarks: Mapping[str, str],
 ) -> str:
-    """Means and differences of chosen metrics: a table for each cell of the other factors, a column for each policy.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    rows : sequence of Row
-        Its table, of runs that are done.
-    metrics : sequence of str
-        What is shown.
-    differences : sequence of Difference
-        Of these metrics.
-    remarks : mapping from str to str
-        Metrics that cannot tell policies apart, and why.
-    """
+    """Means and differences of metrics: a table per combination of the other factors, a column per policy."""
     grid = Grid(study)
     of_cell: dict[tuple[str, ...], list[Row]] = {}
     for row in rows:
@@ -68,17 +54,7 @@ def _mean_cell(study: Study, metric: str, rows: Sequence[Row], one: Difference |
 
 
 def comparison_table(study: Study, differences: Sequence[Difference], remarks: Mapping[str, str]) -> str:
-    """Every comparison with its interval, p-values and the seeds that are needed, in the metric's own unit.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    differences : sequence of Difference
-        What is shown.
-    remarks : mapping from str to str
-        Metrics that cannot tell policies apart, and why.
-    """
+    """Every comparison with its interval, p-values and required number of seeds, in the metric's own unit."""
     numbers = ("baseline", "mean", "difference", f"{study.confidence:.0%} interval", "p", "p adjusted", "seeds")
     head = ["metric", *study.factors, *numbers, f"seeds for ± {study.wanted_interval:.0%}"]
     body = []
@@ -96,20 +72,12 @@ def comparison_table(study: Study, differences: Sequence[Difference], remarks: M
 
 
 def plain_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table of text.
-
-    Parameters
-    ----------
-    head : sequence of str
-        Its columns.
-    rows : iterable of sequences
-        Its rows.
-    """
+    """HTML table of text."""
     return _table(head, [[escape(text) for text in row] for row in rows], texts=len(head))
 
 
 def _table(head: Sequence[str], body: Sequence[Sequence[str]], texts: int) -> str:
-    """A table whose first columns are text, and the others numbers; it scrolls by itself where it is too wide."""
+    """A table whose first columns are text, and the others numbers; it scrolls if it is too wide."""
     kinds = ["" if i < texts else ' class="value"' for i in range(len(head))]
     top = "".join(f"<th{kind}>{escape(name)}</th>" for name, kind in zip(head, kinds, strict=True))
     lines = "\n".join(

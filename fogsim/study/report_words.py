@@ -1,4 +1,4 @@
-"""What a study found, in words: signs only where there is something to show."""
+"""A study's results in words: significant differences only."""
 
 from collections.abc import Mapping, Sequence
 from html import escape
@@ -11,19 +11,7 @@ from fogsim.study.table import Row
 
 
 def summary(study: Study, rows: Sequence[Row], differences: Sequence[Difference], remarks: Mapping[str, str]) -> str:
-    """The summary of the report, as HTML.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    rows : sequence of Row
-        Its table.
-    differences : sequence of Difference
-        Of the metrics that the report shows first.
-    remarks : mapping from str to str
-        Metrics that cannot tell policies apart, and why.
-    """
+    """Summary of the report as HTML, from the differences of the metrics that it shows first."""
     telling = [one for one in differences if one.metric not in remarks]
     return "\n".join(
         [
@@ -46,7 +34,7 @@ def _compared(study: Study, rows: Sequence[Row]) -> str:
 
 
 def _findings(study: Study, differences: Sequence[Difference]) -> list[str]:
-    """What is shown of each metric, in a list for each cell of the other factors."""
+    """Shown differences of each metric, in a list for each combination of the other factors."""
     grid = Grid(study)
     lines = []
     for panel, title in grid.panels.items():
@@ -64,7 +52,7 @@ def _findings(study: Study, differences: Sequence[Difference]) -> list[str]:
 
 
 def _finding(grid: Grid, metric: str, differences: Sequence[Difference]) -> str:
-    """Who differs from the baseline in one metric, by how much, and of whom that could not be shown."""
+    """Policies that differ from the baseline in one metric, by how much, and those without a shown difference."""
     words = metric_words(metric)
     groups: dict[str, list[str]] = {}
     for one in sorted(differences, key=lambda each: each.difference):
@@ -80,7 +68,7 @@ def _finding(grid: Grid, metric: str, differences: Sequence[Difference]) -> str:
 
 
 def _verdict(one: Difference, words: MetricWords) -> str:
-    """Whether a difference is for the better, where the metric says what is."""
+    """Whether a difference is an improvement, if the metric defines one."""
     lower = one.difference < 0
     if words.better == "neither":
         return "lower" if lower else "higher"
@@ -88,7 +76,7 @@ def _verdict(one: Difference, words: MetricWords) -> str:
 
 
 def _doubts(study: Study, differences: Sequence[Difference]) -> list[str]:
-    """How many comparisons there are, and what so many or so few seeds cannot tell."""
+    """Number of comparisons, and the limits of this number of comparisons and seeds."""
     tested = [one for one in differences if one.p_value is not None]
     if not tested:
         return ['<p class="note">Nothing was compared.</p>']

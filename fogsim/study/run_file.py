@@ -1,4 +1,4 @@
-"""Files that runs leave, checked when they are read again: a run whose file is missing or damaged is run again."""
+"""Files of runs, checked when they are read again: a run whose file is missing or damaged is run again."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,7 +16,7 @@ T = TypeVar("T")
 Word = Annotated[str, Field(strict=True)]
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Value = Word | Annotated[int, Field(strict=True)] | Finite | None
-"""What a metric, and a cell of a study's table, holds."""
+"""Value of a metric, or of a cell of a study's table."""
 
 Metrics = Annotated[dict[str, Value], Field(min_length=1)]
 """Metrics of a run by name, as `flat_metrics` gives them."""
@@ -36,7 +36,7 @@ def _with_columns(names: Sequence[str]) -> AfterValidator:
 
 
 class RunRecord(BaseModel):
-    """A part of a run file: these keys and no others."""
+    """A part of a run file with exactly these keys."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -57,7 +57,7 @@ class _Profiles(RunRecord):
 
 
 class FailedRun(RunRecord):
-    """A run that went wrong."""
+    """A failed run."""
 
     status: Literal["failed"]
     message: Annotated[Word, Field(min_length=1)]
@@ -65,7 +65,7 @@ class FailedRun(RunRecord):
 
 
 class CompleteRun(RunRecord):
-    """A run of a study that came to its end."""
+    """A completed run of a study."""
 
     status: Literal["complete"]
     metrics: Metrics
@@ -79,7 +79,7 @@ STUDY_RUN: TypeAdapter[CompleteRun | FailedRun] = TypeAdapter(
 
 
 def read_run(path: Path, schema: TypeAdapter[T]) -> T | None:
-    """What a run's file holds; None where it is missing or damaged, so that the run is run again."""
+    """Content of a run's file; None if it is missing or damaged, so that the run is run again."""
     try:
         return schema.validate_python(read_json(path))
     except (InputError, ValidationError):

@@ -1,4 +1,4 @@
-"""The studies that come with FogSim, by name, as its scenarios are."""
+"""The studies that come with FogSim, by name."""
 
 from pathlib import Path
 
@@ -7,24 +7,13 @@ from fogsim.scenario import catalogue
 
 
 def shipped_studies() -> dict[str, Path]:
-    """Names and files of the studies that come with FogSim: beside its scenarios."""
+    """Names and files of the shipped studies, which are next to the scenarios."""
     folders = {file.parents[1] / "studies" for file in catalogue().values()}
     return {file.stem: file for folder in folders for file in sorted(folder.glob("*.yaml"))}
 
 
 def study_file(name_or_path: str | Path) -> Path:
-    """File of a study.
-
-    Parameters
-    ----------
-    name_or_path : str or Path
-        A study file, or the name of a study that comes with FogSim.
-
-    Raises
-    ------
-    UnknownNameError
-        For one word that is neither; a path is opened as it is, and who opens it says what is wrong.
-    """
+    """Path of a study file or of a shipped study's name; a path is not checked."""
     path = Path(name_or_path)
     if path.suffix or len(path.parts) != 1 or path.exists():
         return path

@@ -1,4 +1,4 @@
-"""The table of a study: a row for each run, in the order of the grid, whatever the order in which they were run."""
+"""The table of a study: a row for each run in the order of the grid, regardless of the order of execution."""
 
 import csv
 import io
@@ -19,13 +19,7 @@ Row = Mapping[str, Value]
 
 
 def columns(rows: Sequence[Row]) -> list[str]:
-    """Names of all columns, in the order in which they first appear.
-
-    Parameters
-    ----------
-    rows : sequence of Row
-        The table.
-    """
+    """Names of all columns, in the order in which they first appear."""
     return list(dict.fromkeys(key for row in rows for key in row))
 
 
@@ -34,13 +28,7 @@ FIXED_COLUMNS = frozenset({"run", "seed", "status", "message", "sumo_outputs"})
 
 
 def column_mistake(factor: str) -> str | None:
-    """Say why the table can have no column for a factor of a name; None if it can.
-
-    Parameters
-    ----------
-    factor : str
-        Name of the factor.
-    """
+    """Why the table cannot have a column of a factor's name; None if it can."""
     if factor in FIXED_COLUMNS:
         return "the table has a column of that name; choose another"
     if factor in metric_keys() or factor.startswith(f"{METHODS_KEY}."):
@@ -49,20 +37,7 @@ def column_mistake(factor: str) -> str | None:
 
 
 def check_factors(rows: Sequence[Row], levels: Sequence[Mapping[str, str]]) -> None:
-    """Refuse a table in which a metric, perhaps of a user's own, has taken the column of a factor.
-
-    Parameters
-    ----------
-    rows : sequence of Row
-        The table.
-    levels : sequence of mapping from str to str
-        Level of each factor in each row.
-
-    Raises
-    ------
-    InputError
-        If a column of a factor has something else than its levels.
-    """
+    """Raise InputError if a metric, such as a user's, has the column name of a factor."""
     for row, wanted in zip(rows, levels, strict=True):
         for factor, level in wanted.items():
             if row[factor] != level:
@@ -73,15 +48,7 @@ def check_factors(rows: Sequence[Row], levels: Sequence[Mapping[str, str]]) -> N
 
 
 def write_table(rows: Sequence[Row], folder: Path) -> None:
-    """Write ``study.parquet`` and ``study.csv``, with a row for each run and the same bytes for the same rows.
-
-    Parameters
-    ----------
-    rows : sequence of Row
-        The table.
-    folder : Path
-        Where they go.
-    """
+    """Write ``study.parquet`` and ``study.csv``, with a row per run and the same bytes for the same rows."""
     names = columns(rows)
     table = pa.table({name: _column([row.get(name) for row in rows]) for name in names})
     content = io.BytesIO()
@@ -91,7 +58,7 @@ def write_table(rows: Sequence[Row], folder: Path) -> None:
 
 
 def _column(values: Sequence[Value]) -> pa.Array:
-    """A column of text, whole numbers or numbers; text where kinds are mixed."""
+    """A column of text, integers or floats; text if types are mixed."""
     kinds = {type(value) for value in values if value is not None}
     if kinds <= {int}:
         return pa.array(values, pa.int64()) if kinds else pa.array(values, pa.float64())
@@ -101,17 +68,7 @@ def _column(values: Sequence[Value]) -> pa.Array:
 
 
 def write_csv(path: Path, names: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
-    """Write a table as CSV; what is undefined is an empty cell.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    names : sequence of str
-        Its columns.
-    rows : sequence of sequences
-        Its rows.
-    """
+    """Write a table as CSV; undefined values are empty cells."""
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(names)

@@ -1,4 +1,4 @@
-"""Tests of driving in fog: scenario files with what they expect, run case by case and judged."""
+"""Tests of driving in fog: scenario files with expectations, run case by case and judged."""
 
 from fogsim.testing.collection import FogTest, collect, find_files, only_cases
 from fogsim.testing.direct import check_one_case, check_test

@@ -1,4 +1,4 @@
-"""What did not pass as GitHub shows it beside the lines of the files: workflow commands on stdout."""
+"""Failures as GitHub shows them next to the lines of the files: workflow commands on stdout."""
 
 from collections.abc import Iterator, Sequence
 
@@ -8,15 +8,7 @@ from fogsim.testing.wording import broken_text, command_text, judgement_text
 
 
 def annotations(outcomes: Sequence[FileOutcome], settings: Sequence[str] = ()) -> Iterator[str]:
-    """A command for each clause that did not pass, and for each file with runs that went wrong.
-
-    Parameters
-    ----------
-    outcomes : sequence of FileOutcome
-        What came of the tests.
-    settings : sequence of str
-        What ``--set`` put in place of the files' values, for the commands that run a case again.
-    """
+    """A CI annotation for each clause that did not pass and each file with failed runs, with ``--set`` settings."""
     for one in outcomes:
         for judgement in one.judgements:
             if judgement.outcome is not Outcome.PASSED:

@@ -1,4 +1,4 @@
-"""What is kept of a case that failed: a video around the failure, and a plot of what was looked at."""
+"""Artefacts of failed cases: a video around the failure, and a plot of the signals."""
 
 import hashlib
 import itertools
@@ -30,7 +30,7 @@ from fogsim.traffic_run import run_traffic
 from fogsim.values import Step, TrafficStep
 
 BEFORE, AFTER = 6.0, 2.0
-"""How long before a failure its video begins, and how long after it it ends [s]."""
+"""Time of a video before a failure, and after it [s]."""
 
 _VIDEO = "video.mp4"
 
@@ -40,46 +40,27 @@ FOLDER = "failures"
 
 @dataclass(frozen=True, slots=True)
 class Artefacts:
-    """Files about a failure.
-
-    Attributes
-    ----------
-    plot : Path or None
-        SVG of the signals.
-    video : Path or None
-        Video around it.
-    """
+    """Files about a failure: an SVG plot of the signals, and a video around it."""
 
     plot: Path | None = None
     video: Path | None = None
 
     @property
     def files(self) -> list[Path]:
-        """Those that are there."""
+        """The existing files."""
         return [one for one in (self.plot, self.video) if one is not None]
 
 
 Kept = Mapping[tuple[str, str, str], Artefacts]
-"""What was kept, by key of the run, name and clause."""
+"""Artefacts by key of the run, name and clause."""
 
 
 def keep_artefacts(
     outcomes: Sequence[FileOutcome], out: Path, processes: int, watch: Callable[[int, int], None] = lambda _, __: None
 ) -> Kept:
-    """Run the telling case of each clause again that did not pass, and keep what it looked like.
+    """Run the representative case of each clause that did not pass again, and keep plots and videos of it.
 
-    The same seed gives the same run; one that was inconclusive shows what did not come.
-
-    Parameters
-    ----------
-    outcomes : sequence of FileOutcome
-        What came of the tests.
-    out : Path
-        Directory of the tests.
-    processes : int
-        Runs at once.
-    watch : callable
-        Called at the beginning and after each case, with how many are done, and how many there are.
+    The same seed gives the same run. `watch` receives the number of finished cases and their total.
     """
     told: dict[str, tuple[StudyRun, list[Finding]]] = {}
     for one in outcomes:
@@ -104,20 +85,14 @@ def keep_artefacts(
 
 
 def _folder_name(test: FogTest, run: StudyRun) -> str:
-    """Name of the folder of a case: one that says what it is, and a digest by which it is like no other."""
+    """Name of a case's folder: a description and a digest that makes it unique."""
     label = label_of(run)
     digest = hashlib.sha256(f"{test.path.resolve()} {label}".encode()).hexdigest()[:6]
     return re.sub(r"[^A-Za-z0-9_.,=-]", "_", f"{test.name}-{digest}{'-' if label else ''}{label}")[:150]
 
 
 def title_of(finding: Finding) -> str:
-    """Name of an expectation and its clause, as files are named.
-
-    Parameters
-    ----------
-    finding : Finding
-        The finding.
-    """
+    """Name of an expectation and its clause, for file names."""
     return re.sub(r"[^A-Za-z0-9_.-]", "_", f"{finding.name}.{finding.clause}")
 
 
@@ -127,33 +102,12 @@ def _if_there(path: Path) -> Path | None:
 
 @dataclass(frozen=True, slots=True)
 class KeepFailures:
-    """Runs cases again up to shortly after their failures, and keeps videos and plots.
-
-    Attributes
-    ----------
-    findings : mapping from str to tuple of Finding
-        What failed, by the name of the folder.
-    """
+    """Runs cases again until shortly after their failures, and keeps videos and plots; findings are by folder name."""
 
     findings: Mapping[str, tuple[Finding, ...]]
 
     def __call__(self, scenario: Scenario, seed: int, result: Path) -> str | None:
-        """Run a case again.
-
-        Parameters
-        ----------
-        scenario : Scenario
-            With what it expects.
-        seed : int
-            Seed of its run.
-        result : Path
-            File that says when it is done; the folder of its name beside it has the rest.
-
-        Returns
-        -------
-        str or None
-            What went wrong with it.
-        """
+        """Run a case again into the folder next to `result`; return what went wrong."""
         folder = result.with_suffix("")
         folder.mkdir(exist_ok=True)
         outcome = outcome_of(lambda: _kept(scenario, seed, self.findings[folder.name], folder))
@@ -162,15 +116,7 @@ class KeepFailures:
 
 
 def conditions_of(scenario: Scenario, finding: Finding) -> Iterator[Condition]:
-    """Conditions of the clause that a finding is about.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        With what it expects.
-    finding : Finding
-        The finding.
-    """
+    """Conditions of the clause that a finding is about."""
     for clause in clauses_of(scenario.expect):
         if (clause.name, clause.clause) == (finding.name, finding.clause):
             if isinstance(clause, Whenever):

@@ -1,4 +1,4 @@
-"""Which tests there are: scenario files that expect something, and the runs of their cases."""
+"""Finding tests: scenario files with expectations, and the runs of their cases."""
 
 import hashlib
 import json
@@ -16,15 +16,15 @@ from fogsim.study.plan import StudyRun, file_digests
 from fogsim.testing.keywords import Keywords
 
 PATTERN = "*.fog.yaml"
-"""Names of files of tests; a folder's scenario.yaml is one too, if it expects something."""
+"""Names of test files; a folder's scenario.yaml is also one, if it has expectations."""
 
 EXPECT = "expect"
-"""The block of a file that makes a test of it."""
+"""The block that makes a file a test."""
 
 
 @dataclass(frozen=True, slots=True)
 class FogTest:
-    """A scenario file with what it expects.
+    """A scenario file with expectations.
 
     Attributes
     ----------
@@ -33,9 +33,9 @@ class FogTest:
     name : str
         Name of the scenario.
     lines : mapping from str to str
-        Expectations that are asked for, and where each stands: ``file:line``.
+        Selected expectations, and the line of each: ``file:line``.
     runs : tuple of StudyRun
-        Cases that are asked for.
+        Selected cases.
     verdict : Verdict
         When all of them together pass.
     """
@@ -48,7 +48,7 @@ class FogTest:
 
 
 def find_files(names: Iterable[str | Path]) -> list[Path]:
-    """Files of tests, in their order, each once.
+    """Test files in order, each once.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def find_files(names: Iterable[str | Path]) -> list[Path]:
     Raises
     ------
     InputError
-        If there is nothing of a name, or a file cannot be read.
+        If a name does not exist, or a file cannot be read.
     """
     found: dict[Path, Path] = {}
     for name in names:
@@ -88,22 +88,22 @@ def collect(
     may_import: MayImport = import_anything,
     watch: CountWatch | None = None,
 ) -> list[FogTest]:
-    """Tests of files; those of which nothing is asked for are left out.
+    """Tests of files; those without a selected expectation or case are left out.
 
     Parameters
     ----------
     files : sequence of Path
         From `find_files`.
     settings : sequence of str
-        ``key.path=value`` each, put in place of every file's.
+        ``key.path=value`` each, replacing every file's values.
     case : str
-        Which cases, as ``--case`` has them; empty for all.
+        Selected cases, as for ``--case``; empty for all.
     keywords : Keywords or None
-        Which expectations.
+        Selected expectations.
     may_import : callable
-        As of `load_scenario`.
+        As in `load_scenario`.
     watch : callable or None
-        As for `load_cases`.
+        As in `load_cases`.
 
     Raises
     ------
@@ -125,7 +125,7 @@ def collect(
         }
         if lines:
             whole = len(loaded.cases) == len(loaded.variation.cases)
-            # A part of the cases shows no rate; none of it may fail.
+            # A selection of cases shows no rate; none of them may fail.
             verdict = loaded.variation.verdict if whole else NONE_FAILS
             tests.append(FogTest(file, name, lines, tuple(_runs(file, loaded)), verdict))
     if mistakes:
@@ -136,7 +136,7 @@ def collect(
 def _runs(file: Path, loaded: ScenarioCases) -> Iterator[StudyRun]:
     described: dict[int, str] = {}
     for number, (case, scenario) in enumerate(loaded.cases):
-        # Cases that differ in their seed share one scenario.
+        # Cases that differ in their seed share a scenario.
         if id(scenario) not in described:
             told = [resolved(scenario), file_digests(scenario), build.own_methods(scenario)]
             described[id(scenario)] = json.dumps(told, sort_keys=True)
@@ -146,7 +146,7 @@ def _runs(file: Path, loaded: ScenarioCases) -> Iterator[StudyRun]:
 
 
 def only_cases(tests: Iterable[FogTest], wanted: Mapping[Path, Sequence[str]]) -> list[FogTest]:
-    """Tests with some of their cases alone; those without any are left out.
+    """Tests reduced to some of their cases; those without any are left out.
 
     Parameters
     ----------
@@ -160,18 +160,12 @@ def only_cases(tests: Iterable[FogTest], wanted: Mapping[Path, Sequence[str]]) -
         labels = wanted.get(test.path.resolve(), ())
         runs = tuple(run for run in test.runs if label_of(run) in labels)
         if runs:
-            # A part of the cases shows no rate.
+            # A selection of cases shows no rate.
             verdict = test.verdict if len(runs) == len(test.runs) else NONE_FAILS
             kept.append(replace(test, runs=runs, verdict=verdict))
     return kept
 
 
 def label_of(run: StudyRun) -> str:
-    """A case as ``--case`` names it.
-
-    Parameters
-    ----------
-    run : StudyRun
-        Its run.
-    """
+    """A case as ``--case`` names it."""
     return ",".join(f"{name}={level}" for name, level in run.levels.items())

@@ -1,4 +1,4 @@
-"""Tests for other programs: a whole file, or one case; in this process where that is quicker."""
+"""Tests for other programs: a whole file, or one case, in this process where that is faster."""
 
 import os
 import time
@@ -19,28 +19,12 @@ from fogsim.testing.session import FileOutcome, run_tests
 
 @dataclass(frozen=True, slots=True)
 class ThisProcess:
-    """An engine that runs one case after another where it is called: quick to begin, and a debugger can follow.
-
-    Attributes
-    ----------
-    work : Work
-        What is done with each run.
-    """
+    """An engine that runs the cases in the calling process, which starts quickly and can be debugged."""
 
     work: Work = check_to_file
 
     def run(self, runs: Sequence[StudyRun], folder: Path, watch: RunWatch) -> None:
-        """Run what is given, as of `Engine`.
-
-        Parameters
-        ----------
-        runs : sequence of StudyRun
-            What is to be run.
-        folder : Path
-            Where the results go, ``KEY.json`` each.
-        watch : RunWatch
-            Who is told of each run that is done.
-        """
+        """As `Engine.run`."""
         for run in runs:
             watch(run, self.work(run.scenario, run.seed, result_file(folder, run)))
 
@@ -53,14 +37,14 @@ def check_test(test: FogTest, out: Path, processes: int | None = None) -> FileOu
     test : FogTest
         From `collect`.
     out : Path
-        Directory of what came of them.
+        Directory of the results.
     processes : int or None
-        Runs at once, in this process for one; None for one a core.
+        Concurrent runs, in this process for one; None for one per core.
 
     Raises
     ------
     InputError, OSError, KeyboardInterrupt
-        As of `run_tests`.
+        As in `run_tests`.
     """
     number = min(processes or os.cpu_count() or 1, len(test.runs))
     engine: Engine = ThisProcess() if number == 1 else ProcessPool(number, check_to_file)
@@ -76,18 +60,18 @@ def check_one_case(
     Parameters
     ----------
     scenario : str or Path
-        As of `load_scenario`; it may expect something or nothing.
+        As in `load_scenario`; expectations are optional.
     settings : sequence of str
-        ``key.path=value`` each, put in place of the file's.
+        ``key.path=value`` each, replacing the file's values.
     case : str
-        Which case, ``name=value`` with commas between; empty for the file's first.
+        The case, as comma-separated ``name=value``; empty for the file's first.
     seed : int or None
         Seed of the run; None for the case's.
 
     Raises
     ------
     FogSimError
-        If the scenario does not fit, or the run goes wrong.
+        If the scenario does not fit, or the run fails.
     """
     if isinstance(settings, str):
         raise InputError(f"settings must be a list of key.path=value each, got the text {settings!r}")

@@ -1,4 +1,4 @@
-"""One case: a run that is watched by what is expected of it."""
+"""One case: a run with its expectations evaluated."""
 
 import time
 import warnings
@@ -18,26 +18,11 @@ from fogsim.traffic_run import run_traffic
 
 
 def check_case(scenario: Scenario, seed: int, sumo_outputs: Path | None = None) -> dict[str, Any]:
-    """Run a case, and tell what came of each of its expectations.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        With what it expects.
-    seed : int
-        Seed of the run.
-    sumo_outputs : Path or None
-        Folder of what SUMO writes, as of `run`.
-
-    Returns
-    -------
-    dict
-        ``findings``, ``metrics`` and ``ending``, as JSON has them.
-    """
+    """Run a case and return ``findings``, ``metrics`` and ``ending`` as JSON data."""
     standard, watch = build.safety_standard(scenario), ExpectationWatch(clauses_of(scenario.expect))
     ending = None
     with warnings.catch_warnings():
-        # What was not played is for the expectations to say.
+        # Expectations decide about events that were not played.
         warnings.simplefilter("ignore", UnplayedWarning)
         if scenario.traffic.has_ego:
             of_ego = RunMetrics(standard)
@@ -59,27 +44,7 @@ def check_case(scenario: Scenario, seed: int, sumo_outputs: Path | None = None) 
 
 
 def check_to_file(scenario: Scenario, seed: int, result: Path) -> str | None:
-    """Check a case, and write what came of it into a file; what goes wrong with the run is told there too.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        With what it expects.
-    seed : int
-        Seed of the run.
-    result : Path
-        The file.
-
-    Returns
-    -------
-    str or None
-        What went wrong with the run, if anything did.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    """
+    """Check a case and write the outcome to `result`; return what went wrong with the run, if anything."""
     begun = time.monotonic()
     outcome = outcome_of(lambda: check_case(scenario, seed, result.with_suffix("")))
     write_json(result, {**outcome, "duration_s": round(time.monotonic() - begun, 3)})

@@ -1,4 +1,4 @@
-"""Whether all cases of a file together pass: each clause of each expectation by itself."""
+"""Whether all cases of a file together pass, for each clause of each expectation."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from fogsim.testing.results import CaseResult
 
 
 class Outcome(StrEnum):
-    """What a line of the report says."""
+    """Wording of an outcome in the report."""
 
     PASSED = "passed"
     FAILED = "failed"
@@ -23,22 +23,7 @@ class Outcome(StrEnum):
 
 
 def rate_bounds(passed: int, tried: int, confidence: float) -> tuple[float, float]:
-    """Bounds of a pass rate, each one-sided: Clopper & Pearson (1934), Biometrika 26, 404.
-
-    Parameters
-    ----------
-    passed : int
-        Cases that passed.
-    tried : int
-        Cases that passed or failed, at least one.
-    confidence : float
-        Confidence of each bound, 0 … 1.
-
-    Returns
-    -------
-    (float, float)
-        The rate is at least the first, and at most the second, with this confidence.
-    """
+    """Lower and upper bound of a pass rate, each one-sided: Clopper & Pearson (1934), Biometrika 26, 404."""
     failed = tried - passed
     low = 0.0 if passed == 0 else float(betaincinv(passed, failed + 1, 1.0 - confidence))
     high = 1.0 if failed == 0 else float(betaincinv(passed + 1, failed, confidence))
@@ -47,22 +32,22 @@ def rate_bounds(passed: int, tried: int, confidence: float) -> tuple[float, floa
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What came of a clause in all cases.
+    """Result of a clause over all cases.
 
     Attributes
     ----------
     name, clause : str
         The expectation and its clause.
     outcome : Outcome
-        What came of it.
+        The clause's outcome.
     numbers : (int, int, int)
         Cases that passed, failed, and were inconclusive.
     telling : Finding
-        A finding that shows why: the first one that failed, else the first of those that the outcome is about.
+        A finding that shows why: the first that failed, otherwise the first with the outcome.
     run : StudyRun
         Its case.
     why : str
-        What the outcome goes by, where there are several cases.
+        Reason for the outcome, if there are several cases.
     """
 
     name: str
@@ -80,15 +65,7 @@ class Judgement:
 
 
 def judge(test: FogTest, results: Sequence[CaseResult]) -> Iterator[Judgement]:
-    """Judge each clause of a test, by the cases whose runs did not go wrong.
-
-    Parameters
-    ----------
-    test : FogTest
-        The test.
-    results : sequence of CaseResult
-        Its cases.
-    """
+    """Judge each clause of a test, by the cases whose runs did not fail."""
     clauses: dict[tuple[str, str], list[tuple[StudyRun, Finding]]] = {}
     for result in results:
         for finding in result.findings:

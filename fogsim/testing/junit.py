@@ -1,7 +1,7 @@
-"""What came of tests as JUnit's XML, as CI servers read it: a suite for each file, a case for each clause.
+"""Test results as JUnit XML for CI servers: a suite for each file, a case for each clause.
 
-By the schema of Jenkins' xUnit plugin (junit-10.xsd), which GitLab and GitHub's actions read too. What is inconclusive
-is a failure there, since those servers take what is skipped for fine.
+By the schema of Jenkins' xUnit plugin (junit-10.xsd), which GitLab and GitHub's actions read too. Inconclusive clauses
+are failures, since those servers treat skipped tests as passed.
 """
 
 import platform
@@ -23,17 +23,7 @@ _NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def write_junit(path: Path, outcomes: Sequence[FileOutcome], settings: Sequence[str] = ()) -> None:
-    """Write what came of tests.
-
-    Parameters
-    ----------
-    path : Path
-        The file; its folder is made where it is not there.
-    outcomes : sequence of FileOutcome
-        What came of the tests.
-    settings : sequence of str
-        What ``--set`` put in place of the files' values, for the commands that run a case again.
-    """
+    """Write the results of tests; `settings` are from ``--set``, for the commands that run a case again."""
     now = datetime.now(UTC).isoformat(timespec="seconds")
     suites = [_suite(one, settings, now) for one in outcomes]
     counted = {key: str(sum(int(one.attrib[key]) for one in suites)) for key in ("tests", "failures", "errors")}

@@ -1,4 +1,4 @@
-"""Which expectations are asked for: words with ``and``, ``or``, ``not`` and parentheses, as of pytest's ``-k``."""
+"""Selection of expectations: words with ``and``, ``or``, ``not`` and parentheses, as in pytest's ``-k``."""
 
 import re
 from collections.abc import Callable
@@ -14,22 +14,14 @@ _Test = Callable[[str], bool]
 
 @dataclass(frozen=True, slots=True)
 class Keywords:
-    """A condition on names.
-
-    Attributes
-    ----------
-    written : str
-        As it was given.
-    match : callable
-        Tells whether text with all names of an expectation meets it.
-    """
+    """A condition on names; `match` evaluates it on a text with all names of an expectation."""
 
     written: str
     match: _Test
 
 
 def parse_keywords(written: str) -> Keywords:
-    """Read a condition on names: a word is met where it is part of a name, in whatever case.
+    """Parse a condition on names: a word matches if it is part of a name, in upper or lower case.
 
     Parameters
     ----------
@@ -39,7 +31,7 @@ def parse_keywords(written: str) -> Keywords:
     Raises
     ------
     InputError
-        If it is none.
+        If it is malformed.
     """
     parser = _Parser(written)
     return Keywords(written, parser.whole())

@@ -1,4 +1,4 @@
-"""What came of tests as one page to read, with pictures and videos of what failed in it."""
+"""Test results as one HTML page, with images and videos of the failures embedded."""
 
 import base64
 import os
@@ -33,24 +33,12 @@ details { margin: .5rem 0; } summary { cursor: pointer; color: #44505c; } ul { m
 """
 
 _LARGEST_EMBEDDED = 6_000_000
-"""Largest video that the page holds itself; a larger one is linked [bytes]."""
+"""Largest embedded video; a larger one is linked [bytes]."""
 
 
 @dataclass(frozen=True, slots=True)
 class PageContent:
-    """What the page shows.
-
-    Attributes
-    ----------
-    outcomes : sequence of FileOutcome
-        What came of the tests.
-    artefacts : mapping from (str, str, str) to Artefacts
-        What was recorded of clauses that did not pass, by key of the run, name and clause.
-    seconds : float
-        How long it took [s].
-    settings : sequence of str
-        What ``--set`` put in place of the files' values.
-    """
+    """Content of the page; `artefacts` are by key of the run, expectation and clause."""
 
     outcomes: Sequence[FileOutcome]
     artefacts: Mapping[tuple[str, str, str], Artefacts]
@@ -59,15 +47,7 @@ class PageContent:
 
 
 def write_page(path: Path, content: PageContent) -> None:
-    """Write the page.
-
-    Parameters
-    ----------
-    path : Path
-        The file; its folder is made where it is not there.
-    content : PageContent
-        What it shows.
-    """
+    """Write the page; its folder is created if missing."""
     worst = _worst(content.outcomes)
     told = totals_text(content.outcomes, content.seconds)
     parts = [
@@ -124,7 +104,7 @@ def _file(outcome: FileOutcome, number: int, content: PageContent, folder: Path)
 
 
 def _clause(outcome: FileOutcome, judgement: Judgement, content: PageContent, folder: Path) -> Iterator[str]:
-    """What is known of a clause that did not pass in every case."""
+    """Details of a clause that did not pass in every case."""
     lines = case_lines(outcome, judgement)
     if judgement.outcome is Outcome.PASSED and not lines:
         return
@@ -143,7 +123,7 @@ def _clause(outcome: FileOutcome, judgement: Judgement, content: PageContent, fo
 
 
 def _dots(outcome: FileOutcome, judgement: Judgement) -> str:
-    """A square for each case, in their order."""
+    """A square for each case, in order."""
     labels = {result.run.key: label for result in outcome.results for label in [_label(result.run.levels)]}
     dots = "".join(
         f'<i class="{finding.verdict}" title="{escape(labels[result.run.key])}: {finding.verdict}"></i>'

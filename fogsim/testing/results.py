@@ -1,4 +1,4 @@
-"""What came of the cases, read back from their files."""
+"""Results of cases, read from their files."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -15,13 +15,7 @@ from fogsim.study.run_file import FailedRun, Finite, Metrics, RunRecord, Word, r
 
 
 def finding_to_json(finding: Finding) -> dict[str, Any]:
-    """A finding as files have it.
-
-    Parameters
-    ----------
-    finding : Finding
-        The finding.
-    """
+    """A finding as JSON data."""
     return dataclasses.asdict(finding)
 
 
@@ -31,7 +25,7 @@ def finding_from_json(values: Mapping[str, Any]) -> Finding:
 
 
 class CompleteCase(RunRecord):
-    """A case whose run came to its end."""
+    """A case with a completed run."""
 
     status: Literal["complete"]
     findings: list[Finding]
@@ -48,16 +42,16 @@ _CASE: TypeAdapter[CompleteCase | FailedRun] = TypeAdapter(
 
 @dataclass(frozen=True, slots=True)
 class CaseResult:
-    """What came of a case.
+    """Result of a case.
 
     Attributes
     ----------
     run : StudyRun
         The case.
     message : str or None
-        What went wrong with its run, if anything did.
+        Error of its run, if any.
     findings : tuple of Finding
-        What came of each clause of the expectations that were asked for.
+        Results of each clause of the selected expectations.
     metrics : mapping
         Metrics of the run.
     duration : float
@@ -72,28 +66,18 @@ class CaseResult:
 
     @property
     def is_passed(self) -> bool:
-        """Whether something was expected, and all of it came."""
+        """Whether there were expectations, and all of them passed."""
         verdicts = [one.verdict for one in self.findings]
         return bool(verdicts) and all(one is FindingVerdict.PASSED for one in verdicts)
 
     @property
     def has_failed(self) -> bool:
-        """Whether the run went wrong, or not as expected."""
+        """Whether the run failed, or an expectation did."""
         return self.message is not None or any(one.verdict is FindingVerdict.FAILED for one in self.findings)
 
 
 def read_result(folder: Path, run: StudyRun, expectations: Sequence[str]) -> CaseResult | None:
-    """What came of a case; None if it has no whole result.
-
-    Parameters
-    ----------
-    folder : Path
-        Where the results are.
-    run : StudyRun
-        The case.
-    expectations : sequence of str
-        Names of those that are asked for.
-    """
+    """Result of a case; None if it is missing or incomplete."""
     found = read_run(result_file(folder, run), _CASE)
     if isinstance(found, FailedRun):
         return CaseResult(run, found.message, duration=found.duration_s)

@@ -1,4 +1,4 @@
-"""Running tests: cases in parallel, results in files, what is left of an earlier call."""
+"""Running tests: cases in parallel, results in files, and resuming an earlier call."""
 
 import shutil
 from collections.abc import Callable, Mapping, Sequence
@@ -21,7 +21,7 @@ from fogsim.testing.judgement import Judgement, Outcome, judge
 from fogsim.testing.results import CaseResult, read_result
 
 Watch = Callable[[int, int], None]
-"""Called at the beginning and after each case, with the numbers of cases that are done and of those that failed."""
+"""Called at the beginning and after each case, with the numbers of completed and failed cases."""
 
 _SESSION = "session.json"
 _RESULTS = "results"
@@ -29,16 +29,16 @@ _RESULTS = "results"
 
 @dataclass(frozen=True, slots=True)
 class FileOutcome:
-    """What came of a test.
+    """Result of a test.
 
     Attributes
     ----------
     test : FogTest
         The test.
     results : tuple of CaseResult
-        Its cases that were run.
+        Its cases with results.
     judgements : tuple of Judgement
-        What came of each clause of its expectations.
+        Result of each clause of its expectations.
     """
 
     test: FogTest
@@ -47,17 +47,17 @@ class FileOutcome:
 
     @property
     def broken(self) -> list[CaseResult]:
-        """Cases whose runs went wrong."""
+        """Cases whose runs failed."""
         return [one for one in self.results if one.message is not None]
 
     @property
     def is_passed(self) -> bool:
-        """Whether all of it passed."""
+        """Whether everything passed."""
         return not self.broken and all(one.outcome is Outcome.PASSED for one in self.judgements)
 
     @property
     def duration(self) -> float:
-        """How long its runs took together [s]."""
+        """Total time of its runs [s]."""
         return sum(one.duration for one in self.results)
 
 
@@ -85,20 +85,20 @@ def run_tests(
     tests : sequence of FogTest
         From `collect`.
     out : Path
-        Directory of what came of them.
+        Directory of the results.
     engine : Engine
-        What runs the cases, with `check_to_file` as its work.
+        Engine for the cases, with `check_to_file` as its work.
     resume : bool
-        Whether results of an earlier call count that was cut off; those of other scenarios, seeds or versions do not.
+        Whether results of an interrupted earlier call count; those of other scenarios, seeds or versions do not.
     first_failure_ends : bool
-        Whether the first case that fails ends it.
+        Whether to stop at the first case that fails.
     watch : callable
         Called at the beginning and after each case.
 
     Returns
     -------
     list of FileOutcome
-        In the order of the tests; after a first failure only cases that were done.
+        In the order of the tests; after a first failure only completed cases.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def run_tests(
     OSError
         If a result cannot be written.
     KeyboardInterrupt
-        On Ctrl-C: cases that are done are kept, for `resume`.
+        On Ctrl-C: completed cases are kept, for `resume`.
     """
     results = _begin(out, resume)
     with WriterLock(out):
@@ -138,7 +138,7 @@ def run_tests(
 
 
 def _begin(out: Path, resume: bool) -> Path:
-    """Make the directory, and leave in it what counts."""
+    """Create the directory, and keep only results that count."""
     refuse_unwritable_folder(out)
     session = out / _SESSION
     if out.is_dir() and not session.exists() and set(out.iterdir()) - {partial_path(session)}:
@@ -153,7 +153,7 @@ def _begin(out: Path, resume: bool) -> Path:
 
 
 class _Session(BaseModel):
-    """What is kept between two calls."""
+    """State that is kept between two calls."""
 
     versions: dict[str, str | None] = Field(default_factory=dict)
     not_passed: dict[str, list[str]] = Field(default_factory=dict)
@@ -172,7 +172,7 @@ def _outcome(test: FogTest, found: Mapping[str, CaseResult | None]) -> FileOutco
 
 
 def _end(out: Path, outcomes: Sequence[FileOutcome]) -> None:
-    """Note what did not pass, for `last_failed`; what was not run again stays noted."""
+    """Record failures for `last_failed`; those that were not run again stay recorded."""
     noted = {str(file): cases for file, cases in last_failed(out).items() if file.is_file()}
     for outcome in outcomes:
         file = str(outcome.test.path.resolve())
@@ -191,7 +191,7 @@ def _counts_against(result: CaseResult, wrong: set[tuple[str, str]]) -> bool:
 
 
 def last_failed(out: Path) -> dict[Path, list[str]]:
-    """Files that did not pass when they were run last, and the labels of their cases that did not.
+    """Files that did not pass when they were last run, and the labels of their failed cases.
 
     Parameters
     ----------

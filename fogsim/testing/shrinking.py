@@ -1,4 +1,4 @@
-"""The smallest case that fails: as many names as can be at their first values, numbers as near to them as can be."""
+"""The smallest failing case: as many names as possible at their first values, numbers as near to them as possible."""
 
 import contextlib
 from collections.abc import Callable, Mapping, Sequence
@@ -18,27 +18,21 @@ from fogsim.testing.wording import command_text
 from fogsim.units.quantities import split_quantity
 
 HALVINGS = 5
-"""How often the way of a number to its first value is halved."""
+"""Maximum number of bisection steps between a number and its first value."""
 
 Values = Mapping[str, str]
-"""Names and their values, as text; those that are drawn for the seed are left out."""
+"""Names and their values, as text, without those that are drawn for the seed."""
 
 Fails = Callable[[Values], bool | None]
-"""Whether a case fails; None if it cannot be one."""
+"""Whether a case fails; None if there is no such case."""
 
 
 @dataclass(frozen=True, slots=True)
 class SmallestCase:
-    """The smallest case that fails.
+    """The smallest case that fails, after `tried` further cases.
 
-    Attributes
-    ----------
-    values : mapping from str to str
-        Its values.
-    passes_at : mapping from str to str
-        For each number that is not at its first value: the nearest one towards it with which the case did not fail.
-    tried : int
-        How many cases were run for it.
+    `passes_at` has, for each number that is not at its first value, the nearest one towards it with which the case did
+    not fail.
     """
 
     values: Values
@@ -47,17 +41,7 @@ class SmallestCase:
 
 
 def smallest_text(test: FogTest, found: SmallestCase, settings: Sequence[str] = ()) -> str:
-    """The smallest case in words, with the command that runs it.
-
-    Parameters
-    ----------
-    test : FogTest
-        The test.
-    found : SmallestCase
-        What `shrink` found.
-    settings : sequence of str
-        What ``--set`` put in place of the file's values.
-    """
+    """The smallest case in words, with the command that runs it."""
     passes = ", ".join(f"{name}={value}" for name, value in found.passes_at.items())
     told = f"; it does not with {passes}" if passes else ""
     run = replace(test.runs[0], levels=found.values)
@@ -67,26 +51,7 @@ def smallest_text(test: FogTest, found: SmallestCase, settings: Sequence[str] = 
 def shrink(
     outcome: FileOutcome, judgement: Judgement, settings: Sequence[str], engine: Engine, out: Path
 ) -> SmallestCase:
-    """Look for the smallest case of a sweep in which a clause fails.
-
-    Parameters
-    ----------
-    outcome : FileOutcome
-        What came of the test, several cases.
-    judgement : Judgement
-        The clause; it has failed in a case at least.
-    settings : sequence of str
-        What ``--set`` put in place of the file's values.
-    engine : Engine
-        What runs further cases.
-    out : Path
-        Where their results go.
-
-    Raises
-    ------
-    OSError
-        If a result cannot be written.
-    """
+    """Search for the smallest case of a sweep in which a clause fails; further results go to `out`."""
     path = outcome.test.path
     variation = load_cases(path, settings).variation
     gridded = [name for name, values in variation.varied.items() if not values.is_drawn]
@@ -142,7 +107,7 @@ def _run(
 
 
 def _at_first_values(values: Values, first: Values, fails: Fails) -> Values:
-    """A failing case none of whose names can be put to its first value alone."""
+    """A failing case in which no single name can be reset to its first value."""
     changed = True
     while changed:
         changed = False

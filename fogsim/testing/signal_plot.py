@@ -1,4 +1,4 @@
-"""What conditions looked at in a run, as a figure: a panel for each signal, with the limits and the failure."""
+"""Signals of conditions in a run, as a figure: a panel for each signal, with the limits and the failure."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -15,20 +15,14 @@ from fogsim.units.quantities import parse_quantity
 from fogsim.values import TrafficStep
 
 MOST_PANELS = 6
-"""Most signals of a figure."""
+"""Maximum number of signals in a figure."""
 
 _ALARM, _LIMIT = "#cf3a34", "#9a6700"
 _PANEL_HEIGHT = 1.25
 
 
 class SignalLog:
-    """Signals of a run, step by step.
-
-    Parameters
-    ----------
-    conditions : iterable of Condition
-        Whose signals are noted.
-    """
+    """Signals of some conditions, step by step."""
 
     def __init__(self, conditions: Iterable[Condition]) -> None:
         asked = list(dict.fromkeys(conditions))
@@ -39,13 +33,7 @@ class SignalLog:
         self._history = History()
 
     def update(self, step: TrafficStep) -> None:
-        """Note the signals at a step.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            The step; each of a run, in their order.
-        """
+        """Record the signals at the next step."""
         moment = self._history.moment(step)
         self.times.append(step.time)
         for signal, values in self.values.items():
@@ -61,22 +49,7 @@ def _limits(condition: Condition) -> list[tuple[Reference, Quantity]]:
 
 
 def plot_signals(log: SignalLog, title: str, failures: Sequence[float]) -> str:
-    """Draw signals over time.
-
-    Parameters
-    ----------
-    log : SignalLog
-        At least one signal, of at least one step.
-    title : str
-        What stands above.
-    failures : sequence of float
-        When something failed [s].
-
-    Returns
-    -------
-    str
-        SVG.
-    """
+    """Draw signals over time as SVG, with marks where something failed [s]."""
     shown = list(log.values)[:MOST_PANELS]
     figure = Figure(figsize=(WIDTH, 0.7 + _PANEL_HEIGHT * len(shown)), layout="constrained")
     panels = figure.subplots(len(shown), 1, squeeze=False, sharex=True)[:, 0]
@@ -94,7 +67,7 @@ def _draw(axes: Axes, signal: Reference, log: SignalLog) -> None:
     unit, values = SIGNALS[signal.signal].told_in, log.values[signal]
     texts = sorted({text for text in map(_text, values) if text is not None})
     if texts:
-        # Words have no order: each is a line of its own.
+        # Words have no order: each gets a line.
         heights = [math.nan if (text := _text(value)) is None else float(texts.index(text)) for value in values]
         axes.set_yticks(range(len(texts)), texts)
         axes.set_ylim(-0.5, len(texts) - 0.5)
@@ -109,7 +82,7 @@ def _draw(axes: Axes, signal: Reference, log: SignalLog) -> None:
 
 
 def _text(value: Value) -> str | None:
-    """Word of what is no number; None for a number, and for what is not known."""
+    """Word of a value that is not a number; None for a number or an unknown value."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, frozenset):
@@ -118,7 +91,7 @@ def _text(value: Value) -> str | None:
 
 
 def _number(value: Value) -> float:
-    """Number to draw; there is a gap where it is not known or endless."""
+    """Number to draw; NaN, a gap, if it is unknown or infinite."""
     if isinstance(value, LanePlace):
         return float(value.number)
     return float(value) if isinstance(value, int | float) and math.isfinite(value) else math.nan

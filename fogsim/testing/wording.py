@@ -1,4 +1,4 @@
-"""What came of tests, in words that terminal, reports and annotations share."""
+"""Test results in words, shared by terminal, reports and annotations."""
 
 import shlex
 from collections.abc import Sequence
@@ -12,13 +12,7 @@ from fogsim.testing.session import FileOutcome
 
 
 def finding_text(finding: Finding) -> str:
-    """What was expected, what came, when and where.
-
-    Parameters
-    ----------
-    finding : Finding
-        The finding.
-    """
+    """What was expected, what came, when and where."""
     came = f", came {finding.came}" if finding.came else ""
     when = "" if finding.time is None or f"{finding.time:g} s" in finding.came else f" at {finding.time:.4g} s"
     where = "" if finding.position is None else f", {finding.position:.0f} m"
@@ -27,13 +21,7 @@ def finding_text(finding: Finding) -> str:
 
 
 def judgement_text(judgement: Judgement) -> str:
-    """What came of a clause in all cases.
-
-    Parameters
-    ----------
-    judgement : Judgement
-        The judgement.
-    """
+    """Result of a clause over all cases."""
     if not judgement.why:
         return finding_text(judgement.telling)
     if judgement.outcome is Outcome.PASSED:
@@ -42,15 +30,7 @@ def judgement_text(judgement: Judgement) -> str:
 
 
 def case_lines(outcome: FileOutcome, judgement: Judgement) -> list[str]:
-    """A line for each case that did not pass a clause; none for a file of one case.
-
-    Parameters
-    ----------
-    outcome : FileOutcome
-        What came of a test.
-    judgement : Judgement
-        One of its clauses.
-    """
+    """A line for each case that did not pass a clause; none for a file with one case."""
     if len(outcome.results) == 1:
         return []
     return [
@@ -63,13 +43,7 @@ def case_lines(outcome: FileOutcome, judgement: Judgement) -> list[str]:
 
 
 def broken_text(broken: Sequence[CaseResult]) -> str:
-    """What went wrong with runs.
-
-    Parameters
-    ----------
-    broken : sequence of CaseResult
-        Those that went wrong, at least one.
-    """
+    """What went wrong with runs."""
     first, number = broken[0], len(broken)
     runs = "the run went wrong" if number == 1 else f"{number} runs went wrong"
     label = label_of(first.run)
@@ -77,19 +51,7 @@ def broken_text(broken: Sequence[CaseResult]) -> str:
 
 
 def command_text(test: FogTest, run: StudyRun, settings: Sequence[str] = (), program: str = "test") -> str:
-    """Command that runs a case again.
-
-    Parameters
-    ----------
-    test : FogTest
-        The test.
-    run : StudyRun
-        The case.
-    settings : sequence of str
-        ``key.path=value`` each, put in place of the file's.
-    program : str
-        ``test``, or ``run`` for all files of a run.
-    """
+    """Command that runs a case again with the same settings; `program` is ``test``, or ``run`` for all files."""
     label = label_of(run)
     chosen = ["--case", label] if label else []
     return shlex.join(
@@ -98,15 +60,7 @@ def command_text(test: FogTest, run: StudyRun, settings: Sequence[str] = (), pro
 
 
 def expectation_lines(outcome: FileOutcome, name: str) -> list[str]:
-    """What keeps an expectation from being passed, and how to see it again; nothing if it is passed.
-
-    Parameters
-    ----------
-    outcome : FileOutcome
-        What came of its test.
-    name : str
-        The expectation.
-    """
+    """Why an expectation did not pass, and how to reproduce it; nothing if it passed."""
     lines = []
     for one in outcome.judgements:
         if one.name == name and one.outcome is not Outcome.PASSED:
@@ -117,15 +71,7 @@ def expectation_lines(outcome: FileOutcome, name: str) -> list[str]:
 
 
 def totals_text(outcomes: Sequence[FileOutcome], seconds: float) -> str:
-    """How many expectations passed.
-
-    Parameters
-    ----------
-    outcomes : sequence of FileOutcome
-        What came of the tests.
-    seconds : float
-        How long it took [s].
-    """
+    """How many expectations passed."""
     numbers = dict.fromkeys(Outcome, 0)
     for one in outcomes:
         numbers[Outcome.ERROR] += bool(one.broken)

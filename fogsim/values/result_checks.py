@@ -1,4 +1,4 @@
-"""What methods of the user's return, checked before it goes on: an error names method, field and value."""
+"""Checks of what users' methods return; errors name method, field and value."""
 
 import math
 from collections.abc import Mapping
@@ -27,25 +27,11 @@ from fogsim.values.light import ALL_LAMPS
 T = TypeVar("T")
 
 _SUM_TOLERANCE = 1e-6
-"""How far the probabilities of a belief may be from adding up to 1."""
+"""Tolerance of the sum of a belief's probabilities."""
 
 
 def checked_estimate(method: str, value: object) -> Estimate:
-    """What an estimator has returned.
-
-    Parameters
-    ----------
-    method : str
-        Name by which the scenario knows the estimator.
-    value : object
-        What its `update` has returned.
-
-    Raises
-    ------
-    InputError
-        If it is no `Estimate` of that method, or a valid one whose extinction or standard deviation is not a finite
-        number of at least 0.
-    """
+    """An estimator's result; InputError unless it is an `Estimate` of that method with valid numbers."""
     who = f"estimator {method!r}: update()"
     estimate = _of_type(who, value, Estimate)
     if estimate.method != method:
@@ -61,20 +47,7 @@ def checked_estimate(method: str, value: object) -> Estimate:
 
 
 def checked_belief(method: str, value: object) -> Belief:
-    """What a fusion has returned.
-
-    Parameters
-    ----------
-    method : str
-        Name of the fusion.
-    value : object
-        What its `update` has returned.
-
-    Raises
-    ------
-    InputError
-        If it is no `Belief`, or its arrays are not a distribution over ascending, finite ln k.
-    """
+    """A fusion's result; InputError unless it is a `Belief` with a distribution over ascending, finite ln k."""
     who = f"fusion {method!r}: update()"
     belief = _of_type(who, value, Belief)
     for name in ("log_extinction", "probability"):
@@ -87,7 +60,7 @@ def checked_belief(method: str, value: object) -> Belief:
         raise InputError(
             f"{who}: log_extinction and probability must be of one length, got {len(cells)} and {len(probability)}"
         )
-    # Copies are of one type, for which the kernel is compiled.
+    # Copies have one type, for which the kernel is compiled.
     is_ascending, least, total = distribution_of(np.array(cells, float), np.array(probability, float))
     if not (is_ascending and math.isfinite(cells[0]) and math.isfinite(cells[-1])):
         raise InputError(f"{who}: log_extinction must be finite and ascending, got {shown(cells)}")
@@ -100,13 +73,7 @@ def checked_belief(method: str, value: object) -> Belief:
 
 @kernel
 def distribution_of(cells: NDArray[np.float64], probability: NDArray[np.float64]) -> tuple[bool, float, float]:
-    """Whether cells ascend, and the least of their probabilities and the sum; NaN where one is none.
-
-    Parameters
-    ----------
-    cells, probability : (n,) float64
-        As of a `Belief`, at least one.
-    """
+    """Whether cells ascend, and the minimum and sum of their probabilities; NaN if one of them is NaN."""
     ascends, least, total = True, probability[0], probability[0]
     for i in range(1, len(cells)):
         ascends &= cells[i] > cells[i - 1]
@@ -115,20 +82,7 @@ def distribution_of(cells: NDArray[np.float64], probability: NDArray[np.float64]
 
 
 def checked_advice(method: str, value: object) -> SpeedAdvice:
-    """What an adviser has returned.
-
-    Parameters
-    ----------
-    method : str
-        Name of the adviser.
-    value : object
-        What its `advise` has returned.
-
-    Raises
-    ------
-    InputError
-        If it is no `SpeedAdvice` with a speed of at least 0, `inf` for none.
-    """
+    """An adviser's result; InputError unless it is a `SpeedAdvice` of at least 0, or `inf` for no advice."""
     who = f"adviser {method!r}: advise()"
     advice = _of_type(who, value, SpeedAdvice)
     _check_speed(who, "speed", advice.speed)
@@ -138,39 +92,13 @@ def checked_advice(method: str, value: object) -> SpeedAdvice:
 
 
 def checked_lamps(method: str, value: object) -> Lamp:
-    """What a lighting policy has returned.
-
-    Parameters
-    ----------
-    method : str
-        Name of the policy.
-    value : object
-        What its `lamps` has returned.
-
-    Raises
-    ------
-    InputError
-        If it is no `Lamp`, or of bits that no lamp has.
-    """
+    """A lighting policy's result; InputError unless it is a valid `Lamp`."""
     who = f"lighting policy {method!r}: lamps()"
     return _real_lamps(who, _of_type(who, value, Lamp))
 
 
 def checked_lamp_choice(method: str, value: object) -> LampChoice:
-    """What a lighting policy that goes by the vehicle's sensors has returned.
-
-    Parameters
-    ----------
-    method : str
-        Name of the policy.
-    value : object
-        What its `choose_lamps` has returned.
-
-    Raises
-    ------
-    InputError
-        If it is no `LampChoice`, or of bits that no lamp has.
-    """
+    """Result of a lighting policy that uses sensors; InputError unless it is a valid `LampChoice`."""
     who = f"lighting policy {method!r}: choose_lamps()"
     choice = _of_type(who, value, LampChoice)
     _real_lamps(who, _of_type(f"{who}: lamps", choice.lamps, Lamp))
@@ -187,18 +115,7 @@ def _real_lamps(who: str, lamps: Lamp) -> Lamp:
 
 
 def checked_command(value: object) -> Command:
-    """A command that the user's own policy has made.
-
-    Parameters
-    ----------
-    value : object
-        What it has made.
-
-    Raises
-    ------
-    InputError
-        If it is no `Command`, a speed in it is nan or negative, or a stretch does not end behind its beginning.
-    """
+    """A user policy's command; InputError unless it is a `Command` with valid speeds and stretches."""
     command = _of_type("the command", value, Command)
     _of_type("the command's advice", command.advice, SpeedAdvice)
     _of_type("the command's lamps", command.lamps, Lamp)
@@ -248,20 +165,7 @@ def _check_kind(who: str, field: str, value: object, kind: type, expected: str) 
 
 
 def checked_values(metric: str, value: object) -> Mapping[str, Any]:
-    """What a metric has returned.
-
-    Parameters
-    ----------
-    metric : str
-        Its name in the registry.
-    value : object
-        What its `result` has returned.
-
-    Raises
-    ------
-    InputError
-        If it is no mapping of names to None, words, finite numbers, and such mappings.
-    """
+    """A metric's result; InputError unless it is a nested mapping of names to None, words and finite numbers."""
     who = f"metric {metric!r}: result()"
     if not isinstance(value, Mapping):
         raise InputError(f"{who} must return a mapping of keys to values, got {shown(value)}")
@@ -271,20 +175,7 @@ def checked_values(metric: str, value: object) -> Mapping[str, Any]:
 
 
 def checked_recorder(name: str, value: T) -> T:
-    """What a factory of recorders has made.
-
-    Parameters
-    ----------
-    name : str
-        Name of the recorder in the registry.
-    value : object
-        What the factory has returned.
-
-    Raises
-    ------
-    InputError
-        If it lacks a method of `fogsim.recorders.Recorder`.
-    """
+    """A recorder from a factory; InputError if it lacks a method of `fogsim.recorders.Recorder`."""
     missing = [f"{method}()" for method in ("record", "close") if not callable(getattr(value, method, None))]
     if missing:
         raise InputError(

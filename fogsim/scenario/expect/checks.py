@@ -1,4 +1,4 @@
-"""What of a scenario's expectations its run could not tell, and the names that stand in them."""
+"""Expectations of a scenario that its run could not evaluate, and the names in them."""
 
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
@@ -16,49 +16,26 @@ if TYPE_CHECKING:
     from fogsim.scenario.schema import Scenario
 
 MOST_SHOWN = 5
-"""Most metrics that a message lists."""
+"""Maximum number of metrics in a message."""
 
 
 def check_expectations(scenario: "Scenario") -> None:
-    """Refuse expectations that a run of a scenario could not tell.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-
-    Raises
-    ------
-    ValidationError
-        If there are any.
-    """
+    """Raise ValidationError if a run of the scenario could not evaluate its expectations."""
     mistakes = expectation_mistakes(scenario.expect, run_content(scenario), last_time(scenario), scenario.traffic.ego)
     refuse((("expect", *place), told) for place, told in mistakes)
 
 
 def last_time(scenario: "Scenario") -> float:
-    """Time of the last frame of a scenario's longest run [s].
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """Time of the last frame of a scenario's longest run [s]."""
     period = scenario.clocks.camera_period_s
     return clock_time(max(1, round(scenario.duration_s / period)) * period)
 
 
 def run_content(scenario: "Scenario") -> RunContent:
-    """What conditions of a scenario may ask for.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """What the conditions of a scenario can refer to."""
     has_ego = scenario.traffic.has_ego
     methods = tuple(one.method for one in scenario.estimators)
-    # On a road by template places count along its way.
+    # On a template's road, positions count along it.
     has_way = bool(scenario.traffic.along) or scenario.road is not None
     has = {Need.EGO: has_ego, Need.ROUTE: has_ego or has_way, Need.FRAMES: bool(methods)}
     return RunContent(
@@ -75,19 +52,7 @@ def run_content(scenario: "Scenario") -> RunContent:
 def expectation_mistakes(
     expect: Mapping[str, Expectation], content: RunContent, duration: float, ego: str
 ) -> Iterator[tuple[KeyPath, str]]:
-    """Say what of some expectations a run could not tell.
-
-    Parameters
-    ----------
-    expect : mapping from str to Expectation
-        The expectations.
-    content : RunContent
-        What the run has.
-    duration : float
-        Time of its last frame [s].
-    ego : str
-        Id of its ego.
-    """
+    """Expectations that a run could not evaluate, by key path; `duration` is the time of its last frame [s]."""
     for name, expectation in expect.items():
         for key, condition in expectation.conditions():
             yield from (((name, key), told) for told in condition_mistakes(condition, content))
@@ -116,13 +81,7 @@ def _metrics(content: RunContent) -> Iterator[str]:
 
 
 def named_vehicles(expect: Mapping[str, Expectation]) -> Iterator[tuple[KeyPath, str]]:
-    """Vehicles that expectations name, the ego aside, and where.
-
-    Parameters
-    ----------
-    expect : mapping from str to Expectation
-        The expectations.
-    """
+    """Key path and id of each vehicle other than the ego that expectations name."""
     for name, expectation in expect.items():
         for key, condition in expectation.conditions():
             yield from ((("expect", name, key), vehicle) for vehicle in vehicles_in(condition))

@@ -1,4 +1,4 @@
-"""Conditions in scenario files: read when the file is, written back as text."""
+"""Conditions in scenario files: parsed with the file, written back as text."""
 
 from collections.abc import Iterable
 from typing import Annotated
@@ -14,7 +14,7 @@ _SCHEMA = {"format": "condition", "anyOf": [{"type": "string"}, {"type": "object
 
 
 def _condition(written: object) -> Condition:
-    """A condition that is written, or that a program has made."""
+    """A condition from a file or a program."""
     return written if isinstance(written, Condition) else parse_condition(written)
 
 
@@ -25,18 +25,7 @@ WrittenCondition = Annotated[
 
 
 def refuse(mistakes: Iterable[tuple[KeyPath, str]]) -> None:
-    """Refuse what has mistakes.
-
-    Parameters
-    ----------
-    mistakes : iterable of tuple
-        Key path and what is wrong there.
-
-    Raises
-    ------
-    ValidationError
-        If there are any.
-    """
+    """Raise ValidationError if there are mistakes, given as key path and message."""
     told = [
         InitErrorDetails(type=PydanticCustomError(MISTAKE, "{told}", {"told": text}), loc=place, input=0)
         for place, text in mistakes

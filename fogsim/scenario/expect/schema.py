@@ -37,7 +37,7 @@ _WANTED: Mapping[str, Mapping[str, bool]] = {
     "whenever": {"would test nothing": False},
     "while": {"would test nothing": False},
 }
-"""What it means for a clause if its condition can be nothing but true, or nothing but false."""
+"""Meaning of a clause whose condition is always true, or always false."""
 
 _TIMES = re.compile(r"\s*(\d+)\s*times?\s*\Z")
 
@@ -48,11 +48,11 @@ _SHARE = (0.0, 1.0)
 """Range of metrics whose keys end in ``_share``."""
 
 _RATIO = "traffic_delay_share"
-"""The one that may be greater: time lost in proportion to the time at free flow."""
+"""The only share that may exceed 1: time lost in proportion to the time at free flow."""
 
 
 def _number_of_times(value: object) -> object:
-    """Let a number of times be written as ``3 times`` or ``once``."""
+    """Accept a number of times as ``3 times`` or ``once``."""
     match = _TIMES.match(value) if isinstance(value, str) else None
     return int(match[1]) if match else 1 if value == "once" else value
 
@@ -136,7 +136,7 @@ class Expectation(Section):
             yield ("throughout",), "needs within: the time for which it must hold"
 
     def pointless(self, limits: Limits, ego: str = EGO) -> Iterator[tuple[str, str]]:
-        """Say by their keys which conditions cannot fail, cannot pass, or can never apply in a run.
+        """Conditions, by their keys, that cannot fail, cannot pass, or never apply in a run.
 
         Parameters
         ----------
@@ -198,20 +198,7 @@ Expectations = dict[Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+$", max_lengt
 
 
 def metric_check(name: str, written: str) -> MetricCheck:
-    """Read what a metric must be.
-
-    Parameters
-    ----------
-    name : str
-        Name of the expectation.
-    written : str
-        ``minimum_gap_m >= 5``; a number may have a unit that fits that of the key.
-
-    Raises
-    ------
-    ValueError
-        If it is something else, or is met or missed by every value that the metric can have.
-    """
+    """Parse ``minimum_gap_m >= 5``, with an optional unit; ValueError if every value would pass, or none."""
     match = _METRIC.match(written)
     if match is None:
         raise ValueError(f"expected a key of metrics.json, one of {' '.join(OPERATORS)} and a value")
@@ -222,7 +209,7 @@ def metric_check(name: str, written: str) -> MetricCheck:
         return MetricCheck(name, key, relation, value)
     unit = UNIT_OF_SUFFIX.get(key.rpartition("_")[2], "")
     has_unit = re.search(r"[^\W\d_]\s*\Z|[%°]\s*\Z", value) is not None and not value.endswith("inf")
-    # A bare number counts in the unit at the end of the key.
+    # A bare number is in the unit at the end of the key.
     number = parse_quantity(value, unit if has_unit else "")
     possible = {compared(one, relation, number) for one in (*_SHARE, 0.5, min(max(number, 0.0), 1.0))}
     if key.endswith("_share") and key != _RATIO and len(possible) == 1:
@@ -233,11 +220,5 @@ def metric_check(name: str, written: str) -> MetricCheck:
 
 
 def clauses_of(expect: Mapping[str, Expectation]) -> tuple[Clause, ...]:
-    """Clauses of some expectations, in their order.
-
-    Parameters
-    ----------
-    expect : mapping from str to Expectation
-        The expectations.
-    """
+    """Clauses of expectations, in order."""
     return tuple(clause for name, expectation in expect.items() for clause in expectation.clauses(name))

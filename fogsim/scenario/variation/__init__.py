@@ -1,4 +1,4 @@
-"""What differs between the cases of a scenario file, and when all of them together pass."""
+"""The cases of a scenario file, and when all of them together pass."""
 
 from fogsim.scenario.variation.cases import (
     KEYS,

@@ -1,4 +1,4 @@
-"""The blocks ``vary`` and ``verdict``: what differs between the cases of a file, and when all of them together pass."""
+"""The blocks ``vary`` and ``verdict``: the cases of a file, and when all of them together pass."""
 
 import contextlib
 import itertools
@@ -21,7 +21,7 @@ from fogsim.scenario.variation.levels import LevelsError, SeedLevels, Value, Val
 from fogsim.units.quantities import split_quantity
 
 _PLACE = re.compile(r"\$(?:\$|\{([^{}]*)\}|([A-Za-z_][A-Za-z0-9_]*))")
-"""Where a name stands: ``$name``, ``${name}``; ``$$`` is a plain ``$``."""
+"""Uses of a name: ``$name``, ``${name}``; ``$$`` is a plain ``$``."""
 
 
 class Verdict(Section):
@@ -49,7 +49,7 @@ NONE_FAILS = Verdict()
 
 
 class VariationKeys(Section):
-    """Keys that stand in a file beside those of a scenario."""
+    """Keys of a file in addition to those of a scenario."""
 
     vary: dict[str, Any] = Field(default_factory=dict)
     """What differs between the cases of the file: a name and its values; ``$name`` stands for them elsewhere."""
@@ -70,59 +70,35 @@ KEYS = tuple(VariationKeys.model_fields)
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One case of a file.
-
-    Attributes
-    ----------
-    values : mapping from str to value
-        What each name stands for.
-    seed : int
-        Seed of its run.
-    """
+    """One case of a file: a value for each varied name, and the seed of its run."""
 
     values: Mapping[str, Value]
     seed: int = 0
 
     @property
     def levels(self) -> dict[str, str]:
-        """What each name stands for, as text."""
+        """Value of each name, as text."""
         return {name: value_text(value) for name, value in self.values.items()}
 
     @property
     def label(self) -> str:
-        """The case as ``--case`` names it; empty for the one of a file that varies nothing."""
+        """The case as ``--case`` names it; empty for the only case of a file without variation."""
         return ",".join(f"{name}={level}" for name, level in self.levels.items())
 
     @property
     def folder_name(self) -> str:
-        """The case as a folder may be named; ``seedN`` for a file that varies nothing."""
+        """Name of the case's folder; ``seedN`` for a file without variation."""
         return re.sub(r"[^\w.,=-]", "_", self.label)[:100] or f"seed{self.seed}"
 
 
 def value_text(value: Value) -> str:
-    """A value as labels and text in a file have it.
-
-    Parameters
-    ----------
-    value : value
-        The value.
-    """
+    """A value as labels and files show it."""
     return str(value).lower() if isinstance(value, bool) else f"{value:g}" if isinstance(value, float) else str(value)
 
 
 @dataclass(frozen=True, slots=True)
 class Variation:
-    """What a file varies.
-
-    Attributes
-    ----------
-    cases : tuple of Case
-        The grid, the last name fastest.
-    varied : mapping from str to Values
-        What each name stands for.
-    verdict : Verdict
-        When all of them together pass.
-    """
+    """What a file varies: its cases as a grid (the last name fastest), and when they pass together."""
 
     cases: tuple[Case, ...]
     varied: Mapping[str, Values] = field(default_factory=dict)
@@ -130,18 +106,7 @@ class Variation:
 
 
 def read_variation(document: Document) -> Variation:
-    """Read ``vary`` and ``verdict``, and check that each name stands somewhere.
-
-    Parameters
-    ----------
-    document : Document
-        What was read, with overrides in place.
-
-    Raises
-    ------
-    InputError
-        A line for each mistake, with file, line, key and what is allowed.
-    """
+    """Read ``vary`` and ``verdict``, and check that each varied name is used somewhere."""
     written = {key: document.data[key] for key in KEYS if key in document.data}
     try:
         keys = VariationKeys.model_validate(written)
@@ -185,7 +150,7 @@ def _parsed(document: Document, written: Mapping[str, Any]) -> tuple[dict[str, V
 
 
 def _misplaced(document: Document, named: Mapping[str, object], varied: Mapping[str, Values]) -> list[str]:
-    """Names that stand nowhere, and places of names that are none."""
+    """Names that are not used, and uses of unknown names."""
     used: set[str] = set()
     mistakes = []
     for at, text in _texts({key: value for key, value in document.data.items() if key not in KEYS}, ()):
@@ -226,7 +191,7 @@ def _grid(document: Document, varied: Mapping[str, Values]) -> tuple[Case, ...]:
 
 
 def _case(varied: Mapping[str, Values], chosen: Mapping[str, Value]) -> Case:
-    """The case of a cell of the grid, with what is drawn for its seed."""
+    """The case of a cell of the grid, with the draws for its seed."""
     seed = next((int(chosen[name]) for name, values in varied.items() if isinstance(values, SeedLevels)), 0)
     return Case(
         {name: values.value(seed) if values.is_drawn else chosen[name] for name, values in varied.items()}, seed
@@ -243,15 +208,7 @@ def _check_reachable(document: Document, verdict: Verdict, number: int) -> None:
 
 
 def with_case(document: Document, case: Case) -> Document:
-    """Copy of a document with a case's values in place of their names, and without `KEYS`.
-
-    Parameters
-    ----------
-    document : Document
-        What `read_variation` has checked.
-    case : Case
-        The case.
-    """
+    """Copy of a document with a case's values in place of their names, and without `KEYS`."""
     data = {key: value for key, value in document.data.items() if key not in KEYS}
     return replace(document, data=_put(data, case.values) if case.values else data)
 
@@ -270,24 +227,10 @@ def _put(value: Any, values: Mapping[str, Value]) -> Any:
 
 
 def chosen_cases(variation: Variation, wanted: str, where: object, seed: int | None = None) -> tuple[Case, ...]:
-    """Cases that have some values.
+    """Cases that match comma-separated ``name=value`` pairs, as in `Case.label`; all cases for "".
 
-    Parameters
-    ----------
-    variation : Variation
-        What the file varies.
-    wanted : str
-        ``name=value`` pairs with commas between, as in `Case.label`; empty for all cases. A name that stands for
-        numbers may have one that is not in the grid.
-    where : object
-        What messages name: the file.
-    seed : int or None
-        Seed of the runs; None for those of the cases.
-
-    Raises
-    ------
-    InputError
-        If it is not of that form, or there is no such name, value or case.
+    A numeric name may have a value that is not in the grid. `where` names the file in messages, and `seed` replaces the
+    seeds of the cases.
     """
     pairs = _pairs(wanted, variation, where)
     of_seeds = next((name for name, values in variation.varied.items() if isinstance(values, SeedLevels)), None)
@@ -320,7 +263,7 @@ def _pairs(wanted: str, variation: Variation, where: object) -> dict[str, str]:
 
 
 def _beside_grid(values: Values, text: str) -> Value | None:
-    """Value of a text for a name whose values are numbers; None if it cannot be one."""
+    """A text as a number for a numeric name; None if it is not one."""
     if isinstance(values, SeedLevels):
         return int(text) if text.isdecimal() else None
     if not values.is_numeric:
@@ -331,7 +274,7 @@ def _beside_grid(values: Values, text: str) -> Value | None:
 
 
 def _distinct(cases: Iterable[Case], name: str, varied: Mapping[str, Values]) -> list[Case]:
-    """Cases that differ in more than one name, and what is drawn for it."""
+    """Cases that differ in several names, and the draws for their seeds."""
     kept: dict[str, Case] = {}
     for case in cases:
         rest = {key: value for key, value in case.values.items() if key != name and not varied[key].is_drawn}

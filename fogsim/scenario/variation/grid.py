@@ -1,23 +1,17 @@
-"""How many runs a file may stand for."""
+"""Limit of a file's number of runs."""
 
 import math
 from collections.abc import Mapping
 
 MOST_RUNS = 100_000
-"""Most runs of a study, and most cases of a scenario file."""
+"""Maximum number of runs of a study and of cases of a scenario file."""
 
 _MOST_NAMED = 5
 _MOST_DIGITS = 15
 
 
 def grid_mistake(sizes: Mapping[str, int]) -> str | None:
-    """Say why a grid has too many runs, without building it; None if it has not.
-
-    Parameters
-    ----------
-    sizes : mapping from str to int
-        Number of levels of each factor, the seeds among them.
-    """
+    """Why a grid has too many runs, from its number of levels per factor; None if it has not."""
     number = math.prod(sizes.values())
     if number <= MOST_RUNS:
         return None

@@ -1,4 +1,4 @@
-"""Values that a name stands for in the cases of a file: a list, a range, seeds, or draws of a distribution."""
+"""Values of a name in the cases of a file: a list, a range, seeds, or draws from a distribution."""
 
 import math
 import re
@@ -10,7 +10,7 @@ from fogsim.randomness import named_generator
 from fogsim.units.quantities import split_quantity
 
 MOST_VALUES = 100_000
-"""Most values of one name."""
+"""Maximum number of values of one name."""
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 _SEEDS = re.compile(r"\s*([0-9]{1,9})\s+seeds?\s*\Z")
@@ -25,19 +25,11 @@ _EXPECTED = "expected a list, {from, to, step}, 20 seeds, or {uniform: [low, hig
 _MOST_DRAWS = 10_000
 
 Value = str | float | int | bool
-"""What a name stands for in one case."""
+"""Value of a name in one case."""
 
 
 class LevelsError(ValueError):
-    """What is wrong with the values of a name.
-
-    Parameters
-    ----------
-    told : str
-        What is wrong.
-    below : str or int
-        At which key or place below the name.
-    """
+    """What is wrong with the values of a name, and at which key or index below it."""
 
     def __init__(self, told: str, *below: str | int) -> None:
         super().__init__(told)
@@ -46,13 +38,7 @@ class LevelsError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Levels:
-    """Values that are all taken, one after another.
-
-    Attributes
-    ----------
-    values : tuple of value
-        The values.
-    """
+    """Values that are all used, one after another."""
 
     values: tuple[Value, ...]
     is_drawn = False
@@ -66,17 +52,11 @@ class Levels:
 
     @property
     def is_numeric(self) -> bool:
-        """Whether all are numbers, perhaps with a unit."""
+        """Whether all are numbers, with or without a unit."""
         return all(not isinstance(one, bool) and _number_and_unit(one) is not None for one in self.values)
 
     def value(self, _: int) -> Value:
-        """First of the values, whatever the seed.
-
-        Parameters
-        ----------
-        _ : int
-            The seed.
-        """
+        """First of the values, whatever the seed."""
         return self.values[0]
 
 
@@ -89,21 +69,7 @@ class SeedLevels(Levels):
 
 @dataclass(frozen=True, slots=True)
 class Draws:
-    """A value for each seed, drawn of a distribution.
-
-    Attributes
-    ----------
-    name : str
-        Name that stands for it, from which its random numbers come.
-    distribution : str
-        Kind of the distribution.
-    parameters : (float, float)
-        Its parameters.
-    limits : (float, float)
-        What the values are between; beyond it, one is drawn again.
-    unit : str
-        Unit of the parameters; empty for none.
-    """
+    """A value per seed from a distribution with `parameters` in `unit`; values outside `limits` are drawn again."""
 
     name: str
     distribution: str
@@ -120,18 +86,7 @@ class Draws:
         yield self.value(0)
 
     def value(self, seed: int) -> Value:
-        """Value of a seed.
-
-        Parameters
-        ----------
-        seed : int
-            The seed.
-
-        Raises
-        ------
-        LevelsError
-            If none of ten thousand draws lies between the limits.
-        """
+        """Value of a seed; LevelsError if ten thousand draws are all outside the limits."""
         generator = named_generator(seed, self.name)
         low, high = self.limits
         for _ in range(_MOST_DRAWS):
@@ -148,24 +103,14 @@ class Draws:
 
 
 Values = Levels | Draws
-"""What a name stands for."""
+"""All values of a name."""
 
 
 def parse_levels(name: str, written: object) -> Values:
-    """Values of a name as a file has them.
+    """Values of a name, from the forms that a file can give.
 
-    Parameters
-    ----------
-    name : str
-        The name.
-    written : object
-        A list; ``{from, to, step}``; ``20 seeds`` or ``{seeds: [3, 5]}``; ``{uniform: [low, high]}``, ``{normal: [mean,
-        deviation]}`` or ``{lognormal: [median, deviation]}``, perhaps with ``at_least`` and ``at_most``.
-
-    Raises
-    ------
-    LevelsError
-        If it is none of them.
+    A list; ``{from, to, step}``; ``20 seeds`` or ``{seeds: [3, 5]}``; ``{uniform: [low, high]}``, ``{normal: [mean,
+    deviation]}`` or ``{lognormal: [median, deviation]}``, optionally with ``at_least`` and ``at_most``.
     """
     if not _NAME.match(name):
         raise LevelsError("a name consists of letters, digits and _, and begins with no digit")
@@ -265,7 +210,7 @@ def _draws(name: str, kind: str, written: dict[str, object]) -> Draws:
 
 
 def _numbers(written: dict[str, object]) -> tuple[list[float], str]:
-    """Numbers of values that have one unit together, and that unit."""
+    """Numbers of values with one common unit, and that unit."""
     found: dict[str, tuple[float, str]] = {}
     for key, value in written.items():
         one = _number_and_unit(value)
@@ -291,15 +236,7 @@ def _number_and_unit(value: object) -> tuple[float, str] | None:
 
 
 def number_with_unit(number: float, unit: str) -> Value:
-    """A number as a file would have it: six digits of it, by which a case can be named.
-
-    Parameters
-    ----------
-    number : float
-        The number.
-    unit : str
-        Its unit; empty for none.
-    """
+    """A number with its unit, rounded to six digits so that it can name a case."""
     rounded = float(f"{number:.6g}")
     plain: float | int = int(rounded) if rounded.is_integer() and abs(rounded) < 1e6 else rounded
     return f"{plain:g} {unit}" if unit else plain

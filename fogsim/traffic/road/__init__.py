@@ -1,1 +1,1 @@
-"""Roads, signs and demand as the files of SUMO and OpenDRIVE have them; no simulation runs."""
+"""Roads, signs and demand from files of SUMO and OpenDRIVE, without a simulation."""

@@ -1,4 +1,4 @@
-"""What a SUMO configuration file names, without starting SUMO, and which of its options FogSim overrides."""
+"""Contents of a SUMO configuration file, read without SUMO, and its options that FogSim overrides."""
 
 import itertools
 from collections.abc import Iterator, Mapping
@@ -15,10 +15,10 @@ _FIRST_ELEMENTS: Mapping[str, tuple[str, ...]] = {
     "routes": ("routes", "additional", "trips"),
     "additional": ("additional", "routes", "OpenDRIVE"),
 }
-"""Usual first elements of SUMO's files by what they are for; SUMO reads files with others too, networks excepted."""
+"""Usual first elements of SUMO's files by their use; SUMO also reads files with others, except for networks."""
 
 _OTHER_FILES = {*itertools.chain(*_FIRST_ELEMENTS.values()), "OpenSCENARIO", "gpx", "kml", "osm", "html", "svg"}
-"""First elements that make a file one of another kind."""
+"""First elements of files of other types."""
 
 _NET = ("net-file", "net", "n")
 _ADDITIONAL = ("additional-files", "additional", "a")
@@ -30,7 +30,7 @@ _REROUTING = "device.rerouting"
 
 @dataclass(frozen=True, slots=True)
 class _UnsupportedOption:
-    """An option that must have one value with FogSim: its names, that value, equivalent ones, and the reason."""
+    """An option that FogSim fixes: its names, value, equivalent values, and the reason."""
 
     names: tuple[str, ...]
     value: str
@@ -48,24 +48,11 @@ _UNSUPPORTED = (
 )
 
 OVERRIDES = tuple(argument for option in _UNSUPPORTED for argument in (f"--{option.names[0]}", option.value))
-"""Arguments of SUMO's command line that override options of a configuration that FogSim does not support."""
+"""SUMO arguments that override unsupported options of a configuration."""
 
 
 def check_sumo_file(kind: str, path: Path) -> None:
-    """Check by its first element that a file is what it should be, which takes no time in a large file.
-
-    Parameters
-    ----------
-    kind : str
-        "config", "net", "routes" or "additional", which may be an OpenDRIVE file.
-    path : Path
-        The file.
-
-    Raises
-    ------
-    InputError
-        If it is missing, or another file.
-    """
+    """Raise InputError unless a file's first element fits "config", "net", "routes" or "additional"."""
     tag, usual = root_tag(path), _FIRST_ELEMENTS[kind]
     if tag not in usual and (kind == "net" or tag in _OTHER_FILES):
         raise InputError(f"{path}: expected <{usual[0]}> at its top, got <{tag[:40]}>")
@@ -74,12 +61,7 @@ def check_sumo_file(kind: str, path: Path) -> None:
 def check_configured_files(config: Path) -> None:
     """Check the network, route and additional files of a SUMO configuration with `check_sumo_file`.
 
-    Names with variables or with separators that only SUMO knows are left to SUMO.
-
-    Raises
-    ------
-    InputError
-        If a file is missing, or another file; or the configuration names no network.
+    Names with variables, or with separators that only SUMO knows, are not checked.
     """
     configured_files(config)
     root = _root(config)
@@ -90,18 +72,7 @@ def check_configured_files(config: Path) -> None:
 
 
 def configured_files(config: Path) -> tuple[Path, tuple[Path, ...]]:
-    """Network and additional files of a SUMO configuration.
-
-    Parameters
-    ----------
-    config : Path
-        The ``.sumocfg`` file; names in it are relative to its folder.
-
-    Raises
-    ------
-    InputError
-        If it is no SUMO configuration or names no network.
-    """
+    """Network and additional files of a ``.sumocfg`` file; names in it are relative to its folder."""
     root = _root(config)
     nets = _named(config, root, _NET)
     if not nets:
@@ -111,16 +82,10 @@ def configured_files(config: Path) -> tuple[Path, tuple[Path, ...]]:
 
 @dataclass(frozen=True, slots=True)
 class ConfiguredDemand:
-    """Where the vehicles of a SUMO configuration come from.
+    """Sources of a SUMO configuration's vehicles: additional and route files, in SUMO's order.
 
-    Attributes
-    ----------
-    files : tuple of Path
-        Additional files and route files, in the order in which SUMO reads them.
-    is_open : bool
-        Whether there may be vehicles that those files do not name: of a saved state, or copies of a scaled demand.
-    reroutes : bool
-        Whether vehicles look for other ways than those written.
+    `is_open` if other vehicles may come, from a saved state or a scaled demand; `reroutes` if vehicles may leave their
+    written routes.
     """
 
     files: tuple[Path, ...]
@@ -129,18 +94,7 @@ class ConfiguredDemand:
 
 
 def configured_demand(config: Path) -> ConfiguredDemand:
-    """Where the vehicles of a SUMO configuration come from.
-
-    Parameters
-    ----------
-    config : Path
-        The ``.sumocfg`` file; names in it are relative to its folder.
-
-    Raises
-    ------
-    InputError
-        If it is no SUMO configuration.
-    """
+    """Sources of a SUMO configuration's vehicles."""
     root = _root(config)
     return ConfiguredDemand(
         files=(*_named(config, root, _ADDITIONAL), *_named(config, root, _ROUTES)),
@@ -150,18 +104,7 @@ def configured_demand(config: Path) -> ConfiguredDemand:
 
 
 def ignored_options(config: Path) -> tuple[str, ...]:
-    """Options of a SUMO configuration that `OVERRIDES` override, each with the reason.
-
-    Parameters
-    ----------
-    config : Path
-        The ``.sumocfg`` file.
-
-    Raises
-    ------
-    InputError
-        If it is no SUMO configuration.
-    """
+    """Options of a SUMO configuration that `OVERRIDES` override, each with the reason."""
     root = _root(config)
     return tuple(
         f"{option.names[0]}={value} is left out: {option.reason}"
@@ -172,34 +115,12 @@ def ignored_options(config: Path) -> tuple[str, ...]:
 
 
 def configured_prefix(config: Path) -> str:
-    """What a SUMO configuration has the names of its outputs begin with.
-
-    Parameters
-    ----------
-    config : Path
-        The ``.sumocfg`` file.
-
-    Raises
-    ------
-    InputError
-        If it is no SUMO configuration.
-    """
+    """Prefix of the names of a SUMO configuration's outputs."""
     return next(_values(_root(config), ("output-prefix",)), "")
 
 
 def input_files(config: Path) -> tuple[Path, ...]:
-    """Every file that a SUMO configuration has the simulation read: network, routes, additional, weights, state.
-
-    Parameters
-    ----------
-    config : Path
-        The ``.sumocfg`` file; names in it are relative to its folder.
-
-    Raises
-    ------
-    InputError
-        If it is no SUMO configuration.
-    """
+    """Every file that a SUMO configuration makes SUMO read: network, routes, additional, weights, state."""
     return _named(config, _root(config), (*_NET, *_ADDITIONAL, *_FURTHER))
 
 
@@ -209,7 +130,7 @@ def _root(config: Path) -> Element:
 
 
 def _values(root: Element, options: tuple[str, ...]) -> Iterator[str]:
-    """Values of an option, which SUMO reads from either attribute, or from between the tags."""
+    """Values of an option, which SUMO reads from either attribute, or from the element's text."""
     for element in root.iter():
         if element.tag in options:
             yield (element.get("value") or element.get("v") or element.text or "").strip()

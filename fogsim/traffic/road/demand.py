@@ -1,4 +1,4 @@
-"""Which vehicles and persons a simulation can have, as its route and additional files say, without starting SUMO."""
+"""Vehicles and persons of a simulation, from its route and additional files, without starting SUMO."""
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
@@ -9,28 +9,18 @@ from fogsim.files.xml_reader import read_elements
 from fogsim.traffic.road.configuration import configured_demand
 
 MOST_BYTES = 50_000_000
-"""Bytes of files, unpacked, after which nothing is claimed about a demand."""
+"""Unpacked bytes of files after which nothing is claimed about a demand."""
 
 MOST_NAMES = 10_000
-"""Most ids that are kept to tell the nearest of them."""
+"""Maximum number of ids that are kept to suggest the nearest."""
 
 _OPENING = frozenset(("include", "calibrator", "personTrip"))
-"""Elements that bring vehicles whose ids are not in sight."""
+"""Elements that create vehicles with unknown ids."""
 
 
 @dataclass(frozen=True, slots=True)
 class VehicleRoute:
-    """The way of a vehicle whose edges are written out.
-
-    Attributes
-    ----------
-    edges : tuple of str
-        Ids of its edges.
-    depart_lane : int or None
-        Lane of the first edge on which it departs, counted from 0; None if SUMO chooses it.
-    file : Path
-        Where the vehicle stands.
-    """
+    """A vehicle's written-out edges, its departure lane (from 0, None if SUMO chooses), and the file with it."""
 
     edges: tuple[str, ...]
     depart_lane: int | None
@@ -39,20 +29,11 @@ class VehicleRoute:
 
 @dataclass(frozen=True, slots=True)
 class Demand:
-    """What route and additional files say about some vehicles.
+    """What route and additional files say about the wanted vehicles.
 
-    Attributes
-    ----------
-    files : tuple of Path
-        The files.
-    found : frozenset of str
-        Those of the wanted vehicles that can come.
-    names : tuple of str
-        Ids of vehicles in the order of the files, at most `MOST_NAMES`; of a flow, its first and its last one.
-    routes : mapping from vehicle id to VehicleRoute
-        Ways of wanted vehicles, where they are written out and nothing changes them.
-    is_open : bool
-        True if vehicles may come that are not in sight, so that nothing can be said about those who were not found.
+    `found` are those that can come, and `routes` the written-out, fixed routes. `names` are at most `MOST_NAMES` ids in
+    file order; a flow has its first and last. `is_open` if other vehicles may come, so that nothing is known about
+    those that were not found.
     """
 
     files: tuple[Path, ...]
@@ -62,31 +43,12 @@ class Demand:
     is_open: bool
 
     def lacks(self, vehicle: str) -> bool:
-        """True if a wanted vehicle can never come.
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        """
+        """Whether a wanted vehicle can never come."""
         return not self.is_open and vehicle not in self.found
 
 
 def read_configured_demand(config: Path, wanted: Iterable[str]) -> Demand:
-    """Look for some vehicles in the files of a SUMO configuration.
-
-    Parameters
-    ----------
-    config : Path
-        The ``.sumocfg`` file.
-    wanted : iterable of str
-        Ids of the vehicles.
-
-    Raises
-    ------
-    InputError
-        If it is no SUMO configuration.
-    """
+    """Search for vehicles in the files of a SUMO configuration."""
     configured = configured_demand(config)
     if configured.is_open:
         return Demand(configured.files, frozenset(), (), {}, is_open=True)
@@ -96,18 +58,9 @@ def read_configured_demand(config: Path, wanted: Iterable[str]) -> Demand:
 def read_demand(
     files: Iterable[Path], wanted: Iterable[str], most_bytes: int = MOST_BYTES, *, reroutes: bool = False
 ) -> Demand:
-    """Look for some vehicles in route and additional files.
+    """Search for vehicles in additional and route files, in SUMO's order.
 
-    Parameters
-    ----------
-    files : iterable of Path
-        The files in the order in which SUMO reads them: additional files first.
-    wanted : iterable of str
-        Ids of the vehicles.
-    most_bytes : int
-        Bytes, unpacked, after which the demand counts as open.
-    reroutes : bool
-        Whether vehicles look for other ways than those written.
+    After `most_bytes` unpacked bytes the demand counts as open.
     """
     files, reader, left = tuple(files), _DemandReader(frozenset(wanted), reroutes), most_bytes
     for file in files:
@@ -115,7 +68,7 @@ def read_demand(
         try:
             left -= read_elements(file, reader, left)
         except InputError:
-            # SUMO tells what is wrong with it when it starts.
+            # SUMO reports its faults when it starts.
             reader.is_open = True
         if reader.is_done:
             break
@@ -126,7 +79,7 @@ def read_demand(
 
 
 class _DemandReader:
-    """Looks for wanted vehicles among elements."""
+    """Searches elements for wanted vehicles."""
 
     def __init__(self, wanted: frozenset[str], reroutes: bool) -> None:
         self.file = Path()
@@ -159,7 +112,7 @@ class _DemandReader:
         elif tag == "route":
             self._take_route(attributes)
         elif tag == "routeDistribution":
-            # One of its routes is drawn.
+            # SUMO chooses one of its routes at random.
             self._inside = ((), None)
         elif tag in _OPENING or (tag == "vType" and "scale" in attributes):
             self.is_open = True
@@ -203,7 +156,7 @@ class _DemandReader:
 
 
 def _flow_vehicles(flow: str, number: int | None, wanted: Collection[str]) -> tuple[str, ...]:
-    """Those of some vehicles that a flow makes, each of which it calls by its own id and a number from 0 on."""
+    """Wanted vehicles of a flow, which are named by its id and a number from 0."""
     made = []
     for vehicle in wanted:
         name, _, place = vehicle.rpartition(".")

@@ -9,11 +9,11 @@ import sumolib
 from fogsim.values import Sign
 
 SPEED_LIMIT = "speed_limit"
-"""Kind of the signs."""
+"""Type of the signs."""
 SIGN_CLEARANCE = 3.9
 """Lateral distance from the edge of the outermost lane to the middle of a sign [m]: behind shoulder and rail."""
 _OTHER_CLEARANCES = (2.0, 1.0, 6.0, 8.0, 12.0, 18.0, 24.0)
-"""Where a sign stands if that is on another road, the first that is not [m]."""
+"""Alternative distances where the usual one is on another road; the first free one is used [m]."""
 SIGN_HEIGHT = 2.6
 """Height of the middle of a sign's face above the road [m]."""
 SIGN_DIAMETER = 0.9
@@ -23,12 +23,7 @@ SIGN_DIAMETER = 0.9
 def limit_sign(edge: Any, side: float) -> Sign | None:
     """Sign at the start of an edge whose limit differs from that of every edge leading to it.
 
-    Parameters
-    ----------
-    edge : sumolib.net.edge.Edge
-        The edge.
-    side : float
-        Where it stands: on the left (1) or right (−1) of the road, on that to which vehicles keep.
+    It stands on the side that vehicles keep to: left (1) or right (−1).
     """
     limit = edge.getSpeed()
     if any(abs(incoming.getSpeed() - limit) < 0.1 for incoming in edge.getIncoming()):
@@ -37,16 +32,16 @@ def limit_sign(edge: Any, side: float) -> Sign | None:
     points = np.array(lane.getShape3D(), dtype=np.float64).reshape(-1, 3)
     ahead = points[np.linalg.norm(points[:, :2] - points[:1, :2], axis=1) > 0.01]
     if not len(ahead):
-        return None  # a lane of no length, as networks written by hand may have, has no direction to face
+        return None  # A lane of zero length, as in some networks written by hand, has no direction to face.
     along = ahead[0] - points[0]
     heading = math.atan2(along[1], along[0])
-    # Ten metres into the edge, so that the sign stands on the stretch that it speaks for.
+    # Ten metres into the edge, so that the sign is on the stretch that it applies to.
     x, y, z = points[0] + along / math.hypot(*along) * min(10.0, 0.5 * lane.getLength())
     places = [
         (float(x) - left * math.sin(heading), float(y) + left * math.cos(heading))
         for left in (side * (lane.getWidth() / 2 + away) for away in (SIGN_CLEARANCE, *_OTHER_CLEARANCES))
     ]
-    # Beside it may be another road, where roads part or meet.
+    # Another road may be next to it, where roads part or meet.
     x, y = next((place for place in places if _is_beside_roads(place, edge)), places[0])
     return Sign(
         f"limit.{edge.getID()}",
@@ -59,7 +54,7 @@ def limit_sign(edge: Any, side: float) -> Sign | None:
 
 
 def _is_beside_roads(place: tuple[float, float], edge: Any) -> bool:
-    """Whether a place lies on no lane of the edges that meet this one."""
+    """Whether a point is on no lane of the edges that meet this one."""
     nodes = edge.getFromNode(), edge.getToNode()
     edges = {other.getID(): other for node in nodes for other in (*node.getOutgoing(), *node.getIncoming())}
     return all(

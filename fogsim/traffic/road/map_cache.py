@@ -1,8 +1,8 @@
-"""Maps of large networks, kept in the user's cache directory, so that a city is parsed once.
+"""Maps of large networks in the user's cache directory, so that a city is parsed only once.
 
-A file of the cache is named after the content of the network's file and the version of what made the map, down to its
-source, so that no other version reads it. It holds arrays of numbers and texts only. A damaged or unreadable file
-counts as missing; where none can be written, each process parses again.
+A cache file is named after the content of the network's file and the version of the code that made the map, down to its
+source, so that no other version reads it. It holds only arrays of numbers and texts. Damaged or unreadable files count
+as missing; without a writable cache, each process parses again.
 """
 
 import contextlib
@@ -25,8 +25,8 @@ from fogsim.files.user_cache import cache_directory
 from fogsim.traffic.road.road_map import RoadMap, edge_ranges
 from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, Sign, SignalHead
 
-_WORTHWHILE = 1_000_000  # bytes of a network's file, from which on reading takes a fifth of a second
-_MOST_FILES = 16  # of the cache; the oldest go
+_WORTHWHILE = 1_000_000  # bytes of a network's file, above which reading takes a fifth of a second
+_MOST_FILES = 16  # of the cache; the oldest are removed
 _MADE_BY = ("limit_signs.py", "map_cache.py", "net_lanes.py", "network.py", "road_map.py", "signal_heads.py")
 _MARKINGS, _KINDS, _ENDS = tuple(LaneMarking), tuple(LaneKind), tuple(LaneEnd)
 _UNREADABLE = (OSError, ValueError, KeyError, IndexError, TypeError, EOFError, zipfile.BadZipFile, zlib.error)
@@ -35,26 +35,14 @@ Arrays = dict[str, NDArray[Any]]
 
 
 def is_worth_caching(net: Path) -> bool:
-    """Tell whether reading a network takes so long that its map is kept.
-
-    Parameters
-    ----------
-    net : Path
-        The network's file.
-    """
+    """Whether reading a network takes long enough to keep its map."""
     with contextlib.suppress(OSError):
         return net.stat().st_size >= _WORTHWHILE
     return False
 
 
 def cached_map(net: Path) -> RoadMap | None:
-    """Map of a network that has been kept; None where there is none.
-
-    Parameters
-    ----------
-    net : Path
-        The network's file.
-    """
+    """Cached map of a network; None if missing."""
     try:
         kept = read_entry(_place(net))
         if kept is None:
@@ -66,26 +54,12 @@ def cached_map(net: Path) -> RoadMap | None:
 
 
 def compacted(roads: RoadMap) -> RoadMap:
-    """The same map in a few large arrays: small ones, made among what a parser drops, hold its memory back.
-
-    Parameters
-    ----------
-    roads : RoadMap
-        The map.
-    """
+    """The same map in a few large arrays: small ones between a parser's temporary objects would keep its memory."""
     return _map_of(_arrays_of(roads))
 
 
 def keep_map(net: Path, roads: RoadMap) -> None:
-    """Keep a map, if the user's cache directory can be written.
-
-    Parameters
-    ----------
-    net : Path
-        The network's file.
-    roads : RoadMap
-        Its map.
-    """
+    """Cache a map, if the user's cache directory can be written."""
     with contextlib.suppress(OSError):
         place, content = _place(net), io.BytesIO()
         np.savez(content, allow_pickle=False, **_arrays_of(roads))
@@ -103,7 +77,7 @@ def _place(net: Path) -> Path:
 
 @functools.cache
 def _version() -> bytes:
-    """What made a map: the versions of FogSim and sumolib, and the source."""
+    """Identity of the code that makes maps: the versions of FogSim and sumolib, and the source."""
     sources = [Path(__file__).with_name(name).read_bytes() for name in _MADE_BY]
     versions = [metadata.version(name).encode() for name in ("fogsim", "eclipse-sumo")]
     return hashlib.sha256(b"\0".join((*versions, *sources))).digest()
@@ -188,7 +162,7 @@ def _cut(arrays: Mapping[str, NDArray[Any]], name: str) -> list[NDArray[np.float
 
 
 def _text(texts: Sequence[str]) -> NDArray[np.uint8]:
-    # No text of XML has a NUL in it.
+    # Texts from XML contain no NUL.
     return np.frombuffer("".join(f"{text}\0" for text in texts).encode(), np.uint8)
 
 

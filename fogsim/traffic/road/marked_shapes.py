@@ -1,4 +1,4 @@
-"""POIs and polygons of SUMO additional files whose type marks them as FogSim's: signs and structures."""
+"""POIs and polygons of SUMO additional files that are marked as FogSim's: signs and structures."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,17 +12,7 @@ _MOST_BYTES, _MOST_ELEMENTS = 2_000_000_000, 20_000_000
 
 @dataclass(frozen=True, slots=True)
 class MarkedShape:
-    """A POI or polygon.
-
-    Attributes
-    ----------
-    where : str
-        File, line, tag and id, for messages.
-    tag, kind : str
-        ``poi`` or ``poly``, and what follows the prefix in its type.
-    attributes, parameters : dict
-        Its attributes, and the values of its ``<param>`` elements by key.
-    """
+    """A POI or polygon; `kind` is its type after the prefix, and `where` names it in messages."""
 
     where: str
     tag: str
@@ -36,13 +26,7 @@ class MarkedShape:
         return self.attributes.get("id", "")
 
     def parameter(self, key: str, least: float, most: float, default: float | None = None) -> float:
-        """Number in a ``<param>``.
-
-        Raises
-        ------
-        InputError
-            If it is missing and there is no default, or it is not a number from `least` to `most`.
-        """
+        """Number in a ``<param>``; InputError if missing without a default, or not from `least` to `most`."""
         if default is not None and key not in self.parameters:
             return default
         if key not in self.parameters:
@@ -50,13 +34,7 @@ class MarkedShape:
         return number_in_text(self.where, key, self.parameters[key], least, most)
 
     def corners(self) -> list[list[float]]:
-        """Coordinates of its shape [m], two or three a corner.
-
-        Raises
-        ------
-        InputError
-            If there are none.
-        """
+        """Coordinates of its corners [m], two or three each; InputError if it has none."""
         shape = self.attributes.get("shape", "")
         corners = [
             [number_in_text(self.where, "shape", number) for number in corner.split(",")] for corner in shape.split()
@@ -67,13 +45,7 @@ class MarkedShape:
 
 
 def marked_shapes(path: Path, prefix: str) -> list[MarkedShape]:
-    """POIs and polygons of an additional file whose type begins with a prefix.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read.
-    """
+    """POIs and polygons of an additional file whose type begins with a prefix."""
     reader = _ShapeReader(path, prefix)
     reader.file.read_all(reader, _MOST_BYTES, _MOST_ELEMENTS)
     return reader.found

@@ -1,4 +1,4 @@
-"""Edges of a SUMO network as its file lists them, for checks that must not wait for the whole network."""
+"""Edges of a SUMO network as listed in its file, for checks that must be faster than reading the whole network."""
 
 import itertools
 import math
@@ -10,63 +10,27 @@ from fogsim.errors import InputError
 from fogsim.files.xml_reader import read_elements
 
 MOST_BYTES = 50_000_000
-"""Bytes of a network file, unpacked, after which it is not looked at."""
+"""Unpacked bytes of a network file after which reading stops."""
 
 Point = tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class NetEdges:
-    """Edges that vehicles drive on.
-
-    Attributes
-    ----------
-    lanes : mapping from edge id to int
-        How many lanes each has.
-    axes : mapping from edge id to sequence of points
-        Middle lane [m] of each edge that was asked for.
-    signals : tuple of str
-        Ids of traffic lights.
-    """
+    """Edges for vehicles: number of lanes, middle lanes [m] of the requested ones, and ids of traffic lights."""
 
     lanes: Mapping[str, int]
     axes: Mapping[str, Sequence[Point]]
     signals: tuple[str, ...] = ()
 
     def route_length(self, route: Sequence[str]) -> float:
-        """Length of the axis that fog is laid along [m]: middle lanes of a route's edges, end to end.
-
-        Parameters
-        ----------
-        route : sequence of str
-            Ids of its edges.
-
-        Raises
-        ------
-        KeyError
-            If the axis of one of them was not asked for.
-        """
+        """Length of the axis that fog is laid along [m]: middle lanes of a route's edges, end to end."""
         points = [point for edge in route for point in self.axes[edge]]
         return sum(math.dist(one, other) for one, other in itertools.pairwise(points))
 
 
 def read_net_edges(net: Path, wanted: Collection[str], most_bytes: int = MOST_BYTES) -> NetEdges | None:
-    """List the edges of a network.
-
-    Parameters
-    ----------
-    net : Path
-        SUMO network file.
-    wanted : collection of str
-        Edges whose axes are asked for.
-    most_bytes : int
-        Bytes, unpacked, after which it is given up.
-
-    Returns
-    -------
-    NetEdges or None
-        None if the file is too large, or no network; the latter is told when it is drawn.
-    """
+    """Edges of a network, with axes of the wanted ones; None if it is too large or not a network."""
     reader = _EdgeReader(wanted)
     try:
         size = read_elements(net, reader, most_bytes)
@@ -99,7 +63,7 @@ class _EdgeReader:
         elif tag == "tlLogic":
             self.signals[attributes.get("id", "")] = None
         elif tag == "connection":
-            # All edges and programs of traffic lights stand before the connections.
+            # All edges and programs of traffic lights come before the connections.
             self.is_done = True
 
     def end(self, tag: str) -> None:
@@ -107,6 +71,6 @@ class _EdgeReader:
 
 
 def _points(shape: str) -> list[Point]:
-    """Points of a shape [m]; those without a height lie at 0."""
+    """Points of a shape [m]; those without a height are at 0."""
     points = [tuple(map(float, point.split(","))) for point in shape.split()]
     return [(*point, 0.0) if len(point) == 2 else point for point in points]

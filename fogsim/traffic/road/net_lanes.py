@@ -1,4 +1,4 @@
-"""What sumolib reads of a SUMO network, as a map of roads and signs."""
+"""A map of roads and signs from a SUMO network that sumolib has read."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -16,21 +16,14 @@ _WALKING_AREA = "walkingarea"
 _OFF_ROAD = frozenset(
     ("rail", "rail_urban", "rail_electric", "rail_fast", "tram", "subway", "cable_car", "ship", "aircraft", "drone")
 )
-_STOP_STATES = frozenset(("s", "w", "a"))  # stop sign, all-way stop, traffic light that turns right on red
-_ADJOINING = 0.6  # two carriageways whose borders lie nearer than this share a line [m]
+_STOP_STATES = frozenset(("s", "w", "a"))  # stop sign, all-way stop, traffic light with right turn on red
+_ADJOINING = 0.6  # two carriageways whose borders are nearer than this share a line [m]
 
 
 def map_of(net: Any, lefthand: bool) -> RoadMap:
-    """Map of a network.
+    """Map of a network that was read with its internal edges.
 
-    In one without any road or footway, the tracks or waterways are drawn in their place, as lanes without lines.
-
-    Parameters
-    ----------
-    net : sumolib.net.Net
-        The network, with what lies within junctions.
-    lefthand : bool
-        Whether vehicles keep to the left.
+    Without any road or footway, tracks or waterways are drawn instead, as lanes without lines.
     """
     edges = net.getEdges()
     lanes = [lane for edge in edges for lane in edge.getLanes()]
@@ -60,13 +53,13 @@ def _heads(edge: Any, side: float) -> Iterator[SignalHead]:
 
 
 def _location(net: Any) -> tuple[str, str] | None:
-    """Offset and projection as they are written; None where the network says nothing about where it is."""
-    written: dict[str, str] = net._location  # of the two, sumolib tells only what it makes of them
+    """Offset and projection as written; None if the network has no location."""
+    written: dict[str, str] = net._location  # sumolib returns both only in converted form
     return (written["netOffset"], written["projParameter"]) if written else None
 
 
 def _kind(lane: Any) -> LaneKind | None:
-    """What a lane is for; None for rails and waterways."""
+    """Use of a lane; None for rails and waterways."""
     function = lane.getEdge().getFunction()
     if function == "crossing":
         return LaneKind.CROSSING
@@ -79,7 +72,7 @@ def _kind(lane: Any) -> LaneKind | None:
 
 
 def _lane(lane: Any, lefthand: bool) -> Lane:
-    """A lane as it is drawn, whatever it is for."""
+    """A lane as it is drawn, whatever its use."""
     kind = _kind(lane)
     inner, outer = _markings(lane) if kind is LaneKind.CARRIAGEWAY else (LaneMarking.NONE, LaneMarking.NONE)
     # Lanes are counted from the side that vehicles keep to.
@@ -104,7 +97,7 @@ def _shape(lane: Any) -> NDArray[np.float64]:
 
 
 def _carriageway(edge: Any) -> list[Any]:
-    """Lanes of an edge that vehicles drive on, from the side that they keep to."""
+    """Lanes of an edge for vehicles, from the side that they keep to."""
     return [lane for lane in edge.getLanes() if _kind(lane) in {LaneKind.CARRIAGEWAY, LaneKind.JUNCTION}]
 
 
@@ -116,7 +109,7 @@ def _markings(lane: Any) -> tuple[LaneMarking, LaneMarking]:
 
 
 def _between_directions(lanes: Sequence[Any]) -> LaneMarking:
-    """Line towards the other direction: it may be overtaken on a road of two lanes, not on one of more."""
+    """Line towards the other direction: overtaking is allowed on a road with two lanes, not on wider ones."""
     edge = lanes[-1].getEdge()
     here = _shape(lanes[-1])
     for other in edge.getToNode().getOutgoing():
@@ -133,11 +126,11 @@ def _between_directions(lanes: Sequence[Any]) -> LaneMarking:
 
 
 def _end(lane: Any) -> LaneEnd:
-    """Line across the end of a lane: at traffic lights and stop signs, or where it must give way."""
+    """Line across the end of a lane: at traffic lights and stop signs, or where vehicles must give way."""
     states = {(connection.getState(), bool(connection.getTLSID())) for connection in lane.getOutgoing()}
     if any(controlled or state in _STOP_STATES for state, controlled in states):
         return LaneEnd.STOP
-    # Who must give way only when turning has no line to wait behind.
+    # A lane that gives way only for turning has no line to wait behind.
     return LaneEnd.YIELD if states and all(state == "m" for state, _ in states) else LaneEnd.OPEN
 
 

@@ -1,4 +1,4 @@
-"""SUMO's netconvert, which makes networks of OpenDRIVE files: a program of its own, in the package eclipse-sumo."""
+"""SUMO's netconvert, which converts OpenDRIVE files to networks: a program of the package eclipse-sumo."""
 
 import importlib.util
 import os
@@ -14,10 +14,10 @@ from fogsim.files.readers import read_text
 from fogsim.traffic.road.opendrive import read_opendrive
 
 USUAL_LIMIT = 130.0 / 3.6
-"""Speed limit of lanes of which an OpenDRIVE file tells none [m/s]."""
+"""Speed limit of lanes without one in the OpenDRIVE file [m/s]."""
 
 _TYPES = ("driving", "entry", "exit", "onRamp", "offRamp", "mwyEntry", "mwyExit", "connectingRamp", "slipLane")
-"""Types of OpenDRIVE lanes on which vehicles drive; of others there are no lanes in the network."""
+"""Types of OpenDRIVE lanes for vehicles; other lanes are not in the network."""
 
 _LONGEST_RUN = 300.0  # [s]
 _MOST_MEMORY, _MOST_BYTES = 4 * 2**30, 2**28  # of the program; of its network [bytes]
@@ -26,13 +26,7 @@ _COMMENT = re.compile(r"<!--.*?-->\s*", re.DOTALL)
 
 
 def netconvert_program() -> str:
-    """Path of netconvert.
-
-    Raises
-    ------
-    MissingDependencyError
-        If it is not there.
-    """
+    """Path of netconvert; MissingDependencyError if it is missing."""
     package = importlib.util.find_spec("sumo")
     folders = [Path(place) / "bin" for place in (package.submodule_search_locations or ())] if package else []
     found = shutil.which("netconvert") or next(
@@ -46,36 +40,15 @@ def netconvert_program() -> str:
 
 
 def netconvert_recipe() -> bytes:
-    """What a network depends on beside its OpenDRIVE file: the program, and how it is called.
-
-    Raises
-    ------
-    MissingDependencyError
-        If there is no netconvert.
-    """
+    """What a network depends on in addition to its OpenDRIVE file: the program and its arguments."""
     program = Path(netconvert_program())
     return f"{program}\0{program.stat().st_mtime_ns}\0".encode() + Path(__file__).read_bytes()
 
 
 def opendrive_net(path: Path) -> str:
-    """SUMO network of an OpenDRIVE file, in the file's own coordinates.
+    """Text of the SUMO network of an OpenDRIVE file, in the file's coordinates.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    str
-        Text of the network; its lanes have the parameter ``origId``, OpenDRIVE's road and lane.
-
-    Raises
-    ------
-    InputError
-        If netconvert cannot read the file.
-    MissingDependencyError
-        If there is no netconvert.
+    Its lanes have the parameter ``origId``, OpenDRIVE's road and lane.
     """
     program = netconvert_program()
     read_opendrive(path)
@@ -91,12 +64,12 @@ def opendrive_net(path: Path) -> str:
             raise InputError(
                 f"{path}: no OpenDRIVE road network that SUMO's netconvert can read: {reported or 'no output'}"
             )
-        # A comment at the top tells when it was made.
+        # A comment at the top has the time of the conversion.
         return _COMMENT.sub("", read_text(net, _MOST_BYTES))
 
 
 def _run(command: list[str], path: Path, folder: Path) -> str:
-    """Run netconvert with limited time, memory and output; what it reported if it failed."""
+    """Run netconvert with limited time, memory and output; return its report if it failed."""
     messages = folder / "messages.txt"
     # Its OpenBLAS would otherwise reserve address space for each processor.
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}

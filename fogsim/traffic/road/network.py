@@ -21,19 +21,9 @@ _MOST_BYTES = 2_000_000_000  # of a network, unpacked
 
 @no_garbage_collection()
 def read_net(path: Path) -> RoadMap:
-    """Read a SUMO network file.
+    """Read a SUMO network file, compressed by gzip or not.
 
-    What is made of a large one is kept in the user's cache directory (see `fogsim.traffic.road.map_cache`).
-
-    Parameters
-    ----------
-    path : Path
-        The file, packed by gzip or not.
-
-    Raises
-    ------
-    InputError
-        If the file is no SUMO network.
+    Maps of large files are cached (see `fogsim.traffic.road.map_cache`).
     """
     if not is_worth_caching(path):
         return _parsed(path)
@@ -65,7 +55,7 @@ def _parsed(path: Path) -> RoadMap:
 
 
 class _NetElements(sumolib.net.NetReader):  # type: ignore[misc]  # sumolib has no types
-    """Hands elements to sumolib, and keeps whether vehicles keep to the left, which sumolib ignores."""
+    """Passes elements to sumolib, and records left-hand traffic, which sumolib ignores."""
 
     is_done = is_lefthand = False
 
@@ -82,23 +72,9 @@ class _NetElements(sumolib.net.NetReader):  # type: ignore[misc]  # sumolib has 
 
 
 def road_network(roads: RoadMap, route: Sequence[str], structures: tuple[Structure, ...] = ()) -> RoadNetwork:
-    """Every lane of a network that is a road or a footway, its junctions, and the axis of a route.
+    """Lanes, footways, junctions and structures of a network, and the axis of the ego's route.
 
-    In a network without any, the tracks or waterways are drawn in their place, as lanes without lines.
-
-    Parameters
-    ----------
-    roads : RoadMap
-        The network.
-    route : sequence of str
-        Edge ids of the ego's route.
-    structures : tuple of Structure
-        What stands beside the roads.
-
-    Raises
-    ------
-    InputError
-        If a lane has no shape to draw.
+    Without any road or footway, tracks or waterways are drawn instead, as lanes without lines.
     """
     lanes = tuple(lane for lane, is_drawn in zip(roads.lanes, roads.drawn.tolist(), strict=True) if is_drawn)
     for lane in lanes:
@@ -117,24 +93,9 @@ def _check_shape(lane: Lane) -> None:
 
 
 def route_axis(roads: RoadMap, route: Sequence[str]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Middle lanes of a route's edges, end to end, without repeated points, and the speed limits along them.
+    """Middle lanes of a route's edges, end to end, as (n, 3) [m], and the speed limit up to each point (n,) [m/s].
 
-    Parameters
-    ----------
-    roads : RoadMap
-        The network.
-    route : sequence of str
-        Edge ids.
-
-    Returns
-    -------
-    tuple of (n, 3) float64 and (n,) float64
-        A polyline [m], and the highest speed limit of the edge that leads to each of its points [m/s].
-
-    Raises
-    ------
-    InputError
-        If a lane has no shape to draw.
+    The polyline repeats no point; the limit is the highest of the edge that leads to the point.
     """
     middle = [roads.middle_lane(edge) for edge in route]
     for lane in middle:

@@ -1,4 +1,4 @@
-"""Signals of OpenDRIVE files: traffic signs at s, t beside a road's reference line (ASAM OpenDRIVE 1.x)."""
+"""Signals of OpenDRIVE files: traffic signs at s, t relative to a road's reference line (ASAM OpenDRIVE 1.x)."""
 
 import math
 from collections.abc import Iterator
@@ -17,14 +17,14 @@ GERMAN_SPEED_LIMIT = "274"
 """Number of the maximum-speed sign in the German catalogue (VzKat), which OpenDRIVE files commonly use."""
 
 HEIGHT = 2.6
-"""Height of the middle of a sign that tells no height [m]."""
+"""Default height of a sign's middle [m]."""
 DIAMETER = 0.9
-"""Diameter of a sign that tells no size [m]."""
+"""Default diameter of a sign [m]."""
 FASTEST = 300.0 / KMH_PER_MPS
 """Highest speed on a sign [m/s]."""
 
 LONGEST_ROAD = 50_000.0
-"""Longest road that is read [m]: the time that netconvert takes grows with the square of a curve's length."""
+"""Longest road that is read [m]: netconvert's time grows with the square of a curve's length."""
 
 _SECTIONS = ("planView", "elevationProfile", "lateralProfile", "lanes")
 _NUMBERS = frozenset(
@@ -37,7 +37,7 @@ _METRES_PER_SECOND = {"": 1 / KMH_PER_MPS, "km/h": 1 / KMH_PER_MPS, "mph": 0.447
 
 @dataclass(frozen=True, slots=True)
 class _Road:
-    """What a signal's place depends on: the file for messages, the road's line and its elevation."""
+    """What a signal's position depends on: the file for messages, the road's line and its elevation."""
 
     where: str
     line: PlanView
@@ -54,47 +54,24 @@ class _Road:
 
 
 def is_opendrive(path: Path) -> bool:
-    """Tell whether a file is OpenDRIVE, by its name.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    """
+    """Whether a file is OpenDRIVE, by its name."""
     return path.suffix.lower() == ".xodr"
 
 
 def opendrive_signs(path: Path, net_offset: tuple[float, float] = (0.0, 0.0)) -> list[Sign]:
-    """Signs that the static signals of an OpenDRIVE file stand for; dynamic ones (traffic lights) are left out.
+    """Signs of the static signals of an OpenDRIVE file; dynamic ones (traffic lights) are left out.
 
-    Signals of type 274 or whose name begins with "speed" are speed limits (their value, by unit; for type 274 the
-    subtype in km/h where there is no value, as the catalogue of 2017 numbers them). Every other, and a speed sign that
-    tells no speed, is of kind ``xodr.TYPE`` with its value as it stands, 0 without one.
-
-    Parameters
-    ----------
-    path : Path
-        OpenDRIVE file.
-    net_offset : tuple of float
-        What the conversion to a SUMO network added to x and y [m] (``netOffset`` in the net).
-
-    Raises
-    ------
-    InputError
-        If the file is not OpenDRIVE, or a signal has no usable place.
+    Signals of type 274 or whose name begins with "speed" are speed limits (their value, by unit; for type 274 without a
+    value the subtype in km/h, as the catalogue of 2017 numbers them). All others, and speed signs without a speed, are
+    of kind ``xodr.TYPE`` with their plain value, 0 without one. `net_offset` [m] was added to x and y by the conversion
+    to a SUMO network.
     """
     roads = read_opendrive(path).iter("road")
     return [sign for road in roads for sign in _road_signs(path, road, net_offset)]
 
 
 def read_opendrive(path: Path) -> Element:
-    """Root of an OpenDRIVE file whose roads can be built: lengths, coordinates and coefficients are of a sane size.
-
-    Raises
-    ------
-    InputError
-        If the file is not OpenDRIVE, or a number of a road is not finite or too large.
-    """
+    """Root of an OpenDRIVE file; InputError unless lengths, coordinates and coefficients have a sane size."""
     root = read_tree(path, "OpenDRIVE")
     for road in root.iter("road"):
         where = f"{path}: road {shown(road.get('id', '?'))}"
@@ -135,7 +112,7 @@ def _sign(road: _Road, signal: Element, net_offset: tuple[float, float], left_ha
         x, y, along = road.line.at(s)
     except ValueError as error:
         raise InputError(f"{where}: {error}") from None
-    # Some programs write -1 for a size that they do not know.
+    # Some programs write -1 for an unknown size.
     size = max(0.0, *(_number(where, signal, key) for key in ("width", "height")))
     above = _number(where, signal, "zOffset") + 0.5 * size if "zOffset" in signal.attrib else HEIGHT
     kind, value = _meaning(where, signal)
@@ -149,13 +126,13 @@ def _sign(road: _Road, signal: Element, net_offset: tuple[float, float], left_ha
 
 
 def _faces_along(signal: Element, t: float, left_hand: bool) -> bool:
-    """Whether it speaks to those who drive along the reference line; where it says both, the side tells."""
+    """Whether the signal applies along the reference line; for both directions, its side decides."""
     orientation = signal.get("orientation", "none")
     return orientation == "+" or (orientation != "-" and (t > 0 if left_hand else t <= 0))
 
 
 def _meaning(where: str, signal: Element) -> tuple[str, float]:
-    """Kind and value of a signal."""
+    """Type and value of a signal."""
     code, name = signal.get("type", ""), signal.get("name", "").lower()
     value = _number(where, signal, "value")
     if code == GERMAN_SPEED_LIMIT and value <= 0 and signal.get("subtype", "").isdecimal():

@@ -1,4 +1,4 @@
-"""Lanes of a network that netconvert has made of an OpenDRIVE file, found by road, lane and s, or by coordinates."""
+"""Lanes of a network that netconvert made from an OpenDRIVE file, found by road, lane and s, or by coordinates."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,32 +14,18 @@ from fogsim.traffic.road.opendrive import read_opendrive
 from fogsim.traffic.road.plan_view import PlanView, plan_view
 
 FARTHEST_ROUTE = 50_000.0
-"""Length at which a route that finds no end is cut off [m]."""
+"""Length at which an endless route is cut off [m]."""
 
 _TURNS = {"s": 0, "r": 1, "R": 1, "l": 2, "L": 2}
-"""Directions of connections, the one that is taken first where nothing is said."""
+"""Directions of connections, in order of preference."""
 
 
 @dataclass(frozen=True, slots=True)
 class RoadLane:
-    """A lane of the network.
+    """A lane by edge and index from the right: length, width [m], limit [m/s] and middle (n, 2) [m].
 
-    Attributes
-    ----------
-    edge : str
-        Its edge.
-    index : int
-        Its number from the right, from 0.
-    length, width : float
-        As the network has them [m].
-    limit : float
-        Speed limit [m/s].
-    shape : (n, 2) float64
-        Its middle [m].
-    lowest : float
-        Height of its lowest point [m].
-    origins : tuple of str
-        OpenDRIVE's road and lane, ``road_lane``; several where they are one edge.
+    `lowest` is the height of its lowest point [m]; `origins` are OpenDRIVE's ``road_lane``, several where they form one
+    edge.
     """
 
     edge: str
@@ -54,15 +40,7 @@ class RoadLane:
 
 @dataclass(frozen=True, slots=True)
 class Spot:
-    """A place on a lane.
-
-    Attributes
-    ----------
-    lane : RoadLane
-        The lane.
-    position : float
-        Distance from its beginning, as SUMO counts it [m].
-    """
+    """A place on a lane, by its distance from the start as SUMO counts it [m]."""
 
     lane: RoadLane
     position: float
@@ -82,18 +60,10 @@ class Spot:
 
 @dataclass(frozen=True, slots=True)
 class OpenDriveLanes:
-    """Lanes and the ways between them.
+    """Lanes for vehicles and their connections.
 
-    Attributes
-    ----------
-    lanes : tuple of RoadLane
-        Every lane on which vehicles drive.
-    followers : mapping from str to sequence of str
-        Edges that follow an edge, the straight one first.
-    roads : mapping from str to PlanView
-        Reference lines of the roads by their ids.
-    latitude, longitude : float or None
-        Where the map is [rad], if the file tells.
+    `followers` are the next edges, the straight one first; `roads` are reference lines; latitude and longitude [rad]
+    are None if the file has none.
     """
 
     lanes: tuple[RoadLane, ...]
@@ -103,20 +73,7 @@ class OpenDriveLanes:
     longitude: float | None
 
     def on_lane(self, road: str, lane: str, s: float) -> Spot:
-        """Place on a lane by OpenDRIVE's coordinates.
-
-        Parameters
-        ----------
-        road, lane : str
-            Their ids.
-        s : float
-            Distance along the road's reference line [m].
-
-        Raises
-        ------
-        ValueError
-            If there is none.
-        """
+        """Place on a lane by OpenDRIVE's road, lane and s [m]; ValueError if it is not on the road."""
         x, y, _ = self._reference(road, s)
         found = [one for one in self.lanes if f"{road}_{lane}" in one.origins]
         if not found:
@@ -124,42 +81,16 @@ class OpenDriveLanes:
                 o.removeprefix(f"{road}_") for one in self.lanes for o in one.origins if o.startswith(f"{road}_")
             )
             raise ValueError(f"road {road!r} has no lane {lane!r} to drive on; it has {', '.join(known) or 'none'}")
-        # Across the road the foot of the reference point is on each lane.
+        # Across the road, the reference point is projected onto each lane.
         return min((_foot(one, x, y) for one in found), key=lambda found: found[0])[1]
 
     def across(self, road: str, s: float, t: float) -> tuple[float, float, float]:
-        """Coordinates and heading of a place beside a road's reference line.
-
-        Parameters
-        ----------
-        road : str
-            Id of the road.
-        s, t : float
-            Distance along its reference line, and to the left of it [m].
-
-        Raises
-        ------
-        ValueError
-            If there is none.
-        """
+        """x, y [m] and heading [rad] at s along a road's reference line and t to its left [m]."""
         x, y, heading = self._reference(road, s)
         return x - t * math.sin(heading), y + t * math.cos(heading), heading + (math.pi if t > 0.0 else 0.0)
 
     def at(self, x: float, y: float, heading: float | None) -> Spot:
-        """Place on the nearest lane.
-
-        Parameters
-        ----------
-        x, y : float
-            Coordinates [m].
-        heading : float or None
-            Direction of travel [rad]; lanes that lead elsewhere do not count. None for any.
-
-        Raises
-        ------
-        ValueError
-            If the coordinates are on no lane.
-        """
+        """Place on the nearest lane that leads in the direction `heading` [rad] (None for any); ValueError if none."""
         feet = [_foot(one, x, y) for one in self.lanes]
         fit = [(d, spot) for d, spot in feet if heading is None or math.cos(spot.world[2] - heading) > 0.0]
         distance, spot = min(fit, key=lambda one: one[0], default=(math.inf, None))
@@ -169,20 +100,7 @@ class OpenDriveLanes:
         return spot
 
     def beside(self, spot: Spot, lanes: int) -> Spot:
-        """Place on another lane of the same edge.
-
-        Parameters
-        ----------
-        spot : Spot
-            The place.
-        lanes : int
-            How many lanes to the left.
-
-        Raises
-        ------
-        ValueError
-            If there is no such lane.
-        """
+        """Place on the lane that is `lanes` to the left on the same edge; ValueError if there is none."""
         index = spot.lane.index + lanes
         found = [one for one in self.lanes if one.edge == spot.lane.edge and one.index == index]
         if not found:
@@ -190,20 +108,7 @@ class OpenDriveLanes:
         return Spot(found[0], spot.position * found[0].length / spot.lane.length)
 
     def along(self, spot: Spot, distance: float) -> Spot:
-        """Place farther along, or before.
-
-        Parameters
-        ----------
-        spot : Spot
-            The place.
-        distance : float
-            How far [m].
-
-        Raises
-        ------
-        ValueError
-            If the road ends before.
-        """
+        """Place `distance` [m] farther along, or back; ValueError if the road ends before it."""
         lane, position = spot.lane, spot.position + distance
         for _ in range(len(self.lanes)):
             if 0.0 <= position <= lane.length:
@@ -221,13 +126,7 @@ class OpenDriveLanes:
         return (position - lane.length if ahead else position + other.length), other
 
     def route(self, edge: str) -> tuple[str, ...]:
-        """Edges from one on, straight ahead where there is a choice, to the end of the road or back where it was.
-
-        Parameters
-        ----------
-        edge : str
-            The first.
-        """
+        """Edges from one on, straight ahead where there is a choice, until the road ends or repeats."""
         lengths = {one.edge: one.length for one in self.lanes}
         found, length = [edge], lengths[edge]
         while length < FARTHEST_ROUTE and (following := self.followers.get(found[-1])):
@@ -244,7 +143,7 @@ class OpenDriveLanes:
 
 
 def _foot(lane: RoadLane, x: float, y: float) -> tuple[float, Spot]:
-    """Distance of a point to a lane [m], and the place on it that is nearest."""
+    """Distance of a point to a lane [m], and its nearest place on it."""
     starts, steps = lane.shape[:-1], np.diff(lane.shape, axis=0)
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     to_point = np.array([x, y]) - starts
@@ -256,20 +155,7 @@ def _foot(lane: RoadLane, x: float, y: float) -> tuple[float, Spot]:
 
 
 def read_opendrive_lanes(net: str, opendrive: Path) -> OpenDriveLanes:
-    """Lanes of a network.
-
-    Parameters
-    ----------
-    net : str
-        Text of the network, from `opendrive_net`.
-    opendrive : Path
-        The OpenDRIVE file that it was made of.
-
-    Raises
-    ------
-    InputError
-        If the file has no road to drive on.
-    """
+    """Lanes of a network that `opendrive_net` made from an OpenDRIVE file; InputError if it has none for vehicles."""
     root = fromstring(net)  # noqa: S314 - netconvert's own output
     lanes = tuple(_lanes(root))
     if not lanes:
@@ -313,7 +199,7 @@ def _followers(root: Element, edges: set[str]) -> dict[str, list[str]]:
 
 
 def _origin(reference: str) -> tuple[float | None, float | None]:
-    """Latitude and longitude [rad] to which a map projection refers, if it tells."""
+    """Latitude and longitude [rad] of a map projection's origin, if the file has one."""
     terms = dict(term.partition("=")[::2] for term in reference.replace("+", " ").split())
     try:
         return math.radians(float(terms["lat_0"])), math.radians(float(terms.get("lon_0", "0")))

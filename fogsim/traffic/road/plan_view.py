@@ -1,4 +1,4 @@
-"""Reference lines of OpenDRIVE roads: straight lines, arcs, spirals and cubic polynomials end to end."""
+"""Reference lines of OpenDRIVE roads: connected straight lines, arcs, spirals and cubic polynomials."""
 
 import math
 from collections.abc import Iterable
@@ -11,7 +11,7 @@ from fogsim.files.readers import number_in_text
 from fogsim.linear_algebra import matrix_product
 
 SPIRAL_NODES, SPIRAL_WEIGHTS = np.polynomial.legendre.leggauss(24)
-"""Gauss-Legendre rule on −1 … 1; on a spiral that turns by π it is exact to far below a millimetre."""
+"""Gauss-Legendre rule on −1 … 1; on a spiral that turns by π its error is far below a millimetre."""
 
 Place = tuple[float, float, float]
 """x, y [m] and heading, counterclockwise from east [rad]."""
@@ -19,17 +19,10 @@ Place = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A stretch of a reference line whose curvature is linear in its length.
+    """A stretch of a reference line with linear curvature: a line, an arc or a spiral.
 
-    Attributes
-    ----------
-    s, length : float
-        Where it begins along the road, and how long it is [m].
-    x, y, heading : float
-        Its first point [m] and the direction there [rad].
-    curvature, curvature_rate : float
-        Curvature at its start [1/m], positive to the left, and its change along the piece [1/m²]; both 0 for a line,
-        the latter 0 for an arc.
+    It begins at s [m], at x, y [m] in direction heading [rad], with curvature [1/m], positive to the left, and its rate
+    of change [1/m²].
     """
 
     s: float
@@ -41,13 +34,7 @@ class Piece:
     curvature_rate: float
 
     def at(self, distance: float) -> Place:
-        """Point at a distance from its start [m].
-
-        Parameters
-        ----------
-        distance : float
-            From its start along the line [m].
-        """
+        """Point at a distance from its start [m]."""
         turned = self._turned(distance)
         if self.curvature_rate:
             along = 0.5 * distance * (SPIRAL_NODES + 1.0)
@@ -69,14 +56,8 @@ class Piece:
 class CubicPiece:
     """A stretch of a reference line whose coordinates are cubic polynomials (``paramPoly3``).
 
-    Attributes
-    ----------
-    s, length, x, y, heading : float
-        As of `Piece`.
-    forward, left : tuple of float
-        Coefficients of the coordinates along and to the left of the first direction, constant term first.
-    is_normalised : bool
-        Whether the parameter runs from 0 to 1 along the piece, and not as far as its length.
+    `forward` and `left` are coefficients along and to the left of the first direction, constant term first; the
+    parameter runs to 1 if `is_normalised`, otherwise to the length.
     """
 
     s: float
@@ -89,13 +70,7 @@ class CubicPiece:
     is_normalised: bool
 
     def at(self, distance: float) -> Place:
-        """Point at a distance from its start [m]; the parameter counts as length of the curve, as the format has it.
-
-        Parameters
-        ----------
-        distance : float
-            From its start along the line [m].
-        """
+        """Point at a distance from its start [m]; the parameter counts as length of the curve, as in the format."""
         p = distance / self.length if self.is_normalised else distance
         (u, du), (v, dv) = _cubic(self.forward, p), _cubic(self.left, p)
         cosine, sine = math.cos(self.heading), math.sin(self.heading)
@@ -111,31 +86,14 @@ def _cubic(coefficients: tuple[float, ...], p: float) -> tuple[float, float]:
 
 @dataclass(frozen=True, slots=True)
 class PlanView:
-    """A road's reference line.
-
-    Attributes
-    ----------
-    pieces : tuple of Piece or str
-        Its pieces in order of s; for a shape that is not known, its place and name.
-    """
+    """A road's reference line: its pieces in order of s."""
 
     pieces: tuple["Piece | CubicPiece | UnknownPiece", ...]
 
     def at(self, s: float) -> Place:
-        """Point at a distance along the road.
-
-        Parameters
-        ----------
-        s : float
-            Distance along the road [m].
-
-        Raises
-        ------
-        ValueError
-            If s is not on the road, or on a stretch of unknown shape.
-        """
+        """Point at s [m]; ValueError if it is not on the road, or the shape there is unknown."""
         end = self.pieces[-1].s + self.pieces[-1].length
-        # Files round s; a centimetre beyond an end is that end.
+        # Files round s; up to a centimetre beyond an end counts as that end.
         if not -0.01 <= s <= end + 0.01:
             raise ValueError(f"expected s on the road, 0 … {end:g} m, got {s:g}")
         piece = next((p for p in reversed(self.pieces) if p.s <= s), self.pieces[0])
@@ -151,31 +109,13 @@ class UnknownPiece:
     shape: str
 
     def at(self, distance: float) -> Place:
-        """Raise what a user can make something of.
-
-        Parameters
-        ----------
-        distance : float
-            From its start along the line [m].
-        """
+        """Raise a ValueError that names the shape."""
         where = self.s + distance
         raise ValueError(f"s = {where:g} m is on a {self.shape}; places on line, arc, spiral and paramPoly3 are known")
 
 
 def plan_view(geometries: Iterable[Element]) -> PlanView:
-    """Reference line of a road from its ``<geometry>`` elements.
-
-    Parameters
-    ----------
-    geometries : iterable of Element
-        They, with ``s``, ``x``, ``y``, ``hdg`` and ``length``, each holding ``<line>``, ``<arc>``, ``<spiral>`` or
-        ``<paramPoly3>``.
-
-    Raises
-    ------
-    ValueError
-        If there is none, or a number is missing.
-    """
+    """Reference line from ``<geometry>`` elements; ValueError if there are none or a number is missing."""
     pieces = tuple(sorted((_piece(g) for g in geometries), key=lambda p: p.s))
     if not pieces:
         raise ValueError("the road has no geometry")

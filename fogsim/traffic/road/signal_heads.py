@@ -1,4 +1,4 @@
-"""Where the heads of traffic lights stand, as networks do not tell: as in Europe, beside and above the stop lines."""
+"""Positions of traffic light heads, which networks lack: as in Europe, next to and above the stop lines."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -12,16 +12,16 @@ from fogsim.values import SignalHead
 from fogsim.values.light import SIGNAL_DIAMETER
 
 LARGE_DIAMETER = 0.3
-"""Diameter of the lenses above roads and beside fast ones [m]."""
+"""Diameter of the lenses above roads and next to fast ones [m]."""
 
 FAST = 16.7
-"""Speed limit above which the lenses beside a road are large, too [m/s]."""
+"""Speed limit above which the lenses next to a road are large, too [m/s]."""
 
 POST_HEIGHT, ARM_HEIGHT = 2.75, 5.5
-"""Height of the middle lens beside and above the road [m]: footways are clear to 2.1 m, roads to 4.5 m."""
+"""Height of the middle lens next to and above the road [m]: footways are clear to 2.1 m, roads to 4.5 m."""
 
 ON_FOOT_HEIGHT = 2.4
-"""Height of the middle of heads for persons [m]."""
+"""Height of the middle of heads for pedestrians [m]."""
 
 _BEYOND, _BESIDE_CROSSING = 0.5, 0.4  # of posts of such heads, from the end and the border of their crossing [m]
 _BESIDE = 0.6  # of posts, beyond the edge of the outermost lane [m]
@@ -30,12 +30,7 @@ _BESIDE = 0.6  # of posts, beyond the edge of the outermost lane [m]
 def signal_heads(lanes: Sequence[Any], side: float) -> Iterator[SignalHead]:
     """Heads at the end of an edge: one on a post for the outermost lane, one on its arm for each other lane.
 
-    Parameters
-    ----------
-    lanes : sequence of sumolib.net.lane.Lane
-        Lanes of the edge for vehicles, from the side that these keep to.
-    side : float
-        That side: 1 for the left, −1 for the right.
+    `lanes` (sumolib) are those for vehicles, from the side that they keep to: left (1) or right (−1).
     """
     heads = [(lane, signal, links) for lane in lanes for signal, links in _signals(lane)]
     if not heads:
@@ -46,7 +41,7 @@ def signal_heads(lanes: Sequence[Any], side: float) -> Iterator[SignalHead]:
     post = outer[-1] + (half + _BESIDE) * across
     for number, (lane, signal, links) in enumerate(heads):
         end = np.array(lane.getShape3D()[-1], np.float64)
-        # Lanes of an edge end on a line across it, and arms reach along that.
+        # Lanes of an edge end on a line across it, and arms extend along that line.
         place = post if number == 0 else post + across * float(matrix_product(end - post, across))
         height = ARM_HEIGHT if number else POST_HEIGHT
         is_large = number > 0 or float(lane.getSpeed()) > FAST
@@ -62,14 +57,9 @@ def signal_heads(lanes: Sequence[Any], side: float) -> Iterator[SignalHead]:
 
 
 def crossing_heads(crossing: Any, side: float) -> Iterator[SignalHead]:
-    """Heads for persons: beyond both ends of a crossing with lights, beside it.
+    """Heads for pedestrians at both ends of a crossing lane (sumolib).
 
-    Parameters
-    ----------
-    crossing : sumolib.net.lane.Lane
-        Lane of the crossing.
-    side : float
-        Side that vehicles keep to: 1 for the left, −1 for the right.
+    `side` is the side that vehicles keep to: left (1) or right (−1).
     """
     edge = crossing.getEdge()
     ways = [way for source in edge.getIncoming() for way in source.getConnections(edge) if way.getTLSID()]
@@ -94,7 +84,7 @@ def crossing_heads(crossing: Any, side: float) -> Iterator[SignalHead]:
 
 
 def _signals(lane: Any) -> list[tuple[str, tuple[int, ...]]]:
-    """The traffic light at the end of a lane with the links of the lane; none where there is none."""
+    """The traffic light at the end of a lane with the links of the lane; none without a light."""
     ways = [(way.getTLSID(), way.getTLLinkIndex()) for way in lane.getOutgoing() if way.getTLSID()]
     return [(ways[0][0], tuple(sorted(link for signal, link in ways if signal == ways[0][0])))] if ways else []
 

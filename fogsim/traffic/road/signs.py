@@ -1,4 +1,4 @@
-"""Signs of a SUMO network: where limits change, marked places in additional files, OpenDRIVE signals."""
+"""Signs of a SUMO network: changes of the limit, marked shapes in additional files, OpenDRIVE signals."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -19,9 +19,9 @@ SIGN_TYPE = "fogsim.sign."
 """POIs and polygons of type ``fogsim.sign.KIND`` in an additional file are signs."""
 
 LIMITS = frozenset((SPEED_LIMIT, "end_of_speed_limit", "variable_speed_limit"))
-"""Kinds whose value is a speed, in km/h in additional files."""
+"""Types whose value is a speed, in km/h in additional files."""
 GANTRY_HEIGHT = 6.2
-"""Height of the middle of a face that hangs over a lane, above the road [m]: vehicles up to 4.5 m pass below."""
+"""Height of the middle of a face above a lane [m]: vehicles up to 4.5 m pass below."""
 
 DIAMETERS, HEIGHTS = (0.05, 20.0), (0.0, 50.0)
 """Sizes of signs, and heights of their middle above the road [m]."""
@@ -30,20 +30,7 @@ LonLat = tuple[float, float]
 
 
 def sign_map(roads: RoadMap, additional: Iterable[Path]) -> SignMap:
-    """Signs of a network; none at all make an empty map.
-
-    Parameters
-    ----------
-    roads : RoadMap
-        The network.
-    additional : iterable of Path
-        SUMO additional files, and OpenDRIVE files (``.xodr``) that the network was made from.
-
-    Raises
-    ------
-    InputError
-        If a sign cannot be placed or has no usable value.
-    """
+    """Signs of a network, of SUMO additional files and of OpenDRIVE files; possibly none."""
     signs, pieces = list(roads.limit_signs), _Roads(roads)
     for path in additional:
         if is_opendrive(path):
@@ -54,18 +41,7 @@ def sign_map(roads: RoadMap, additional: Iterable[Path]) -> SignMap:
 
 
 def geographic_position(roads: RoadMap) -> Callable[[float, float], LonLat] | None:
-    """Conversion of a network's x, y [m] to longitude and latitude [deg].
-
-    Parameters
-    ----------
-    roads : RoadMap
-        The network.
-
-    Returns
-    -------
-    callable or None
-        None where the network has no projection or pyproj is not installed.
-    """
+    """Conversion of a network's x, y [m] to longitude and latitude [deg]; None without projection or pyproj."""
     if roads.location is None:
         return None
     net = sumolib.net.Net()
@@ -84,15 +60,15 @@ def geographic_position(roads: RoadMap) -> Callable[[float, float], LonLat] | No
 
 
 def _net_offset(roads: RoadMap) -> tuple[float, float]:
-    """What was added to the source's coordinates to get the network's [m]."""
-    if roads.location is None:  # a network written by hand says nothing about where it is
+    """Offset from the source's coordinates to the network's [m]."""
+    if roads.location is None:  # a network written by hand has no location
         return 0.0, 0.0
     x, y = map(float, roads.location[0].split(","))
     return x, y
 
 
 class _Roads:
-    """Straight pieces of all lanes that vehicles drive on."""
+    """Straight pieces of all lanes for vehicles."""
 
     def __init__(self, roads: RoadMap) -> None:
         lanes = [lane for lane, is_between in zip(roads.lanes, roads.between.tolist(), strict=True) if is_between]
@@ -102,7 +78,7 @@ class _Roads:
         self._half_width = np.repeat([0.5 * lane.width for lane in lanes], [max(len(li) - 1, 0) for li in lines])
 
     def below(self, x: float, y: float) -> tuple[float, bool]:
-        """Height of the nearest lane [m], and whether the place lies over it."""
+        """Height of the nearest lane [m], and whether the point is above it."""
         offset, step = np.array([x, y]) - self._start[:, :2], self._step
         square = np.maximum(np.sum(step[:, :2] ** 2, axis=1), 1e-12)
         share = np.clip(np.sum(offset * step[:, :2], axis=1) / square, 0.0, 1.0)
@@ -125,7 +101,7 @@ def _marked_sign(shape: MarkedShape, roads: _Roads) -> Sign:
 
 
 def _middle(shape: MarkedShape) -> tuple[float, float]:
-    """Where a POI is, or the middle of a polygon's bounding box [m]."""
+    """Position of a POI, or the middle of a polygon's bounding box [m]."""
     if shape.tag == "poi":
         x, y = (number_in_text(shape.where, key, shape.attributes.get(key, "")) for key in "xy")
         return x, y

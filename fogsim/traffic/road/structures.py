@@ -1,4 +1,4 @@
-"""What stands beside a road or over it: polygons of SUMO additional files."""
+"""Structures next to a road or over it: polygons of SUMO additional files."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -18,18 +18,7 @@ WIDEST, HEIGHTS = 10_000.0, (-1000.0, 10_000.0)
 
 
 def structures(additional: Iterable[Path]) -> tuple[Structure, ...]:
-    """Structures of additional files.
-
-    Parameters
-    ----------
-    additional : iterable of Path
-        SUMO additional files; OpenDRIVE files among them have none.
-
-    Raises
-    ------
-    InputError
-        If a file is none, or a structure's kind or measures are not known.
-    """
+    """Structures of SUMO additional files; InputError if a type or a dimension is invalid."""
     files = (path for path in additional if not is_opendrive(path))
     return tuple(
         _structure(shape) for path in files for shape in marked_shapes(path, STRUCTURE_TYPE) if shape.tag == "poly"

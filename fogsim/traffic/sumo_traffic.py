@@ -137,7 +137,9 @@ class SumoTraffic:
         """
         setup = self._setup
         api = self._link.begin(command_line(setup, seed))
-        roster, session = Roster(api, self._link.remote), new_session(api)
+        session = new_session(api)
+        mark = LoadMark(api, session)
+        roster = Roster(api, self._link.remote, mark)
         reader = SubscribedReader if self._link.remote else VehicleReader
         script, speeds, changes = Script(setup.events), SpeedControl(api, setup.step_length), LaneChangeSmoothing()
         self._run = _Run(
@@ -153,7 +155,7 @@ class SumoTraffic:
             script=script,
             actions=ScriptedActions(api, speeds, script.lamps, changes, session),
             session=session,
-            mark=LoadMark(api, session),
+            mark=mark,
             persons=PersonReader(api, self._link.shared),
         )
         self._signals = None
@@ -343,7 +345,6 @@ class SumoTraffic:
             run.drivers.update(command)
 
     def _read_step(self, run: _Run) -> None:
-        run.mark.check()
         run.collisions.add(run.reader.collisions())
         run.roster.update()
         if self._link.shared:

@@ -113,7 +113,6 @@ class AttachedTraffic(SumoTraffic):
         """
         # The owner may have taken a vehicle away since the look, or loaded another simulation.
         with self._attached.translated_errors():
-            self._running.mark.check()
             self._running.roster.check_count()
         super().obey(command)
 

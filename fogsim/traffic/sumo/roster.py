@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Sequence
 
+from fogsim.traffic.sumo.claims import LoadMark
 from fogsim.traffic.sumo.link import Api, getter, subscribed
 
 _GETTERS = {
@@ -28,6 +29,8 @@ class Roster:
         The simulation.
     remote : bool
         True where every call is a message to another process.
+    mark : LoadMark or None
+        Checked at every step, or where that is a message, whenever all ids are read again and once a `CHECK_PERIOD`.
 
     Attributes
     ----------
@@ -41,7 +44,8 @@ class Roster:
         Number of steps in which vehicles have left: as long as it stays, none has.
     """
 
-    def __init__(self, api: Api, remote: bool = False) -> None:
+    def __init__(self, api: Api, remote: bool = False, mark: LoadMark | None = None) -> None:
+        self._mark, self._remote = mark, remote
         getters = subscribed(api, _GETTERS) if remote else [getter(api, "simulation", name) for name in _GETTERS]
         self._now, self._departed, self._returned, self._teleporting, self._arrived = getters
         self._all_ids = getter(api, "vehicle", "getIDList")
@@ -60,6 +64,7 @@ class Roster:
         now = self._now()
         if now == self.time:
             return
+        self._check_mark(often=True)
         self.teleported = self._teleporting()
         # Lists of changes are of one step only: after a jump of time they do not tell all.
         if not 0.0 < now - self.time < 1.5 * self._step:
@@ -76,19 +81,27 @@ class Roster:
         self._leave(self._arrived())
         if now - self._checked >= CHECK_PERIOD:
             self._checked = now
+            self._check_mark()
             self.check_count()
 
     def check_count(self) -> None:
         """Notice vehicles removed by hand, of which SUMO says nothing; asks for all ids if there are any."""
+        self._check_mark(often=True)
         if self._count() != len(self.present):
             self.reload()
 
     def reload(self) -> None:
         """Ask for all ids."""
+        self._check_mark()
         self.time = self._checked = self._now()
         ids = self._all_ids()
         self._leave(self.present.difference(ids))
         self._enter(ids)
+
+    def _check_mark(self, *, often: bool = False) -> None:
+        """Check that the simulation is still the same; often only where that is no message to another process."""
+        if self._mark is not None and not (often and self._remote):
+            self._mark.check()
 
     def _enter(self, vehicles: Sequence[str]) -> None:
         if vehicles:

@@ -14,6 +14,7 @@ from fogsim.errors import InputError, UnknownNameError, nearest, shown, suggest
 from fogsim.parameters import checked_parameters
 from fogsim.registry.user_code import MayImport, import_anything
 from fogsim.scenario.document import Document, apply_overrides, read_scenario_document
+from fogsim.scenario.expect.checks import last_time
 from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.roads.departures import entering_vehicles
@@ -126,9 +127,9 @@ def scenario_reader(
     return lambda overrides: _checked(document, overrides, context, closed_demand=not others_add_vehicles)
 
 
-def _context(folder: Path, may_import: MayImport = import_anything) -> dict[str, Any]:
-    """Context of the schema's validators of methods; file names are relative to the same folder."""
-    return {"folder": folder, "may_import": may_import}
+def _context(folder: Path, may_import: MayImport = import_anything, *, is_test: bool = False) -> dict[str, Any]:
+    """What the schema's validators are given; the folder is also where file names are relative to."""
+    return {"folder": folder, "may_import": may_import, "is_test": is_test}
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,11 +153,13 @@ def load_cases(
     watch: CountWatch | None = None,
     *,
     may_import: MayImport = import_anything,
+    is_test: bool = False,
 ) -> ScenarioCases:
     """Load and check the cases of a scenario file; a file that varies nothing has one.
 
     `wanted` selects cases by comma-separated ``name=value`` ("" for all), `seed` replaces their seeds, and `watch`
-    receives the number of checked cases and their total. InputError describes the first case that does not fit.
+    receives the number of checked cases and their total. In a test each expectation must be decided within the run,
+    even if ``--set`` has shortened it. InputError describes the first case that does not fit.
     """
     path = scenario_file(name_or_path)
     document = _overridden(read_scenario_document(path), overrides)
@@ -169,7 +172,7 @@ def load_cases(
         # Cases that differ only in their seed share a scenario.
         key = json.dumps(put.data)
         if key not in checked:
-            checked[key] = _checked_case(put, case, _context(path.parent, may_import))
+            checked[key] = _checked_case(put, case, _context(path.parent, may_import, is_test=is_test))
         cases.append((case, checked[key]))
         if watch is not None:
             watch(done, len(chosen))
@@ -307,7 +310,7 @@ def _checked_scenario(
     data = document.data
     mistakes = _unnamed_files(document, data) if named_files else []
     try:
-        scenario = Scenario.model_validate(data, context=dict(context))
+        scenario = Scenario.model_validate(data, context={**context, "is_shortened": _is_shortened(document, context)})
         scenario = scenario.model_copy(update={"directory": context["folder"]})
     except ValidationError as error:
         raise InputError(mistake_lines(document, Scenario, error, mistakes, BESIDE)) from error
@@ -325,10 +328,17 @@ def _checked_scenario(
     _check_placement(document, scenario)
     _check_departures(document, scenario)
     scenario = with_way(scenario)
-    unknown = demand_mistakes(document, scenario) if named_files and closed_demand else []
+    end = math.inf if _is_shortened(document, context) else last_time(scenario)
+    unknown = demand_mistakes(document, scenario, end) if named_files and closed_demand else []
     if unknown:
         raise InputError("\n".join(unknown))
     return scenario
+
+
+def _is_shortened(document: Document, context: Mapping[str, Any]) -> bool:
+    """Whether a run may end before its expectations are decided: an override set its end, and it is no test."""
+    is_set = document.is_overridden(("duration_s",)) or not document.is_written(("expect",))
+    return is_set and not context["is_test"]
 
 
 _TRAFFIC = "it is required, or road (a road by template) in its place"

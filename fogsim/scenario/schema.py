@@ -199,8 +199,8 @@ class Scenario(Section):
         return self
 
     @model_validator(mode="after")
-    def _can_be_told(self) -> Self:
-        check_expectations(self)
+    def _can_be_told(self, info: ValidationInfo) -> Self:
+        check_expectations(self, is_shortened=bool((info.context or {}).get("is_shortened")))
         check_timeline(self)
         return self
 

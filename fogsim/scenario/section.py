@@ -15,6 +15,7 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 from fogsim.errors import InputError, is_name
 from fogsim.parameters import parameter_mistakes
 from fogsim.registry import Registry
+from fogsim.registry.user_code import import_anything
 from fogsim.units.quantities import is_quantity, parse_quantity
 
 FARTHEST = 1e6
@@ -160,7 +161,9 @@ def method_of(registry: Registry[Callable[..., Any]]) -> BeforeValidator:
         written = {"method": value} if isinstance(value, str) else value
         if isinstance(written, dict) and isinstance(written.get("method"), str):
             try:
-                factory = registry.find_if_allowed(written["method"], **(info.context or {"folder": None}))
+                context = info.context or {}
+                may_import = context.get("may_import", import_anything)
+                factory = registry.find_if_allowed(written["method"], context.get("folder"), may_import)
             except InputError as error:
                 # pydantic shows only a plain ValueError's message.
                 raise ValueError(str(error)) from None

@@ -75,8 +75,10 @@ MOST_SHOWN = 10
 """Maximum number of names in a message."""
 
 
-def demand_mistakes(document: Document, scenario: Scenario) -> list[str]:
+def demand_mistakes(document: Document, scenario: Scenario, end: float) -> list[str]:
     """One line for each vehicle, edge or lane that a scenario names and its route files or network lack.
+
+    `end` is the time by which conditions must have been decided [s].
 
     Nothing is reported where vehicles may come from elsewhere, routes are not written out, or files are very large.
     """
@@ -96,7 +98,7 @@ def demand_mistakes(document: Document, scenario: Scenario) -> list[str]:
         told |= _unknown_signals(scenario, edges)
         way = _way(scenario, demand)
         told |= _unknown_edges(scenario, edges) or _places_aside(scenario, way, edges)
-        told |= _pointless(document, scenario, _limits(scenario, way, edges))
+        told |= _pointless(document, scenario, _limits(end, way, edges))
     return [f"{document.where(at)}: {dotted(at)}: {text}" for at, text in told.items()]
 
 
@@ -198,9 +200,9 @@ def _wide_changes(scenario: Scenario, demand: Demand, edges: NetEdges) -> dict[K
     return told
 
 
-def _limits(scenario: Scenario, way: tuple[str, ...], edges: NetEdges) -> Limits:
+def _limits(end: float, way: tuple[str, ...], edges: NetEdges) -> Limits:
     """Ranges of time, lanes and positions in a run."""
-    limits = {"time": (0.0, last_time(scenario)), "X.lane": (0.0, max(edges.lanes.values()) - 1.0)}
+    limits = {"time": (0.0, end), "X.lane": (0.0, max(edges.lanes.values()) - 1.0)}
     if way and all(edges.axes.get(edge) for edge in way):
         length = edges.route_length(way)
         limits["X.position"] = (-_ASIDE, _LONGER * length + _ASIDE)

@@ -113,7 +113,7 @@ def collect(
     tests, mistakes = [], []
     for file in files:
         try:
-            loaded = load_cases(file, settings, case, watch=watch, may_import=may_import)
+            loaded = load_cases(file, settings, case, watch=watch, may_import=may_import, is_test=True)
         except InputError as error:
             mistakes.append(str(error))
             continue

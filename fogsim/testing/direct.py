@@ -76,7 +76,7 @@ def check_one_case(
     if isinstance(settings, str):
         raise InputError(f"settings must be a list of key.path=value each, got the text {settings!r}")
     begun = time.monotonic()
-    chosen, loaded = load_cases(scenario, settings, case, seed).cases[0]
+    chosen, loaded = load_cases(scenario, settings, case, seed, is_test=True).cases[0]
     run = StudyRun(0, chosen.levels, chosen.seed, loaded, "")
     found = check_case(loaded, run.seed)
     findings = tuple(finding_from_json(one) for one in found["findings"])

@@ -1,5 +1,6 @@
 """Expectations of a scenario that its run could not evaluate, and the names in them."""
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
@@ -19,9 +20,13 @@ MOST_SHOWN = 5
 """Maximum number of metrics in a message."""
 
 
-def check_expectations(scenario: "Scenario") -> None:
-    """Raise ValidationError if a run of the scenario could not evaluate its expectations."""
-    mistakes = expectation_mistakes(scenario.expect, run_content(scenario), last_time(scenario), scenario.traffic.ego)
+def check_expectations(scenario: "Scenario", *, is_shortened: bool = False) -> None:
+    """Raise ValidationError if a run of the scenario could not evaluate its expectations.
+
+    A run that ``--set`` has shortened is for a look, and may end before its expectations are decided.
+    """
+    end = math.inf if is_shortened else last_time(scenario)
+    mistakes = expectation_mistakes(scenario.expect, run_content(scenario), end, scenario.traffic.ego)
     refuse((("expect", *place), told) for place, told in mistakes)
 
 

@@ -27,6 +27,7 @@ def pages_elsewhere() -> Iterator[tuple[str, Path]]:
     """Place on the site, and file in the checkout, of each page that is no file of docs/."""
     yield "changelog.md", ROOT / "CHANGELOG.md"
     yield "contributing.md", ROOT / "CONTRIBUTING.md"
+    yield "security.md", ROOT / "SECURITY.md"
     yield "notices.md", ROOT / "THIRD_PARTY_NOTICES.md"
     for page in sorted((ROOT / "scenarios").glob("*/README.md")):
         yield f"gallery/{page.parent.name}.md", page

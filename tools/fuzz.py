@@ -296,9 +296,9 @@ def try_input(entry: Entry, content: bytes, folder: Path) -> None:
     """
     path = folder / f"input{entry.suffix}"
     path.write_bytes(content)
-    for beside in ("road/road.net.xml", "road/road.rou.xml", "openscenario/two_lanes.xodr"):
-        if not (folder / Path(beside).name).exists():
-            shutil.copy(ROOT / "tests" / "data" / beside, folder)
+    for name in ("road/road.net.xml", "road/road.rou.xml", "openscenario/two_lanes.xodr"):
+        if not (folder / Path(name).name).exists():
+            shutil.copy(ROOT / "tests" / "data" / name, folder)
     with _only_clear_errors():
         entry.read(path)
 
@@ -340,8 +340,8 @@ def _search(name: str, seed: int, seconds: float, folder: Path) -> None:
         try:
             seeded(seed)(attempt)()
         except FindingError as finding:
-            told = "".join(traceback.format_exception(finding))
-            (folder / "finding").write_text(told, encoding="utf-8", errors="backslashreplace")
+            report = "".join(traceback.format_exception(finding))
+            (folder / "finding").write_text(report, encoding="utf-8", errors="backslashreplace")
             return
         seed += 1_000_003
         (folder / "count").write_text(str(count))

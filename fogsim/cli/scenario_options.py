@@ -43,7 +43,7 @@ def with_timeout(settings: Sequence[str] | None, method_timeout: float | None) -
 
 
 class CodeNotice:
-    """Names each Python file beside a scenario once, before its import, and allows it."""
+    """Names each Python file next to a scenario once, before its import, and allows it."""
 
     def __init__(self) -> None:
         self._named: set[Path] = set()

@@ -40,7 +40,7 @@ def list_command() -> None:
 def validate_command(
     files: Annotated[list[str], typer.Argument(help="Scenario files, folders or names.")],
     allow_code: Annotated[
-        bool, typer.Option("--allow-code", help="Import Python files beside a scenario, to check their parameters too.")
+        bool, typer.Option("--allow-code", help="Import Python files next to a scenario, to check parameters too.")
     ] = False,
 ) -> None:
     """Check scenario files; every mistake is named with file, line, key, value and what is allowed."""

@@ -26,7 +26,7 @@ T = TypeVar("T")
 class Registry(Mapping[str, T]):
     """Named factories of one type; duplicates are refused, and unknown names raise an error that lists the known ones.
 
-    It also finds users' classes: ``module:Class`` beside a scenario, and entry points of the group `group` in installed
+    It also finds users' classes: ``module:Class`` next to a scenario, and entry points of `group` in installed
     packages. They must have `methods` ("a|b" for either) and are guarded: they raise only `MethodError` and
     KeyboardInterrupt.
     """
@@ -76,8 +76,8 @@ class Registry(Mapping[str, T]):
 
     def find_if_allowed(self, name: str, folder: Path | None, may_import: MayImport = import_anything) -> T | None:
         """As `find`, but None for a user's class whose file defines it and may not be imported."""
-        is_beside = bool(self._group) and name not in self._entries and is_class_name(name)
-        if is_beside and not may_import(module_file(name, folder)):
+        is_in_folder = bool(self._group) and name not in self._entries and is_class_name(name)
+        if is_in_folder and not may_import(module_file(name, folder)):
             check_source(name, folder)
             return None
         return self.find(name, folder)

@@ -1,4 +1,4 @@
-"""Users' methods: a class in a module beside the scenario, or an entry point of an installed package."""
+"""Users' methods: a class in a module next to the scenario, or an entry point of an installed package."""
 
 import ast
 import contextlib
@@ -19,7 +19,7 @@ from typing import Any
 from fogsim.errors import InputError, shown, suggest
 
 MayImport = Callable[[Path], bool]
-"""Decides before an import whether a Python file beside a scenario may be imported, and so run."""
+"""Decides before an import whether a Python file next to a scenario may be imported, and so run."""
 
 _NAME = re.compile(r"(?P<module>[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*):(?P<object>[A-Za-z_]\w*)\Z")
 
@@ -51,7 +51,7 @@ def module_file(name: str, folder: Path | None) -> Path:
     found = next((file for file in files if file.is_file()), None)
     if found is None:
         raise InputError(
-            f"{name}: there is no {module.replace('.', '/')}.py in {home}; the module of module:Class lies beside the "
+            f"{name}: there is no {module.replace('.', '/')}.py in {home}; the module of module:Class lies next to the "
             "scenario, and an installed package announces its methods as entry points"
         )
     return found

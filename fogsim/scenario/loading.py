@@ -102,7 +102,7 @@ def load_scenario(
     others_add_vehicles : bool
         True if vehicles may come that are not in the route files, as in a simulation with other clients.
     may_import : callable
-        Decides, from its path, whether a Python file beside the scenario is imported, which runs it; otherwise,
+        Decides, from its path, whether a Python file next to the scenario is imported, which runs it; otherwise,
         the parameters of its methods are not checked.
 
     Returns

@@ -58,7 +58,7 @@ class StudyDirectory:
         except (InputError, ValidationError) as error:
             raise InputError(
                 f"{manifest}: not the description of a study; choose another directory with --out, or remove the file "
-                "and the results beside it"
+                "and the results next to it"
             ) from error
         # The baseline and the number of seeds may change: completed runs stay valid.
         now = {**described, "versions": _deciding_versions(versions())}

@@ -77,7 +77,7 @@ def for_kernels(image: Image) -> Image:
     It would compile every kernel a second time, and take 20 µs to find the type at each call.
     """
     view: Image = image.view()
-    # Pixels that nobody may write, such as those of bytes, stay as they are.
+    # Pixels that cannot be written, such as those of bytes, stay as they are.
     with contextlib.suppress(ValueError):
         view.flags.writeable = True
     return view

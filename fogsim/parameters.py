@@ -280,9 +280,12 @@ def _number_check(usual: Any, kind: Any, interval: Range, expected: str) -> Chec
     least, most, or_nan = interval.least, interval.most, interval.or_nan
 
     def check(value: Any) -> str | None:
-        # The abstract class would be slower.
-        is_number = type(value) is usual or (isinstance(value, kind) and not isinstance(value, bool))
-        return None if is_number and (least <= value <= most or (or_nan and math.isnan(value))) else expected
+        if type(value) is not usual:  # the abstract class would be slower
+            if isinstance(value, bool) or not isinstance(value, kind):
+                return expected
+            # A bound would overflow in a narrower type of numpy's.
+            value = value.item() if isinstance(value, np.generic) else value
+        return None if least <= value <= most or (or_nan and math.isnan(value)) else expected
 
     return check
 

@@ -132,3 +132,10 @@ def test_a_checked_class_keeps_its_signature() -> None:
 def test_whole_numbers_of_numpy_are_whole_numbers(method: str) -> None:
     for name in accepted_parameters(ESTIMATORS[method], {"camera"}).keys() & {"frames", "inflection_frames"}:
         ESTIMATORS[method](CAMERA, **{name: np.int64(7)})
+
+
+@pytest.mark.parametrize("kind", [np.float16, np.float32, np.float64, np.int8, np.uint64])
+def test_numbers_of_numpy_are_numbers_without_a_warning(kind: type[np.number[Any]]) -> None:
+    assert mismatch(float, kind(3)) is None
+    assert mismatch(Annotated[float, Range(0.0, 1e300)], kind(3)) is None
+    assert mismatch(float, np.float32("nan")) == "a number, finite"

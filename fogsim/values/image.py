@@ -1,6 +1,5 @@
 """What a camera could see, and what it did."""
 
-import contextlib
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -74,10 +73,11 @@ def read_only(array: T) -> T:
 def for_kernels(image: Image) -> Image:
     """An image for numba's kernels, which must not write into it: a read-only array is of another type to numba.
 
-    It would compile every kernel a second time, and take 20 µs to find the type at each call.
+    Every kernel would be compiled a second time, and each call would take 20 µs to find the type.
     """
     view: Image = image.view()
-    # Pixels that cannot be written, such as those of bytes, stay as they are.
-    with contextlib.suppress(ValueError):
+    try:
         view.flags.writeable = True
+    except ValueError:  # its owner is read-only too, as bytes are
+        return image.copy()
     return view

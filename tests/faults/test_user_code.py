@@ -16,6 +16,7 @@ from fogsim.errors import InputError, MethodError
 from fogsim.scenario import build
 from fogsim.study.execution import run_to_file
 from fogsim.testing.direct import ThisProcess
+from fogsim.values.image import for_kernels
 
 Command = Callable[..., "CompletedProcess[str]"]
 ROOT = Path(__file__).parents[2]
@@ -184,6 +185,15 @@ def test_others_read_and_record_what_the_camera_took(folder: Path) -> None:
             array[:] = 0
     image[:] = 9  # the caller's own stays theirs
     assert image.flags.writeable
+
+
+def test_pixels_that_cannot_be_written_are_read_by_the_usual_kernels() -> None:
+    fixed = np.frombuffer(bytes(range(48)), np.uint8).reshape(4, 4, 3)
+    for image in (fixed, Observation(fixed).image, Observation(np.zeros((4, 4, 3), np.uint8)).image):
+        assert not image.flags.writeable
+        given = for_kernels(image)
+        assert given.flags.writeable
+        assert (given == image).all()
 
 
 def test_methods_may_catch_their_own_errors_and_be_named_tuples(folder: Path) -> None:

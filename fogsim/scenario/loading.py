@@ -254,6 +254,11 @@ def resolved(scenario: Scenario) -> dict[str, Any]:
     return data
 
 
+def deciding(scenario: Scenario) -> dict[str, Any]:
+    """As `resolved`, without the time limit of methods, which decides whether a run fails but not what it gives."""
+    return {key: value for key, value in resolved(scenario).items() if key != "method_timeout_s"}
+
+
 def as_written(scenario: Scenario) -> dict[str, Any]:
     """A scenario as plain data without its defaults."""
     data: dict[str, Any] = _without_infinities(scenario.model_dump(mode="json", exclude_none=True, exclude_unset=True))

@@ -16,10 +16,10 @@ from fogsim.errors import InputError, shown, suggest
 from fogsim.files.readers import open_regular
 from fogsim.parameters import checked_parameters
 from fogsim.registry.user_code import MayImport, import_anything
-from fogsim.scenario import Scenario, build, resolved, scenario_from_config
+from fogsim.scenario import Scenario, build, scenario_from_config
 from fogsim.scenario.document import Document, read_document
 from fogsim.scenario.expect.conditions import refuse
-from fogsim.scenario.loading import CountWatch, scenario_reader
+from fogsim.scenario.loading import CountWatch, deciding, scenario_reader
 from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath
 from fogsim.scenario.schema import NO_RENDERER
@@ -170,7 +170,7 @@ class Study:
         """Everything that determines its runs, as JSON data: each cell's scenario by its levels, and the seeds."""
         # Runs of a cell share a scenario, and differ in their seed.
         of_cells = list({id(run.scenario): run for run in self.runs}.values())
-        cells = {_label(run.levels): resolved(run.scenario) for run in of_cells}
+        cells = {_label(run.levels): deciding(run.scenario) for run in of_cells}
         seeds = list(dict.fromkeys(run.seed for run in self.runs))
         factors = {name: list(levels) for name, levels in self.factors.items()}
         files = dict(item for run in of_cells for item in file_digests(run.scenario).items())
@@ -265,7 +265,7 @@ def _runs(
     for done, cell in enumerate(grid, 1):
         levels = dict(zip(written.factors, cell, strict=True))
         scenario = _scenario(document, written, levels, load)
-        text = json.dumps([resolved(scenario), file_digests(scenario)], sort_keys=True)
+        text = json.dumps([deciding(scenario), file_digests(scenario)], sort_keys=True)
         for seed in seeds:
             key = hashlib.sha256(f"{text} {seed}".encode()).hexdigest()[:20]
             yield StudyRun(next(number), levels, seed, scenario, key)

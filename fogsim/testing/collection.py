@@ -8,9 +8,9 @@ from pathlib import Path
 
 from fogsim.errors import InputError
 from fogsim.registry.user_code import MayImport, import_anything
-from fogsim.scenario import build, resolved
+from fogsim.scenario import build
 from fogsim.scenario.document import read_scenario_document
-from fogsim.scenario.loading import SCENARIO_FILE, CountWatch, ScenarioCases, load_cases, scenario_file
+from fogsim.scenario.loading import SCENARIO_FILE, CountWatch, ScenarioCases, deciding, load_cases, scenario_file
 from fogsim.scenario.variation import NONE_FAILS, Verdict
 from fogsim.study.plan import StudyRun, file_digests
 from fogsim.testing.keywords import Keywords
@@ -138,7 +138,7 @@ def _runs(file: Path, loaded: ScenarioCases) -> Iterator[StudyRun]:
     for number, (case, scenario) in enumerate(loaded.cases):
         # Cases that differ in their seed share a scenario.
         if id(scenario) not in described:
-            told = [resolved(scenario), file_digests(scenario), build.own_methods(scenario)]
+            told = [deciding(scenario), file_digests(scenario), build.own_methods(scenario)]
             described[id(scenario)] = json.dumps(told, sort_keys=True)
         text = f"{file.resolve()} {described[id(scenario)]} {case.label} {case.seed}"
         key = hashlib.sha256(text.encode()).hexdigest()[:20]

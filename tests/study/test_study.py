@@ -81,7 +81,8 @@ def test_a_changed_study_is_refused_with_the_difference(tmp_path: Path) -> None:
     changed = load_study(study_file(tmp_path, STUDY.replace("duration_s=1", "duration_s=2")))
     with pytest.raises(InputError, match=r"policy=none · duration_s was 1\.0 and is 2\.0"):
         StudyDirectory(out, changed)
-    # More seeds, or another baseline, are the same study.
+    # More seeds, another baseline, or another time limit of methods are the same study.
+    assert StudyDirectory(out, load_study(study_file(tmp_path), ["method_timeout_s=2"])).missing()
     more = load_study(study_file(tmp_path, STUDY.replace("seeds: 2", "seeds: 5\nbaseline: {policy: fixed}")))
     assert len(StudyDirectory(out, more).missing()) == 10
 

@@ -11,6 +11,7 @@ import ray
 
 from fogsim.scenario import Scenario
 from fogsim.study.execution import run_outcome
+from fogsim.study.profiles import RunProfiles
 
 
 def marks() -> Path:
@@ -31,7 +32,7 @@ def killed_always(scenario: Scenario, seed: int, outputs: Path) -> dict[str, Any
     """Kill the process that has seed 1."""
     if seed == 1:
         os.kill(os.getpid(), signal.SIGKILL)
-    return {"status": "complete", "metrics": {"seed": seed}}
+    return {"status": "complete", "metrics": {"seed": seed}, "profiles": RunProfiles().to_json()}
 
 
 def held(scenario: Scenario, seed: int, outputs: Path) -> dict[str, Any]:

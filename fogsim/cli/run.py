@@ -96,7 +96,9 @@ def run_command(
     camera_processes: Annotated[
         int | None,
         typer.Option(
-            min=0, max=1024, help="Processes that draw for equipped vehicles other than the ego. [one less than processors]"
+            min=0,
+            max=1024,
+            help="Processes that draw for equipped vehicles other than the ego. [one less than processors]",
         ),
     ] = None,
     method_timeout: MethodTimeout = None,

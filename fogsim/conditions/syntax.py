@@ -128,7 +128,7 @@ class AllOf:
 
 @dataclass(frozen=True, slots=True)
 class AnyOf:
-    """Conditions of which at least one is true."""
+    """Conditions, at least one of which is true."""
 
     parts: tuple["Condition", ...]
 

@@ -53,11 +53,11 @@ def load_sign_file(path: Path) -> SignFile:
     Properties: ``kind`` (required), ``height_m``, ``diameter_m``, ``heading_deg`` (clockwise from north, the direction
     of travel that the sign applies to), ``speed_limit_kmh``. Features other than points are skipped.
     """
-    told = _read(path)
-    _refuse_other_frames(path, told)
-    features = told.get("features")
+    content = _read(path)
+    _refuse_other_frames(path, content)
+    features = content.get("features")
     if not isinstance(features, list):
-        raise InputError(f'{path}: expected a GeoJSON FeatureCollection with "features", got {_kind_of(told)}')
+        raise InputError(f'{path}: expected a GeoJSON FeatureCollection with "features", got {_kind_of(content)}')
     points = [(number, one) for number, one in enumerate(features) if _is_point(one)]
     if not points:
         raise InputError(f"{path}: the map has no signs: expected features that are points, got {len(features)} others")
@@ -69,24 +69,24 @@ def load_sign_file(path: Path) -> SignFile:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    told = read_json(path)
-    if not isinstance(told, dict):
-        raise InputError(f"{path}: expected a GeoJSON FeatureCollection, got {type(told).__name__}")
-    return told
+    content = read_json(path)
+    if not isinstance(content, dict):
+        raise InputError(f"{path}: expected a GeoJSON FeatureCollection, got {type(content).__name__}")
+    return content
 
 
-def _kind_of(told: Mapping[str, Any]) -> str:
-    return f"type {shown(told['type'])}" if "type" in told else "no type"
+def _kind_of(content: Mapping[str, Any]) -> str:
+    return f"type {shown(content['type'])}" if "type" in content else "no type"
 
 
-def _refuse_other_frames(path: Path, told: Mapping[str, Any]) -> None:
+def _refuse_other_frames(path: Path, content: Mapping[str, Any]) -> None:
     """Refuse a map that declares other coordinates than longitude and latitude."""
-    if told.get("coordinates") == NET:
+    if content.get("coordinates") == NET:
         raise InputError(
             f"{path}: its points are x and y of a SUMO network, which tells no projection; expected longitude and "
             "latitude, WGS 84"
         )
-    frame = told.get("crs") or "CRS84"
+    frame = content.get("crs") or "CRS84"
     name = _block(_block(frame).get("properties")).get("name", frame)
     if not isinstance(name, str) or not name.endswith(WGS84):
         raise InputError(f"{path}: the map is in {shown(name)}; expected longitude and latitude, WGS 84 (EPSG:4326)")
@@ -101,45 +101,45 @@ def _is_point(feature: Any) -> bool:
 
 
 def _sign(where: str, number: int, feature: Mapping[str, Any]) -> GeographicSign:
-    told = _block(feature.get("properties"))
-    kind, sign_id = told.get("kind"), feature.get("id", told.get("id", number))
+    content = _block(feature.get("properties"))
+    kind, sign_id = content.get("kind"), feature.get("id", content.get("id", number))
     if not isinstance(kind, str) or not kind:
         raise InputError(f'{where}: a sign needs a property "kind", as "speed_limit" or "stop", got {shown(kind)}')
     if not isinstance(sign_id, str | int | float):
         raise InputError(f"{where}: expected text or a number for its id, got {shown(sign_id)}")
     longitude, latitude = _place(where, feature["geometry"].get("coordinates"))
-    heading = _number(where, told, "heading_deg", math.nan, -360.0, 360.0)
-    limit = _number(where, told, "speed_limit_kmh", math.nan, 0.0, 300.0) / KMH_PER_MPS
+    heading = _number(where, content, "heading_deg", math.nan, -360.0, 360.0)
+    limit = _number(where, content, "speed_limit_kmh", math.nan, 0.0, 300.0) / KMH_PER_MPS
     return GeographicSign(
         str(sign_id),
         kind,
         limit,
         math.radians(longitude),
         math.radians(latitude),
-        _number(where, told, "height_m", USUAL_HEIGHT, 0.0, 20.0),
-        _number(where, told, "diameter_m", USUAL_DIAMETER, 0.1, 10.0),
+        _number(where, content, "height_m", USUAL_HEIGHT, 0.0, 20.0),
+        _number(where, content, "diameter_m", USUAL_DIAMETER, 0.1, 10.0),
         None if math.isnan(heading) else math.radians(90.0 - heading),
     )
 
 
-def _place(where: str, told: Any) -> tuple[float, float]:
+def _place(where: str, content: Any) -> tuple[float, float]:
     """Longitude and latitude [deg]."""
-    if not isinstance(told, list) or len(told) < 2:
-        raise InputError(f"{where}: expected coordinates [longitude, latitude], got {shown(told)}")
+    if not isinstance(content, list) or len(content) < 2:
+        raise InputError(f"{where}: expected coordinates [longitude, latitude], got {shown(content)}")
     longitude, latitude = (
-        number_within(where, key, one) for key, one in zip(("longitude", "latitude"), told[:2], strict=True)
+        number_within(where, key, one) for key, one in zip(("longitude", "latitude"), content[:2], strict=True)
     )
     if abs(longitude) > 180.0 or abs(latitude) > 90.0:
         raise InputError(
-            f"{where}: expected longitude within ±180° and latitude within ±90° (WGS 84), got {told[:2]}: "
+            f"{where}: expected longitude within ±180° and latitude within ±90° (WGS 84), got {content[:2]}: "
             "the map is in another coordinate frame"
         )
     return longitude, latitude
 
 
-def _number(where: str, told: Mapping[str, Any], key: str, usual: float, least: float, most: float) -> float:
+def _number(where: str, content: Mapping[str, Any], key: str, usual: float, least: float, most: float) -> float:
     """Number of a property; the default if it is missing."""
-    value = told.get(key)
+    value = content.get(key)
     return usual if value is None else number_within(where, key, value, least, most)
 
 

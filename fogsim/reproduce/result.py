@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.reproduce.paper_cells import PaperCell
 from fogsim.values import Estimate
 
 Cell = str | float | bool | None
@@ -99,6 +100,8 @@ class Reproduction:
         All tables, of a paper that has several.
     sweeps : tuple of mappings
         Further records: what becomes of the method where the paper leaves something open, or a repair is left out.
+    cells : tuple of PaperCell
+        Every figure of the paper's evaluation that can be compared, whether it is reached or not.
     """
 
     paper: str
@@ -108,6 +111,7 @@ class Reproduction:
     picture: NDArray[np.uint8]
     tables: tuple[TitledTable, ...] = ()
     sweeps: tuple[Mapping[str, Cell], ...] = ()
+    cells: tuple[PaperCell, ...] = ()
 
     @property
     def all_tables(self) -> tuple[TitledTable, ...]:

@@ -36,13 +36,7 @@ class Lighting:
     _most_veil: float | None = None
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
         effects = sample.step.truth.lamp_effects
         if effects is None:
             return

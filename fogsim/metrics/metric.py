@@ -36,13 +36,7 @@ class Metric(Protocol):
     """One line on each key of the result; a key ends in its unit."""
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
 
     def result(self) -> Mapping[str, JsonValue]:
         """Say what the steps so far amount to; the keys are those of `meanings`."""

@@ -27,13 +27,7 @@ class Motion:
     _max_speed: float = 0.0
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
         step = sample.step
         if self._steps == 0:
             self._start = step.route_position
@@ -68,13 +62,7 @@ class Comfort:
     _time: float = 0.0
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
         acceleration = float(sample.step.traffic.acceleration[sample.step.ego])
         self._max_deceleration = max(self._max_deceleration or 0.0, -acceleration)
         if self._previous is not None and sample.elapsed > 0:
@@ -119,13 +107,7 @@ class Compliance:
     _above_time: float = 0.0
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
         advised = sample.step.command.advice.speed
         self._time += sample.elapsed
         self._distance += float(sample.step.traffic.speed[sample.step.ego]) * sample.elapsed

@@ -65,13 +65,7 @@ class Conflict:
     _queue: _Approach = field(default_factory=_Approach)
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
         leader, speed = sample.step.leader, float(sample.step.traffic.speed[sample.step.ego])
         if leader is None:
             return
@@ -125,13 +119,7 @@ class Sight:
     _judged: bool = False
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
         margin = sample.derived["visibility_margin_m"]
         self._judged = True
         self._least_visibility = _least(self._least_visibility, finite_or_none(sample.step.truth.visibility_ahead))
@@ -165,13 +153,7 @@ class Collisions:
     _ego: list[Collision] = field(default_factory=list)
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
         if not sample.step.collisions:
             return
         ego = sample.step.traffic.ids[sample.step.ego]

@@ -26,13 +26,7 @@ class TrafficCollisions(TrafficMetric):
     _impacts: list[float] = field(default_factory=list)
 
     def add(self, span: TrafficSpan) -> None:
-        """Take in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The next steps.
-        """
+        """Add some steps."""
         self._exposure.add(span)
         self._impacts += [hit.impact_speed for hit in span.collisions]
 

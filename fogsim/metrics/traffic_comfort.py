@@ -31,13 +31,7 @@ class TrafficComfort(TrafficMetric):
     _braking: float = 0.0
 
     def add(self, span: TrafficSpan) -> None:
-        """Take in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The next steps.
-        """
+        """Add some steps."""
         self._exposure.add(span)
         self._braking += float(span.elapsed[span.acceleration < -CRITICAL_DECELERATION].sum())
         # The last step of the span before comes first.

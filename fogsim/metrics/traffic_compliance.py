@@ -32,13 +32,7 @@ class TrafficCompliance(TrafficMetric):
     _compliant_time: float = 0.0
 
     def add(self, span: TrafficSpan) -> None:
-        """Take in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The next steps.
-        """
+        """Add some steps."""
         self._exposure.add(span)
         advised = np.isfinite(span.advised_speed)
         if advised.any():

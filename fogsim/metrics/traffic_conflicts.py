@@ -67,13 +67,7 @@ class TrafficConflicts(TrafficMetric):
     _most: float = 0.0
 
     def add(self, span: TrafficSpan) -> None:
-        """Take in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The next steps.
-        """
+        """Add some steps."""
         self._exposure.add(span)
         found = span.following
         driving = found.speed >= QUEUE_SPEED

@@ -66,13 +66,7 @@ class TrafficEmissions(TrafficMetric):
     _milligrams: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
 
     def add(self, span: TrafficSpan) -> None:
-        """Take in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The next steps.
-        """
+        """Add some steps."""
         self._exposure.add(span)
         names = np.array([_KINDS.index(name) if name in _KINDS else 0 for name in span.kind_names], dtype=np.intp)
         kind, speed, acceleration = names[span.kind], span.speed, span.acceleration

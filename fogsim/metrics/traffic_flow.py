@@ -85,13 +85,7 @@ class TrafficFlow(TrafficMetric):
     _lane_names: tuple[str, ...] = ()
 
     def add(self, span: TrafficSpan) -> None:
-        """Take in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The next steps.
-        """
+        """Add some steps."""
         self._exposure.add(span)
         self._duration += span.duration
         way = span.elapsed * span.speed

@@ -30,13 +30,7 @@ class TrafficHeadways(TrafficMetric):
     _headways: Histogram = field(default_factory=lambda: Histogram(0.0, 10.0, 0.05))
 
     def add(self, span: TrafficSpan) -> None:
-        """Take in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The next steps.
-        """
+        """Add some steps."""
         found = span.following
         moving = found.speed >= QUEUE_SPEED
         headways = time_headway(found.gap[moving], found.speed[moving])

@@ -43,13 +43,7 @@ class TrafficSight(TrafficMetric):
     _margins: Histogram = field(default_factory=lambda: Histogram(-FOG_LIMIT, FOG_LIMIT, 0.5))
 
     def add(self, span: TrafficSpan) -> None:
-        """Take in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The next steps.
-        """
+        """Add some steps."""
         # Nothing is greater than nan, which stands for fog that is not known.
         foggy = span.extinction > OPTICAL_DEPTH_AT_VISIBILITY / FOG_LIMIT
         visibility, fast = OPTICAL_DEPTH_AT_VISIBILITY / span.extinction[foggy], span.speed[foggy]

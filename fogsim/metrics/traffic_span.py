@@ -106,13 +106,7 @@ class SpanWatcher(Protocol):
     """Whoever watches everybody near the ego."""
 
     def add(self, span: TrafficSpan) -> None:
-        """Take in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The next steps.
-        """
+        """Add some steps."""
 
 
 class TrafficMetric(ABC):
@@ -123,13 +117,7 @@ class TrafficMetric(ABC):
 
     @abstractmethod
     def add(self, span: TrafficSpan) -> None:
-        """Take in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The next steps.
-        """
+        """Add some steps."""
 
     @abstractmethod
     def result(self) -> Mapping[str, JsonValue]:
@@ -152,13 +140,7 @@ class Exposure:
     distance: float = 0.0
 
     def add(self, span: TrafficSpan) -> None:
-        """Take in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The next steps.
-        """
+        """Add some steps."""
         self.time += span.vehicle_time
         self.distance += span.vehicle_distance
 

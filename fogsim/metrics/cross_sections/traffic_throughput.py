@@ -41,13 +41,7 @@ class TrafficThroughput(TrafficMetric):
     _time: float = 0.0
 
     def add(self, span: TrafficSpan) -> None:
-        """Take in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The next steps.
-        """
+        """Add some steps."""
         if span.route is None:
             return
         if self._sections is None:

@@ -44,13 +44,7 @@ class TrafficEncroachment(TrafficMetric):
     _least: dict[tuple[int, int, int], float] = field(default_factory=dict)
 
     def add(self, span: TrafficSpan) -> None:
-        """Take in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The next steps.
-        """
+        """Add some steps."""
         self._exposure.add(span)
         if not len(span.time):
             return

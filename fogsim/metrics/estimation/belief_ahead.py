@@ -44,13 +44,7 @@ class BeliefAheadError:
     _held: dict[int, int] = field(default_factory=lambda: dict.fromkeys(PLACES, 0))
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
         believed, true = sample.step.belief.profile, sample.step.truth.profile
         if believed is None or true is None or not true.distance.size:
             return
@@ -86,13 +80,7 @@ class DenseFogKnown:
     _found: list[float] = field(default_factory=list)
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
         step = sample.step
         if self._begins is None:
             self._begins, self._known = _dense_fog_ahead(step), None

@@ -25,13 +25,7 @@ class EquippedBelief:
     _errors: list[float] = field(default_factory=list)
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
         self._steps += 1
         self._vehicles += len(sample.step.equipped)
         for one in sample.step.equipped:

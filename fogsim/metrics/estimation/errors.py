@@ -149,13 +149,7 @@ class EstimatorErrors:
     _methods: dict[str, Errors] = field(default_factory=dict)
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
         truth = sample.step.truth.visibility_ahead
         for estimate in sample.step.estimates:
             errors = self._methods.setdefault(estimate.method, Errors())
@@ -187,13 +181,7 @@ class BeliefError:
     _waiting: list[tuple[float, float, Belief]] = field(default_factory=list)
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
         self._waiting.append((sample.step.time, sample.step.truth.visibility_ahead, sample.step.belief))
         if len(self._waiting) >= _MOST_WAITING:
             self._judge_waiting()

@@ -29,15 +29,16 @@ Column = tuple[str, str, float, int]
 SPEED: Column = ("traffic_mean_speed_mps", "mean speed [km/h]", 3.6, 1)
 SPREAD: Column = ("traffic_speed_standard_deviation_mps", "its sd [km/h]", 3.6, 1)
 DELAY: Column = ("traffic_delay_s_per_vehicle_km", "delay [s/km]", 1.0, 1)
-OVERDRIVING: Column = ("traffic_overdriving_time_share", "overdriving [% of time in fog]", 100.0, 0)
-CONFLICTS: Column = ("traffic_conflicts_per_vehicle_h", "conflicts [1/h]", 1.0, 2)
-BRAKING: Column = ("traffic_hard_braking_time_share", "hard braking [% of time]", 100.0, 2)
+OVERDRIVING: Column = ("traffic_overdriven_m_per_vehicle_km_in_fog", "overdriven [m/veh·km in fog]", 1.0, 0)
+MARGIN: Column = ("traffic_sight_margin_by_distance_m", "sight margin by distance [m]", 1.0, 0)
+CONFLICTS: Column = ("traffic_conflicts_per_vehicle_km", "conflicts [1/veh·km]", 1.0, 3)
+BRAKING: Column = ("traffic_hard_braking_time_share", "hard braking [% of all vehicle time]", 100.0, 2)
 COLLISIONS: Column = ("collisions", "collisions a run", 1.0, 2)
-EGO: Column = ("negative_margin_time_share", "ego too fast for its sight [% of time]", 100.0, 0)
+EGO: Column = ("overdriven_m_per_km_in_fog", "overdriven by the ego [m/km in fog]", 1.0, 0)
 
 COLUMNS: Mapping[str, Sequence[Column]] = {
-    "motorway_policies": (SPEED, DELAY, OVERDRIVING, CONFLICTS, BRAKING, COLLISIONS, EGO),
-    "motorway_compliance": (SPEED, DELAY, OVERDRIVING, CONFLICTS, BRAKING, COLLISIONS),
+    "motorway_policies": (SPEED, DELAY, OVERDRIVING, MARGIN, CONFLICTS, BRAKING, COLLISIONS, EGO),
+    "motorway_compliance": (SPEED, DELAY, OVERDRIVING, MARGIN, CONFLICTS, BRAKING, COLLISIONS),
     "estimators_in_the_loop": (
         ("belief_median_error_percent", "error of the belief [%]", 1.0, 1),
         ("mean_advised_speed_mps", "speed advised [km/h]", 3.6, 1),
@@ -79,12 +80,12 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
         ("ego_collisions", "hits the dark car [% of runs]", 100.0, 0),
         ("ego_max_impact_speed_mps", "impact [km/h]", 3.6, 0),
     ),
-    "field_sizes": (SPEED, SPREAD, OVERDRIVING, CONFLICTS, ("traffic_collisions", "collisions a run", 1.0, 2)),
+    "field_sizes": (SPEED, SPREAD, OVERDRIVING, MARGIN, CONFLICTS, ("traffic_collisions", "collisions a run", 1.0, 2)),
 }
 """Of each study: metrics, what the column is called, the factor to its unit, and digits after the point."""
 
 FIGURES: Mapping[str, Sequence[str]] = {
-    "motorway_policies": ("trade_off_traffic_conflicts_per_vehicle_km", "speed_over_road"),
+    "motorway_policies": ("trade_off_traffic_overdriven_m_per_vehicle_km_in_fog", "speed_over_road"),
 }
 """Figures of a study's report that the page shows."""
 

@@ -71,8 +71,8 @@ def environment(name: str, minutes: float, tables: tuple[str, ...], options: str
     )
 
 
-SIMULATIONS = {"field_sizes": ("scenarios/studies/motorway",)}
-"""Folders of studies that run a SUMO simulation, and no scenario."""
+SIMULATIONS = dict.fromkeys(("field_sizes", "message_sign", "motorway_policies"), ("scenarios/studies/motorway",))
+"""Folders of studies that run no scenario of the catalogue."""
 
 ACCURACY_KEPT = " --keep runs/tables/estimator_accuracy.kept"
 TARGETS_KEPT = " --keep runs/tables/estimator_targets.kept"
@@ -143,12 +143,10 @@ MEASUREMENTS = (
         60,
         ("benchmarks/monte_carlo.py", "docs/make_airlight_tables.py"),
     ),
-    study("belief_over_places", 40),
     study("which_sensor", 20),
     study("who_tells_of_the_bank", 40),
     study("lighting_policies", 40),
     study("estimators_in_the_loop", 40),
-    study("motorway_compliance", 60),
     study("field_sizes", 40),
     study("motorway_policies", 180),
     environment(

@@ -187,7 +187,7 @@ class Unwritten:
 
 
 UNWRITTEN = (
-    Unwritten("docs/benchmarks/policies.md", "beside what was seen on real roads", "from `field_sizes`, by hand"),
+    Unwritten("docs/benchmarks/policies.md", "compared with real roads", "from `field_sizes`, by hand"),
     Unwritten("docs/explanation/drivers.md", "who sees what at night", "`fogsim.traffic.drivers.own_beams`, by hand"),
     Unwritten("docs/explanation/drivers.md", "how far a traffic light is seen", "Allard's law, by hand"),
     Unwritten("docs/explanation/drivers.md", "gaps accepted at a crossing", "`python benchmarks/junctions.py`"),

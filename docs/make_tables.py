@@ -23,7 +23,7 @@ from fogsim.estimators.zhu2015_road import Zhu2015Repair
 from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.lighting.legal import LAWS
-from fogsim.metrics import RunMetrics
+from fogsim.metrics import metric_definitions
 from fogsim.openscenario.actions import ACTIONS, LAMPS
 from fogsim.openscenario.entities import CLASSES
 from fogsim.openscenario.findings import ATTRIBUTES_PASSED_OVER, PASSED_OVER
@@ -150,7 +150,14 @@ def event_columns() -> list[tuple[str, ...]]:
 
 def metrics() -> list[tuple[str, ...]]:
     """Keys of metrics.json."""
-    return [(f"`{key}`", meaning) for key, meaning in RunMetrics().summary().meanings.items()]
+    ranks = {"lower": "lower is better", "higher": "higher is better", None: "–"}
+    return [
+        (
+            *(f"`{key}`", one.meaning.replace("|", "\\|"), one.numerator or "–", one.denominator),
+            *("yes" if one.denominator_moves else "no", ranks[one.better]),
+        )
+        for key, one in metric_definitions().items()
+    ]
 
 
 def signals() -> list[tuple[str, ...]]:
@@ -301,7 +308,9 @@ TABLES = {
         "signals": (("signal", "unit or kind", "meaning", "needs"), signals),
     },
     "explanation/night.md": {"laws": (("rules", "what", "from, up to [m]", "source"), laws)},
-    "reference/metrics.md": {"metrics": (("key", "meaning"), metrics)},
+    "reference/metrics.md": {
+        "metrics": (("key", "meaning", "numerator", "denominator", "a policy moves it", "ranks policies"), metrics)
+    },
     "reference/results.md": {
         "columns": (("column", "type", "meaning"), columns),
         "traffic_columns": (("column", "type", "meaning"), traffic_columns),

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
-from fogsim.study.comparison import Difference, number_of
+from fogsim.study.comparison import Difference, moved_denominators, number_of
 from fogsim.study.drawing import Grid
 from fogsim.study.main_metrics import metric_words, signed
 from fogsim.study.plan import Study
@@ -38,7 +38,8 @@ def main_tables(
         "Mean over the seeds; below, the difference to the baseline with its interval; bold where a difference is "
         "shown. Shares in percent, their differences in percentage points."
     )
-    return "\n".join([*parts, f'<p class="note">{note}</p>'])
+    notes = (note, *moved_denominators(study, rows))
+    return "\n".join([*parts, *(f'<p class="note">{escape(one)}</p>' for one in notes)])
 
 
 def _mean_cell(study: Study, metric: str, rows: Sequence[Row], one: Difference | None) -> str:

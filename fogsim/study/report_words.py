@@ -68,11 +68,11 @@ def _finding(grid: Grid, metric: str, differences: Sequence[Difference]) -> str:
 
 
 def _verdict(one: Difference, words: MetricWords) -> str:
-    """Whether a difference is an improvement, if the metric defines one."""
-    lower = one.difference < 0
-    if words.better == "neither":
-        return "lower" if lower else "higher"
-    return "better" if lower == (words.better == "less") else "worse"
+    """Whether a difference is an improvement, if the metric ranks policies."""
+    direction = "lower" if one.difference < 0 else "higher"
+    if words.better is None:
+        return direction
+    return "better" if direction == words.better else "worse"
 
 
 def _doubts(study: Study, differences: Sequence[Difference]) -> list[str]:

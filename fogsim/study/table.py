@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 
 from fogsim.errors import InputError
 from fogsim.files.atomic import write_bytes, write_text
-from fogsim.metrics import metric_keys
+from fogsim.metrics import metric_definitions
 from fogsim.study.main_metrics import METHODS_KEY
 from fogsim.study.run_file import Value
 
@@ -31,7 +31,7 @@ def column_mistake(factor: str) -> str | None:
     """Why the table cannot have a column of a factor's name; None if it can."""
     if factor in FIXED_COLUMNS:
         return "the table has a column of that name; choose another"
-    if factor in metric_keys() or factor.startswith(f"{METHODS_KEY}."):
+    if factor in metric_definitions() or factor.startswith(f"{METHODS_KEY}."):
         return "a metric has that name; choose another"
     return None
 

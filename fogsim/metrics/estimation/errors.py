@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from fogsim.metrics.metric import JsonValue, Sample, share
+from fogsim.metrics.metric import Definition, JsonValue, Sample, definitions_of, share
 from fogsim.units import finite_or_none
 from fogsim.values import Belief
 
@@ -140,22 +140,11 @@ def quantile(values: Sequence[float], probability: float) -> float | None:
 class EstimatorErrors:
     """Error of every method in fog, frame by frame."""
 
-    meanings: ClassVar[Mapping[str, str]] = {
-        "estimators": "error |V − V_true| / V_true of each method against the true visibility ahead, in fog "
-        "(below 1000 m): frames, share with a valid estimate, share of those that said clear air, quantiles; bias "
-        "(median of V / V_true − 1); share of valid estimates whose 90 % interval (± 1.645 deviations of k) held the "
-        "truth; latency (lag up to 30 s at which they match the fog best; none where it hardly changes)",
-    }
+    definitions: ClassVar[Mapping[str, Definition]] = definitions_of("estimators")
     _methods: dict[str, Errors] = field(default_factory=dict)
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
         truth = sample.step.truth.visibility_ahead
         for estimate in sample.step.estimates:
             errors = self._methods.setdefault(estimate.method, Errors())
@@ -175,25 +164,12 @@ class EstimatorErrors:
 class BeliefError:
     """Error of the median belief in fog, and how often its 90 % interval held the truth."""
 
-    meanings: ClassVar[Mapping[str, str]] = {
-        "belief_count": "number of steps in fog (true visibility ahead below 1000 m)",
-        "belief_median_error_percent": "median over those steps of the error of the median belief",
-        "belief_p95_error_percent": "95th percentile of the same",
-        "belief_bias_percent": "median over those steps of V / V_true − 1",
-        "belief_latency_s": "lag up to 30 s at which the belief matches the fog best; none where it hardly changes",
-        "belief_coverage_share": "share of those steps in which the 90 % interval held the truth",
-    }
+    definitions: ClassVar[Mapping[str, Definition]] = definitions_of("belief")
     _errors: Errors = field(default_factory=Errors)
     _waiting: list[tuple[float, float, Belief]] = field(default_factory=list)
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
         self._waiting.append((sample.step.time, sample.step.truth.visibility_ahead, sample.step.belief))
         if len(self._waiting) >= _MOST_WAITING:
             self._judge_waiting()

@@ -31,7 +31,7 @@ SPREAD: Column = ("traffic_speed_standard_deviation_mps", "its sd [km/h]", 3.6, 
 OVERDRIVEN: Column = ("traffic_overdriven_m_per_vehicle_km_in_fog", "overdriven in fog [m per vehicle-km]", 1.0, 0)
 MARGIN: Column = ("traffic_sight_margin_by_distance_m", "sight margin in fog, by distance [m]", 1.0, 0)
 CONFLICTS: Column = ("traffic_conflicts_per_cohort_vehicle", "conflicts per 100 vehicles", 100.0, 1)
-COLLISIONS: Column = ("traffic_collisions", "collisions a run", 1.0, 2)
+COLLISIONS: Column = ("traffic_collisions_per_cohort_vehicle", "collisions per 100 vehicles", 100.0, 1)
 DELAY: Column = ("traffic_delay_s_per_cohort_vehicle", "delay [s per vehicle]", 1.0, 0)
 SIGNS = (SPEED, DELAY, OVERDRIVEN, MARGIN, CONFLICTS, COLLISIONS)
 EGO: Column = ("overdriven_m_per_km_in_fog", "overdriven by the ego [m per km in fog]", 1.0, 0)
@@ -46,7 +46,7 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
         ("advised_time_share", "advised [% of time]", 100.0, 0),
         EGO,
         OVERDRIVEN,
-        COLLISIONS,
+        ("collisions", "collisions a run", 1.0, 2),
     ),
     "who_tells_of_the_bank": (
         ("equipped_vehicles_mean", "other cameras near", 1.0, 1),
@@ -74,7 +74,7 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
         ("ego_collisions", "hits the dark car [% of runs]", 100.0, 0),
         ("ego_max_impact_speed_mps", "impact [km/h]", 3.6, 0),
     ),
-    "field_sizes": (SPEED, SPREAD, OVERDRIVEN, MARGIN, COLLISIONS),
+    "field_sizes": (SPEED, SPREAD, OVERDRIVEN, MARGIN, ("traffic_collisions", "collisions a run", 1.0, 2)),
 }
 """Of each study: metrics, what the column is called, the factor to its unit, and digits after the point."""
 

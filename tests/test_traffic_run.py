@@ -186,8 +186,8 @@ def test_a_cohort_is_due_in_its_time_and_the_run_ends_when_it_has_left(tmp_path:
     values = metrics.summary().values
     assert (values["traffic_cohort_vehicles"], values["traffic_cohort_unfinished"]) == (3, 0)
     arrival = {v: max(step.time for step in steps if v in step.traffic.ids) for v in "abc"}
-    # They are due 1 s after the warm-up, and the time from the step before stands for each.
-    expected = sum(time - 0.5 for time in arrival.values()) / 3
+    # They are due 1 s after the warm-up.
+    expected = sum(time - 1.0 for time in arrival.values()) / 3
     assert values["traffic_travel_time_s_per_cohort_vehicle"] == pytest.approx(expected)
 
 

@@ -51,7 +51,8 @@ class TrafficConflicts(TrafficMetric):
         self._exposure.add(span)
         found = span.following
         driving = found.speed >= QUEUE_SPEED
-        row, gap, own, ahead = (part[driving] for part in (found.follower, found.gap, found.speed, found.leader_speed))
+        row = found.follower[driving]
+        gap, own, ahead = (part[driving] for part in (found.gap, found.speed, found.leader_speed))
         elapsed, queued = span.elapsed[row], (ahead < QUEUE_SPEED).astype(np.intp)
         remaining = time_to_collision(gap, own, ahead)
         exposed = remaining <= self.threshold

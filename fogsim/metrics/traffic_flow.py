@@ -20,28 +20,14 @@ class SpeedsByNumber:
         self._way = np.zeros(0)
 
     def add(self, number: NDArray[np.intp], elapsed: NDArray[np.float64], way: NDArray[np.float64]) -> None:
-        """Take in times and ways.
-
-        Parameters
-        ----------
-        number : (n,) intp
-            Vehicles or lanes.
-        elapsed, way : (n,) float64
-            Their times [s] and ways [m].
-        """
+        """Add times [s] and distances [m] by vehicle or lane."""
         size = max(len(self._time), int(number.max(initial=-1)) + 1)
         grown = (0, size - len(self._time))
         self._time = np.pad(self._time, grown) + np.bincount(number, elapsed, minlength=size)
         self._way = np.pad(self._way, grown) + np.bincount(number, way, minlength=size)
 
     def variance_between(self, group: Sequence[int] | None = None) -> float | None:
-        """Variance of the mean speeds about that of their group, by time [m²/s²]; None without time.
-
-        Parameters
-        ----------
-        group : (n,) sequence of int or None
-            Group of each number; None for one of all.
-        """
+        """Variance of the mean speeds about that of their group, by time [m²/s²]; None without time."""
         groups = np.zeros(len(self._time), np.intp) if group is None else np.array(group, dtype=np.intp)
         times, ways = np.bincount(groups, self._time)[groups], np.bincount(groups, self._way)[groups]
         been = self._time > 0.0

@@ -187,15 +187,7 @@ class TrafficGathering:
         return self._rows >= MOST_ROWS
 
     def add(self, step: TrafficStep, elapsed: float) -> None:
-        """Take in a step.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            The next step.
-        elapsed : float
-            Time since the one before [s].
-        """
+        """Add a step, a time [s] after the one before."""
         traffic, self._route, self._cohort = step.traffic, step.truth.route, step.cohort
         if self._cohort is not None:
             self._cohort_waiting_time += elapsed * self._cohort.waiting
@@ -272,28 +264,14 @@ def _known(values: NDArray[np.float64], count: int, unknown: float) -> NDArray[n
 
 
 class GatheredMetrics:
-    """Hands whoever watches everybody the steps of a run, some at a time.
-
-    Parameters
-    ----------
-    watchers : sequence of SpanWatcher
-        Metrics of everybody, and others who watch.
-    """
+    """Hands whoever watches everybody the steps of a run, some at a time."""
 
     def __init__(self, watchers: Sequence[SpanWatcher]) -> None:
         self._watchers = watchers
         self._gathering = TrafficGathering()
 
     def add(self, step: TrafficStep, elapsed: float) -> None:
-        """Take in a step.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            The next step.
-        elapsed : float
-            Time since the one before [s].
-        """
+        """Add a step, a time [s] after the one before."""
         if self._watchers:
             self._gathering.add(step, elapsed)
             if self._gathering.is_full:

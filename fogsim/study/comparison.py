@@ -119,16 +119,16 @@ def moved_denominators(study: Study, rows: Sequence[Row]) -> list[str]:
             change = here / baseline - 1.0 if baseline > 0.0 else 0.0
             if abs(change) > MOVED_SHARE:
                 said.append(
-                    f"{words.label}: {here:.3g} {words.unit} with {policy}, {baseline:.3g} under the baseline "
-                    f"({signed(100.0 * change, 2)} %). What is divided by it compares different amounts of traffic."
+                    f"{words.label}: {here:.3g} {words.unit} with {policy}, {baseline:.3g} {words.unit} under the "
+                    f"baseline ({signed(100.0 * change, 2)} %). What is divided by it compares different traffic."
                 )
     for policy, both in pairs:
         of_cohort = [_paired_values(both, f"traffic_cohort_{key}") for key in ("unfinished", "vehicles")]
         unfinished, vehicles = (float(values[:, 1].sum()) for values in of_cohort)
         if unfinished > MOVED_SHARE * vehicles:
             said.append(
-                f"Cohort: {100.0 * unfinished / vehicles:.0f} % of its vehicles have not left at the end with {policy}, so that "
-                "what happens to them later is not counted; raise duration_s."
+                f"Cohort: {100.0 * unfinished / vehicles:.0f} % of its vehicles have not left when the run ends with "
+                f"{policy}, and their later conflicts are not counted; raise duration_s."
             )
     return said
 

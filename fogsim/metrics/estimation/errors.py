@@ -16,13 +16,7 @@ FOG_LIMIT = 1000.0
 
 
 def relative_error(visibility: float, truth: float) -> float:
-    """|V − V_true| / V_true in percent; ``inf`` for a visibility without limit.
-
-    Parameters
-    ----------
-    visibility, truth : float
-        Visibilities [m].
-    """
+    """|V − V_true| / V_true in percent; ``inf`` for a visibility without limit."""
     return abs(visibility - truth) / truth * 100.0
 
 
@@ -53,33 +47,13 @@ class Errors:
     _truths: list[tuple[float, float]] = field(default_factory=list)
 
     def follow(self, time: float, truth: float, said: float | None) -> None:
-        """Take in how the fog is, and what was said of it, if anything.
-
-        Parameters
-        ----------
-        time : float
-            Simulated time [s].
-        truth : float
-            Visibility ahead [m].
-        said : float or None
-            What was said of it [m].
-        """
+        """Add the visibility ahead [m] at a time [s], and the reported one, if any."""
         self._truths.append((time, math.log(min(truth, FOG_LIMIT))))
         if said is not None:
             self._said.append((time, math.log(min(said, FOG_LIMIT))))
 
     def judge(self, truth: float, said: float, low: float, high: float) -> None:
-        """Take in one visibility that was said in fog.
-
-        Parameters
-        ----------
-        truth : float
-            Visibility ahead [m].
-        said : float
-            What was said of it [m]; ``inf`` for clear air.
-        low, high : float
-            Ends of the interval that was to hold the truth in 90 % of all cases [m].
-        """
+        """Add a visibility reported in fog, ``inf`` for clear air, and its 90 % interval [m]."""
         self.percent.append(relative_error(said, truth))
         self._ratios.append(math.log(said / truth))
         self.covered += low <= truth <= high
@@ -122,15 +96,7 @@ class Errors:
 
 
 def quantile(values: Sequence[float], probability: float) -> float | None:
-    """Quantile without interpolation, so that an infinite value never makes a NaN of its neighbour.
-
-    Parameters
-    ----------
-    values : (n,) sequence of float
-        The values.
-    probability : float
-        Which quantile [-].
-    """
+    """Quantile without interpolation, so that an infinite value never makes a NaN of its neighbour."""
     if not values:
         return None
     return finite_or_none(float(np.quantile(values, probability, method="inverted_cdf")))

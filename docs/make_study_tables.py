@@ -79,7 +79,7 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
 """Of each study: metrics, what the column is called, the factor to its unit, and digits after the point."""
 
 FIGURES: Mapping[str, Sequence[str]] = {
-    "motorway_policies": ("trade_off_traffic_conflicts_per_cohort_vehicle", "speed_over_road"),
+    "message_sign": ("trade_off_traffic_conflicts_per_cohort_vehicle", "speed_over_road"),
 }
 """Figures of a study's report that the page shows."""
 

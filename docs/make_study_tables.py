@@ -28,24 +28,25 @@ Column = tuple[str, str, float, int]
 
 SPEED: Column = ("traffic_mean_speed_mps", "mean speed [km/h]", 3.6, 1)
 SPREAD: Column = ("traffic_speed_standard_deviation_mps", "its sd [km/h]", 3.6, 1)
-DELAY: Column = ("traffic_delay_s_per_vehicle_km", "delay [s/km]", 1.0, 1)
-OVERDRIVING: Column = ("traffic_overdriven_m_per_vehicle_km_in_fog", "overdriven [m/veh·km in fog]", 1.0, 0)
-MARGIN: Column = ("traffic_sight_margin_by_distance_m", "sight margin by distance [m]", 1.0, 0)
-CONFLICTS: Column = ("traffic_conflicts_per_vehicle_km", "conflicts [1/veh·km]", 1.0, 3)
-BRAKING: Column = ("traffic_hard_braking_time_share", "hard braking [% of all vehicle time]", 100.0, 2)
-COLLISIONS: Column = ("collisions", "collisions a run", 1.0, 2)
-EGO: Column = ("overdriven_m_per_km_in_fog", "overdriven by the ego [m/km in fog]", 1.0, 0)
+OVERDRIVEN: Column = ("traffic_overdriven_m_per_vehicle_km_in_fog", "overdriven in fog [m per vehicle-km]", 1.0, 0)
+MARGIN: Column = ("traffic_sight_margin_by_distance_m", "sight margin in fog, by distance [m]", 1.0, 0)
+CONFLICTS: Column = ("traffic_conflicts_per_cohort_vehicle", "conflicts per 100 vehicles", 100.0, 1)
+COLLISIONS: Column = ("traffic_collisions_per_cohort_vehicle", "collisions per 100 vehicles", 100.0, 1)
+DELAY: Column = ("traffic_delay_s_per_cohort_vehicle", "delay [s per vehicle]", 1.0, 0)
+SIGNS = (SPEED, DELAY, OVERDRIVEN, MARGIN, CONFLICTS, COLLISIONS)
+EGO: Column = ("overdriven_m_per_km_in_fog", "overdriven by the ego [m per km in fog]", 1.0, 0)
+CLOSEST: Column = ("minimum_time_to_collision_s", "least time to collision of the ego [s]", 1.0, 1)
 
 COLUMNS: Mapping[str, Sequence[Column]] = {
-    "motorway_policies": (SPEED, DELAY, OVERDRIVING, MARGIN, CONFLICTS, BRAKING, COLLISIONS, EGO),
-    "motorway_compliance": (SPEED, DELAY, OVERDRIVING, MARGIN, CONFLICTS, BRAKING, COLLISIONS),
+    "message_sign": SIGNS,
+    "motorway_policies": SIGNS,
     "estimators_in_the_loop": (
         ("belief_median_error_percent", "error of the belief [%]", 1.0, 1),
         ("mean_advised_speed_mps", "speed advised [km/h]", 3.6, 1),
         ("advised_time_share", "advised [% of time]", 100.0, 0),
         EGO,
-        OVERDRIVING,
-        COLLISIONS,
+        OVERDRIVEN,
+        ("collisions", "collisions a run", 1.0, 2),
     ),
     "who_tells_of_the_bank": (
         ("equipped_vehicles_mean", "other cameras near", 1.0, 1),
@@ -53,22 +54,15 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
         ("belief_200_m_ahead_median_error_percent", "belief 200 m ahead: error [%]", 1.0, 0),
         ("belief_200_m_ahead_coverage_share", "held [%]", 100.0, 0),
         EGO,
-        OVERDRIVING,
-        ("max_deceleration_mps2", "hardest braking [m/s²]", 1.0, 1),
+        OVERDRIVEN,
+        CLOSEST,
     ),
     "which_sensor": (
         ("dense_fog_known_before_m", "bank known before it [m]", 1.0, 0),
         ("advised_time_share", "advised [% of time]", 100.0, 0),
         ("mean_speed_mps", "speed of the ego [km/h]", 3.6, 0),
         EGO,
-        ("max_deceleration_mps2", "hardest braking [m/s²]", 1.0, 1),
-        COLLISIONS,
-    ),
-    "belief_over_places": (
-        ("belief_median_error_percent", "error here and now [%]", 1.0, 1),
-        ("belief_coverage_share", "held [%]", 100.0, 0),
-        ("dense_fog_known_before_m", "bank known before it [m]", 1.0, 0),
-        EGO,
+        CLOSEST,
         ("ego_collisions", "collisions of the ego a run", 1.0, 2),
     ),
     "lighting_policies": (
@@ -80,12 +74,12 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
         ("ego_collisions", "hits the dark car [% of runs]", 100.0, 0),
         ("ego_max_impact_speed_mps", "impact [km/h]", 3.6, 0),
     ),
-    "field_sizes": (SPEED, SPREAD, OVERDRIVING, MARGIN, CONFLICTS, ("traffic_collisions", "collisions a run", 1.0, 2)),
+    "field_sizes": (SPEED, SPREAD, OVERDRIVEN, MARGIN, ("traffic_collisions", "collisions a run", 1.0, 2)),
 }
 """Of each study: metrics, what the column is called, the factor to its unit, and digits after the point."""
 
 FIGURES: Mapping[str, Sequence[str]] = {
-    "motorway_policies": ("trade_off_traffic_overdriven_m_per_vehicle_km_in_fog", "speed_over_road"),
+    "message_sign": ("trade_off_traffic_conflicts_per_cohort_vehicle", "speed_over_road"),
 }
 """Figures of a study's report that the page shows."""
 

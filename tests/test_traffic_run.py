@@ -156,3 +156,11 @@ def test_runs_with_and_without_an_ego_name_one_another() -> None:
         next(fogsim.run(alone(EVEN)))
     with pytest.raises(FogSimError, match=r"traffic\.ego is 'ego'; write none, or call fogsim\.run"):
         next(fogsim.run_traffic(load_scenario("motorway_fog_bank")))
+
+
+@pytest.mark.parametrize(("written", "differ"), [("", True), (", seed: 4", False)])
+def test_patches_are_drawn_for_each_seed_unless_theirs_is_written(written: str, differ: bool) -> None:
+    with TrafficRun(alone(f"fog={{visibility_m: 60, patches: {{correlation_length_m: 50{written}}}}}")) as run:
+        fogs = [run.start(seed)[0].truth.fog for seed in (1, 2, 1)]
+    assert fogs[0] == fogs[2]
+    assert (fogs[0] != fogs[1]) is differ

@@ -42,6 +42,7 @@ def study_command(
     """Run a grid of policies, fogs, drivers and seeds, and write a table, differences with intervals, and a report."""
     from fogsim.registry.user_code import import_nothing
     from fogsim.study import RayCluster, load_study, run_study
+    from fogsim.study.execution import build_without_running
 
     if address is not None and engine is EngineName.POOL:
         raise InputError("--address is a Ray cluster's: give --engine ray with it")
@@ -56,6 +57,11 @@ def study_command(
         f"{escape(loaded.name)}: {escape(shape)} × {len(loaded.runs) // cells} seeds = {len(loaded.runs)} runs"
     )
     if check:
+        for label, scenario in loaded.cells().items():
+            try:
+                build_without_running(scenario)
+            except InputError as error:
+                raise InputError(f"{loaded.file}: {label}: {error}") from error
         return
     directory = out or Path("runs", loaded.name)
     failed: list[str] = []

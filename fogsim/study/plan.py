@@ -166,16 +166,19 @@ class Study:
     level_settings: Mapping[str, Mapping[str, tuple[str, ...]]] = field(default_factory=dict)
     file: Path = Path("study.yaml")
 
+    def cells(self) -> dict[str, Scenario]:
+        """Scenario of each cell, by the levels of all factors as text."""
+        return {_label(run.levels): run.scenario for run in self.runs}
+
     def description(self) -> dict[str, Any]:
         """Everything that determines its runs, as JSON data: each cell's scenario by its levels, and the seeds."""
-        # Runs of a cell share a scenario, and differ in their seed.
-        of_cells = list({id(run.scenario): run for run in self.runs}.values())
-        cells = {_label(run.levels): deciding(run.scenario) for run in of_cells}
+        of_cells = self.cells()
+        cells = {label: deciding(scenario) for label, scenario in of_cells.items()}
         seeds = list(dict.fromkeys(run.seed for run in self.runs))
         factors = {name: list(levels) for name, levels in self.factors.items()}
-        files = dict(item for run in of_cells for item in file_digests(run.scenario).items())
+        files = dict(item for scenario in of_cells.values() for item in file_digests(scenario).items())
         told = {"factors": factors, "baseline": dict(self.baseline), "seeds": seeds, "files": files, "cells": cells}
-        methods = dict(item for run in of_cells for item in build.own_methods(run.scenario).items())
+        methods = dict(item for scenario in of_cells.values() for item in build.own_methods(scenario).items())
         return {**told, "own_methods": methods} if methods else told
 
 

@@ -10,6 +10,7 @@ from fogsim.metrics.run_metrics import (
     RunSummary,
     TrafficRunMetrics,
     metric_keys,
+    metric_topics,
 )
 from fogsim.metrics.step_metrics import DEFAULT_STANDARD, step_metrics
 from fogsim.metrics.surrogate import (
@@ -37,6 +38,7 @@ __all__ = [
     "TrafficRunMetrics",
     "deceleration_rate_to_avoid_crash",
     "metric_keys",
+    "metric_topics",
     "modified_deceleration_rate_to_avoid_crash",
     "potential_collision_speed",
     "step_metrics",

@@ -279,6 +279,11 @@ def metric_keys() -> tuple[str, ...]:
     return tuple(dict.fromkeys((*RunMetrics().summary().meanings, *TrafficRunMetrics().summary().meanings)))
 
 
+def metric_topics() -> dict[str, tuple[str, ...]]:
+    """Keys of ``metrics.json`` by topic, the name of their metric in `METRICS` in words."""
+    return {name.replace("_", " "): tuple(make(DEFAULT_STANDARD).meanings) for name, make in METRICS.items()}
+
+
 def _elapsed(last: TrafficStep | None, step: TrafficStep) -> float | None:
     """Time since the step before [s]; None if it is the same."""
     if last is None:

@@ -277,9 +277,7 @@ def _changes(fog: Fog, ground: float) -> tuple[FogChange, ...]:
 
 
 def _patches(patches: Patches) -> FogPatches:
-    return FogPatches(
-        patches.correlation_length_m, patches.correlation_height_m, patches.strength, patches.seed or 0
-    )
+    return FogPatches(patches.correlation_length_m, patches.correlation_height_m, patches.strength, patches.seed or 0)
 
 
 def _velocity(wind: Wind) -> tuple[float, float]:

@@ -5,6 +5,7 @@ from html import escape
 
 from fogsim.study.comparison import Difference, number_of
 from fogsim.study.drawing import Grid
+from fogsim.study.event_counts import event_count, rows_of_cells
 from fogsim.study.main_metrics import metric_words, signed
 from fogsim.study.plan import Study
 from fogsim.study.table import Row
@@ -19,9 +20,7 @@ def main_tables(
 ) -> str:
     """Means and differences of metrics: a table per combination of the other factors, a column per policy."""
     grid = Grid(study)
-    of_cell: dict[tuple[str, ...], list[Row]] = {}
-    for row in rows:
-        of_cell.setdefault(tuple(str(row[name]) for name in study.factors), []).append(row)
+    of_cell = rows_of_cells(study, rows)
     found = {(one.metric, tuple(one.levels.values())): one for one in differences}
     parts = ["<h2>Main metrics</h2>"]
     for panel, title in grid.panels.items():
@@ -45,6 +44,8 @@ def _mean_cell(study: Study, metric: str, rows: Sequence[Row], one: Difference |
     scale = metric_words(metric).scale
     values = [v for row in rows if (v := number_of(row.get(metric))) is not None]
     text = f"{scale * sum(values) / len(values):.3g}" if values else "–"
+    count = event_count(metric, rows)
+    text += "" if count is None else f"<br><small>{_events(count)}</small>"
     if one is None:
         return text
     said = signed(scale * one.difference)
@@ -53,8 +54,15 @@ def _mean_cell(study: Study, metric: str, rows: Sequence[Row], one: Difference |
     return f"{text}<br><small>{f'<b>{said}</b>' if one.is_shown(study.confidence) else said}</small>"
 
 
-def comparison_table(study: Study, differences: Sequence[Difference], remarks: Mapping[str, str]) -> str:
-    """Every comparison with its interval, p-values and required number of seeds, in the metric's own unit."""
+def _events(count: int) -> str:
+    return f"{count} event{'' if count == 1 else 's'}"
+
+
+def comparison_table(
+    study: Study, rows: Sequence[Row], differences: Sequence[Difference], remarks: Mapping[str, str]
+) -> str:
+    """Every comparison with its interval, p-values, events and required seeds, in the metric's own unit."""
+    cells = rows_of_cells(study, rows)
     numbers = ("baseline", "mean", "difference", f"{study.confidence:.0%} interval", "p", "p adjusted", "seeds")
     head = ["metric", *study.factors, *numbers, f"seeds for ± {study.wanted_interval:.0%}"]
     body = []
@@ -63,12 +71,19 @@ def comparison_table(study: Study, differences: Sequence[Difference], remarks: M
         body.append(
             [
                 *(escape(text) for text in (one.metric, *one.levels.values())),
-                *(f"{one.baseline_mean:.3g}", f"{one.mean:.3g}", f"{one.difference:+.3g}", escape(interval)),
+                _with_events(one.baseline_mean, one.metric, cells[tuple({**one.levels, **study.baseline}.values())]),
+                _with_events(one.mean, one.metric, cells[tuple(one.levels.values())]),
+                *(f"{one.difference:+.3g}", escape(interval)),
                 *(_shown(one.p_value), _shown(one.adjusted_p_value), str(one.pairs)),
                 "–" if one.seeds_for_half_width is None else str(one.seeds_for_half_width),
             ]
         )
     return _table(head, body, texts=1 + len(study.factors))
+
+
+def _with_events(mean: float, metric: str, rows: Sequence[Row]) -> str:
+    count = event_count(metric, rows)
+    return f"{mean:.3g}" if count is None else f"{mean:.3g}<br><small>{_events(count)}</small>"
 
 
 def plain_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -5,7 +5,9 @@ from html import escape
 
 from fogsim.study.comparison import Difference
 from fogsim.study.drawing import Grid
+from fogsim.study.event_counts import scarce_events
 from fogsim.study.main_metrics import MetricWords, metric_words, signed
+from fogsim.study.methods import empty_start
 from fogsim.study.plan import Study
 from fogsim.study.table import Row
 
@@ -17,10 +19,18 @@ def summary(study: Study, rows: Sequence[Row], differences: Sequence[Difference]
         [
             "<h2>Summary</h2>",
             f"<p>{escape(_compared(study, rows))}</p>",
+            *(f'<p class="warning">{escape(line)}</p>' for line in _warnings(study, rows, differences)),
             *_findings(study, telling),
             *_doubts(study, telling),
         ]
     )
+
+
+def _warnings(study: Study, rows: Sequence[Row], differences: Sequence[Difference]) -> list[str]:
+    """Reasons for which the study may show nothing, or something else than it seems."""
+    done = [row for row in rows if row["status"] == "complete"]
+    empty = dict.fromkeys(filter(None, map(empty_start, study.cells().values())))
+    return [*empty, *scarce_events(study, done, differences)]
 
 
 def _compared(study: Study, rows: Sequence[Row]) -> str:

@@ -132,7 +132,7 @@ def test_the_report_says_what_is_shown_and_no_more(study: Study, folder: Path) -
     assert len(re.findall(r"Mean speed of all \[km/h\]: lower with slow &lt;1&gt; \(−1[78][.\d]*\)", summary)) == 2
     assert summary.count("No difference of any could be shown in: Collisions of all.") == 2
     assert "4 of 6 comparisons that vary" in summary
-    assert "Run without a camera, which nothing in them goes by: all." in page
+    assert "No camera is simulated, since neither advice nor lamps depend on it." in page
     assert "advice=&lt;slow&gt;" in page
     assert "fogsim study study.yaml --out" in page
     comparison = table(folder / "comparison.csv")

@@ -45,8 +45,8 @@ def study_command(
 ) -> None:
     """Run a grid of policies, fogs, drivers and seeds, and write a table, differences with intervals, and a report."""
     from fogsim.registry.user_code import import_nothing
+    from fogsim.scenario.wording.sentences import empty_start
     from fogsim.study import RayCluster, load_study, run_study
-    from fogsim.study.methods import empty_start
 
     if address is not None and engine is EngineName.POOL:
         raise InputError("--address is a Ray cluster's: give --engine ray with it")

@@ -281,7 +281,8 @@ def metric_keys() -> tuple[str, ...]:
 
 def metric_topics() -> dict[str, tuple[str, ...]]:
     """Keys of ``metrics.json`` by topic, the name of their metric in `METRICS` in words."""
-    return {name.replace("_", " "): tuple(make(DEFAULT_STANDARD).meanings) for name, make in METRICS.items()}
+    keys = {name: RunMetrics(names=[name]).summary().values for name in METRICS}
+    return {name.replace("_", " "): tuple(key for key in of if key != "ending") for name, of in keys.items()}
 
 
 def _elapsed(last: TrafficStep | None, step: TrafficStep) -> float | None:

@@ -29,7 +29,6 @@ h3 { font-size: 1rem; margin: 1.2rem 0 .3rem; }
 .scrolls small { color: #5d6975; } .scrolls small b { color: #1c2733; }
 figure { max-width: 52rem; }
 p.warning { background: #fff4d6; border-left: 4px solid #e0a100; margin: .5rem 0; padding: .4rem .8rem; }
-details { margin: .8rem 0; } summary { cursor: pointer; font-weight: 600; color: #44505c; }
 ul { margin: .2rem 0; padding-left: 1.2rem; } code { overflow-wrap: anywhere; }
 """
 

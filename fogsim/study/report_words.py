@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 from html import escape
 
+from fogsim.scenario.wording.sentences import empty_start
 from fogsim.study.comparison import Difference
 from fogsim.study.drawing import Grid
 from fogsim.study.event_counts import scarce_events
 from fogsim.study.main_metrics import MetricWords, metric_words, signed
-from fogsim.study.methods import empty_start
 from fogsim.study.plan import Study
 from fogsim.study.table import Row
 

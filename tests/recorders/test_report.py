@@ -11,7 +11,8 @@ from PIL import Image
 
 from fogsim.metrics import RunMetrics, step_metrics
 from fogsim.recorders import ReportRecorder, RunDirectory, RunInformation, versions
-from fogsim.recorders.report_data import MOST_PICTURES, Album
+from fogsim.recorders.report import _key_numbers
+from fogsim.recorders.report_data import MOST_PICTURES, Album, DecisiveFrames
 from fogsim.values import Step
 from tests.recorders.synthetic import METHODS, drive, make_step
 
@@ -73,7 +74,18 @@ def test_a_report_is_whole_and_loads_nothing(tmp_path: Path) -> None:
     assert "link" not in page.tags
     assert page.links == []
     assert re.search(r"https?://|url\(|@import", text) is None
-    assert len(page.images) == 4 + MOST_PICTURES
+    assert (
+        text.index('class="numbers"')
+        < text.index("Timeline")
+        < text.index("Decisive frames")
+        < text.index("All metrics")
+    )
+    assert (
+        len(page.images)
+        == 4
+        + len(re.findall("Hardest braking|First frame|Least time to collision: |Collision of", page.text))
+        + MOST_PICTURES
+    )
     for source in page.images:
         kind, data = source.split(",", 1)
         assert kind == "data:image/png;base64"
@@ -88,6 +100,32 @@ def test_it_shows_metrics_with_units_methods_seed_and_versions(tmp_path: Path) -
         assert method in text
     assert "seed 11" in text
     assert f"numpy {versions()['numpy']}" in text
+
+
+def test_it_opens_with_the_least_time_to_any_leader_moving_or_standing() -> None:
+    metrics = {"ego_collisions": 0, "minimum_time_to_collision_s": 42.2, "minimum_queue_time_to_collision_s": 2.5}
+    page = Page(_key_numbers({**metrics, "traffic_minimum_time_to_collision_s": 1.0, "belief_coverage_share": 0.9}, {}))
+    assert page.text == (
+        "0collisions of the ego2.5 sleast time to collision, with standing leaders too90 %of its 90 % intervals hold the truth"
+    )
+
+
+def test_decisive_frames_are_those_of_the_extremes_in_order_of_time() -> None:
+    steps = [
+        make_step(0, time=0.0, visibility_ahead=900.0),
+        make_step(1, time=1.0, visibility_ahead=150.0),
+        make_step(2, time=2.0, visibility_ahead=100.0, acceleration=-4.0),
+        make_step(3, time=3.0, visibility_ahead=90.0, acceleration=-2.0),
+    ]
+    frames = DecisiveFrames()
+    for step, left in zip(steps, (9.0, 5.0, None, 3.0), strict=True):
+        frames.add(step, {"time_to_collision_s": left})
+    said = [(caption.partition(":")[0], one.time) for caption, one in frames.in_order()]
+    assert said == [
+        ("First frame with less than 200 m of visibility ahead", 1.0),
+        ("Hardest braking", 2.0),
+        ("Least time to collision", 3.0),
+    ]
 
 
 def test_pictures_say_where_and_what_was_true_and_believed(tmp_path: Path) -> None:

@@ -7,11 +7,12 @@ from typer.testing import CliRunner
 
 from fogsim.cli.app import app
 from fogsim.scenario import load_scenario
-from fogsim.scenario.non_defaults import non_default_settings
+from fogsim.scenario.wording.non_defaults import non_default_settings
+from fogsim.scenario.wording.sentences import empty_start
 from fogsim.study import load_study
 from fogsim.study.comparison import compare_to_baseline
 from fogsim.study.event_counts import event_count, scarce_events
-from fogsim.study.methods import empty_start, study_methods
+from fogsim.study.methods import study_methods
 from fogsim.study.plan import Study
 
 ALONE = """

@@ -74,18 +74,11 @@ def test_a_report_is_whole_and_loads_nothing(tmp_path: Path) -> None:
     assert "link" not in page.tags
     assert page.links == []
     assert re.search(r"https?://|url\(|@import", text) is None
-    assert (
-        text.index('class="numbers"')
-        < text.index("Timeline")
-        < text.index("Decisive frames")
-        < text.index("All metrics")
-    )
-    assert (
-        len(page.images)
-        == 4
-        + len(re.findall("Hardest braking|First frame|Least time to collision: |Collision of", page.text))
-        + MOST_PICTURES
-    )
+    places = [text.index(part) for part in ('class="numbers"', "Timeline", "Decisive frames", "All metrics")]
+    assert places == sorted(places)
+    decisive = text[places[2] : text.index("What the camera saw")].count("<figure")
+    assert decisive >= 1
+    assert len(page.images) == 4 + decisive + MOST_PICTURES
     for source in page.images:
         kind, data = source.split(",", 1)
         assert kind == "data:image/png;base64"
@@ -105,9 +98,9 @@ def test_it_shows_metrics_with_units_methods_seed_and_versions(tmp_path: Path) -
 def test_it_opens_with_the_least_time_to_any_leader_moving_or_standing() -> None:
     metrics = {"ego_collisions": 0, "minimum_time_to_collision_s": 42.2, "minimum_queue_time_to_collision_s": 2.5}
     page = Page(_key_numbers({**metrics, "traffic_minimum_time_to_collision_s": 1.0, "belief_coverage_share": 0.9}, {}))
-    assert page.text == (
-        "0collisions of the ego2.5 sleast time to collision, with standing leaders too90 %of its 90 % intervals hold the truth"
-    )
+    for number in ("0collisions of the ego", "2.5 sleast time to collision", "90 %of its 90 % intervals"):
+        assert number in page.text
+    assert "1 s" not in page.text
 
 
 def test_decisive_frames_are_those_of_the_extremes_in_order_of_time() -> None:

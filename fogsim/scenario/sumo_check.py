@@ -139,7 +139,7 @@ def _way(scenario: Scenario, demand: Demand) -> tuple[str, ...]:
 def _unknown_edges(scenario: Scenario, edges: NetEdges) -> dict[KeyPath, str]:
     """Edges of ``traffic.along`` that the network does not have, or that do not follow the one before."""
     along = scenario.traffic.along
-    unknown = {
+    unknown: dict[KeyPath, str] = {
         ("traffic", "along", i): f"the net has no edge {shown(edge)}; {_suggested(edge, edges.lanes)}"
         for i, edge in enumerate(along)
         if edge not in edges.lanes

@@ -3,18 +3,18 @@
 import math
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from fogsim.study.comparison import Difference, number_of
 from fogsim.study.main_metrics import metric_words
 from fogsim.study.plan import Study
 from fogsim.study.table import Row
 
-_EVENTS = re.compile(r".*(collisions|conflicts|encroachments)(_below_\d+_s)?(_per_(?P<per>\w+))?")
+_EVENTS = re.compile(r".*(collisions|conflicts|encroachments|events)(_below_\d+_s)?(_per_(?P<per>\w+))?")
 _DENOMINATORS: Mapping[str | None, tuple[str, float]] = {
     "vehicle_km": ("traffic_vehicle_distance_m", 1e3),
     "million_vehicle_km": ("traffic_vehicle_distance_m", 1e9),
     "vehicle_h": ("traffic_vehicle_time_s", 3600.0),
+    "cohort_vehicle": ("traffic_cohort_vehicles", 1.0),
 }
 """Metric that a rate's events are divided by, and how much of it is one unit."""
 
@@ -51,10 +51,11 @@ def scarce_events(study: Study, rows: Sequence[Row], differences: Sequence[Diffe
     none, few = [], []
     for metric in dict.fromkeys(one.metric for one in differences):
         words = metric_words(metric)
-        counts = [_both(study, cells, one) for one in differences if one.metric == metric]
-        if words.better == "less" and not any(number_of(row.get(metric)) for row in rows):
+        both = [events_of_both(study, cells, one) for one in differences if one.metric == metric]
+        counts = [of_baseline + here for of_baseline, here in both if of_baseline is not None and here is not None]
+        if words.better in {"less", "lower"} and not any(number_of(row.get(metric)) for row in rows):
             none.append(words.label)
-        elif counts and None not in counts and (most := max(filter(None, counts), default=0)) < needed:
+        elif counts and (most := max(counts)) < needed:
             few.append(f"{words.label} (at most {most})")
     kilometres = math.fsum(number_of(row.get("traffic_vehicle_distance_m")) or 0.0 for row in rows) / 1000.0
     advice = "raise the demand, add an incident, or choose another metric."
@@ -67,9 +68,9 @@ def scarce_events(study: Study, rows: Sequence[Row], differences: Sequence[Diffe
     ]
 
 
-def _both(study: Study, cells: Mapping[tuple[str, ...], Sequence[Row]], one: Difference) -> int | None:
-    """Events in a cell and in the baseline that it is compared to."""
-    levels: dict[str, Any] = dict(one.levels)
-    both = [tuple(levels.values()), tuple({**levels, **study.baseline}.values())]
-    counts = [event_count(one.metric, cells[cell]) for cell in both]
-    return None if None in counts else sum(count for count in counts if count is not None)
+def events_of_both(
+    study: Study, cells: Mapping[tuple[str, ...], Sequence[Row]], one: Difference
+) -> tuple[int | None, int | None]:
+    """Events under the baseline and in the cell that is compared to it; None if the metric counts none."""
+    of_baseline, here = tuple({**one.levels, **study.baseline}.values()), tuple(one.levels.values())
+    return event_count(one.metric, cells[of_baseline]), event_count(one.metric, cells[here])

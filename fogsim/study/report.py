@@ -11,6 +11,7 @@ from fogsim.metrics import metric_topics
 from fogsim.recorders.report import PAGE_STYLE
 from fogsim.study.comparison import Difference, adjust_p_values, compare_to_baseline, numeric_metrics, uninformative
 from fogsim.study.drawing import StudyFigure
+from fogsim.study.event_counts import events_of_both, rows_of_cells
 from fogsim.study.figures import differences_figure, trade_off_figure
 from fogsim.study.main_metrics import DELAY_METRICS, SAFETY_METRICS, main_metrics
 from fogsim.study.methods import write_methods
@@ -59,7 +60,7 @@ def write_report(study: Study, rows: Sequence[Row], profiles: Mapping[Cell, Pool
     others = [] if study.metrics else [name for name in known if name not in main]
     remarks = uninformative(done, [*main, *others])
     differences = adjust_p_values(compare_to_baseline(study, done, main)) + compare_to_baseline(study, done, others)
-    _write_comparison(study, differences, remarks, folder)
+    _write_comparison(study, done, differences, remarks, folder)
     telling = [one for one in differences if one.metric in main and one.metric not in remarks]
     figures = [*_figures(study, done, remarks, profiles, telling)]
     (folder / "figures").mkdir(exist_ok=True)
@@ -70,19 +71,26 @@ def write_report(study: Study, rows: Sequence[Row], profiles: Mapping[Cell, Pool
 
 
 def _write_comparison(
-    study: Study, differences: Sequence[Difference], remarks: Mapping[str, str], folder: Path
+    study: Study,
+    rows: Sequence[Row],
+    differences: Sequence[Difference],
+    remarks: Mapping[str, str],
+    folder: Path,
 ) -> None:
     names = ("metric", "baseline_mean", "mean", "difference", "low", "high", "p_value", "p_value_adjusted", "pairs")
+    events = ("baseline_events", "events")
     seeds = f"seeds_for_{100 * study.wanted_interval:g}_percent"
-    rows = [
+    cells = rows_of_cells(study, rows)
+    lines = [
         [
             *(one.levels[name] for name in study.factors),
             *(one.metric, one.baseline_mean, one.mean, one.difference, one.low, one.high),
-            *(one.p_value, one.adjusted_p_value, one.pairs, one.seeds_for_half_width, remarks.get(one.metric)),
+            *(one.p_value, one.adjusted_p_value, one.pairs, one.seeds_for_half_width),
+            *(*events_of_both(study, cells, one), remarks.get(one.metric)),
         ]
         for one in differences
     ]
-    write_csv(folder / "comparison.csv", [*study.factors, *names, seeds, "remark"], rows)
+    write_csv(folder / "comparison.csv", [*study.factors, *names, seeds, *events, "remark"], lines)
 
 
 def _figures(

@@ -5,7 +5,7 @@ from html import escape
 
 from fogsim.study.comparison import Difference, number_of
 from fogsim.study.drawing import Grid
-from fogsim.study.event_counts import event_count, rows_of_cells
+from fogsim.study.event_counts import event_count, events_of_both, rows_of_cells
 from fogsim.study.main_metrics import metric_words, signed
 from fogsim.study.plan import Study
 from fogsim.study.table import Row
@@ -71,8 +71,7 @@ def comparison_table(
         body.append(
             [
                 *(escape(text) for text in (one.metric, *one.levels.values())),
-                _with_events(one.baseline_mean, one.metric, cells[tuple({**one.levels, **study.baseline}.values())]),
-                _with_events(one.mean, one.metric, cells[tuple(one.levels.values())]),
+                *map(_with_events, (one.baseline_mean, one.mean), events_of_both(study, cells, one)),
                 *(f"{one.difference:+.3g}", escape(interval)),
                 *(_shown(one.p_value), _shown(one.adjusted_p_value), str(one.pairs)),
                 "–" if one.seeds_for_half_width is None else str(one.seeds_for_half_width),
@@ -81,8 +80,7 @@ def comparison_table(
     return _table(head, body, texts=1 + len(study.factors))
 
 
-def _with_events(mean: float, metric: str, rows: Sequence[Row]) -> str:
-    count = event_count(metric, rows)
+def _with_events(mean: float, count: int | None) -> str:
     return f"{mean:.3g}" if count is None else f"{mean:.3g}<br><small>{_events(count)}</small>"
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from fogsim.study.comparison import Difference, number_of
 from fogsim.study.main_metrics import metric_words
 from fogsim.study.plan import Study
-from fogsim.study.table import Row
+from fogsim.study.table import Row, rows_of_cells
 
 _EVENTS = re.compile(r".*(collisions|conflicts|encroachments|events)(_below_\d+_s)?(_per_(?P<per>\w+))?")
 _DENOMINATORS: Mapping[str | None, tuple[str, float]] = {
@@ -34,20 +34,12 @@ def event_count(metric: str, rows: Sequence[Row]) -> int | None:
     return round(math.fsum(counts)) if counts else None
 
 
-def rows_of_cells(study: Study, rows: Sequence[Row]) -> dict[tuple[str, ...], list[Row]]:
-    """Rows by the levels of all factors."""
-    cells: dict[tuple[str, ...], list[Row]] = {}
-    for row in rows:
-        cells.setdefault(tuple(str(row[name]) for name in study.factors), []).append(row)
-    return cells
-
-
 def scarce_events(study: Study, rows: Sequence[Row], differences: Sequence[Difference]) -> list[str]:
     """A line for metrics without any event, and one for those with too few in every comparison to show a difference.
 
     With n events, at most n seeds differ, and the paired permutation test cannot give less than 2^(1 − n).
     """
-    cells, needed = rows_of_cells(study, rows), 1 + math.ceil(-math.log2(1.0 - study.confidence))
+    cells, needed = rows_of_cells(study.factors, rows), 1 + math.ceil(-math.log2(1.0 - study.confidence))
     none, few = [], []
     for metric in dict.fromkeys(one.metric for one in differences):
         words = metric_words(metric)

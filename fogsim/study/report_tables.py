@@ -5,10 +5,10 @@ from html import escape
 
 from fogsim.study.comparison import Difference, number_of
 from fogsim.study.drawing import Grid
-from fogsim.study.event_counts import event_count, events_of_both, rows_of_cells
+from fogsim.study.event_counts import event_count, events_of_both
 from fogsim.study.main_metrics import metric_words, signed
 from fogsim.study.plan import Study
-from fogsim.study.table import Row
+from fogsim.study.table import Row, rows_of_cells
 
 
 def main_tables(
@@ -20,7 +20,7 @@ def main_tables(
 ) -> str:
     """Means and differences of metrics: a table per combination of the other factors, a column per policy."""
     grid = Grid(study)
-    of_cell = rows_of_cells(study, rows)
+    of_cell = rows_of_cells(study.factors, rows)
     found = {(one.metric, tuple(one.levels.values())): one for one in differences}
     parts = ["<h2>Main metrics</h2>"]
     for panel, title in grid.panels.items():
@@ -62,7 +62,7 @@ def comparison_table(
     study: Study, rows: Sequence[Row], differences: Sequence[Difference], remarks: Mapping[str, str]
 ) -> str:
     """Every comparison with its interval, p-values, events and required seeds, in the metric's own unit."""
-    cells = rows_of_cells(study, rows)
+    cells = rows_of_cells(study.factors, rows)
     numbers = ("baseline", "mean", "difference", f"{study.confidence:.0%} interval", "p", "p adjusted", "seeds")
     head = ["metric", *study.factors, *numbers, f"seeds for ± {study.wanted_interval:.0%}"]
     body = []

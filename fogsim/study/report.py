@@ -11,14 +11,13 @@ from fogsim.metrics import metric_topics
 from fogsim.recorders.report import PAGE_STYLE
 from fogsim.study.comparison import Difference, adjust_p_values, compare_to_baseline, numeric_metrics, uninformative
 from fogsim.study.drawing import StudyFigure
-from fogsim.study.event_counts import events_of_both
 from fogsim.study.figures import differences_figure, trade_off_figure
 from fogsim.study.main_metrics import DELAY_METRICS, SAFETY_METRICS, main_metrics
 from fogsim.study.methods import write_methods
 from fogsim.study.plan import Study
 from fogsim.study.pooled_profiles import Cell, PooledProfiles
 from fogsim.study.profile_figures import collisions_figure, speed_figure, survival_figure
-from fogsim.study.report_tables import comparison_table, main_tables, plain_table
+from fogsim.study.report_tables import comparison_table, events_of_both, main_tables, plain_table
 from fogsim.study.report_words import summary
 from fogsim.study.table import Row, rows_of_cells, write_csv
 

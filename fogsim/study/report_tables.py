@@ -1,14 +1,24 @@
 """Tables of a study's report."""
 
+import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
 from fogsim.study.comparison import Difference, number_of
 from fogsim.study.drawing import Grid
-from fogsim.study.event_counts import event_count, events_of_both
 from fogsim.study.main_metrics import metric_words, signed
 from fogsim.study.plan import Study
 from fogsim.study.table import Row, rows_of_cells
+
+_EVENTS = re.compile(r".*(collisions|conflicts|encroachments|events)(_below_\d+_s)?(_per_(?P<per>\w+))?")
+_DENOMINATORS: Mapping[str | None, tuple[str, float]] = {
+    "vehicle_km": ("traffic_vehicle_distance_m", 1e3),
+    "million_vehicle_km": ("traffic_vehicle_distance_m", 1e9),
+    "vehicle_h": ("traffic_vehicle_time_s", 3600.0),
+    "cohort_vehicle": ("traffic_cohort_vehicles", 1.0),
+}
+"""Metric that a rate's events are divided by, and how much of it is one unit."""
 
 
 def main_tables(
@@ -52,6 +62,29 @@ def _mean_cell(study: Study, metric: str, rows: Sequence[Row], one: Difference |
     if one.low is not None and one.high is not None:
         said += f"<br>({signed(scale * one.low, 2)} … {signed(scale * one.high, 2)})"
     return f"{text}<br><small>{f'<b>{said}</b>' if one.is_shown(study.confidence) else said}</small>"
+
+
+def event_count(metric: str, rows: Sequence[Row]) -> int | None:
+    """Events behind a metric in all runs together; None if it counts none, or no run has it."""
+    found = _EVENTS.fullmatch(metric)
+    if found is None or (found["per"] and found["per"] not in _DENOMINATORS):
+        return None
+    key, unit = _DENOMINATORS.get(found["per"], ("", 1.0))
+    counts = [
+        value * (of / unit)
+        for row in rows
+        if (value := number_of(row.get(metric))) is not None
+        and (of := number_of(row.get(key)) if key else 1.0) is not None
+    ]
+    return round(math.fsum(counts)) if counts else None
+
+
+def events_of_both(
+    study: Study, cells: Mapping[tuple[str, ...], Sequence[Row]], one: Difference
+) -> tuple[int | None, int | None]:
+    """Events under the baseline and in the cell that is compared to it; None if the metric counts none."""
+    of_baseline, here = tuple({**one.levels, **study.baseline}.values()), tuple(one.levels.values())
+    return event_count(one.metric, cells[of_baseline]), event_count(one.metric, cells[here])
 
 
 def _events(count: int) -> str:

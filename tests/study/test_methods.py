@@ -93,7 +93,7 @@ def test_events_that_are_too_few_to_differ_are_reported_with_their_number(study:
     metrics = ["collisions", "traffic_conflicts_per_vehicle_km"]
     rare, common = rows_of(study, (0.5, 0.25, 0.0, 0.5)), rows_of(study, (0.5, 0.25, 0.0, 1.0))
     none, few = scarce_events(study, rare, compare_to_baseline(study, rare, metrics))
-    assert "no such event in any of its 4 runs (16 vehicle-km): Collisions of all." in none
+    assert "no such event in any of its 4 runs (16 vehicle-km): Collisions of all" in none
     # 2^(1 − 6) is the largest power of two below 0.05.
     assert "Fewer than the 6 events" in few
     assert "(at most 5)" in few

@@ -120,7 +120,8 @@ def _shares(numbers: Mapping[str, float]) -> str:
 def _fog_words(scenario: Scenario) -> str:
     fog, outside = scenario.fog, scenario.fog.outside_visibility_m
     if fog.visibility_m is not None:
-        text = "Clear air" if math.isinf(fog.visibility_m) else f"Fog of {fog.visibility_m:g} m everywhere"
+        everywhere = f"Meteorological visibility {fog.visibility_m:g} m everywhere"
+        text = "Clear air" if math.isinf(fog.visibility_m) else everywhere
     else:
         banks = "; ".join(
             f"{one.visibility_m:g} m from {one.start_m:g} to {one.end_m:g} m (edges of {one.edge_m:g} m)"
@@ -168,7 +169,7 @@ def _advice_words(scenario: Scenario) -> str:
     advice, drivers = scenario.advice, scenario.drivers
     if advice.method == "none":
         return "No speed is advised."
-    informed = {"belief": "the ego's belief", "truth": "the true visibility at the meters", "sensors": "sensor reports"}
+    informed = {"belief": "the ego's belief", "truth": "the true visibility", "sensors": "sensor reports"}
     given = f" with {shown_value(advice.parameters)}" if advice.parameters else ""
     text = f"{advice.method}{given}{_cited(ADVISERS, [advice.method])}, informed by {informed[advice.informed_by]}; "
     text += f"advised: {drivers.advised}."
@@ -193,7 +194,7 @@ def _driver_words(scenario: Scenario) -> str:
         else "Drivers react to a leader only once the fog lets them see it (Koschmieder for bodies, Allard for lamps), "
         f"{drivers.reaction_time_s:g} s after it comes into sight"
     )
-    obeyed = ", ".join(f"{key} {shown_value(value)}" for key, value in drivers.compliance)
+    obeyed = ", ".join(f"{key} {shown_value(value)}" for key, value in drivers.compliance if key != "like")
     return (
         f"{sight}. Speed choice: {drivers.speed_choice}{_cited(SPEED_CHOICES, [drivers.speed_choice])}, with a factor "
         f"for each driver (log-standard deviation {drivers.speed_spread:g}). Car following: {_shares(kinds)}"

@@ -176,12 +176,13 @@ class TrafficRun:
             If SUMO cannot start, or runs already in this process.
         """
         self._step = None
+        streams = spawn_streams(seed)
+        self._fog = build.fog_of_run(self._scenario, self._fog, streams.patch_seed)
         self._timeline, self._fog_now = Timeline(self._scenario), self._fog
         self._cohort = _CohortWatch(self._scenario.traffic.cohort_s)
         self._drivers_fog.restart()
         if not self._drivers_fog.is_about(self._fog):
             self._drivers_fog.enter(self._fog, self._traffic)
-        streams = spawn_streams(seed)
         self._reporters.reset(streams.reports)
         self._section_meters.reset()
         self._traffic.start(streams.traffic_seed)

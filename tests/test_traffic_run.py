@@ -134,6 +134,7 @@ def test_signs_along_named_edges_go_each_by_its_own_meter() -> None:
             r"traffic.events.0.at_gap_to_ego_m: a gap to the ego needs an ego",
         ),
         (("traffic.along=[bnk]",), r"traffic.along.0: the net has no edge 'bnk'; did you mean 'bank'"),
+        (('traffic.along=["bank","approach"]',), r"along.1: the net has no lane that leads from edge 'bank'"),
         (
             ("traffic.ego=ego", "traffic.warm_up_s=5", "estimators=[negru2013]"),
             r"traffic: warm_up_s: goes with ego: none, and the ego is 'ego'",
@@ -196,3 +197,11 @@ def test_vehicles_of_a_cohort_that_have_not_left_in_time_are_unfinished(tmp_path
     keys = ("clocks.traffic_step_s=0.5", "clocks.camera_period_s=0.5", "traffic.cohort_s=6", "duration_s=8")
     found = measure_run(scenario_from_config(config, "none", [EVEN, *keys]), 1)["metrics"]
     assert (found["ending"], found["traffic_cohort_vehicles"], found["traffic_cohort_unfinished"]) == ("time", 3, 3)
+
+
+@pytest.mark.parametrize(("written", "differ"), [("", True), (", seed: 4", False)])
+def test_patches_are_drawn_for_each_seed_unless_theirs_is_written(written: str, differ: bool) -> None:
+    with TrafficRun(alone(f"fog={{visibility_m: 60, patches: {{correlation_length_m: 50{written}}}}}")) as run:
+        fogs = [run.start(seed)[0].truth.fog for seed in (1, 2, 1)]
+    assert fogs[0] == fogs[2]
+    assert (fogs[0] != fogs[1]) is differ

@@ -10,6 +10,7 @@ from fogsim.metrics.run_metrics import (
     RunSummary,
     TrafficRunMetrics,
     metric_definitions,
+    metric_topics,
 )
 from fogsim.metrics.safety import DEFAULT_STANDARD, step_metrics
 from fogsim.metrics.surrogate import (
@@ -41,6 +42,7 @@ __all__ = [
     "crash_potential",
     "deceleration_rate_to_avoid_crash",
     "metric_definitions",
+    "metric_topics",
     "modified_deceleration_rate_to_avoid_crash",
     "potential_collision_speed",
     "step_metrics",

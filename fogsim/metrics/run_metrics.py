@@ -10,7 +10,7 @@ from fogsim.metrics.cross_sections import TrafficThroughput
 from fogsim.metrics.crossing import TrafficEncroachment
 from fogsim.metrics.estimation import BeliefAheadError, BeliefError, DenseFogKnown, EquippedBelief, EstimatorErrors
 from fogsim.metrics.lighting import Lighting
-from fogsim.metrics.metric import Definition, JsonValue, Metric, Sample
+from fogsim.metrics.metric import Definition, JsonValue, Metric, Sample, definitions_of
 from fogsim.metrics.motion import Comfort, Compliance, Motion
 from fogsim.metrics.safety import DEFAULT_STANDARD, Collisions, Conflict, Sight, step_metrics
 from fogsim.metrics.surrogate import SafetyStandard
@@ -277,6 +277,11 @@ class TrafficRunMetrics(MetricsOfRun[TrafficStep]):
 def metric_definitions() -> Mapping[str, Definition]:
     """Definitions of all keys of ``metrics.json``; `estimators` has a block for each method."""
     return RunMetrics().summary().definitions
+
+
+def metric_topics() -> dict[str, tuple[str, ...]]:
+    """Keys of ``metrics.json`` by topic, the name of their metric in words."""
+    return {name.replace("_", " "): tuple(definitions_of(name)) for name in METRICS}
 
 
 def _elapsed(last: TrafficStep | None, step: TrafficStep) -> float | None:

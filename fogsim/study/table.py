@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import pyarrow as pa
@@ -21,6 +21,15 @@ Row = Mapping[str, Value]
 def columns(rows: Sequence[Row]) -> list[str]:
     """Names of all columns, in the order in which they first appear."""
     return list(dict.fromkeys(key for row in rows for key in row))
+
+
+def rows_of_cells(factors: Iterable[str], rows: Iterable[Row]) -> dict[tuple[str, ...], list[Row]]:
+    """Rows by the levels of all factors."""
+    names = tuple(factors)
+    cells: dict[tuple[str, ...], list[Row]] = {}
+    for row in rows:
+        cells.setdefault(tuple(str(row[name]) for name in names), []).append(row)
+    return cells
 
 
 FIXED_COLUMNS = frozenset({"run", "seed", "status", "message", "sumo_outputs"})

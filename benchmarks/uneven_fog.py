@@ -20,10 +20,10 @@ import json
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from docs_table import write_table
 from rich.console import Console
 from rich.progress import track
 
@@ -45,7 +45,6 @@ CAMERAS = (
     ("camera.width=800", "camera.height=600", "camera.field_of_view_deg=50", "camera.response=linear"),
 )
 CLEAR_ROADS = ("motorway_fog_bank", "graded_motorway", "clear_day", "ramp_merge")
-DOCS = Path(__file__).resolve().parents[1] / "docs" / "explanation" / "estimators.md"
 Row = dict[str, Any]
 
 
@@ -216,15 +215,6 @@ def table(rows: list[Row]) -> Iterator[str]:
             yield f"\nIn {row['hours']:.2f} h of clear air: {row['false_announcements']} false announcements."
 
 
-def write_docs(rows: list[Row]) -> None:
-    """Write the table into docs/explanation/estimators.md."""
-    text = DOCS.read_text(encoding="utf-8")
-    head, rest = text.split("<!-- table: uneven fog -->\n")
-    _, tail = rest.split("<!-- end of uneven fog -->")
-    body = "\n".join(table(rows))
-    DOCS.write_text(f"{head}<!-- table: uneven fog -->\n\n{body}\n\n<!-- end of uneven fog -->{tail}", encoding="utf-8")
-
-
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -242,7 +232,7 @@ def main() -> None:
         run(drive, arguments.methods, found)
     rows = list(records(found, arguments.pool))
     if arguments.docs:
-        write_docs(rows)
+        write_table("explanation/estimators.md", "uneven fog", table(rows))
     if arguments.json:
         print(json.dumps(rows, indent=2))
     else:

@@ -1,11 +1,15 @@
 """Tables between marks of pages, ``<!-- table: NAME -->`` … ``<!-- end of … -->``, and the line that dates one."""
 
+import contextlib
+import fcntl
 import hashlib
 import os
 import re
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+ROOT = Path(__file__).resolve().parents[1]
 NUMBER = r"\d+(?:\.\d+)?"
 MARK = re.compile(r"<!-- table: (.+?) -->\n")
 END = "<!-- end of "
@@ -31,6 +35,43 @@ def with_block(text: str, name: str, new: str) -> str:
     """A page's text with something else between a table's marks."""
     before, _, after = _parts(text, name)
     return before + new + after
+
+
+@contextlib.contextmanager
+def locked(root: Path) -> Iterator[None]:
+    """Keep other processes from changing pages in the meantime: two commands may finish at the same moment."""
+    folder = os.open(root / "docs", os.O_RDONLY)
+    try:
+        fcntl.flock(folder, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(folder)
+
+
+def replace(page: Path, text: str) -> None:
+    """Write a page whole or, if interrupted, not at all."""
+    new = page.with_suffix(".new")
+    new.write_text(text, encoding="utf-8")
+    new.replace(page)
+
+
+def write_table(page: str | Path, name: str, lines: Iterable[str]) -> None:
+    """Put lines between a table's marks; the page's path is given from docs/."""
+    path = ROOT / "docs" / page
+    with locked(ROOT):
+        replace(path, filled(path.read_text(encoding="utf-8"), name, lines))
+
+
+def filled(text: str, name: str, lines: Iterable[str]) -> str:
+    """A page's text with lines between a table's marks."""
+    return with_block(text, name, "\n" + "\n".join(lines) + "\n\n")
+
+
+def lines_of(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """Lines of a table; each cell is put in one line, its pipes escaped."""
+    cells = ([" ".join(cell.split()).replace("|", r"\|") for cell in row] for row in (headings, *rows))
+    heading, *body = (f"| {' | '.join(row)} |" for row in cells)
+    return [heading, "|" + " --- |" * len(headings), *body]
 
 
 def with_line(text: str, name: str, told: str) -> str:

@@ -2,8 +2,8 @@
 
 They are the modules of this repository that a script imports, and those that these import, also within functions; the
 files of data beside them; the shipped scenarios that they name. What runs is less, since modules import what they may
-need: where digests have changed figures may have moved, and where none has they have not. Imports of scripts in docs/
-are not followed, since these write tables of many kinds.
+need: where digests have changed figures may have moved, and where none has they have not. Scripts in docs/ count only
+where a measurement names them, and their imports are not followed, since these write tables of many kinds.
 """
 
 import ast
@@ -17,7 +17,7 @@ from pathlib import Path
 SOURCES = (
     ("fogsim", "fogsim"),
     ("envs/fogsim_envs", "fogsim_envs"),
-    *((folder, "") for folder in ("benchmarks", "docs", "tests/pictures", "tests/data", "tools")),
+    *((folder, "") for folder in ("benchmarks", "tests/pictures", "tests/data", "tools")),
 )
 """Folders in which imports are looked for, with the package that they are, if any."""
 

@@ -1,6 +1,6 @@
-"""The measured tables of the docs: the command that writes each, how long it takes, and what it rests on.
+"""The measured tables of the docs: the command that writes each, how long it takes, and what it depends on.
 
-A table that has no command, but figures, is in `UNWRITTEN`. Tables that come from the code alone are those of
+Tables whose figures no command writes are in `UNWRITTEN`. Tables that come from the code alone are those of
 docs/make_tables.py and docs/make_gallery.py.
 """
 
@@ -14,18 +14,22 @@ class Measurement:
     Attributes
     ----------
     name : str
-        As the command line has it. What a command needs to go on after an interruption it keeps in
-        ``runs/tables/NAME`` or ``runs/tables/NAME.kept``.
+        Its name on the command line. A command that can resume keeps its results in ``runs/tables/NAME`` or
+        ``runs/tables/NAME.kept``.
     commands : tuple of str
-        Command lines, one after the other, in the checkout.
+        Command lines, run one after the other from the root of the checkout.
     minutes : float
-        About how long they take together on two cores [min].
+        About how long they take together on two cores [min]; a stamp's measured time counts instead.
     rests_on : tuple of str
-        Scripts, modules, data and folders of scenarios; what these import is found.
+        Scripts, modules, data and folders of scenarios; the modules that these import are found.
     tables : tuple of str
-        Names of the tables, as their marks have them; by default the measurement's own.
+        Names of the tables in their marks; by default the measurement's own.
     times : str
-        What in the tables is time on the clock, which is other on each machine and in each run.
+        Which figures are times on the clock, which differ with the machine; the measurement then runs alone.
+    cores : int
+        How many cores its commands keep busy.
+    is_study : bool
+        Whether it is a policy study, which `make tables STUDIES=1` measures.
     """
 
     name: str
@@ -34,6 +38,8 @@ class Measurement:
     rests_on: tuple[str, ...]
     tables: tuple[str, ...] = ()
     times: str = ""
+    cores: int = 1
+    is_study: bool = False
 
     def __post_init__(self) -> None:
         """Name the table."""
@@ -42,13 +48,19 @@ class Measurement:
 
 
 def benchmark(
-    name: str, minutes: float, tables: tuple[str, ...] = (), options: str = "", *, times: str = "", more: str = ""
+    name: str,
+    minutes: float,
+    tables: tuple[str, ...] = (),
+    options: str = "",
+    *,
+    times: str = "",
+    more: str = "",
+    cores: int = 1,
 ) -> Measurement:
     """A script of benchmarks/ that writes its own tables with ``--docs``."""
     command = f"python benchmarks/{name}.py --docs{options}"
-    return Measurement(
-        name, (command, more) if more else (command,), minutes, (f"benchmarks/{name}.py",), tables, times
-    )
+    commands = (command, more) if more else (command,)
+    return Measurement(name, commands, minutes, (f"benchmarks/{name}.py",), tables, times, cores)
 
 
 def study(name: str, minutes: float) -> Measurement:
@@ -56,10 +68,13 @@ def study(name: str, minutes: float) -> Measurement:
     file, folder = f"scenarios/studies/{name}.yaml", f"runs/tables/{name}"
     commands = (f"fogsim study {file} -j 2 --out {folder}", f"python docs/make_study_tables.py {folder}")
     rests_on = (file, "fogsim/cli/study.py", "docs/make_study_tables.py")
-    return Measurement(name, commands, minutes, (*rests_on, *SIMULATIONS.get(name, ())))
+    rests_on = (*rests_on, *SIMULATIONS.get(name, ()))
+    return Measurement(name, commands, minutes, rests_on, cores=2, is_study=True)
 
 
-def environment(name: str, minutes: float, tables: tuple[str, ...], options: str, *rests_on: str) -> Measurement:
+def environment(
+    name: str, minutes: float, tables: tuple[str, ...], options: str, *rests_on: str, cores: int = 1
+) -> Measurement:
     """Tables of docs/make_environment_tables.py."""
     command = f"python docs/make_environment_tables.py --ids {options}"
     return Measurement(
@@ -68,6 +83,7 @@ def environment(name: str, minutes: float, tables: tuple[str, ...], options: str
         minutes,
         ("docs/make_environment_tables.py", "envs/fogsim_envs/evaluation.py", "envs/fogsim_envs/task", *rests_on),
         tables,
+        cores=cores,
     )
 
 
@@ -105,7 +121,7 @@ MEASUREMENTS = (
     benchmark("photograph_roads", 5, ("photographs",)),
     benchmark("sign_estimators", 10, ("sign estimators",), " --drives 12"),
     benchmark("sensor_faults", 10, ("sensor faults",)),
-    benchmark("broken_devices", 15, ("broken devices",), " -j 2"),
+    benchmark("broken_devices", 15, ("broken devices",), " -j 2", cores=2),
     benchmark("grades", 15),
     benchmark("uneven_fog", 30, ("uneven fog",)),
     benchmark("lead_accuracy", 20, ("lead accuracy",), times="ms"),
@@ -139,9 +155,9 @@ MEASUREMENTS = (
     benchmark("photon_fog", 14, ("mended",), " --drives 2"),
     Measurement(
         "surroundings",
-        (f"python benchmarks/monte_carlo.py surroundings {PHOTONS}", "python docs/make_airlight_tables.py"),
-        60,
-        ("benchmarks/monte_carlo.py", "docs/make_airlight_tables.py"),
+        ("python docs/make_airlight_tables.py",),
+        0.1,
+        (PHOTONS, "docs/make_airlight_tables.py"),
     ),
     study("belief_over_places", 40),
     study("which_sensor", 20),
@@ -152,9 +168,14 @@ MEASUREMENTS = (
     study("field_sizes", 40),
     study("motorway_policies", 180),
     environment(
-        "advisory", 15, ("returns fogsim/FogAdvisory-v1",), "fogsim/FogAdvisory-v1 --episodes 30", "fogsim/loop.py"
+        "advisory",
+        15,
+        ("returns fogsim/FogAdvisory-v1",),
+        "fogsim/FogAdvisory-v1 --episodes 30",
+        "fogsim/loop.py",
+        cores=2,
     ),
-    environment("advisory_fast", 8, ("returns fogsim/FogAdvisoryFast-v1",), "fogsim/FogAdvisoryFast-v1"),
+    environment("advisory_fast", 8, ("returns fogsim/FogAdvisoryFast-v1",), "fogsim/FogAdvisoryFast-v1", cores=2),
     environment("densities", 8, ("densities",), "--density"),
     environment("surrogate", 10, ("surrogate",), "--surrogate --episodes 90", "benchmarks/surrogate.py"),
     environment(
@@ -166,7 +187,7 @@ MEASUREMENTS = (
         "envs/fogsim_envs/corridor",
     ),
 )
-"""All of them, the quick ones first."""
+"""All of them; a round measures the longest first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,11 +197,11 @@ class Unwritten:
     Attributes
     ----------
     page : str
-        Where they are.
+        Their page.
     about : str
-        What they tell.
+        Their subject.
     figures : str
-        Command that prints their figures, or whence they are.
+        The command that prints their figures, or their source.
     """
 
     page: str

@@ -12,7 +12,7 @@ The drives in clear air (V_met 2000 m and more; `--clear` minutes of them) count
 
 Constants were chosen on pool 0 (other seeds, visibilities and camera); pool 1 is what is reported.
 
-    python benchmarks/uneven_fog.py [--json] [--pool 1] [--methods joint_road …] [--clear 60] [--only bank] [--docs]
+    python benchmarks/uneven_fog.py [--json] [--pool 1] [--methods joint_road …] [--clear 75] [--only bank] [--docs]
 """
 
 import argparse
@@ -44,6 +44,7 @@ CAMERAS = (
     ("camera.width=640", "camera.height=480"),
     ("camera.width=800", "camera.height=600", "camera.field_of_view_deg=50", "camera.response=linear"),
 )
+METHODS = ("joint_road", "negru2013", "zhu2015", "huang2015_rough", "lead_contrast")
 CLEAR_ROADS = ("motorway_fog_bank", "graded_motorway", "clear_day", "ramp_merge")
 Row = dict[str, Any]
 
@@ -221,8 +222,8 @@ def main() -> None:
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
     parser.add_argument("--docs", action="store_true", help="write the table of docs/explanation/estimators.md")
     parser.add_argument("--pool", type=int, choices=(0, 1), default=1, help="0: constants chosen on it")
-    parser.add_argument("--methods", nargs="+", default=["joint_road"], help="names of estimators")
-    parser.add_argument("--clear", type=float, default=60.0, help="minutes of driving in clear air")
+    parser.add_argument("--methods", nargs="+", default=METHODS, help="names of estimators")
+    parser.add_argument("--clear", type=float, default=75.0, help="minutes of driving in clear air")
     parser.add_argument("--only", help="only kinds of fog whose name begins so")
     arguments = parser.parse_args()
     plan = [*drives(arguments.pool), *clear_drives(arguments.pool, arguments.clear)]

@@ -1,5 +1,6 @@
 """Tables state when they were measured and what has changed since; one command measures them again."""
 
+import fcntl
 import json
 import subprocess
 import sys
@@ -171,9 +172,7 @@ def test_changed_code_is_listed_and_changed_prose_is_not(root: Path, rerun: Run)
     assert "on width: " in done.stdout
     assert "fogsim/road.py" in done.stdout
     assert "python docs/rerun_tables.py --page" in done.stdout
-    planned = rerun("--dry-run").stdout
-    assert "python benchmarks/roads.py twice 2" in planned
-    assert planned.endswith("2 to measure, about 1 min\n") or "about 0 min" in planned
+    assert "python benchmarks/roads.py twice 2" in rerun("--dry-run").stdout
     assert rerun("--page").returncode == 0
     assert overview(root).count("| fogsim: road.py |") == 2
     assert rerun("--check").returncode == 0
@@ -207,7 +206,7 @@ def test_tables_that_have_not_changed_are_not_measured(root: Path, rerun: Run) -
     assert rerun("--dry-run").stdout.splitlines()[-1].startswith("1 to measure")
     done = rerun()
     assert "moved in the tables of twice: 0" in done.stdout
-    assert rerun("--dry-run").stdout.splitlines()[-1].startswith("0 to measure")
+    assert "no table's code has changed" in rerun().stdout
     assert rerun("--dry-run", "--all").stdout.splitlines()[-1].startswith("2 to measure")
     assert (root / "runs" / "tables" / "width.log").read_text(encoding="utf-8") == once
 
@@ -225,7 +224,6 @@ def test_two_commands_run_at_once(root: Path, rerun: Run) -> None:
 def test_times_and_two_cores_need_the_whole_machine(root: Path, rerun: Run, field: dict[str, object]) -> None:
     done = rerun(measured=ALONE, **field)
     assert done.returncode == 0, done.stderr
-    assert rerun(measured=ALONE, cores=1).returncode == 0, "nothing is left to measure"
     assert rerun("--all", measured=ALONE, cores=1).returncode == 1, "together they are in each other's way"
 
 
@@ -253,11 +251,33 @@ def test_finished_measurements_are_not_repeated_by_the_same_request(root: Path, 
     assert (root / "runs" / "tables" / "width.log").read_text(encoding="utf-8") == once
 
 
+def test_what_another_command_measures_is_left_alone(root: Path, rerun: Run) -> None:
+    (root / "runs" / "tables").mkdir(parents=True)
+    with (root / "runs" / "tables" / "width.log").open("wb") as log:
+        fcntl.flock(log, fcntl.LOCK_EX)
+        done = rerun("width")
+    assert done.returncode == 1
+    assert "width is being measured by another command" in done.stderr
+    assert rerun("width").returncode == 0
+
+
 @pytest.fixture
 def docs(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], ModuleType]:
     """Import of a script of docs/."""
     monkeypatch.syspath_prepend(str(DOCS))
     return import_module
+
+
+def test_a_forecast_fills_both_cores(docs: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch) -> None:
+    table_round, measurement = docs("table_round"), docs("measured_tables").Measurement
+    monkeypatch.setattr(table_round, "CORES", 2)
+    one, other, both, timed = (
+        measurement(name, (), 0.0, (), (), times, cores)
+        for name, times, cores in (("a", "", 1), ("b", "", 1), ("c", "", 2), ("d", "ms", 1))
+    )
+    assert table_round.forecast({one: 10.0, other: 20.0}) == 20.0
+    assert table_round.forecast({one: 10.0, other: 20.0, both: 8.0, timed: 2.0}) == 25.0
+    assert table_round.forecast({}) == 0.0
 
 
 def test_last_digits_and_times_of_a_cell(docs: Callable[[str], ModuleType]) -> None:

@@ -64,22 +64,26 @@ class Round:
         columns = (TextColumn("{task.description}"), BarColumn(bar_width=20), TimeElapsedColumn())
         failed: list[str] = []
         running: list[Job] = []
+        text = ""
         with Progress(*columns, console=self._console) as progress:
             task, total = progress.add_task("", total=len(left)), len(left)
             try:
                 while left or running:
                     for job in [job for job in running if job.process.poll() is not None]:
                         running.remove(job)
-                        if not self._finish(job):
+                        if self._finish(job):
+                            progress.console.print(f"{job.one.name}: {job.spent:.1f} min; {text}")
+                        else:
                             failed.append(job.one.name)
                             progress.console.print(f"{job.one.name} failed: {self._folder / job.one.name}.log")
                     while one := next((one for one in left if cores(one) <= free(running)), None):
                         left.remove(one)
                         running.append(self._start(one))
-                    names = ", ".join(job.one.name for job in running)
                     rest = {job.one: max(minutes[job.one] - job.spent, 0.0) for job in running}
-                    text = f"{names}; about {forecast(rest | {one: minutes[one] for one in left}):.0f} min left"
-                    progress.update(task, completed=total - len(left) - len(running), description=text)
+                    text = f"about {forecast(rest | {one: minutes[one] for one in left}):.0f} min left"
+                    names = ", ".join(job.one.name for job in running)
+                    done = total - len(left) - len(running)
+                    progress.update(task, completed=done, description=f"{names}; {done} of {total}, {text}")
                     time.sleep(0.1)
             except BaseException:
                 end([job.process for job in running])

@@ -210,12 +210,12 @@ class Unwritten:
 
 
 UNWRITTEN = (
-    Unwritten("docs/benchmarks/policies.md", "beside what was seen on real roads", "from `field_sizes`, by hand"),
-    Unwritten("docs/explanation/drivers.md", "who sees what at night", "`fogsim.traffic.drivers.own_beams`, by hand"),
-    Unwritten("docs/explanation/drivers.md", "how far a traffic light is seen", "Allard's law, by hand"),
+    Unwritten("docs/benchmarks/policies.md", "comparison with real roads", "from `field_sizes`, by hand"),
+    Unwritten("docs/explanation/drivers.md", "sight of other road users at night", "`fogsim.traffic.drivers.own_beams`, by hand"),
+    Unwritten("docs/explanation/drivers.md", "visibility of traffic lights", "Allard's law, by hand"),
     Unwritten("docs/explanation/drivers.md", "gaps accepted at a crossing", "`python benchmarks/junctions.py`"),
-    Unwritten("docs/explanation/drivers.md", "collisions behind who stands", "`python benchmarks/collisions.py`"),
-    Unwritten("docs/explanation/drivers.md", "networks that FogSim did not write", "`python benchmarks/networks.py`"),
+    Unwritten("docs/explanation/drivers.md", "collisions with standing vehicles", "`python benchmarks/collisions.py`"),
+    Unwritten("docs/explanation/drivers.md", "networks from other sources", "`python benchmarks/networks.py`"),
     Unwritten("docs/explanation/drivers.md", "cost beside SUMO's step", "`python benchmarks/traffic.py`"),
     Unwritten("docs/explanation/estimators.md", "what of the papers is reached", "`fogsim reproduce NAME`"),
     Unwritten("docs/explanation/night.md", "pictures taken for fog, glow", "`python benchmarks/night_sources.py`"),
@@ -224,7 +224,7 @@ UNWRITTEN = (
     Unwritten("docs/explanation/physics.md", "how roads reflect", "`python tools/make_road_reflectance.py`"),
     Unwritten("docs/explanation/signs.md", "how well signs are found", "`python benchmarks/sign_detector.py`"),
     Unwritten("docs/explanation/signs.md", "visibility by first detection", "`fogsim reproduce belaroussi2015`"),
-    Unwritten("docs/reference/environments.md", "returns beside thresholds", "`fogsim_envs.evaluate`, by hand"),
-    Unwritten("docs/reference/environments.md", "what an agent learned", "`python examples/train_ppo.py`"),
+    Unwritten("docs/reference/environments.md", "returns and their thresholds", "`fogsim_envs.evaluate`, by hand"),
+    Unwritten("docs/reference/environments.md", "results of a trained agent", "`python examples/train_ppo.py`"),
 )
 """Tables of figures that are written by hand."""

@@ -211,7 +211,7 @@ class Unwritten:
 
 UNWRITTEN = (
     Unwritten("docs/benchmarks/policies.md", "comparison with real roads", "from `field_sizes`, by hand"),
-    Unwritten("docs/explanation/drivers.md", "sight of other road users at night", "`fogsim.traffic.drivers.own_beams`, by hand"),
+    Unwritten("docs/explanation/drivers.md", "sight of others at night", "`fogsim.traffic.drivers.own_beams`, by hand"),
     Unwritten("docs/explanation/drivers.md", "visibility of traffic lights", "Allard's law, by hand"),
     Unwritten("docs/explanation/drivers.md", "gaps accepted at a crossing", "`python benchmarks/junctions.py`"),
     Unwritten("docs/explanation/drivers.md", "collisions with standing vehicles", "`python benchmarks/collisions.py`"),

@@ -108,7 +108,7 @@ MEASUREMENTS = (
     ),
     benchmark("stereo", 1, times="ms"),
     benchmark("belief", 2),
-    benchmark("disappearing_vehicles", 5, ("disappearing vehicles",), times="ms"),
+    benchmark("disappearing_vehicles", 2, ("disappearing vehicles",), times="ms"),
     benchmark("night_estimators", 5, ("night-estimators",), times="ms"),
     Measurement(
         "restoration",

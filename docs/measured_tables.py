@@ -134,7 +134,7 @@ MEASUREMENTS = (
         times="ms",
         more="python docs/make_measured_tables.py excerpt",
     ),
-    Measurement("zhu2015", ("python docs/make_measured_tables.py zhu2015",), 1, ("fogsim/reproduce/zhu2015.py",)),
+    Measurement("zhu2015", ("python docs/make_measured_tables.py zhu2015",), 3, ("fogsim/reproduce/zhu2015.py",)),
     Measurement(
         "drivers",
         ("python docs/make_measured_tables.py drivers",),
@@ -210,7 +210,7 @@ class Unwritten:
 
 
 UNWRITTEN = (
-    Unwritten("docs/benchmarks/policies.md", "comparison with real roads", "from `field_sizes`, by hand"),
+    Unwritten("docs/benchmarks/policies.md", "compared with real roads", "from `field_sizes`, by hand"),
     Unwritten("docs/explanation/drivers.md", "sight of others at night", "`fogsim.traffic.drivers.own_beams`, by hand"),
     Unwritten("docs/explanation/drivers.md", "visibility of traffic lights", "Allard's law, by hand"),
     Unwritten("docs/explanation/drivers.md", "gaps accepted at a crossing", "`python benchmarks/junctions.py`"),
@@ -224,7 +224,7 @@ UNWRITTEN = (
     Unwritten("docs/explanation/physics.md", "how roads reflect", "`python tools/make_road_reflectance.py`"),
     Unwritten("docs/explanation/signs.md", "how well signs are found", "`python benchmarks/sign_detector.py`"),
     Unwritten("docs/explanation/signs.md", "visibility by first detection", "`fogsim reproduce belaroussi2015`"),
-    Unwritten("docs/reference/environments.md", "returns and their thresholds", "`fogsim_envs.evaluate`, by hand"),
-    Unwritten("docs/reference/environments.md", "results of a trained agent", "`python examples/train_ppo.py`"),
+    Unwritten("docs/reference/environments.md", "returns beside thresholds", "`fogsim_envs.evaluate`, by hand"),
+    Unwritten("docs/reference/environments.md", "what an agent learned", "`python examples/train_ppo.py`"),
 )
 """Tables of figures that are written by hand."""

@@ -13,10 +13,11 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from make_tables import HERE, filled
+from page_tables import ROOT, filled, lines_of, write_table
 
-PAGE = HERE / "benchmarks" / "policies.md"
-PAGES = {"lighting_policies": HERE.parent / "scenarios" / "rural_night_fog" / "README.md"}
+DOCS = ROOT / "docs"
+PAGE = DOCS / "benchmarks" / "policies.md"
+PAGES = {"lighting_policies": ROOT / "scenarios" / "rural_night_fog" / "README.md"}
 """Pages of studies whose tables are not in docs/benchmarks/policies.md."""
 
 Cells = tuple[str, ...]
@@ -128,15 +129,14 @@ def main() -> int:
             parser.error(f"no study of the docs is called {folder.name!r}; there are {', '.join(COLUMNS)}")
         heading, *rows = table(folder, COLUMNS[folder.name])
         page = PAGES.get(folder.name, PAGE)
-        text = page.read_text(encoding="utf-8")
-        new = filled(text, folder.name, heading, rows)
-        if new != text and arguments.check:
+        text, lines = page.read_text(encoding="utf-8"), lines_of(heading, rows)
+        if arguments.check and filled(text, folder.name, lines) != text:
             stale = True
             print(f"{page.name}: {folder.name} is not up to date")  # noqa: T201 - the line is the result
         elif not arguments.check:
-            page.write_text(new, encoding="utf-8")
+            write_table(page, folder.name, lines)
             for name in FIGURES.get(folder.name, ()):
-                shutil.copy(folder / "figures" / f"{name}.svg", HERE / "pictures" / f"{folder.name}_{name}.svg")
+                shutil.copy(folder / "figures" / f"{name}.svg", DOCS / "pictures" / f"{folder.name}_{name}.svg")
     return int(stale)
 
 

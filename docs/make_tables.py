@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
+from page_tables import filled, lines_of
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
@@ -42,7 +43,6 @@ from fogsim.traffic import COMPLIANCES, FOLLOWING_MODELS, SPEED_CHOICES
 from fogsim.traffic.drivers.following import OBSERVED_MIXTURE
 
 HERE = Path(__file__).resolve().parent
-END = "<!-- end of table -->"
 
 
 def scenario_keys(model: type[BaseModel] = Scenario, prefix: str = "") -> list[tuple[str, ...]]:
@@ -321,28 +321,13 @@ TABLES = {
 """Tables by file and marker, with their headings and rows."""
 
 
-def filled(text: str, marker: str, headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
-    """Text with the table between a marker and the next end put in anew."""
-    begin = f"<!-- table: {marker} -->"
-    before, rest = text.split(begin, 1)
-    after = rest.split(END, 1)[1]
-    lines = [headings, tuple("---" for _ in headings), *rows]
-    table = "\n".join("| " + " | ".join(map(_cell, cells)) + " |" for cells in lines)
-    return f"{before}{begin}\n\n{table}\n\n{END}{after}"
-
-
-def _cell(text: str) -> str:
-    """Text that stays in one cell: in one line, with no pipe that would part it."""
-    return " ".join(text.split()).replace("|", r"\|")
-
-
 def pages() -> dict[Path, str]:
     """Every page with its tables as they should be."""
     result = {}
     for name, tables in TABLES.items():
         text = (HERE / name).read_text(encoding="utf-8")
         for marker, (headings, rows) in tables.items():
-            text = filled(text, marker, headings, rows())
+            text = filled(text, marker, lines_of(headings, rows()))
         result[HERE / name] = text
     return result
 

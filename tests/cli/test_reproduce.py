@@ -16,7 +16,7 @@ from tests.test_interruption import raise_as_numba_does
 DONE = Reproduction("negru2013", ({"paper": "negru2013"},), (("a",), ("1",)), (), np.zeros((2, 2, 3), np.uint8))
 
 
-def evaluation(watch) -> Reproduction:
+def evaluation(quick, table, watch) -> Reproduction:
     for step in range(5):
         watch(step, 4)
     return DONE
@@ -52,7 +52,7 @@ def test_elsewhere_nothing_is_shown(reproduce) -> None:
 @pytest.mark.parametrize("terminal", [True, False])
 @pytest.mark.parametrize("in_kernel", [True, False])
 def test_an_interruption_ends_in_one_line(reproduce, *, terminal: bool, in_kernel: bool) -> None:
-    def interrupted(watch) -> Reproduction:
+    def interrupted(quick, table, watch) -> Reproduction:
         watch(0, 4)
         watch(1, 4)
         if in_kernel:

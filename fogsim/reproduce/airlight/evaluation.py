@@ -14,6 +14,7 @@ from fogsim.render import Renderer
 from fogsim.reproduce.airlight.conditions import conditions
 from fogsim.reproduce.airlight.picture import picture
 from fogsim.reproduce.huang2015_chase import drawn
+from fogsim.reproduce.paper_cells import chosen_tables
 from fogsim.reproduce.result import Cell, Reproduction, Rows, Steps, TitledTable, Watch, unwatched
 from fogsim.reproduce.road_sweeps import CAMERA
 from fogsim.reproduce.scenes import StagedVehicle, foggy_radiance, road_renderer
@@ -102,17 +103,19 @@ class Plan:
         return tuple(Case(albedo, visibility) for albedo in self.albedos for visibility in self.visibilities)
 
 
-WHOLE = Plan()
-"""What the command runs."""
-
-
-def reproduce(plan: Plan = WHOLE, *, watch: Watch = unwatched) -> Reproduction:
+def reproduce(
+    plan: Plan | None = None, *, quick: bool = False, table: str | None = None, watch: Watch = unwatched
+) -> Reproduction:
     """Let every daytime method read frames of both fogs.
 
     Parameters
     ----------
-    plan : Plan
-        What is run.
+    plan : Plan, optional
+        A part of it; all by default.
+    quick : bool
+        One drive for each camera.
+    table : str, optional
+        Refused, for the evaluation follows no paper's tables.
     watch : Watch
         Told of every drive.
 
@@ -122,6 +125,8 @@ def reproduce(plan: Plan = WHOLE, *, watch: Watch = unwatched) -> Reproduction:
         A record for each height, albedo, visibility and method: share of drives with an estimate of fog, the median of
         what they read, and how often the 90 % interval holds the truth.
     """
+    chosen_tables((), table)
+    plan = plan or (Plan(drives=1) if quick else Plan())
     steps = Steps(len(plan.heights) * 2 * plan.drives, watch)
     records: list[Mapping[str, Cell]] = []
     with road_renderer() as renderer:

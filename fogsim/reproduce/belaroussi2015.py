@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fogsim.calibration.sign_calibration import measure_operating_range
+from fogsim.calibration.sign_drives import PoseNoise, SignDrive, observed, sign_beside
 from fogsim.estimators.signs.belaroussi2015 import Belaroussi2015
 from fogsim.estimators.signs.operating_range import OperatingRange
 from fogsim.reproduce.belaroussi2015_picture import picture
 from fogsim.reproduce.result import Cell, Reproduction, Watch, unwatched
-from fogsim.reproduce.sign_calibration import measure_operating_range
-from fogsim.reproduce.sign_drives import PoseNoise, SignDrive, observed, sign_beside
 from fogsim.values import Camera, Response
 
 KINDS = ("speed_limit", "pedestrian_crossing", "stop")

@@ -36,7 +36,7 @@ def test_one_part_runs_what_it_needs() -> None:
     road = reproduce(CAMERA, Size(2, 4, 5), table="fig12")
     assert [cell.place for cell in road.cells] == ["figure 12"]
     assert len(road.all_tables) == len(road.records) == 1
-    with pytest.raises(InputError, match="fig13.*fig14"):
+    with pytest.raises(InputError, match=r"fig13.*fig14"):
         reproduce(CAMERA, table="fig13")
 
 

@@ -10,7 +10,6 @@ from fogsim.lighting.beams import high_beam, low_beam, scaled_beam
 from fogsim.reproduce.night.gallen2014 import Size, reproduce
 from fogsim.reproduce.night.limits import limits
 from fogsim.values import Camera, Response
-from tests.reproduce.test_paper_figures import GALLEN2014, numbers_of
 
 CAMERA = Camera(240, 160, 220.0, (119.5, 79.5), 1.38, pitch=0.035, response=Response.SRGB)
 
@@ -28,16 +27,15 @@ def test_the_evaluation_runs_small() -> None:
     assert all(thick > thin for thick, thin in itertools.pairwise(scores))
     assert records[1]["night_road_m"] == pytest.approx(records[1]["visibility_m"], rel=0.2)
     assert found.picture.shape[2] == 3
-    assert {cell.paper for cell in found.cells} <= numbers_of(GALLEN2014)
     assert len(found.cells) == 17
 
 
 def test_one_part_runs_what_it_needs() -> None:
-    road = reproduce(CAMERA, Size(2, 4, 5), table="fig12")
+    road = reproduce(CAMERA, Size(2, 4, 5), table="figure 12")
     assert [cell.place for cell in road.cells] == ["figure 12"]
     assert len(road.all_tables) == len(road.records) == 1
-    with pytest.raises(InputError, match=r"fig13.*fig14"):
-        reproduce(CAMERA, table="fig13")
+    with pytest.raises(InputError, match=r"figure 1[24]"):
+        reproduce(CAMERA, table="figure 13")
 
 
 def test_limits_of_the_beams() -> None:

@@ -31,7 +31,7 @@ from fogsim.vision.light.pixel_kernels import Pixels
 CAMERA = Camera(1280, 800, 1154.0, (639.5, 399.5), 1.38, pitch=0.035, response=Response.SRGB)
 """The size of the paper's images; nothing else is known of its camera."""
 
-TABLES = ("I", "fig8", "fig11", "fig12", "fig14")
+TABLES = ("I", "figure 8", "figure 11", "figure 12", "figure 14")
 """Parts of the paper that can be chosen: table I with equations 11 and 12, and figures with the text about them."""
 
 DRIVES = (("clear 1", math.inf, 1), ("clear 2", math.inf, 2), ("fog 1", 150.0, 1), ("fog 2", 80.0, 2))
@@ -110,7 +110,7 @@ def reproduce(
     """
     wanted = chosen_tables(TABLES, table)
     size = size or (_QUICK if quick else Size())
-    has_drives, has_fogs = "fig8" in wanted, bool({"I", "fig11", "fig14"}.intersection(wanted))
+    has_drives, has_fogs = "figure 8" in wanted, bool({"I", "figure 11", "figure 14"}.intersection(wanted))
     frames_driven = has_drives * (size.scenes + len(DRIVES) * size.frames)
     steps = Steps(frames_driven + has_fogs * (len(REFERENCES) + size.fogs) + 1, watch)
     tables, cells, drives, fogs, road, least = list[TitledTable](), list[PaperCell](), [], [], [], PUBLISHED
@@ -119,21 +119,21 @@ def reproduce(
         least = threshold.steepness
         drives = [_drive(camera, *drive, threshold, size.frames, steps) for drive in DRIVES]
         tables.append(TitledTable("Halos: frames taken for fog, each and by the mean of 25 [%]", _drive_rows(drives)))
-        cells += _drive_cells(drives, least)
+        cells += drive_cells(drives, least)
     if has_fogs:
         fogs = list(_dissipating(camera, size.fogs, steps))
         tables.append(TitledTable("Estimates of the right class and within the published accuracy", _right_rows(fogs)))
         tables.append(TitledTable("Veil while fog dissipates: scores by reference and estimates [m]", _fog_rows(fogs)))
-        cells += [one for name in ("I", "fig11", "fig14") if name in wanted for one in _FOG_CELLS[name](fogs)]
-    if "fig12" in wanted:
+        cells += fog_cells(fogs, wanted)
+    if "figure 12" in wanted:
         road = [_open_road(camera)]
         tables.append(TitledTable(f"Scores in fog of {LIDAR:g} m on an open road, by reference", _road_rows(road[0])))
-        cells.append(_road_cell(road[0]))
+        cells.append(road_cell(road[0]))
     if "I" in wanted:
-        cells += _limit_cells()
+        cells += limit_cells()
     steps.advance()
-    drawn = picture(drives, fogs, least)
     records = (*drives, *fogs, *road)
+    drawn = picture(drives, fogs, least)
     return Reproduction("gallen2014", records, tables[0].rows, NOTES, drawn, tuple(tables), cells=tuple(cells))
 
 
@@ -243,7 +243,7 @@ def _drive_rows(records: Sequence[Record]) -> Rows:
     return tuple(rows)
 
 
-def _drive_cells(records: Sequence[Record], threshold: float) -> list[PaperCell]:
+def drive_cells(records: Sequence[Record], threshold: float) -> list[PaperCell]:
     """Frames of all drives that are classified right, and the threshold that separates clear frames from foggy ones."""
 
     def right(key: str) -> float:
@@ -321,7 +321,10 @@ def _accuracy_cells(records: Sequence[Record]) -> list[PaperCell]:
     return cells
 
 
-_FOG_CELLS = {"I": _class_cells, "fig11": _score_cells, "fig14": _accuracy_cells}
+def fog_cells(records: Sequence[Record], wanted: Sequence[str] = TABLES) -> list[PaperCell]:
+    """Classes, scores and errors while fog dissipates."""
+    parts = {"I": _class_cells, "figure 11": _score_cells, "figure 14": _accuracy_cells}
+    return [cell for name, part in parts.items() if name in wanted for cell in part(records)]
 
 
 def _road_rows(record: Record) -> Rows:
@@ -330,7 +333,9 @@ def _road_rows(record: Record) -> Rows:
     return (("reference", *names), *((_words(name), *map(str, scores[name])) for name in scores))
 
 
-def _road_cell(record: Record) -> PaperCell:
+def road_cell(record: Record) -> PaperCell:
+    """The reference that is most like the open road."""
+
     def best(method: str) -> float:
         return max(PUBLISHED_VISIBILITIES, key=lambda one: float(record[f"{method}_score_{one:g}"]))
 
@@ -338,7 +343,8 @@ def _road_cell(record: Record) -> PaperCell:
     return PaperCell("figure 12", f"V_met {LIDAR:g} m by LIDAR", column, 500.0, best("as_published"), best("corrected"))
 
 
-def _limit_cells() -> list[PaperCell]:
+def limit_cells() -> list[PaperCell]:
+    """Equations 11 and 12 in both types of fog."""
     cells, column = [], "V_met where both beams show equally far [m]"
     for kind in FogKind:
         (eleven, twelve), (own_eleven, own_twelve) = limits(low_beam(), kind), limits(low_beam(), kind, None)

@@ -82,7 +82,7 @@ class Size:
     fogs: int = 50
 
 
-_QUICK = Size(frames=60, scenes=16)
+_QUICK = Size(frames=60)
 
 
 def reproduce(

@@ -25,7 +25,7 @@ from fogsim.vision.lines.gradient_lines import consensus_vanishing_point
 from fogsim.vision.lines.horizon import PITCH_DEVIATION, Horizon, PitchDeviation, calibrated_horizon, weighted_mean
 from fogsim.vision.lines.road_lines import road_vanishing_point
 from fogsim.vision.lines.vanishing_point import VanishingPoint
-from fogsim.vision.region.curve_checks import SURE_OF_FOG, check_law, seen_up_to, told
+from fogsim.vision.region.curve_checks import SURE_OF_FOG, check_law, detection_limit, seen_up_to, told
 from fogsim.vision.region.inflection import (
     FogModel,
     Parameters,
@@ -115,7 +115,8 @@ class Negru2013Repair(Repair):
     )
     REFUSALS = (
         "refusals",
-        "the point of least error is the inflection, whatever its model; without one there is no fog",
+        "the point of least error is the inflection, whatever its model; without one, or without a band, there is no"
+        " fog, so that a wall and a traffic jam are clear air",
         "no estimate where the model is not one of fog over this road (its airlight is not the sky's, its contrast is"
         " small, the curve fits badly), or where the road is hidden or ends below the horizon",
     )
@@ -141,8 +142,8 @@ class Negru2013:
     does otherwise is listed in `Negru2013Repair`, and can be switched one by one.
 
     A region that reaches the horizon without an inflection gives k = 0 with the detection limit as its deviation. An
-    image that shows no road by day, or no band, gives an invalid estimate with the reason in its diagnostics, in either
-    form. Daytime only, flat road, road darker than the airlight.
+    image that shows no road by day gives an invalid estimate with the reason in its diagnostics, in either form.
+    Daytime only, flat road, road darker than the airlight.
 
     Parameters
     ----------
@@ -241,7 +242,12 @@ class Negru2013:
         diagnostics["horizon_row"] = horizon.row
         ahead = Negru2013Repair.BAND_AHEAD in self._repairs
         hiding = lead if Negru2013Repair.LEAD_LEFT_OUT in self._repairs else None
-        band = road_band(road, edges, self._limits(road, edges, slope), self._camera, widest=not ahead, lead=hiding)
+        try:
+            band = road_band(road, edges, self._limits(road, edges, slope), self._camera, widest=not ahead, lead=hiding)
+        except CannotTellError:
+            if self._refuses:
+                raise
+            return self._no_fog(0.0, horizon, diagnostics)
         diagnostics["band"] = (band.left, band.right, band.top + road.first_row, band.bottom + road.first_row)
         here = replace(band, left=band.left - road.first_column, right=band.right - road.first_column)
         seen = SeenBand(road, horizon, band, band_profile(road.luminance, here))
@@ -256,15 +262,17 @@ class Negru2013:
         if model is None:
             if self._refuses:
                 self._check_clear_view(seen)
-            # An inflection needs a row on either side: the topmost that could have been seen is the second.
-            rows = max(float(curve.below_horizon[0]), 1.0) + 1.0
-            limit = 2.0 / self._camera.row_distance * math.hypot(rows, horizon.standard_deviation)
-            return Estimate(self.method, 0.0, limit, diagnostics=diagnostics)
+            return self._no_fog(float(curve.below_horizon[0]), horizon, diagnostics)
         self._models.append(model)
         model = min(self._models, key=lambda m: m.residual / max(m.airlight - m.road, 1e-9))
         inflection = horizon.row + 0.5 * model.extinction * self._camera.row_distance
         found = {"inflection_row": inflection, "airlight": model.airlight, "road": model.road}
         return Estimate(self.method, model.extinction, model.standard_deviation, diagnostics=diagnostics | found)
+
+    def _no_fog(self, top: float, horizon: Horizon, diagnostics: dict[str, object]) -> Estimate:
+        """Clear air to the detection limit of a road seen up to some rows below the horizon [px]."""
+        limit = detection_limit(top, horizon.standard_deviation, self._camera.row_distance)
+        return Estimate(self.method, 0.0, limit, diagnostics=diagnostics)
 
     def _road(self, image: NDArray[np.uint8] | NDArray[np.uint16]) -> tuple[RoadImage, LinearPixels]:
         """Road from a little above the horizon down to the image's bottom or (repaired) the own bonnet."""

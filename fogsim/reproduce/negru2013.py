@@ -106,12 +106,13 @@ def reproduce(
             left_open = over_growths("published", VARIANTS["published"])
             sweeps, tables = swept("negru2013", Negru2013Repair, renderer, steps, drives, left_open)
         shown += tables
+    cells = paper_cells()
     return Reproduction(
-        "negru2013", tuple(records), shown[0].rows, NOTES, np.hstack(pictures), tuple(shown), tuple(sweeps), _cells()
+        "negru2013", tuple(records), shown[0].rows, NOTES, np.hstack(pictures), tuple(shown), tuple(sweeps), cells
     )
 
 
-def _cells() -> tuple[PaperCell, ...]:
+def paper_cells() -> tuple[PaperCell, ...]:
     """Times of a frame at both sizes of the paper."""
     cells = []
     for (width, height), printed in PAPER_MS.items():

@@ -171,13 +171,13 @@ def reproduce(
             shown += tables
     drawing = picture(pictured[-1], CAMERA)
     steps.advance()
-    cells = tuple(cell for cell in _cells(records) if cell.place.removeprefix("table ") in chosen)
+    cells = tuple(cell for cell in paper_cells(records) if cell.place.removeprefix("table ") in chosen)
     return Reproduction(
         "zhu2015", tuple(records), shown[0].rows, NOTES, drawing, tuple(shown), tuple(swept_records), cells
     )
 
 
-def _cells(records: Sequence[Mapping[str, Cell]]) -> Iterator[PaperCell]:
+def paper_cells(records: Sequence[Mapping[str, Cell]]) -> Iterator[PaperCell]:
     """Table 2, its share over all frames, and figure 7 by class of fog."""
     column = "frames with the right state [%]"
     for weather in WEATHERS:

@@ -104,7 +104,7 @@ def test_the_command_prints_a_table_and_writes_a_picture(command, tmp_path: Path
     code, out, _ = command("all", "--out", str(tmp_path / "new"))
     assert code == 0
     assert "empty road" in out
-    assert "Of 2 published figures" in out
+    assert "2 published figures" in out
     with Image.open(tmp_path / "new" / "negru2013.png") as picture:
         assert picture.size == (3 * 688, 515)
 

@@ -111,13 +111,15 @@ class Belaroussi2015:
         self._horizon = camera.horizon_row
         self.reset()
 
-    def calibrated(self, measured: OperatingRange) -> Self:
+    def calibrated(self, measured: OperatingRange, watch: SignWatch | None = None) -> Self:
         """Take a calibration that was not read from a file.
 
         Parameters
         ----------
         measured : OperatingRange
             Of this camera.
+        watch : SignWatch, optional
+            Looks for signs in place of this estimator's own, such as one that several estimators share.
 
         Raises
         ------
@@ -125,6 +127,7 @@ class Belaroussi2015:
             If it is of a camera of another focal length.
         """
         self._range = _checked_range(measured, self._camera)
+        self._watch = watch or self._watch
         return self
 
     def reset(self) -> None:

@@ -189,7 +189,7 @@ def swept(
     records: list[dict[str, Cell]] = []
     for setting in SETTINGS:
         seen = driven(renderer, setting, VISIBILITIES, drives, steps)
-        forms = both | (without_each(kind) | left_open if setting is SETTINGS[0] else {})
+        forms = both | ({**without_each(kind), **left_open} if setting is SETTINGS[0] else {})
         for name, form in forms.items():
             for visibility in VISIBILITIES:
                 here = [one for one in seen if one.visibility == visibility]

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fogsim.calibration.sign_calibration import cropped, measure_operating_range
+from fogsim.calibration.sign_drives import PoseNoise, SignDrive, observed, sign_beside
 from fogsim.estimators.signs.belaroussi2015 import Belaroussi2015
 from fogsim.estimators.signs.operating_range import OperatingRange
 from fogsim.estimators.signs.regions import PoseDeviation
@@ -12,8 +14,6 @@ from fogsim.estimators.signs.watch import SignWatch, Watched
 from fogsim.reproduce.belaroussi2015_picture import picture
 from fogsim.reproduce.paper_cells import PaperCell, chosen_tables
 from fogsim.reproduce.result import Cell, Reproduction, Rows, Watch, unwatched
-from fogsim.reproduce.sign_calibration import cropped, measure_operating_range
-from fogsim.reproduce.sign_drives import PoseNoise, SignDrive, observed, sign_beside
 from fogsim.values import Camera, Observation, Response
 
 KINDS = ("speed_limit", "pedestrian_crossing", "stop")

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fogsim.calibration.staged_road import road_renderer
 from fogsim.estimators import make
 from fogsim.estimators.huang2015_medians import Huang2015Repair
 from fogsim.render import Renderer
@@ -13,7 +14,6 @@ from fogsim.reproduce.huang2015_plan import CAMERA, LAST, VARIANTS, VEHICLE, Cas
 from fogsim.reproduce.huang2015_tables import NOTES, records, tables, verdicts
 from fogsim.reproduce.result import Reproduction, Steps, Watch, unwatched
 from fogsim.reproduce.road_sweeps import steps_of, swept
-from fogsim.reproduce.scenes import road_renderer
 from fogsim.values import Estimate, Observation
 
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fogsim.calibration.staged_road import StagedVehicle
 from fogsim.reproduce.huang2015_published import TABLE_4_3, TABLE_5_2, TABLE_5_3
 from fogsim.reproduce.road_sweeps import DRIVES
-from fogsim.reproduce.scenes import StagedVehicle
 from fogsim.values import Camera, Estimate
 
 CAMERA = Camera(800, 600, 5600.0, (399.5, 299.5), mount_height=1.0)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.calibration.staged_road import road_renderer
 from fogsim.errors import InputError
 from fogsim.estimators import make
 from fogsim.estimators.zhu2015 import FRAMES, GROWTH
@@ -13,7 +14,6 @@ from fogsim.estimators.zhu2015_road import Zhu2015Repair
 from fogsim.reproduce.paper_cells import PaperCell, chosen_tables
 from fogsim.reproduce.result import Cell, Reproduction, Steps, TitledTable, Watch, found_visibility, unwatched
 from fogsim.reproduce.road_sweeps import CAMERA, DRIVES, over_growths, steps_of, swept
-from fogsim.reproduce.scenes import road_renderer
 from fogsim.reproduce.zhu2015_drive import Moment, drive, observed
 from fogsim.reproduce.zhu2015_picture import picture
 from fogsim.values import Estimate, FogCategory, Observation

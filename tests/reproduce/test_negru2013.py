@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from fogsim.calibration.staged_road import foggy_image, views
 from fogsim.cli import app
 from fogsim.errors import InputError
 from fogsim.reproduce import REPRODUCTIONS, Reproduction
 from fogsim.reproduce.negru2013 import CAMERA, EXTINCTIONS, SCENES, reproduce
 from fogsim.reproduce.road_sweeps import SETTINGS
-from fogsim.reproduce.scenes import foggy_image, views
 
 
 @pytest.fixture(scope="module")

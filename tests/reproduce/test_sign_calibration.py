@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from fogsim.calibration.sign_calibration import measure_operating_range
 from fogsim.cli.app import app
 from fogsim.errors import InputError
 from fogsim.estimators.signs.operating_range import OperatingRange
 from fogsim.reproduce.belaroussi2015 import PUBLISHED, Setup, reproduce
-from fogsim.reproduce.sign_calibration import measure_operating_range
 from fogsim.values import Camera, Response
 
 CAMERA = Camera(320, 160, 300.0, (159.5, 79.5), 1.4, pitch=0.01, response=Response.SRGB)

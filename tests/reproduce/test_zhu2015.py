@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fogsim.calibration.staged_road import road_renderer
 from fogsim.cli import app
 from fogsim.errors import InputError
 from fogsim.estimators.zhu2015 import zhu_category
@@ -14,7 +15,6 @@ from fogsim.estimators.zhu2015_road import Zhu2015Repair
 from fogsim.reproduce import REPRODUCTIONS, Reproduction
 from fogsim.reproduce.road_sweeps import GROWTHS, SETTINGS
 from fogsim.reproduce.road_sweeps import VISIBILITIES as VISIBILITIES_OF_SWEEPS
-from fogsim.reproduce.scenes import road_renderer
 from fogsim.reproduce.zhu2015 import CAMERA, EDGE, TITLES, WEATHERS, Size, reproduce, right_share
 from fogsim.reproduce.zhu2015_drive import ROAD, SETBACK, drive, observed, worn
 from fogsim.values import CameraPose, View

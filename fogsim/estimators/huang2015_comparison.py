@@ -27,8 +27,8 @@ HALF_WIDTH, MIDDLE, HALF_HEIGHT = 0.42, 0.42, 0.32
 its height [-]. It ends below the roof of the flattest car and above the shadow under it."""
 
 BODY_HALF_WIDTH, BODY_HEIGHTS = 0.34, (0.15, 0.7)
-"""The part whose variance is taken, in widths of the vehicle [-]. It lies on the body of every vehicle: beside a sloping
-rear window there is sky, and under the bumper road, whose share of the window would change with its place."""
+"""The part whose variance is taken, in widths of the vehicle [-]. It lies on the body of every vehicle: beside a narrow
+roof there is sky, and under the bumper road, whose share of a larger window would change with its place."""
 
 MARGIN, MARGIN_PIXELS = 0.12, 8
 """What a stored picture holds around that part: widths of the vehicle [-] and pixels."""
@@ -319,18 +319,22 @@ def _window_variance(patch: Patch) -> float:
     return max(square - mean**2, 0.0)
 
 
-def expected_placement(reference: RearPatch, picture: RearPatch) -> PlacementPrior:
-    """Where the reference is expected in the next frame: as before, but for pitch, steering and the range's noise.
+def expected_placement(
+    reference: RearPatch, picture: RearPatch, range_deviation: float = RANGE_DEVIATION
+) -> PlacementPrior:
+    """Where the reference is expected in the next frame: as before, but for pitch, steering and noise of the range [m].
 
     Parameters
     ----------
     reference, picture : RearPatch
         The two.
+    range_deviation : float
+        Standard deviation of the range [m].
     """
     nearness = 1.0 / picture.distance + 1.0 / reference.distance
     placement = Placement(picture.patch.column, picture.patch.row, picture.width / reference.width)
     return PlacementPrior(
-        placement, 1.0 + STEERING * picture.width, 0.5 + picture.pitch_deviation, RANGE_DEVIATION * nearness
+        placement, 1.0 + STEERING * picture.width, 0.5 + picture.pitch_deviation, range_deviation * nearness
     )
 
 

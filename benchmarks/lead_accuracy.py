@@ -57,6 +57,7 @@ AIRLIGHT_LEVELS = (120.0, 200.0, 255.0)
 METHODS: dict[str, tuple[str, dict[str, Any]]] = {
     "huang2015_lead, published": ("huang2015_lead", {"as_published": True}),
     "huang2015_lead": ("huang2015_lead", {}),
+    "huang2015_lead, camera's ranges": ("huang2015_lead", {"range_from": "camera"}),
     "huang2015, published": ("huang2015", {"as_published": True}),
     "huang2015": ("huang2015", {}),
     "lead_contrast": ("lead_contrast", {}),

@@ -24,10 +24,10 @@ from typing import Any
 import numpy as np
 from docs_table import write_table
 
+from fogsim.calibration.staged_road import StagedVehicle, road_renderer
 from fogsim.estimators import make
 from fogsim.render import Renderer
 from fogsim.reproduce.huang2015_chase import FASTER, OWN_SPEED, drawn, fogged
-from fogsim.reproduce.scenes import StagedVehicle, road_renderer
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, Estimate, Frame, LeadMeasurement, Observation, Response
 from fogsim.values.estimate import NORMAL_90_PERCENT
@@ -57,6 +57,7 @@ AIRLIGHT_LEVELS = (120.0, 200.0, 255.0)
 METHODS: dict[str, tuple[str, dict[str, Any]]] = {
     "huang2015_lead, published": ("huang2015_lead", {"as_published": True}),
     "huang2015_lead": ("huang2015_lead", {}),
+    "huang2015_lead, camera's ranges": ("huang2015_lead", {"range_from": "camera"}),
     "huang2015, published": ("huang2015", {"as_published": True}),
     "huang2015": ("huang2015", {}),
     "lead_contrast": ("lead_contrast", {}),

@@ -22,10 +22,10 @@ from rich.console import Console
 from rich.progress import track
 
 from fogsim.atmosphere import Droplets
+from fogsim.calibration.staged_road import road_renderer
 from fogsim.reproduce.airlight import CHASE_METHODS
 from fogsim.reproduce.airlight.evaluation import EVEN_AIRLIGHT, Case, drive_alone, follow
 from fogsim.reproduce.road_sweeps import CAMERA
-from fogsim.reproduce.scenes import road_renderer
 from fogsim.values import Estimate
 
 ALBEDOS = (0.05, 0.1, 0.2, 0.4, 0.8)

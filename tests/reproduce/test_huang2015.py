@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from fogsim.calibration.staged_road import road_renderer
 from fogsim.cli import reproduce as reproduce_module
 from fogsim.estimators.huang2015_ratios import image_confidence
 from fogsim.reproduce import REPRODUCTIONS, Reproduction
@@ -12,7 +13,6 @@ from fogsim.reproduce import huang2015_published as published
 from fogsim.reproduce.huang2015 import reproduce
 from fogsim.reproduce.huang2015_chase import Chase
 from fogsim.reproduce.huang2015_plan import CAMERA, LAST, VARIANTS, VEHICLE, Case, Plan
-from fogsim.reproduce.scenes import road_renderer
 
 PART = Plan(
     methods=(100.0, 500.0),

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fogsim.calibration.staged_road import AIRLIGHT, ILLUMINANCE, foggy_radiance, straight_road
 from fogsim.camera import Sensor, expose
 from fogsim.render import make_renderer
-from fogsim.reproduce.scenes import AIRLIGHT, ILLUMINANCE, foggy_radiance, straight_road
 from fogsim.scene import build_scene
 from fogsim.sensors import signs_ahead
 from fogsim.units import extinction_from_visibility
@@ -68,6 +68,9 @@ class SignDrive:
         How far ahead the map is read [m].
     known : tuple of Sign or None
         Signs as the map has them; None for those that stand there, each as far off as `noise` says.
+    farthest : float
+        Distance of the first sign, over the visibility, beyond which a fog has no images [-]; 2.5 leaves 0.06 % of a
+        sign's contrast, less than a grey level.
     """
 
     camera: Camera
@@ -77,6 +80,7 @@ class SignDrive:
     grey: float = 200.0
     reach: float = 400.0
     known: tuple[Sign, ...] | None = None
+    farthest: float = math.inf
 
 
 def observed(
@@ -99,7 +103,8 @@ def observed(
     scene = build_scene(straight_road(length), SignMap(drive.signs), np.random.default_rng(rng.integers(2**31)))
     true = replace(told, pitch=told.pitch + rng.normal(0.0, noise.pitch))
     sensor = Sensor(AIRLIGHT * 255.0 / drive.grey)
-    renderer = make_renderer("auto", scene, illuminance=ILLUMINANCE)
+    # Not OpenGL: a run may use the only context of this process, and results would depend on the machine.
+    renderer = make_renderer("cpu", scene, illuminance=ILLUMINANCE)
     try:
         for x in drive.places:
             pose = CameraPose((x - SETBACK, 0.0, true.mount_height), heading=0.0)
@@ -109,6 +114,8 @@ def observed(
             signs = signs_ahead(known, place, rng.normal(0.0, noise.heading), drive.reach)
             seen = {}
             for visibility in visibilities:
+                if drive.signs[0].position[0] - x > drive.farthest * visibility:
+                    continue
                 light = foggy_radiance(view, pose, true, extinction_from_visibility(visibility))
                 image = expose(light, sensor, told.response, rng).astype(np.uint8)
                 seen[visibility] = Observation(Frame(x / SPEED, image, told), SPEED, None, signs, SETBACK)

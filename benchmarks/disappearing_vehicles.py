@@ -32,11 +32,11 @@ from lead_accuracy import CAMERAS, OTHERS, SETBACK, VEHICLES
 from rich.console import Console
 from rich.progress import track
 
+from fogsim.calibration.staged_road import StagedVehicle, road_renderer
 from fogsim.estimators import make
 from fogsim.estimators.protocol import Estimator
 from fogsim.render import Renderer
 from fogsim.reproduce.huang2015_chase import FASTER, OWN_SPEED, drawn, fogged
-from fogsim.reproduce.scenes import StagedVehicle, road_renderer
 from fogsim.values import Camera, Estimate, Frame, LeadMeasurement, Observation
 
 VISIBILITIES = (60.0, 100.0, 150.0, 250.0)

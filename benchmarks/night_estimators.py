@@ -22,11 +22,9 @@ from typing import Any
 import numpy as np
 
 from fogsim.atmosphere.lamps.phase_function import Droplets
-from fogsim.calibration.veil_references import usual_references
+from fogsim.calibration.staged_night import SETBACK, NightRoad, NightScene
 from fogsim.estimators import make
 from fogsim.estimators.night.gallen2014_veil import BANDS
-from fogsim.estimators.night.references import TakesReferences
-from fogsim.reproduce.night.scenes import SETBACK, NightRoad, NightScene
 from fogsim.values import Camera, Estimate, Lamp, Observation
 from fogsim.values.camera import Response
 
@@ -77,10 +75,7 @@ def looks(variant: Variant, pool: int, count: int) -> Iterator[tuple[float, Came
 def estimates(name: str, told: Camera, seen: Observation) -> Estimate:
     """What a method says of one picture alone."""
     method, options = METHODS[name]
-    estimator = make(method, told, **options)
-    if isinstance(estimator, TakesReferences):
-        estimator.take_references(usual_references)
-    return estimator.update(seen)
+    return make(method, told, **options).update(seen)
 
 
 def record(name: str, variant: str, found: list[tuple[float, Estimate]]) -> dict[str, Any]:
@@ -117,7 +112,6 @@ def milliseconds() -> dict[str, float]:
     seen, spent = Observation(picture, lamps=Lamp.LOW_BEAM, camera_setback=SETBACK), {}
     for name in ("night_road", "gallen2014_veil"):
         estimator = make(name, camera)
-        estimator.take_references(usual_references)  # type: ignore[attr-defined]  # both do
         estimator.update(seen)
         times = []
         for _ in range(20):

@@ -16,11 +16,11 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from fogsim.atmosphere.lamps.phase_function import Droplets
+from fogsim.calibration.halo_calibration import measure_halo_threshold, random_scene
+from fogsim.calibration.staged_night import SETBACK, NightRoad, NightScene, NightVehicle
+from fogsim.calibration.staged_road import StagedVehicle
 from fogsim.estimators.night.halos import HaloWatch, largest_sharpness, mean_steepness
 from fogsim.estimators.night.night_glow import NightGlow
-from fogsim.reproduce.night.halo_calibration import measure_halo_threshold, random_scene
-from fogsim.reproduce.night.scenes import SETBACK, NightRoad, NightScene, NightVehicle
-from fogsim.reproduce.scenes import StagedVehicle
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, Estimate, Frame, Lamp, LeadMeasurement, Observation, Response
 from fogsim.vision.sources.halo_profile import halos_of

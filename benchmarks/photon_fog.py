@@ -27,10 +27,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "docs"))
 from make_tables import filled
 
 from fogsim.atmosphere import Droplets
+from fogsim.calibration.staged_road import road_renderer
 from fogsim.reproduce.airlight import CHASE_METHODS
 from fogsim.reproduce.airlight.evaluation import EVEN_AIRLIGHT, Case, drive_alone, follow
 from fogsim.reproduce.road_sweeps import CAMERA
-from fogsim.reproduce.scenes import road_renderer
 from fogsim.values import Estimate
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "explanation" / "airlight.md"

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.reproduce.scenes import StagedVehicle
+from fogsim.calibration.staged_road import StagedVehicle
 from fogsim.values import Camera, CameraPose
 from fogsim.values.pinhole import camera_axes
 

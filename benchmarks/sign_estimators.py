@@ -21,10 +21,10 @@ import numpy as np
 from docs_table import write_table
 from sign_drives import CAMERA, Drive, drives
 
+from fogsim.calibration.sign_calibration import measure_operating_range
 from fogsim.estimators.protocol import Estimator
 from fogsim.estimators.signs.belaroussi2015 import Belaroussi2015
 from fogsim.estimators.signs.sign_contrast import SignContrast
-from fogsim.reproduce.sign_calibration import measure_operating_range
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Estimate
 from fogsim.values.estimate import NORMAL_90_PERCENT

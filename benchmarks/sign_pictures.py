@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
+from fogsim.calibration.staged_road import AIRLIGHT, ILLUMINANCE, foggy_radiance, straight_road
 from fogsim.camera import Sensor, expose
 from fogsim.render import make_renderer
-from fogsim.reproduce.scenes import AIRLIGHT, ILLUMINANCE, foggy_radiance, straight_road
 from fogsim.scene import build_scene
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, CameraPose, Response, Sign, SignMap

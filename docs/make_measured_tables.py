@@ -53,29 +53,40 @@ def _short(number: str) -> str:
     return f"{float(number):.1f}" if float(number) < 9.95 else f"{float(number):.0f}"
 
 
-def zhu2015() -> Rows:
-    """What `fogsim reproduce zhu2015` prints."""
-    from fogsim.reproduce import REPRODUCTIONS  # noqa: PLC0415 - heavy, and the other tables do not need it
-
-    return list(REPRODUCTIONS["zhu2015"]().table)
+PAPERS = ("negru2013", "zhu2015", "huang2015", "belaroussi2015", "gallen2014")
+"""Papers whose published figures are compared cell by cell."""
 
 
 @functools.cache
-def reproduced_drivers() -> "Reproduction":
-    """What `fogsim reproduce drivers` tells; minutes."""
+def reproduced(name: str) -> "Reproduction":
+    """What `fogsim reproduce NAME` finds; minutes."""
     from fogsim.reproduce import REPRODUCTIONS  # noqa: PLC0415 - heavy, and the other tables do not need it
 
-    return REPRODUCTIONS["drivers"]()
+    return REPRODUCTIONS[name]()
+
+
+def paper_cells(name: str) -> Rows:
+    """Every published figure of a paper next to ours, misses in bold, and how many are reached."""
+    from fogsim.reproduce.paper_cells import CELL_HEADING, reached_counts  # noqa: PLC0415 - as above
+
+    cells = reproduced(name).cells
+    reached = map(str, reached_counts(cells))
+    return [CELL_HEADING, *(cell.shown() for cell in cells), ("reached", "", "", f"of {len(cells)}", *reached)]
+
+
+def zhu2015() -> Rows:
+    """Classes and errors of zhu2015, on free roads and behind a car."""
+    return list(reproduced("zhu2015").table)
 
 
 def drivers() -> Rows:
     """Published findings of traffic in fog, and ours."""
-    return list(reproduced_drivers().table)
+    return list(reproduced("drivers").table)
 
 
 def drivers_traffic() -> Rows:
     """The default drivers' traffic by demand and visibility."""
-    return list(reproduced_drivers().tables[1].rows)
+    return list(reproduced("drivers").tables[1].rows)
 
 
 TABLES: dict[str, tuple[str, Callable[[], Rows]]] = {
@@ -87,6 +98,7 @@ TABLES: dict[str, tuple[str, Callable[[], Rows]]] = {
     "night-lamps": ("docs/explanation/night.md", night_deviations.lamp_fluxes),
     "night-limits": ("docs/explanation/night.md", night_deviations.limits),
     "night-directions": ("docs/explanation/night.md", night_deviations.directions),
+    **{f"paper-{name}": ("docs/explanation/estimators.md", functools.partial(paper_cells, name)) for name in PAPERS},
     "zhu2015": ("docs/explanation/estimators.md", zhu2015),
     "drivers-published": ("docs/explanation/drivers.md", drivers),
     "drivers-traffic": ("docs/explanation/drivers.md", drivers_traffic),

@@ -59,6 +59,13 @@ def study(name: str, minutes: float) -> Measurement:
     return Measurement(name, commands, minutes, (*rests_on, *SIMULATIONS.get(name, ())))
 
 
+def paper(name: str, minutes: float, *more: str, module: str = "", times: str = "") -> Measurement:
+    """Published figures of a paper next to ours, and further tables of its evaluation."""
+    tables = (f"paper-{name}", *more)
+    command = f"python docs/make_measured_tables.py {' '.join(tables)}"
+    return Measurement(name, (command,), minutes, (f"fogsim/reproduce/{module or name}.py",), tables, times)
+
+
 def environment(name: str, minutes: float, tables: tuple[str, ...], options: str, *rests_on: str) -> Measurement:
     """Tables of docs/make_environment_tables.py."""
     command = f"python docs/make_environment_tables.py --ids {options}"
@@ -118,7 +125,11 @@ MEASUREMENTS = (
         times="ms",
         more="python docs/make_measured_tables.py excerpt",
     ),
-    Measurement("zhu2015", ("python docs/make_measured_tables.py zhu2015",), 3, ("fogsim/reproduce/zhu2015.py",)),
+    paper("negru2013", 1, times="time [ms]"),
+    paper("zhu2015", 3, "zhu2015"),
+    paper("huang2015", 5),
+    paper("belaroussi2015", 5),
+    paper("gallen2014", 10, module="night/gallen2014"),
     Measurement(
         "drivers",
         ("python docs/make_measured_tables.py drivers",),
@@ -196,13 +207,11 @@ UNWRITTEN = (
     Unwritten("docs/explanation/drivers.md", "collisions behind who stands", "`python benchmarks/collisions.py`"),
     Unwritten("docs/explanation/drivers.md", "networks that FogSim did not write", "`python benchmarks/networks.py`"),
     Unwritten("docs/explanation/drivers.md", "cost beside SUMO's step", "`python benchmarks/traffic.py`"),
-    Unwritten("docs/explanation/estimators.md", "what of the papers is reached", "`fogsim reproduce NAME`"),
     Unwritten("docs/explanation/night.md", "pictures taken for fog, glow", "`python benchmarks/night_sources.py`"),
     Unwritten("docs/explanation/night.md", "pictures of drives taken for fog", "`fogsim reproduce gallen2014`"),
     Unwritten("docs/explanation/night.md", "sight by low and high beams", "`fogsim.lighting.own_sight`, by hand"),
     Unwritten("docs/explanation/physics.md", "how roads reflect", "`python tools/make_road_reflectance.py`"),
     Unwritten("docs/explanation/signs.md", "how well signs are found", "`python benchmarks/sign_detector.py`"),
-    Unwritten("docs/explanation/signs.md", "visibility by first detection", "`fogsim reproduce belaroussi2015`"),
     Unwritten("docs/reference/environments.md", "returns beside thresholds", "`fogsim_envs.evaluate`, by hand"),
     Unwritten("docs/reference/environments.md", "what an agent learned", "`python examples/train_ppo.py`"),
 )

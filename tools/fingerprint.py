@@ -25,12 +25,12 @@ from typing import Any
 import numpy as np
 
 import fogsim
+from fogsim.calibration.staged_road import ILLUMINANCE, StagedVehicle, straight_road
 from fogsim.estimators import ESTIMATORS, make
 from fogsim.metrics import RunMetrics
 from fogsim.recorders import write_json
 from fogsim.render import make_renderer
 from fogsim.reproduce.huang2015_chase import Chase
-from fogsim.reproduce.scenes import ILLUMINANCE, StagedVehicle, straight_road
 from fogsim.scenario import build
 from fogsim.scene import SIGN_KINDS, build_scene
 from fogsim.traffic.road.network import read_net, road_network

@@ -1,1 +1,1 @@
-"""What methods must know of a camera before they can tell anything, computed by the models of air and lamps."""
+"""What methods must know about a camera, and the staged scenes and models of lamps that it is measured with."""

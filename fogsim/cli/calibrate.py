@@ -33,10 +33,10 @@ def calibrate_signs_command(
     as_json: Annotated[bool, typer.Option("--json", help="Print the calibration in place of the table.")] = False,
 ) -> None:
     """From how far signs are detected in fog: the operating range that belaroussi2015 turns into a visibility."""
+    from fogsim.calibration.sign_calibration import measure_operating_range
     from fogsim.files.atomic import write_bytes
     from fogsim.files.output_targets import refuse_unwritable
     from fogsim.offline.camera_file import load_camera
-    from fogsim.reproduce.sign_calibration import measure_operating_range
 
     refuse_unwritable(out, "--out", overwrite=overwrite, read=[camera])
     known, done = load_camera(camera), 0
@@ -86,10 +86,10 @@ def calibrate_halos_command(
     as_json: Annotated[bool, typer.Option("--json", help="Print the calibration in place of a line.")] = False,
 ) -> None:
     """How steeply light falls off about lamps in clear air and in fog: below which Br50 gallen2014 sees fog."""
+    from fogsim.calibration.halo_calibration import measure_halo_threshold
     from fogsim.files.atomic import write_bytes
     from fogsim.files.output_targets import refuse_unwritable
     from fogsim.offline.camera_file import load_camera
-    from fogsim.reproduce.night.halo_calibration import measure_halo_threshold
 
     refuse_unwritable(out, "--out", overwrite=overwrite, read=[camera])
     known, done = load_camera(camera), 0

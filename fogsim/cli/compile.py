@@ -201,14 +201,12 @@ def read_own_beams() -> None:
     """Run night methods on images of a lit road, in colour and in grey."""
     import numpy as np
 
-    from fogsim.calibration.veil_references import usual_references
-    from fogsim.estimators.night.night_road import NightRoad
+    from fogsim.estimators import make
     from fogsim.values import Camera, Lamp, Observation
 
     camera = Camera(160, 120, 144.0, (80.0, 60.0), 1.4, pitch=0.03)
     lit = np.repeat(np.linspace(10, 120, 120).astype(np.uint8)[:, None], 160, axis=1)
-    estimator = NightRoad(camera)
-    estimator.take_references(usual_references)
+    estimator = make("night_road", camera)
     for image in (np.repeat(lit[:, :, None], 3, axis=2), lit):
         estimator.update(Observation(image, lamps=Lamp.LOW_BEAM))
 

@@ -71,12 +71,12 @@ def _evaluated(name: str, evaluation: "Evaluation", *, quick: bool, table: str |
                 return evaluation(quick=quick, table=table, watch=watch)
         except KeyboardInterrupt:
             progress.stop()
-            stderr.print(f"interrupted: {name} after {steps}; nothing of it is told or written", soft_wrap=True)
+            stderr.print(f"interrupted: {name} after {steps}; nothing of it is printed or written", soft_wrap=True)
             raise typer.Exit(INTERRUPTED) from None
 
 
 def _show(done: "Reproduction", *, as_json: bool) -> None:
-    from fogsim.reproduce.paper_cells import CELL_HEADING, reached_line
+    from fogsim.reproduce.paper_cells import CELL_HEADING, reached_counts
 
     if as_json:
         cells = [{"paper": done.paper, "table": "cells", **cell.record()} for cell in done.cells]
@@ -88,7 +88,11 @@ def _show(done: "Reproduction", *, as_json: bool) -> None:
         miss = "[bold]{}[/]" if stdout.is_terminal else "**{}**"
         rows = [(*map(escape, shown[:3]), *shown[3:]) for shown in (cell.shown(miss) for cell in done.cells)]
         _print_table(f"{done.paper}: the paper's figures and ours, misses in bold", CELL_HEADING, rows)
-        stdout.print(reached_line(done.cells), soft_wrap=True, end="\n\n")
+        published, corrected = reached_counts(done.cells)
+        summary = (
+            f"Of {len(done.cells)} published figures {published} are reached as published and {corrected} corrected."
+        )
+        stdout.print(summary, soft_wrap=True, end="\n\n")
     for shown in done.all_tables:
         heading, *plain = shown.rows
         _print_table(shown.title, heading, [tuple(map(escape, row)) for row in plain])

@@ -1,6 +1,7 @@
 """Visibility estimators, one method a module, in one registry: published ones and three of this project's own."""
 
 from collections.abc import Callable
+from importlib import import_module
 
 from fogsim import registry
 from fogsim.estimators.cramer_rao import FoggyRoad, extinction_bound
@@ -17,7 +18,7 @@ from fogsim.estimators.night.night_road import NightRoad
 from fogsim.estimators.other_sensors.gabb2014 import Gabb2014
 from fogsim.estimators.other_sensors.hautiere2006_stereo import Hautiere2006Stereo
 from fogsim.estimators.other_sensors.scatterometer import Scatterometer
-from fogsim.estimators.protocol import Estimator
+from fogsim.estimators.protocol import Estimator, TakesCalibrations
 from fogsim.estimators.signs.belaroussi2015 import Belaroussi2015
 from fogsim.estimators.signs.sign_contrast import SignContrast
 from fogsim.estimators.zhu2015 import Zhu2015
@@ -63,6 +64,9 @@ ESTIMATORS: Registry[Callable[..., Estimator]] = Registry(
 def make(name: str, camera: Camera, **options: object) -> Estimator:
     """Build an estimator.
 
+    An estimator that needs a calibration of the camera, and is given no file of it, calibrates the camera when it first
+    needs to; calibrations of halos and signs are cached (``FOGSIM_CACHE_DIR``).
+
     Parameters
     ----------
     name : str
@@ -79,7 +83,11 @@ def make(name: str, camera: Camera, **options: object) -> Estimator:
     InputError
         If the estimator has no such parameter.
     """
-    return registry.make(ESTIMATORS, name, camera, **options)
+    made: Estimator = registry.make(ESTIMATORS, name, camera, **options)
+    if isinstance(made, TakesCalibrations):
+        # By name, for scenes are drawn by stages that no estimator may import.
+        import_module("fogsim.calibration.cached").supply(made)
+    return made
 
 
 __all__ = ["ESTIMATORS", "Estimator", "FoggyRoad", "extinction_bound", "make"]

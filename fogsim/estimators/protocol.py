@@ -1,8 +1,13 @@
 """What every estimator is to the loop."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
+from fogsim.estimators.night.halos import HaloThreshold
+from fogsim.estimators.night.references import VeilReferences
+from fogsim.estimators.signs.operating_range import OperatingRange
+from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
+from fogsim.values.light import Lamp
 from fogsim.values.observation import Observation
 
 
@@ -34,4 +39,35 @@ class Estimator(Protocol):
 
     def reset(self) -> None:
         """Forget all earlier observations; their time may begin anew."""
+        ...
+
+
+class Calibrations(Protocol):
+    """Calibrations of a camera, each made when it is first needed; InputError if the camera cannot be calibrated."""
+
+    def veil_references(self, camera: Camera, lamps: Lamp, setback: float) -> tuple[VeilReferences, ...]:
+        """References of the lit head lamps' veil; `setback` is from the front bumper back to the camera [m]."""
+        ...
+
+    def halo_threshold(self, camera: Camera) -> HaloThreshold:
+        """Sharpness of halos below which there is fog."""
+        ...
+
+    def operating_range(self, camera: Camera, diameter: float) -> OperatingRange:
+        """Distances at which signs of a diameter [m] are detected in fog."""
+        ...
+
+
+@runtime_checkable
+class TakesCalibrations(Protocol):
+    """An estimator that needs calibrations where its parameters name no file of them."""
+
+    def take_calibrations(self, source: Calibrations) -> None:
+        """Take calibrations from a source when they are first needed.
+
+        Parameters
+        ----------
+        source : Calibrations
+            Makes them.
+        """
         ...

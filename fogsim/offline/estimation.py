@@ -6,10 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fogsim.calibration.veil_references import usual_references
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.estimators import ESTIMATORS, Estimator, make
-from fogsim.estimators.night.references import TakesReferences
 from fogsim.offline.camera_file import Calibration
 from fogsim.offline.image_files import Pixels
 from fogsim.offline.input_paths import find_source
@@ -182,11 +180,7 @@ class _Bench:
 
     def _made(self, camera: Camera) -> list[Estimator]:
         told = NightDrive() if self._night is None else self._night
-        made = [make(name, camera, **told.parameters_of(name)) for name in self._methods]
-        for estimator in made:
-            if isinstance(estimator, TakesReferences):
-                estimator.take_references(usual_references)
-        return made
+        return [make(name, camera, **told.parameters_of(name)) for name in self._methods]
 
     def reset(self) -> None:
         """Forget all earlier images."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.calibration.staged_road import AIRLIGHT, StagedVehicle, foggy_radiance, staged_traffic
 from fogsim.camera import Sensor, averaged, expose, supersampled
 from fogsim.render import Renderer
-from fogsim.reproduce.scenes import AIRLIGHT, StagedVehicle, foggy_radiance, staged_traffic
 from fogsim.scene import vehicle_batches
 from fogsim.units import extinction_from_visibility
 from fogsim.values import (

@@ -86,13 +86,9 @@ def _figure(value: float, like: float | None = None) -> str:
     return f"{value:g}" if like is None else f"{value:.{decimals}f}"
 
 
-def reached_line(cells: Sequence[PaperCell]) -> str:
-    """How many of a paper's figures each form of its method reaches."""
-    published, corrected = (
-        sum(cell.reached(ours) for cell, ours in zip(cells, column, strict=True))
-        for column in ([cell.as_published for cell in cells], [cell.corrected for cell in cells])
-    )
-    return f"Of {len(cells)} published figures {published} are reached as published and {corrected} corrected."
+def reached_counts(cells: Sequence[PaperCell]) -> tuple[int, int]:
+    """How many of a paper's figures are reached as published and corrected."""
+    return sum(cell.reached(cell.as_published) for cell in cells), sum(cell.reached(cell.corrected) for cell in cells)
 
 
 def chosen_tables(known: Sequence[str], table: str | None) -> tuple[str, ...]:

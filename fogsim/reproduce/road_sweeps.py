@@ -23,6 +23,9 @@ VISIBILITIES = (50.0, 100.0, 200.0, 400.0)
 DRIVES, FRAMES = 6, 3
 """Drives of each setting, and their frames, of which the last one's estimate counts."""
 
+GROWTHS = (0.5, 1.0, 2.0, 4.0, 6.0, 8.0, 12.0, 20.0, 40.0)
+"""G_max of region growing as published [grey levels]."""
+
 Form = Mapping[str, object]
 """Options of an estimator."""
 
@@ -146,10 +149,20 @@ def steps_of(drives: int = DRIVES) -> int:
     return len(SETTINGS) * drives
 
 
+def over_growths(name: str, form: Form) -> dict[str, Form]:
+    """A form of a method whose region grows with each of `GROWTHS`."""
+    return {f"{name}, G_max {growth:g}": {**form, "growth": growth} for growth in GROWTHS}
+
+
 def swept(
-    method: str, kind: type[Repair], renderer: Renderer, steps: Steps, drives: int = DRIVES
-) -> tuple[list[dict[str, Cell]], tuple[TitledTable, TitledTable]]:
-    """Errors of a method, as published and corrected, over settings, and with each repair switched off.
+    method: str,
+    kind: type[Repair],
+    renderer: Renderer,
+    steps: Steps,
+    drives: int = DRIVES,
+    left_open: Mapping[str, Form] | None = None,
+) -> tuple[list[dict[str, Cell]], tuple[TitledTable, ...]]:
+    """Errors of a method, as published and corrected, over settings, with each repair off, and over what is left open.
 
     Parameters
     ----------
@@ -163,31 +176,36 @@ def swept(
         Told of every drive.
     drives : int
         Drives of each setting.
+    left_open : mapping, optional
+        Forms with other values of what the paper leaves open, by name; run in the first setting.
 
     Returns
     -------
-    (list of records, (TitledTable, TitledTable))
+    (list of records, tables)
         A record for each setting, form and visibility: share of drives with an estimate of fog, median error and bias.
     """
     both: dict[str, Form] = {"published": {"as_published": True}, "corrected": {}}
+    left_open = left_open or {}
     records: list[dict[str, Cell]] = []
     for setting in SETTINGS:
         seen = driven(renderer, setting, VISIBILITIES, drives, steps)
-        forms = both | (without_each(kind) if setting is SETTINGS[0] else {})
+        forms = both | ({**without_each(kind), **left_open} if setting is SETTINGS[0] else {})
         for name, form in forms.items():
             for visibility in VISIBILITIES:
                 here = [one for one in seen if one.visibility == visibility]
                 estimates = [last_estimate(method, setting.camera, form, one) for one in here]
                 records.append(_record(method, setting, name, visibility, estimates))
-    titles = (
-        f"Sweeps of {method}: |error| of V_met, median [%], and share of drives that tell, by V_met",
-        f"Repairs of {method}, each switched off: |error| of V_met, median [%], and share of drives that tell",
+    shown = {
+        "Sweeps of {}": [(setting.name, name) for setting in SETTINGS for name in both],
+        "Repairs of {}, each switched off": [(SETTINGS[0].name, name) for name in ("published", *without_each(kind))],
+        "What the paper of {} leaves open": [(SETTINGS[0].name, name) for name in left_open],
+    }
+    figures = "|error| of V_met, median [%], and share of drives where fog is found, by V_met"
+    return records, tuple(
+        TitledTable(f"{title.format(method)}: {figures}", _rows(records, wanted))
+        for title, wanted in shown.items()
+        if wanted
     )
-    rows = (
-        _rows(records, [(setting.name, name) for setting in SETTINGS for name in both]),
-        _rows(records, [(SETTINGS[0].name, name) for name in ("published", *without_each(kind))]),
-    )
-    return records, (TitledTable(titles[0], rows[0]), TitledTable(titles[1], rows[1]))
 
 
 def _record(

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.calibration.staged_road import AIRLIGHT, foggy_radiance, standing_cars
 from fogsim.camera import Sensor, expose
 from fogsim.render import Renderer
-from fogsim.reproduce.scenes import AIRLIGHT, foggy_radiance, standing_cars
 from fogsim.scene import vehicle_batches
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, CameraPose, LeadMeasurement, Observation, View

@@ -63,5 +63,5 @@ def test_an_interruption_ends_in_one_line(reproduce, *, terminal: bool, in_kerne
     assert (code, out) == (130, "")
     # What the bar drew and wiped again is control sequences and what stands between them and a carriage return.
     lines = [line for line in re.sub(r"\x1b\[[0-9;?]*[A-Za-z]|.*\r", "", err).split("\n") if line.strip()]
-    assert lines[-1] == "interrupted: negru2013 after 1 of 4 steps; nothing of it is told or written"
+    assert lines[-1] == "interrupted: negru2013 after 1 of 4 steps; nothing of it is printed or written"
     assert terminal or len(lines) == 1

@@ -14,12 +14,12 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
+from fogsim.calibration.staged_road import foggy_image, straight_road
 from fogsim.errors import InputError
 from fogsim.estimators import make
 from fogsim.offline import Straightener, estimate_images, find_source, guess_camera, straightened
 from fogsim.offline.camera_file import Calibration, load_calibration, load_camera
 from fogsim.render import make_renderer
-from fogsim.reproduce.scenes import foggy_image, straight_road
 from fogsim.scene import build_scene
 from fogsim.values import Camera, CameraPose, Observation, Response, SignMap
 

@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from fogsim.calibration.sign_calibration import measure_operating_range
 from fogsim.cli.app import app
 from fogsim.errors import InputError
 from fogsim.estimators.signs.operating_range import OperatingRange
 from fogsim.reproduce.belaroussi2015 import PUBLISHED, Setup, reproduce
-from fogsim.reproduce.sign_calibration import measure_operating_range
 from fogsim.values import Camera, Response
 
 CAMERA = Camera(320, 160, 300.0, (159.5, 79.5), 1.4, pitch=0.01, response=Response.SRGB)
@@ -56,7 +56,7 @@ def test_the_evaluation_stands_beside_the_paper() -> None:
     steps: list[tuple[int, int]] = []
     done = reproduce(12, [Setup("small", CAMERA)], 4, fogs=FOGS, watch=lambda step, total: steps.append((step, total)))
     assert [record["visibility_m"] for record in done.records] == list(PUBLISHED)
-    assert {record["paper_m"] for record in done.records} == set(PUBLISHED.values())
+    assert [cell.paper for cell in done.cells] == [72.0, 172.0, 218.0, 245.0, 285.0, 28.0, 18.0, 25.0, 28.0]
     assert len(done.table) == 1 + len(PUBLISHED)
     assert done.picture.ndim == 3
     assert steps == sorted(steps)

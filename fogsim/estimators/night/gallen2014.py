@@ -4,10 +4,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Self
 
+from fogsim.errors import InputError
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.night.gallen2014_veil import LEAST_ROWS, Gallen2014Veil
 from fogsim.estimators.night.halos import PUBLISHED, WINDOW, HaloReading, HaloThreshold, HaloWatch, largest_sharpness
-from fogsim.estimators.night.references import ReferenceSource
+from fogsim.estimators.protocol import Calibrations
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera
@@ -52,8 +53,8 @@ class Gallen2014:
     camera : Camera
         The assumed calibration.
     halos : str or None
-        File of ``fogsim calibrate halos``, of this camera; without it ``detected`` is whether the mean Br50 is below
-        the paper's 9, which is of its own camera, and there are no bounds.
+        File of ``fogsim calibrate halos`` for this camera; None to calibrate it, once, when
+        it is first needed.
     references : str or None
         File of ``fogsim calibrate veil``; see `NightRoad`.
     window : int
@@ -83,6 +84,8 @@ class Gallen2014:
         self._window, self._as_published = int(window), as_published
         self._veil = Gallen2014Veil(camera, references=references, as_published=as_published)
         self._watch, self._is_calibrated = HaloWatch(PUBLISHED, window=self._window), False
+        self._source: Calibrations | None = None
+        self._trouble = "halos are not calibrated for this camera: fogsim calibrate halos, parameter halos"
         if halos is not None:
             self.calibrated(HaloThreshold.read(Path(halos)))
 
@@ -107,15 +110,10 @@ class Gallen2014:
             self._watch = HaloWatch(checked.sharpness, largest_sharpness, window=window)
         return self
 
-    def take_references(self, source: ReferenceSource) -> None:
-        """Take references from a source where no file was named; see `TakesReferences`.
-
-        Parameters
-        ----------
-        source : callable
-            Gives them when they are first needed.
-        """
-        self._veil.take_references(source)
+    def take_calibrations(self, source: Calibrations) -> None:
+        """Take calibrations from a source where no file was named."""
+        self._source = source
+        self._veil.take_calibrations(source)
 
     def reset(self) -> None:
         """Forget all earlier frames."""
@@ -150,10 +148,20 @@ class Gallen2014:
             return Estimate.invalid(self.method, why)
         if not lit_by_lamps(levelled(image, self._camera), self._camera):
             return Estimate.invalid(self.method, "no lamps light the road: this is a method for the night")
+        self._calibrate()
         reading = self._watch.look(image, self._camera.bits)
         if reading.is_fog is not None:
             return self._by_halos(reading)
         return self._by_veil(observation)
+
+    def _calibrate(self) -> None:
+        """Calibrate the camera, unless it is or cannot be."""
+        if self._is_calibrated or self._source is None:
+            return
+        try:
+            self.calibrated(self._source.halo_threshold(self._camera))
+        except InputError as error:
+            self._source, self._trouble = None, str(error)
 
     def _by_veil(self, observation: Observation) -> Estimate:
         told = self._veil.update(observation)
@@ -166,8 +174,7 @@ class Gallen2014:
         found: dict[str, object] = {"by": "halos", "detected": reading.is_fog, "lamps": len(reading.halos)}
         found |= {"value": reading.value, "smoothed": reading.smoothed}
         if not self._is_calibrated:
-            why = "halos are not calibrated for this camera: fogsim calibrate halos, parameter halos"
-            return Estimate.invalid(self.method, why, **found)
+            return Estimate.invalid(self.method, self._trouble, **found)
         if reading.is_fog:
             why, bounds = (
                 "halos show fog, but not how much",

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.night.cells import CellMeans, cell_means, cell_size
 from fogsim.estimators.night.reference_file import HEAD_LAMPS, References
-from fogsim.estimators.night.references import ReferenceSource
 from fogsim.estimators.night.veil_correlation import (
     VeilScores,
     VeilTemplates,
     visibility_by_parabola,
     visibility_by_peak,
 )
+from fogsim.estimators.protocol import Calibrations
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera, Response
@@ -103,15 +103,9 @@ class Gallen2014Veil:
         self._threshold, self._as_published = threshold, as_published
         self.reset()
 
-    def take_references(self, source: ReferenceSource) -> None:
-        """Take references from a source where no file was named; see `TakesReferences`.
-
-        Parameters
-        ----------
-        source : callable
-            Gives them when they are first needed.
-        """
-        self._references.source = source
+    def take_calibrations(self, source: Calibrations) -> None:
+        """Take references from a source where no file was named."""
+        self._references.source = source.veil_references
 
     def reset(self) -> None:
         """Forget all earlier frames."""

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.night.cells import CellMeans, camera_of_cells, cell_means, cell_size
 from fogsim.estimators.night.reference_file import HEAD_LAMPS, References
-from fogsim.estimators.night.references import ReferenceSource, VeilReferences
+from fogsim.estimators.night.references import VeilReferences
 from fogsim.estimators.night.veil_fit import Parts, VeilFit, fit_veil
+from fogsim.estimators.protocol import Calibrations
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera
@@ -117,9 +118,8 @@ class NightRoad:
     camera : Camera
         The assumed calibration.
     references : str or None
-        File of ``fogsim calibrate veil``. In a scenario and in ``fogsim estimate`` none is needed for a car's usual
-        lamps: references are then computed, once for each camera and set of lamps. Elsewhere `take_references` has
-        them.
+        File of ``fogsim calibrate veil``; None for a car's usual lamps, whose references are computed
+        once for each camera and set of lamps.
     pitch_deviation : float
         Standard deviation of the true pitch about the assumed one [rad].
     frames : int
@@ -148,15 +148,9 @@ class NightRoad:
         self._frames = int(frames)
         self.reset()
 
-    def take_references(self, source: ReferenceSource) -> None:
-        """Take references from a source where no file was named; see `TakesReferences`.
-
-        Parameters
-        ----------
-        source : callable
-            Gives them when they are first needed.
-        """
-        self._references.source = source
+    def take_calibrations(self, source: Calibrations) -> None:
+        """Take references from a source where no file was named."""
+        self._references.source = source.veil_references
 
     def reset(self) -> None:
         """Forget all earlier frames."""

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,17 +58,3 @@ class VeilReferences:
 ReferenceSource = Callable[[Camera, Lamp, float], tuple[VeilReferences, ...]]
 """Gives references for a camera, the lamps that are lit and the camera's distance behind the front bumper [m], of the
 same visibilities for each kind of droplets."""
-
-
-@runtime_checkable
-class TakesReferences(Protocol):
-    """A method that compares with references, which who builds it may tell it."""
-
-    def take_references(self, source: ReferenceSource) -> None:
-        """Take references from a source where no file of them was named.
-
-        Parameters
-        ----------
-        source : callable
-            Gives them when they are first needed.
-        """

@@ -8,6 +8,7 @@ from typing import Annotated, Self
 
 from fogsim.errors import InputError
 from fogsim.estimators.image_check import ObservationCheck
+from fogsim.estimators.protocol import Calibrations
 from fogsim.estimators.signs.operating_range import OperatingRange
 from fogsim.estimators.signs.regions import PoseDeviation
 from fogsim.estimators.signs.track import SignTrack
@@ -54,7 +55,7 @@ class Belaroussi2015:
     """Signs of the map are detected in the picture; where each was first detected tells the fog.
 
     A sign comes out of the fog at d_sign, the operating range of the detector, of which the visibility is a function
-    that was calibrated for the camera: `fogsim calibrate signs`. Each sign gives one measurement; k-means with three
+    that is calibrated for the camera and the size of the sign. Each sign gives one measurement; k-means with three
     clusters sets outliers aside, and a mixture of normal distributions is reduced to one (sections 4.2 to 4.4). What a
     sign says fades with the way driven since and with time. Where the curve is flat, or was not measured, a sign tells
     nothing: the distance at which it came out was set by the camera's resolution.
@@ -67,7 +68,8 @@ class Belaroussi2015:
     camera : Camera
         The assumed calibration.
     operating_range : str or None
-        File of the calibration, of this camera; without it nothing can be told.
+        File of ``fogsim calibrate signs`` for this camera, which then counts for signs of all sizes; None to calibrate
+        the camera for each size of signs, once, when the first is ahead.
     as_published : bool
         Whether the curve is the paper's cubic through the distances of 80 % detection, in place of the monotone one
         through the distances of first detection, and p(c) is 1.
@@ -103,7 +105,12 @@ class Belaroussi2015:
     ) -> None:
         self._check = ObservationCheck(camera)
         self._camera = camera
-        self._range = None if operating_range is None else _read_range(operating_range, camera)
+        self._given: OperatingRange | None = None
+        self._source: Calibrations | None = None
+        self._made: dict[float, OperatingRange | None] = {}
+        self._trouble = "the detector is not calibrated for this camera: fogsim calibrate signs"
+        if operating_range is not None:
+            self.calibrated(OperatingRange.read(Path(operating_range)))
         self._as_published = as_published
         deviation = PoseDeviation(position_deviation, heading=heading_deviation, pitch=pitch_deviation)
         self._watch = SignWatch(camera, setback, deviation)
@@ -111,21 +118,34 @@ class Belaroussi2015:
         self._horizon = camera.horizon_row
         self.reset()
 
-    def calibrated(self, measured: OperatingRange) -> Self:
+    def calibrated(self, measured: OperatingRange, watch: SignWatch | None = None) -> Self:
         """Take a calibration that was not read from a file.
 
         Parameters
         ----------
         measured : OperatingRange
             Of this camera.
+        watch : SignWatch, optional
+            Looks for signs in place of this estimator's own, such as one that several estimators share.
 
         Raises
         ------
         InputError
             If it is of a camera of another focal length.
         """
-        self._range = _checked_range(measured, self._camera)
+        if abs(measured.focal_length / self._camera.focal_length - 1.0) > LIKE:
+            raise InputError(
+                f"the operating range was calibrated for a focal length of {measured.focal_length:g} px, and the "
+                f"camera has {self._camera.focal_length:g} px: calibrate it for this camera"
+            )
+        self._given, self._trouble = measured, ""
+        if watch is not None:
+            self._watch = watch
         return self
+
+    def take_calibrations(self, source: Calibrations) -> None:
+        """Take calibrations from a source where no file was named."""
+        self._source, self._trouble = source, ""
 
     def reset(self) -> None:
         """Forget all signs."""
@@ -135,7 +155,7 @@ class Belaroussi2015:
         self._seen: list[_Seen] = []
         self._way, self._time = 0.0, -math.inf
         self._least: tuple[float, float] | None = None
-        self._missed: dict[str, tuple[float, float]] = {}
+        self._missed: dict[str, tuple[OperatingRange, float, float]] = {}
         self._map_holds = False
 
     def update(self, observation: Observation) -> Estimate:
@@ -167,34 +187,43 @@ class Belaroussi2015:
         watched = self._watch.look(observation)
         found: dict[str, object] = {"horizon_row": self._horizon, "sign_boxes": _boxes(watched)}
         found["sign_looks"] = sign_looks(watched, self._watch.tracks)
-        if self._range is None:
-            why = "the detector is not calibrated for this camera: fogsim calibrate signs, parameter operating_range"
-            return Estimate.invalid(self.method, why, **found)
-        self._count(watched, self._range)
+        self._count(watched)
         self._note_missed()
-        return self._estimate(found, self._range)
+        return self._estimate(found)
 
-    def _count(self, watched: Watched, measured: OperatingRange) -> None:
+    def _range_of(self, track: SignTrack) -> OperatingRange | None:
+        """The calibration for signs of a size; None without one, and `_trouble` has the reason."""
+        size = round(track.sign.sighting.diameter, 1)
+        if self._given is not None or self._source is None:
+            return self._given
+        if size not in self._made:
+            try:
+                self._made[size] = self._source.operating_range(self._camera, size)
+            except InputError as error:
+                self._made[size], self._trouble = None, str(error)
+        return self._made[size]
+
+    def _count(self, watched: Watched) -> None:
         """Measurements of the signs that are confirmed now."""
         self._counted -= {track.sign.sighting.sign_id for track in watched.passed}
         for track in self._watch.tracks:
             if track.confirmed and track.first_seen is not None and track.sign.sighting.sign_id not in self._counted:
                 self._counted.add(track.sign.sighting.sign_id)
-                self._add(track, track.first_seen, measured)
+                if (measured := self._range_of(track)) is not None:
+                    self._add(track, track.first_seen, measured)
 
     def _note_missed(self) -> None:
-        """Signs that should be seen and are not, each with the nearest distance of which that is so, and when."""
+        """Note signs that should be seen and are not: their calibration, the nearest such distance, and when."""
         for track in self._watch.tracks:
             sign_id = track.sign.sighting.sign_id
             if track.confirmed:
                 self._map_holds = True
                 self._missed.pop(sign_id, None)
             elif track.misses >= MISSES and track.unseen_before is not None:
-                self._missed[sign_id] = track.unseen_before, self._time
+                if (measured := self._range_of(track)) is not None:
+                    self._missed[sign_id] = measured, track.unseen_before, self._time
         self._missed = {
-            sign_id: (distance, time)
-            for sign_id, (distance, time) in self._missed.items()
-            if self._time - time < self._fading_time
+            sign_id: missed for sign_id, missed in self._missed.items() if self._time - missed[2] < self._fading_time
         }
 
     def _add(self, track: SignTrack, first_seen: float, measured: OperatingRange) -> None:
@@ -211,17 +240,17 @@ class Belaroussi2015:
         elif first_seen > measured.reach[1]:
             self._least = measured.farthest, self._time
 
-    def _estimate(self, found: dict[str, object], measured: OperatingRange) -> Estimate:
+    def _estimate(self, found: dict[str, object]) -> Estimate:
         weighted = [(one, self._weight(one)) for one in self._seen]
         weighted = [(one, weight) for one, weight in weighted if weight >= FORGOTTEN]
         self._seen = [one for one, _ in weighted]
         if self._least is not None and self._time - self._least[1] < self._fading_time:
             found["visibility_at_least"] = self._least[0]
         if not weighted:
-            why = self._watch.trouble or "no sign has come out of the fog yet"
+            why = self._trouble or self._watch.trouble or "no sign has come out of the fog yet"
             if "visibility_at_least" in found:
                 why = f"signs are seen from beyond the curve's range: at least {found['visibility_at_least']:.0f} m"
-            bounds = self._bounds(found, measured)
+            bounds = self._bounds(found)
             if bounds is not None and bounds.least > 0.0:
                 found["visibility_at_most"] = visibility_from_extinction(bounds.least)
                 why = f"signs of the map are not seen: at most {found['visibility_at_most']:.0f} m"
@@ -237,7 +266,7 @@ class Belaroussi2015:
         found |= {"signs": len(kept), "single_visibilities": tuple(values)}
         return Estimate(self.method, k, k * deviation / mean, diagnostics=found)
 
-    def _bounds(self, found: Mapping[str, object], measured: OperatingRange) -> ExtinctionBounds | None:
+    def _bounds(self, found: Mapping[str, object]) -> ExtinctionBounds | None:
         """What signs tell that were seen from beyond the curve's end, or not at all: at least, or at most, so much.
 
         A sign that is not seen where it should be has not come out of the fog, unless it is missing or hidden; so there
@@ -246,33 +275,21 @@ class Belaroussi2015:
         least = found.get("visibility_at_least")
         if isinstance(least, float):
             return ExtinctionBounds(most=extinction_from_visibility(least), softness=SOFTNESS)
-        nearest = sorted(distance for distance, _ in self._missed.values())
-        if not self._map_holds or len(nearest) < MISSED_SIGNS:
+        if not self._map_holds or len(self._missed) < MISSED_SIGNS:
             return None
-        low, high = measured.reach
-        told = measured.visibility_at(max(nearest[MISSED_SIGNS - 1], low))
-        if told is None or low > high:
+        most = [
+            measured.visibility_at(max(nearest, measured.reach[0])) for measured, nearest, _ in self._missed.values()
+        ]
+        lowest = sorted(one for one in most if one is not None)
+        if len(lowest) < MISSED_SIGNS:
             return None
-        found_at_most, deviation = told
+        found_at_most, deviation = lowest[MISSED_SIGNS - 1]
         softness = math.hypot(SOFTNESS, deviation / found_at_most)
         return ExtinctionBounds(least=extinction_from_visibility(found_at_most), softness=softness)
 
     def _weight(self, one: _Seen) -> float:
         faded = (self._way - one.way) / self._fading_way + (self._time - one.time) / self._fading_time
         return one.confidence * math.exp(-faded)
-
-
-def _read_range(path: str, camera: Camera) -> OperatingRange:
-    return _checked_range(OperatingRange.read(Path(path)), camera)
-
-
-def _checked_range(measured: OperatingRange, camera: Camera) -> OperatingRange:
-    if abs(measured.focal_length / camera.focal_length - 1.0) > LIKE:
-        raise InputError(
-            f"the operating range was calibrated for a focal length of {measured.focal_length:g} px, and the camera "
-            f"has {camera.focal_length:g} px: calibrate it for this camera"
-        )
-    return measured
 
 
 def _boxes(watched: Watched) -> tuple[tuple[float, float, float, float], ...]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import Droplets
+from fogsim.calibration.staged_road import StagedVehicle, foggy_radiance, road_renderer
 from fogsim.camera import Sensor, expose
 from fogsim.estimators import make
 from fogsim.render import Renderer
@@ -17,7 +18,6 @@ from fogsim.reproduce.huang2015_chase import drawn
 from fogsim.reproduce.paper_cells import chosen_tables
 from fogsim.reproduce.result import Cell, Reproduction, Rows, Steps, TitledTable, Watch, unwatched
 from fogsim.reproduce.road_sweeps import CAMERA
-from fogsim.reproduce.scenes import StagedVehicle, foggy_radiance, road_renderer
 from fogsim.reproduce.zhu2015_drive import SPEED, drive
 from fogsim.units import LUMINANCE_WEIGHTS, extinction_from_visibility
 from fogsim.values import Camera, CameraPose, Estimate, Frame, LeadMeasurement, Observation, View

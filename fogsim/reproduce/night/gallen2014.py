@@ -7,16 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from fogsim.atmosphere.visibility.night_visibility import FogKind, high_beam_veil, visibility_distance
-from fogsim.calibration.veil_references import usual_references
+from fogsim.calibration.cached import supply
+from fogsim.calibration.halo_calibration import measure_halo_threshold
+from fogsim.calibration.staged_night import SETBACK, NightRoad, NightScene, NightVehicle
 from fogsim.estimators.night.gallen2014 import fog_class
 from fogsim.estimators.night.gallen2014_veil import BANDS, Gallen2014Veil
 from fogsim.estimators.night.halos import PUBLISHED, HaloThreshold, HaloWatch, largest_sharpness, mean_steepness
 from fogsim.estimators.night.night_road import NightRoad as NightRoadEstimator
 from fogsim.lighting.beams import high_beam, low_beam, scaled_beam
 from fogsim.reproduce.night.gallen2014_picture import picture
-from fogsim.reproduce.night.halo_calibration import measure_halo_threshold
 from fogsim.reproduce.night.limits import clear_low_sight, equal_sight, veil_luminance
-from fogsim.reproduce.night.scenes import SETBACK, NightRoad, NightScene, NightVehicle
 from fogsim.reproduce.result import Cell, Reproduction, Rows, Steps, TitledTable, Watch, unwatched
 from fogsim.values import Camera, Estimate, Frame, Lamp, Observation, Response
 
@@ -184,7 +184,7 @@ def _told(
     methods: tuple[Gallen2014Veil, Gallen2014Veil, NightRoadEstimator],
 ) -> tuple[Gallen2014Veil, Gallen2014Veil, NightRoadEstimator]:
     for method in methods:
-        method.take_references(usual_references)
+        supply(method)
     return methods
 
 

@@ -4,10 +4,9 @@ import dataclasses
 from typing import TypeVar
 
 from fogsim.advice import ADVISERS, Adviser, VehicleAdviser
-from fogsim.calibration.veil_references import usual_references
+from fogsim.calibration.cached import supply
 from fogsim.errors import InputError
 from fogsim.estimators import ESTIMATORS, Estimator
-from fogsim.estimators.night.references import TakesReferences
 from fogsim.fusion import FUSIONS, Fusion, LocatedFusion
 from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy, VehicleLightingPolicy
 from fogsim.metrics import SafetyStandard
@@ -73,8 +72,7 @@ def estimators(scenario: Scenario, assumed: Camera) -> tuple[Estimator, ...]:
     """
     made = tuple(_factory(ESTIMATORS, one, scenario)(assumed, **one.parameters) for one in scenario.estimators)
     for estimator in made:
-        if isinstance(estimator, TakesReferences):
-            estimator.take_references(usual_references)
+        supply(estimator)
     return made
 
 

@@ -60,7 +60,7 @@ def test_published_threshold_and_daylight() -> None:
         make("gallen2014", CAMERA, window=1, as_published=flag).calibrated(MEASURED).update(halo).diagnostics
         for flag in (False, True)
     )
-    told = make("gallen2014", CAMERA, window=1).update(halo)
+    told = Gallen2014(CAMERA, window=1).update(halo)
     uncalibrated = told.diagnostics
     assert "fogsim calibrate halos" in uncalibrated["reason"]
     assert told.bounds is None

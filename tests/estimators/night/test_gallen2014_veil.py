@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fogsim.calibration.veil_references import usual_references
+from fogsim.calibration.cached import supply
 from fogsim.estimators.night.gallen2014_veil import Gallen2014Veil
 from fogsim.estimators.night.veil_correlation import (
     VeilScores,
@@ -48,7 +48,7 @@ def test_the_peak_in_ln_v_gives_back_its_top() -> None:
 
 def read(picture: np.ndarray, frames: int = 1, **options: bool) -> Estimate:
     estimator = Gallen2014Veil(CAMERA, **options)
-    estimator.take_references(usual_references)
+    supply(estimator)
     for _ in range(frames):
         found = estimator.update(Observation(picture, lamps=Lamp.LOW_BEAM, camera_setback=SETBACK))
     return found
@@ -68,7 +68,7 @@ def test_as_published_the_top_lies_far_off() -> None:
 
 def test_the_median_leaves_out_what_passes() -> None:
     estimator = Gallen2014Veil(CAMERA, frames=5, median=True)
-    estimator.take_references(usual_references)
+    supply(estimator)
     passing = night_picture(60.0)
     passing[40:70] = 255
     for picture in (night_picture(60.0), passing, night_picture(60.0)):

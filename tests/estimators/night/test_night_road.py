@@ -8,7 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from fogsim.atmosphere.lamps.phase_function import Droplets
-from fogsim.calibration.veil_references import PUBLISHED_VISIBILITIES, compute_references, usual_references
+from fogsim.calibration.cached import supply
+from fogsim.calibration.veil_references import PUBLISHED_VISIBILITIES, compute_references
 from fogsim.errors import InputError
 from fogsim.estimators import make
 from fogsim.estimators.night.night_road import NightRoad
@@ -24,7 +25,7 @@ def estimate(picture: NDArray[np.uint8], camera: Camera = CAMERA, **known: objec
 
 def night_road(camera: Camera = CAMERA, frames: int = 3) -> NightRoad:
     made = NightRoad(camera, frames=frames)
-    made.take_references(usual_references)
+    supply(made)
     return made
 
 

@@ -1,14 +1,13 @@
 """Which halos part fog from clear nights with a camera: many staged scenes, exposures and strengths of lamps."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from fogsim.calibration.staged_night import GLARE, NightRoad, NightScene, NightVehicle
 from fogsim.errors import InputError
 from fogsim.estimators.night.halos import HaloThreshold, largest_sharpness, mean_steepness
-from fogsim.reproduce.night.scenes import GLARE, NightRoad, NightScene, NightVehicle
-from fogsim.reproduce.result import Steps, Watch, unwatched
 from fogsim.values import Camera, Lamp
 from fogsim.vision.sources.halo_profile import halos_of
 from fogsim.vision.sources.source_tree import source_tree
@@ -18,6 +17,9 @@ FOGS = (200.0, 100.0, 50.0)
 
 EXPOSURES, STRENGTHS = (0.6, 1.6), (0.6, 1.6)
 """Range of exposures over the automatic one, and of lamps' intensities over the usual ones [-]."""
+
+Watch = Callable[[int, int], None]
+"""Called with the number of finished scenes and of all."""
 
 _LIT = Lamp.POSITION | Lamp.LOW_BEAM
 
@@ -46,14 +48,14 @@ def random_scene(rng: np.random.Generator, strengths: tuple[float, float] = STRE
 
 
 def measure_halo_threshold(
-    camera: Camera, scenes: int = 80, *, glare: float = GLARE, seed: int = 0, watch: Watch = unwatched
+    camera: Camera, scenes: int = 80, *, glare: float = GLARE, seed: int = 0, watch: Watch = lambda *_: None
 ) -> HaloThreshold:
     """Draw scenes in clear air and in fog, and choose the thresholds that err as seldom in either.
 
     Parameters
     ----------
     camera : Camera
-        The told calibration.
+        The assumed calibration.
     scenes : int
         How many scenes are drawn, each in clear air and in all fogs.
     glare : float
@@ -61,7 +63,7 @@ def measure_halo_threshold(
     seed : int
         Of scenes, exposures and noise.
     watch : Watch
-        Is told of every scene.
+        Called after every scene.
 
     Raises
     ------
@@ -70,7 +72,8 @@ def measure_halo_threshold(
     """
     if scenes < 4:
         raise InputError(f"scenes: expected at least 4, got {scenes}")
-    steps, clear, fog = Steps(scenes, watch), list[_Values](), list[_Values]()
+    watch(0, scenes)
+    clear, fog = list[_Values](), list[_Values]()
     with NightRoad(camera, glare=glare, seed=seed) as road:
         for number in range(scenes):
             rng = np.random.default_rng((seed, number))
@@ -81,7 +84,7 @@ def measure_halo_threshold(
                 mean, largest = mean_steepness(halos), largest_sharpness(halos)
                 if mean is not None and largest is not None:
                     (clear if visibility == math.inf else fog).append((mean, largest))
-            steps.advance()
+            watch(number + 1, scenes)
     if not clear or not fog:
         raise InputError(f"no lamp makes a halo in pictures of {camera.width}x{camera.height} px: a larger picture")
     by_mean, by_largest = (parting([one[at] for one in clear], [one[at] for one in fog]) for at in range(2))

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.calibration.halo_calibration import Watch
+from fogsim.calibration.sign_drives import SETBACK, PoseNoise, SignDrive, observed, sign_beside
 from fogsim.errors import InputError
 from fogsim.estimators.signs.operating_range import OperatingRange
 from fogsim.estimators.signs.regions import PoseDeviation
 from fogsim.estimators.signs.watch import SignWatch
-from fogsim.reproduce.result import Steps, Watch, unwatched
-from fogsim.reproduce.sign_drives import SETBACK, PoseNoise, SignDrive, observed, sign_beside
 from fogsim.values import Camera, Observation
 
 VISIBILITIES = (50.0, 75.0, 100.0, 130.0, 170.0, 220.0, 280.0, 350.0, 430.0, 550.0, 800.0)
@@ -37,7 +37,7 @@ def measure_operating_range(
     approaches: int = 24,
     step: float = 5.0,
     seed: int = 0,
-    watch: Watch = unwatched,
+    watch: Watch = lambda *_: None,
 ) -> OperatingRange:
     """Drive up to signs in fog of each visibility, and see from how far they are detected.
 
@@ -56,7 +56,7 @@ def measure_operating_range(
     seed : int
         Of places, errors and noise.
     watch : Watch
-        Is told of every approach.
+        Called after every approach.
 
     Raises
     ------
@@ -66,15 +66,16 @@ def measure_operating_range(
     for name, value, least in (("approaches", approaches, 4), ("step", step, 0.5), ("diameter", diameter, 0.1)):
         if not value >= least:
             raise InputError(f"{name}: expected at least {least}, got {value}")
-    fogs, steps = tuple(float(v) for v in visibilities), Steps(approaches, watch)
+    fogs = tuple(float(v) for v in visibilities)
     found: dict[float, list[_Approach]] = {v: [] for v in fogs}
-    part, noise = _cropped(camera), PoseNoise()
+    part, noise = cropped(camera), PoseNoise()
     reach = min(max(80.0, 1.3 * fogs[-1]), 0.25 * camera.focal_length * diameter)
     if reach - _NEAREST < step:
         raise InputError(
             f"a camera with a focal length of {camera.focal_length:g} px shows a sign of {diameter:g} m on too few "
             "pixels to detect it: expected a longer focal length or a larger sign"
         )
+    watch(0, approaches)
     for number in range(approaches):
         rng = np.random.default_rng((seed, number))
         sign = sign_beside("s", KINDS[number % len(KINDS)], reach, diameter, rng)
@@ -87,7 +88,7 @@ def measure_operating_range(
                 looks[visibility].look(observation)
         for visibility, approach in looks.items():
             found[visibility].append(approach)
-        steps.advance()
+        watch(number + 1, approaches)
     return _summary(camera, diameter, found)
 
 
@@ -139,8 +140,8 @@ def _range_of(looks: Sequence[tuple[float, bool]]) -> float:
     return farthest
 
 
-def _cropped(camera: Camera) -> Camera:
-    """The part of a camera's picture that signs on the right of the road pass through."""
+def cropped(camera: Camera) -> Camera:
+    """Camera of the part of an image that signs on the right of the road pass through."""
     (u0, _), f, horizon = camera.principal_point, camera.focal_length, camera.horizon_row
     left, right = max(round(u0 - 0.1 * f), 0), min(round(u0 + 0.8 * f), camera.width)
     top, bottom = max(round(horizon - 0.25 * f), 0), min(round(horizon + 0.1 * f), camera.height)

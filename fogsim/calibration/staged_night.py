@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere import Air
 from fogsim.atmosphere.lamps.phase_function import Droplets
+from fogsim.calibration.sign_drives import sign_beside
+from fogsim.calibration.staged_road import StagedVehicle, staged_traffic, straight_road
 from fogsim.camera.exposure import AutoExposure, Metering, Pixels, Sensor, expose, metered_luminance, sensor_at
 from fogsim.camera.exposure import wanted_saturation as saturation_for
 from fogsim.camera.glare import LensGlare
 from fogsim.lighting import LampMount, own_head_lamps
 from fogsim.render import Renderer, make_renderer
-from fogsim.reproduce.scenes import StagedVehicle, staged_traffic, straight_road
-from fogsim.reproduce.sign_drives import sign_beside
 from fogsim.scene import build_scene, light_sources, street_lamp_heads, street_lighting, vehicle_batches
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, CameraPose, FogField, Lamp, Lights, LightSources, SignMap, TrafficState
@@ -137,7 +137,7 @@ class NightRoad:
         if lit not in self._drawn:
             trees = np.random.default_rng(self._seed)
             scene = build_scene(straight_road(_FAR), self._signs, trees, street_lamps=lit)
-            self._drawn[lit] = make_renderer("auto", scene, illuminance=DARK), street_lamp_heads(scene)
+            self._drawn[lit] = make_renderer("cpu", scene, illuminance=DARK), street_lamp_heads(scene)
         return self._drawn[lit]
 
     def radiances(self, scene: NightScene, visibilities: Sequence[float]) -> list[NDArray[np.float32]]:

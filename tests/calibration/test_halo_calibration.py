@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from fogsim.calibration.halo_calibration import measure_halo_threshold, parting
 from fogsim.cli.app import app
 from fogsim.errors import InputError
 from fogsim.estimators.night.halos import HaloThreshold
-from fogsim.reproduce.night.halo_calibration import measure_halo_threshold, parting
 from fogsim.values import Camera, Response
 
 FILE = """

@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from fogsim.reproduce.scenes import AIRLIGHT, StagedVehicle, foggy_image, foggy_radiance, staged_traffic, standing_cars
+from fogsim.calibration.staged_road import (
+    AIRLIGHT,
+    StagedVehicle,
+    foggy_image,
+    foggy_radiance,
+    staged_traffic,
+    standing_cars,
+)
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, CameraPose, Response, View
 

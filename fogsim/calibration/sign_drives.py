@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fogsim.calibration.staged_road import AIRLIGHT, ILLUMINANCE, foggy_radiance, straight_road
 from fogsim.camera import Sensor, expose
 from fogsim.render import make_renderer
-from fogsim.reproduce.scenes import AIRLIGHT, ILLUMINANCE, foggy_radiance, straight_road
 from fogsim.scene import build_scene
 from fogsim.sensors import signs_ahead
 from fogsim.units import extinction_from_visibility
@@ -99,7 +99,8 @@ def observed(
     scene = build_scene(straight_road(length), SignMap(drive.signs), np.random.default_rng(rng.integers(2**31)))
     true = replace(told, pitch=told.pitch + rng.normal(0.0, noise.pitch))
     sensor = Sensor(AIRLIGHT * 255.0 / drive.grey)
-    renderer = make_renderer("auto", scene, illuminance=ILLUMINANCE)
+    # Not OpenGL: a run may use the only context of this process, and results would depend on the machine.
+    renderer = make_renderer("cpu", scene, illuminance=ILLUMINANCE)
     try:
         for x in drive.places:
             pose = CameraPose((x - SETBACK, 0.0, true.mount_height), heading=0.0)

@@ -1,0 +1,133 @@
+"""Calibrations of the camera in use: made when a method first needs them, and kept in the user's cache directory."""
+
+import contextlib
+import fcntl
+import functools
+import hashlib
+import json
+import logging
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
+from importlib import metadata
+from pathlib import Path
+from typing import TypeVar
+
+from fogsim.calibration.halo_calibration import Watch, measure_halo_threshold
+from fogsim.calibration.sign_calibration import measure_operating_range
+from fogsim.calibration.veil_references import usual_references
+from fogsim.estimators import Estimator
+from fogsim.estimators.night.halos import HaloThreshold
+from fogsim.estimators.night.references import VeilReferences
+from fogsim.estimators.protocol import TakesCalibrations
+from fogsim.estimators.signs.operating_range import OperatingRange
+from fogsim.files.cache_entries import keep_newest, read_entry, write_entry
+from fogsim.files.user_cache import cache_directory
+from fogsim.values import Camera, Lamp
+
+_T = TypeVar("_T", HaloThreshold, OperatingRange)
+
+_RESTS_ON = (
+    "atmosphere",
+    "calibration",
+    "camera",
+    "estimators",
+    "lighting",
+    "render",
+    "scene",
+    "sensors",
+    "units",
+    "values",
+    "vision",
+)
+"""Packages whose code decides what is drawn and detected: a change in one of them makes calibrations anew."""
+
+_MOST_KEPT = 200
+_NEWS_PERIOD = 10.0  # between two lines about the progress [s]
+
+
+class CachedCalibrations:
+    """Calibrations by staged scenes; those of halos and signs are made once for each camera and then read."""
+
+    def veil_references(self, camera: Camera, lamps: Lamp, setback: float) -> tuple[VeilReferences, ...]:
+        """References for a car's head lamps, computed once in each process."""
+        return usual_references(camera, lamps, setback)
+
+    def halo_threshold(self, camera: Camera) -> HaloThreshold:
+        """Sharpness of halos below which there is fog; InputError if the camera shows none."""
+        return _cached(HaloThreshold, "halos", camera, lambda watch: measure_halo_threshold(camera, watch=watch))
+
+    def operating_range(self, camera: Camera, diameter: float) -> OperatingRange:
+        """Distances at which signs of a diameter [m] are detected in fog; InputError if the camera is too coarse."""
+        name = f"signs of {diameter:g} m"
+        return _cached(
+            OperatingRange, name, camera, lambda watch: measure_operating_range(camera, diameter, watch=watch)
+        )
+
+
+def supply(estimator: Estimator) -> None:
+    """Give an estimator calibrations to take where it was given none."""
+    if isinstance(estimator, TakesCalibrations):
+        estimator.take_calibrations(CachedCalibrations())
+
+
+def _cached(kind: type[_T], name: str, camera: Camera, measure: Callable[[Watch], _T]) -> _T:
+    """The calibration from the cache; measured if it is not there, by one process at a time."""
+    key = hashlib.sha256(repr((name, camera, _code())).encode()).hexdigest()[:24]
+    folder = cache_directory() / "calibrations"
+    path = folder / f"{key}.json"
+    if (kept := read_entry(path)) is not None:
+        return _decoded(kind, kept)
+    with _turn(folder):
+        # Another process may have made it in the meantime.
+        if (kept := read_entry(path)) is not None:
+            return _decoded(kind, kept)
+        made = measure(_Progress(f"{name} for a camera of {camera.width} × {camera.height} px"))
+        with contextlib.suppress(OSError):
+            write_entry(path, json.dumps(asdict(made)).encode())
+            keep_newest(folder, _MOST_KEPT)
+        return made
+
+
+def _decoded(kind: type[_T], kept: bytes) -> _T:
+    values = json.loads(kept)
+    return kind(**{name: tuple(value) if isinstance(value, list) else value for name, value in values.items()})
+
+
+@functools.cache
+def _code() -> str:
+    """Identity of the code that calibrates."""
+    digest, package = hashlib.sha256(metadata.version("fogsim").encode()), Path(__file__).parents[1]
+    for file in sorted(file for room in _RESTS_ON for file in (package / room).rglob("*.py")):
+        digest.update(file.read_bytes())
+    return digest.hexdigest()
+
+
+@contextlib.contextmanager
+def _turn(folder: Path) -> Iterator[None]:
+    """Wait while another process calibrates; without a writable cache directory, do not wait."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = folder.with_suffix(".lock").open("wb")
+    except OSError:
+        yield
+        return
+    with lock:
+        with contextlib.suppress(OSError):  # a file system without locks
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+class _Progress:
+    """Logs that a calibration is made, and now and then how far it is."""
+
+    def __init__(self, name: str) -> None:
+        self._name, self._last = name, time.monotonic()
+        self._log = logging.getLogger("fogsim").warning
+        self._log("fogsim: calibrating %s, once (kept in %s)", name, cache_directory())
+
+    def __call__(self, done: int, total: int) -> None:
+        """Log the number of finished scenes every ten seconds."""
+        if time.monotonic() - self._last > _NEWS_PERIOD:
+            self._last = time.monotonic()
+            self._log("fogsim: calibrating %s: %d of %d", self._name, done, total)

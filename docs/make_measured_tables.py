@@ -96,7 +96,7 @@ TABLES: dict[str, tuple[str, Callable[[], Rows]]] = {
     "night-glows": ("docs/explanation/night.md", night_deviations.glows),
     "night-lobes": ("docs/explanation/night.md", night_deviations.lobes),
     "night-lamps": ("docs/explanation/night.md", night_deviations.lamp_fluxes),
-    "night-limits": ("docs/explanation/night.md", night_deviations.limits),
+    "night-limits": ("docs/explanation/night.md", night_deviations.fog_limits),
     "night-directions": ("docs/explanation/night.md", night_deviations.directions),
     **{f"paper-{name}": ("docs/explanation/estimators.md", functools.partial(paper_cells, name)) for name in PAPERS},
     "zhu2015": ("docs/explanation/estimators.md", zhu2015),

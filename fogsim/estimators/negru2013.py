@@ -150,7 +150,7 @@ class Negru2013:
     camera : Camera
         The assumed calibration.
     as_published : bool
-        Make no repairs but that of the signs, without which it finds nothing.
+        Make no repairs, except that of the signs, without which every estimate is far off.
     repairs : {'all', 'none'} or list of str
         Which of the repairs are made.
     printed_signs : bool

@@ -87,7 +87,8 @@ class Zhu2015:
     limited to 10° … 170° is here that of the line to the rows, as the paper words it; its eq. 7 has the normal's, by
     which upright lines would go and the horizon stay.
 
-    Daytime, flat and straight road, road darker than the airlight.
+    Where the lines do not meet the calibration gives the horizon, and an image that shows no road by day is refused, in
+    either form. Daytime, flat and straight road, road darker than the airlight.
 
     Parameters
     ----------

@@ -66,15 +66,7 @@ NOTES = (
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """A camera of the evaluation.
-
-    Attributes
-    ----------
-    name : str
-        As the table calls it.
-    camera : Camera
-        Its told calibration.
-    """
+    """A camera of the evaluation, and its name in the table."""
 
     name: str
     camera: Camera

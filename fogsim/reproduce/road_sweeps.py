@@ -32,18 +32,9 @@ Form = Mapping[str, object]
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """What is other than in the first of the sweeps.
+    """A camera, how much the road's albedo changes along the way [-], and a sensor.
 
-    Attributes
-    ----------
-    name : str
-        In words.
-    camera : Camera
-        The assumed calibration; the pitch is off by 0.1° and sways by 0.05°.
-    wear : float
-        Change of the road's albedo along the way [-].
-    sensor : Sensor
-        Noise and exposure.
+    The true pitch is off the assumed one by 0.1° and sways by 0.05°.
     """
 
     name: str
@@ -79,21 +70,7 @@ class Driven:
 def driven(
     renderer: Renderer, setting: Setting, visibilities: Sequence[float], drives: int, steps: Steps
 ) -> list[Driven]:
-    """Drive along the road alone, in every fog.
-
-    Parameters
-    ----------
-    renderer : Renderer
-        Of the road.
-    setting : Setting
-        Camera, road and sensor.
-    visibilities : sequence of float
-        V_met [m].
-    drives : int
-        How many.
-    steps : Steps
-        Told of every drive.
-    """
+    """Observations of drives along the road alone, in every fog; visibilities in [m]."""
     found = []
     for number in range(drives):
         rng = np.random.default_rng([2013, number])
@@ -106,32 +83,14 @@ def driven(
 
 
 def last_estimate(method: str, camera: Camera, form: Form, one: Driven) -> Estimate:
-    """What a form of a method says after the last frame of a drive.
-
-    Parameters
-    ----------
-    method : str
-        Its name.
-    camera : Camera
-        The assumed calibration.
-    form : mapping
-        Its options.
-    one : Driven
-        The drive.
-    """
+    """Estimate of a form of a method after the last frame of a drive."""
     estimator = make(method, camera, **form)
     found = [estimator.update(observation) for observation in one.observations]
     return found[-1]
 
 
 def without_each(kind: type[Repair]) -> dict[str, Form]:
-    """Forms of a method: all repairs, and all but each.
-
-    Parameters
-    ----------
-    kind : type
-        The repairs that there are.
-    """
+    """Forms of a method with all repairs, and with all but each."""
     forms: dict[str, Form] = {"all repairs": {}}
     for left_out in kind:
         forms[f"without {left_out.value}"] = {"repairs": [one.value for one in kind if one is not left_out]}
@@ -139,13 +98,7 @@ def without_each(kind: type[Repair]) -> dict[str, Form]:
 
 
 def steps_of(drives: int = DRIVES) -> int:
-    """Steps that `swept` takes.
-
-    Parameters
-    ----------
-    drives : int
-        Drives of each setting.
-    """
+    """Steps that `swept` takes, by drives of each setting."""
     return len(SETTINGS) * drives
 
 
@@ -164,25 +117,8 @@ def swept(
 ) -> tuple[list[dict[str, Cell]], tuple[TitledTable, ...]]:
     """Errors of a method, as published and corrected, over settings, with each repair off, and over what is left open.
 
-    Parameters
-    ----------
-    method : str
-        Its name.
-    kind : type
-        Its repairs.
-    renderer : Renderer
-        Of the road.
-    steps : Steps
-        Told of every drive.
-    drives : int
-        Drives of each setting.
-    left_open : mapping, optional
-        Forms with other values of what the paper leaves open, by name; run in the first setting.
-
-    Returns
-    -------
-    (list of records, tables)
-        A record for each setting, form and visibility: share of drives with an estimate of fog, median error and bias.
+    `left_open` has forms with other values of what the paper leaves open, by name; they run in the first setting. A
+    record for each setting, form and visibility has the share of drives where fog is found, median error and bias.
     """
     both: dict[str, Form] = {"published": {"as_published": True}, "corrected": {}}
     left_open = left_open or {}

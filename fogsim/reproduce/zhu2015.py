@@ -24,18 +24,10 @@ EDGE = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Weather:
-    """A row of the paper's tables 1 and 2.
+    """A row of the paper's tables 1 and 2: English name, class, and the range of visibilities that ours are of [m].
 
-    Attributes
-    ----------
-    name : str
-        As the paper has it, in English.
-    category : FogCategory
-        Its class.
-    low, high : float
-        Visibilities between which ours are drawn [m]; of "sunny" one more is without any fog.
-    right : float
-        Share of frames that the paper's method classed rightly, as printed [%].
+    "sunny" has one more, without any fog. `right` is the share of frames that the paper's method classed rightly, as
+    printed [%].
     """
 
     name: str
@@ -275,15 +267,7 @@ def _row(weather: Weather, records: Sequence[Mapping[str, Cell]]) -> tuple[str, 
 
 
 def right_share(records: Sequence[Mapping[str, Cell]], variant: str) -> float:
-    """Share of frames whose state is the true class.
-
-    Parameters
-    ----------
-    records : sequence of mappings
-        Records of a `Reproduction`.
-    variant : str
-        A name of `VARIANTS`.
-    """
+    """Share of frames whose state is the true class, by a name of `VARIANTS`."""
     return float(np.mean([record[f"{variant}_state"] == record["category"] for record in records]))
 
 

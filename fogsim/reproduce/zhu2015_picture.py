@@ -27,19 +27,7 @@ RED, BLUE, GREEN, YELLOW = (230, 30, 30), (30, 60, 255), (60, 200, 90), (255, 21
 
 
 def picture(moment: Moment, camera: Camera) -> NDArray[np.uint8]:
-    """Draw an instant in four fogs, as published on the left and corrected on the right.
-
-    Parameters
-    ----------
-    moment : Moment
-        The instant.
-    camera : Camera
-        The assumed calibration.
-
-    Returns
-    -------
-    (rows, cols, 3) uint8
-    """
+    """Draw an instant in four fogs, as published on the left and corrected on the right: (rows, cols, 3) uint8."""
     rows = []
     for visibility in PICTURED:
         seen = observed(moment, camera, visibility, np.random.default_rng(0))

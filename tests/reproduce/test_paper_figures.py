@@ -5,7 +5,10 @@ from collections.abc import Iterable
 
 import pytest
 
+from fogsim.calibration.veil_references import PUBLISHED_VISIBILITIES
+from fogsim.estimators.night.halos import WINDOW
 from fogsim.reproduce import belaroussi2015, huang2015, huang2015_figures, negru2013, zhu2015
+from fogsim.reproduce.night import gallen2014
 from fogsim.reproduce.paper_cells import PaperCell
 from fogsim.values import Estimate
 
@@ -107,11 +110,37 @@ HUANG2015: Quotes = {
 }
 """The tables of the thesis, in order; INF and Infinity are infinite."""
 
+GALLEN2014: Quotes = {
+    "table I": ("1 - light fog > 300", "2 - fog 100 to 300", "3 - dense fog <100"),
+    "equation 11": ("we are able to compute the corresponding Vmet threshold as Vhigh|fog = Vlow|fog ≈ 100 m.",),
+    "equation 12": ("we are able to compute the corresponding Vmet threshold as Vhigh|fog = Vlow|nofog ≈ 300 m.",),
+    "section III-B": ("The optimal threshold on Br50 in our database was estimated to be 9.",),
+    "section IV-A": ("using a video of resolution 1280×800 at 10 frames/s",),
+    "section IV-B": (
+        "the proposed algorithm produced a fog detection rate of 98.4%.",
+        "on 1 s of video (25 images), the fog detection rate reached 99.86%.",
+        "A high correlation score (greater than 0.6) is obtained when the measured and reference images correspond to"
+        " dense fog (see Table I). In the presence of fog, this score becomes smaller (around 0.4). In the presence of"
+        " light fog, it becomes very small (less than 0.2).",
+    ),
+    "figure 12": (
+        "the six simulated reference images (15, 50, 100, 200, 500 m, and ∞).",
+        "The highest correlation score corresponds to the reference image having a visibility of 500 m, which is quite"
+        " consistent with the output of the dedicated LIDAR of 368 m.",
+    ),
+    "section IV-C": (
+        "the following measured visibility distances: 12.6, 51.4, 91.8, 167.8, 415.6, and 2000 m.",
+        "about 10 m of accuracy when Vmet < 50 m; about 20 m of accuracy when Vmet < 100 m; about 40 m of accuracy when"
+        " Vmet < 200 m; Less than 100 m of accuracy when Vmet > 200 m.",
+    ),
+}
+
 QUOTES: dict[str, Quotes] = {
     "huang2015": HUANG2015,
     "negru2013": NEGRU2013,
     "zhu2015": ZHU2015,
     "belaroussi2015": BELAROUSSI2015,
+    "gallen2014": GALLEN2014,
 }
 
 
@@ -142,18 +171,31 @@ def huang2015_cells() -> Iterable[PaperCell]:
     return huang2015_figures.cells(figures, results, dict.fromkeys(huang2015.TABLE_4_1, variants))
 
 
+def gallen2014_cells() -> Iterable[PaperCell]:
+    counts = dict.fromkeys(("published_each", "published_of_25", "largest_each", "largest_of_25"), 1)
+    drives = [{"visibility_m": 80.0, "with_halos": 1, **counts}]
+    scores = {f"score_{one:g}": 0.5 for one in gallen2014.REFERENCES}
+    fogs = [{"visibility_m": fog, "as_published_m": fog, "corrected_m": None, **scores} for fog in (20.0, 150.0, 500.0)]
+    road = {f"{form}_score_{one:g}": 0.5 for form in ("as_published", "corrected") for one in PUBLISHED_VISIBILITIES}
+    yield from gallen2014.drive_cells(drives, 9.0)
+    yield from gallen2014.fog_cells([*fogs, {**fogs[0], "visibility_m": 70.0}])
+    yield gallen2014.road_cell(road)
+    yield from gallen2014.limit_cells()
+
+
 CELLS = {
     "huang2015": huang2015_cells,
     "negru2013": negru2013.paper_cells,
     "zhu2015": zhu2015_cells,
     "belaroussi2015": belaroussi2015_cells,
+    "gallen2014": gallen2014_cells,
 }
 """Cells of each paper, of records that need no frames."""
 
 
 def numbers(quotes: Iterable[str]) -> set[float]:
     """Every number of some quotes; commas between digits part thousands."""
-    pattern = r"\d[\d,]*(?:\.\d+)?|INF"
+    pattern = r"\d[\d,]*(?:\.\d+)?|\bINF(?:INITY)?\b"
     return {float(found.replace(",", "")) for quote in quotes for found in re.findall(pattern, quote, re.IGNORECASE)}
 
 
@@ -185,3 +227,10 @@ def test_every_figure_of_huang2015_is_compared_in_the_order_of_the_thesis() -> N
             # Its first row is each picture over itself.
             printed = [figure for figure in printed if figure != 100.0]
         assert found == printed, place
+
+
+def test_gallen2014_is_run_with_the_figures_of_its_paper() -> None:
+    assert set(gallen2014.REFERENCES) < numbers(GALLEN2014["section IV-C"])
+    assert {gallen2014.LIDAR, *PUBLISHED_VISIBILITIES[:-1]} == numbers(GALLEN2014["figure 12"])
+    assert {gallen2014.CAMERA.width, gallen2014.CAMERA.height} < numbers(GALLEN2014["section IV-A"])
+    assert WINDOW in numbers(GALLEN2014["section IV-B"])

@@ -56,9 +56,9 @@ class Gallen2014Veil:
     the best score detects fog. The visibility is that at the top of exp(a V² + b V + c) through the scores (equation
     13), and its error the published one.
 
-    As published, that top lies far off where references are far apart: with the paper's six it is near 1100 m in any fog
-    thinner than 80 m. By default references in equal steps of ln V, one mask for all, and a parabola in ln V through
-    Fisher's z of the three best take their place. Road, albedo and amplitude stay unused, so
+    As published, that top lies far off where references are far apart: with the paper's six it is near 1100 m in any
+    fog thinner than 80 m. By default references in equal steps of ln V, one mask for all, and a parabola in ln V
+    through Fisher's z of the three best take their place. Road, albedo and amplitude stay unused, so
     in thin fog, where the veil's shape hardly depends on the visibility, both read what the road does; `NightRoad` does
     not.
 

@@ -25,7 +25,7 @@ from fogsim.reproduce.huang2015_figures import (
 from fogsim.reproduce.huang2015_picture import Tracked, picture
 from fogsim.reproduce.huang2015_published import TABLE_4_1
 from fogsim.reproduce.paper_cells import chosen_tables
-from fogsim.reproduce.result import Reproduction, Rows, Steps, TitledTable, Watch, unwatched
+from fogsim.reproduce.result import Cell, Reproduction, Rows, Steps, TitledTable, Watch, unwatched
 from fogsim.reproduce.road_sweeps import DRIVES, steps_of, swept
 from fogsim.values import Camera, Estimate, Observation
 
@@ -96,7 +96,8 @@ def reproduce(*, quick: bool = False, table: str | None = None, watch: Watch = u
         shown = [Tracked(v, {name: results[Case(v)][name][LAST] for name in VARIANTS}) for v in PICTURED]
         drawing = picture(renderer, Chase(CAMERA, VEHICLE, samples=SAMPLES), shown)
         steps.advance()
-        sweeps, more_tables = ([], ())
+        sweeps: list[dict[str, Cell]] = []
+        more_tables: tuple[TitledTable, ...] = ()
         if drives:
             sweeps, more_tables = swept("huang2015_rough", Huang2015Repair, renderer, steps, drives)
     compared = cells(wanted, results, rough)

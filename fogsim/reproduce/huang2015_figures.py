@@ -133,9 +133,11 @@ def _ours(figure: Figure, variant: str, estimate: Estimate) -> float | None:
         return math.log(20.0) / first if isinstance(first, float) else None
     if figure.pair is None:
         return seen_visibility(estimate)
+    if not estimate.valid:
+        return None
     if variant == "corrected":
         # It compares no variances: what its extinction makes of theirs.
-        return _ratio(figure.pair, estimate.extinction) if estimate.valid else None
+        return _ratio(figure.pair, estimate.extinction)
     distances, variances = (np.asarray(estimate.diagnostics[name]) for name in ("distances", "variances"))
     near, far = (float(variances[np.argmin(np.abs(distances - at))]) for at in figure.pair)
     return 100.0 * far / near
@@ -150,8 +152,9 @@ def cells(wanted: Sequence[Figure], results: Results, rough: Rough) -> list[Pape
     """Every figure of the thesis with ours."""
     found = []
     for figure in wanted:
-        ours = [_ours(figure, name, _estimate(figure, name, results, rough)) for name in VARIANTS]
-        found.append(PaperCell(f"table {figure.table}", figure.row, figure.column, figure.paper, *ours))
+        published, corrected = (_ours(figure, name, _estimate(figure, name, results, rough)) for name in VARIANTS)
+        place = f"table {figure.table}"
+        found.append(PaperCell(place, figure.row, figure.column, figure.paper, published, corrected))
     return found
 
 

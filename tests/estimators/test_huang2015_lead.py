@@ -218,6 +218,37 @@ def test_the_window_on_the_way_back_is_that_of_the_way_away(visibility):
     assert back[:5] == pytest.approx(away[:5], rel=0.05)
 
 
+@pytest.mark.parametrize("visibility", [80.0, 150.0, 300.0])
+@pytest.mark.parametrize(("width", "bound"), [(None, 0.08), (1.8, 0.06)])
+def test_without_a_radar_the_camera_gives_the_range(visibility, width, bound):
+    estimator = make("huang2015_lead", Chase().camera, range_from="camera", vehicle_width=width)
+    for seen in chased(Chase(visibility=visibility), 1, AWAY[:10]):
+        found = estimator.update(replace(seen, lead=None))
+    assert found.diagnostics["distances"] == pytest.approx(AWAY[:10], rel=0.05)
+    low, high = found.visibility_interval
+    assert low < visibility < high
+    assert found.visibility == pytest.approx(visibility, rel=bound)
+
+
+def test_pitch_that_may_be_off_widens_the_interval_by_ranges_of_the_camera():
+    seen = [replace(one, lead=None) for one in chased(Chase(visibility=150.0), 1, AWAY[:10])]
+    spread = []
+    for pitch in (0.05, 0.4):
+        estimator = make("huang2015_lead", Chase().camera, range_from="camera", pitch_deviation=np.radians(pitch))
+        found = [estimator.update(one) for one in seen][-1]
+        spread.append(found.standard_deviation / found.extinction)
+    # Alone, 0.4° is 13 % of the range at 25 m.
+    assert spread[1] == pytest.approx(np.radians(0.4) * 25.0 / 1.3, rel=0.15)
+    assert spread[0] < 0.4 * spread[1]
+
+
+def test_a_pitch_that_is_hardly_known_leaves_ranges_of_the_camera_unknown():
+    estimator = make("huang2015_lead", Chase().camera, range_from="camera", pitch_deviation=np.radians(2.0))
+    found = [estimator.update(replace(one, lead=None)) for one in chased(Chase(visibility=150.0), 1, AWAY[:10])][-1]
+    assert not found.valid
+    assert "too uncertain" in found.diagnostics["reason"]
+
+
 @pytest.mark.parametrize(("distance", "bound"), [(90.0, 0.2), (60.0, 0.15), (30.0, 0.07)])
 @pytest.mark.parametrize("visibility", [120.0, 200.0, 500.0])
 def test_the_foot_is_found_as_well_as_the_pitch_is_known_or_better(distance, visibility, bound):
@@ -302,10 +333,10 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("as_published", [False, True])
+@pytest.mark.parametrize("options", [{}, {"as_published": True}, {"range_from": "camera"}])
 @pytest.mark.parametrize("name", BAD)
-def test_an_image_without_a_vehicle_says_nothing(name, as_published):
-    estimator = make("huang2015_lead", Chase().camera, as_published=as_published)
+def test_an_image_without_a_vehicle_says_nothing(name, options):
+    estimator = make("huang2015_lead", Chase().camera, **options)
     for distance in AWAY[:4]:
         found = estimator.update(Observation(BAD[name], lead=LeadMeasurement(distance, 0.0)))
         assert not found.valid
@@ -318,11 +349,21 @@ def test_odd_ranges_are_refused(distance):
     assert not found.valid
 
 
+def test_an_empty_road_shows_the_camera_no_range():
+    chase = Chase(visibility=150.0)
+    image = exposed(chase, picture(chase, 5000.0, np.random.default_rng(0)), np.random.default_rng(0))
+    found = make("huang2015_lead", chase.camera, range_from="camera").update(Observation(image))
+    assert not found.valid
+    assert found.diagnostics["reason"]
+
+
 def test_nan_range_and_odd_setback_are_errors():
     with pytest.raises(InputError, match="NaN"):
         make("huang2015_lead", Chase().camera).update(Observation(BAD["grey"], lead=LeadMeasurement(np.nan, 0.0)))
     with pytest.raises(InputError, match="setback"):
         make("huang2015_lead", Chase().camera, setback=np.nan)
+    with pytest.raises(InputError, match="range_from"):
+        make("huang2015_lead", Chase().camera, vehicle_width=1.8)
 
 
 @pytest.mark.parametrize("pitch", [-40.0, 40.0, 89.0])

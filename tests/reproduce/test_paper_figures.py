@@ -1,15 +1,19 @@
 """Every figure in a "paper" column is one that the paper prints: its text is quoted here with its place."""
 
+import json
+import math
 import re
 from collections.abc import Iterable
+from typing import Any
 
 import pytest
 
 from fogsim.calibration.veil_references import PUBLISHED_VISIBILITIES
 from fogsim.estimators.night.halos import WINDOW
-from fogsim.reproduce import belaroussi2015, negru2013, zhu2015
+from fogsim.reproduce import belaroussi2015, huang2015, huang2015_figures, negru2013, zhu2015
 from fogsim.reproduce.night import gallen2014
 from fogsim.reproduce.paper_cells import PaperCell
+from fogsim.values import Estimate
 
 Quotes = dict[str, tuple[str, ...]]
 """Sentences and rows of a paper, by place."""
@@ -47,6 +51,68 @@ BELAROUSSI2015: Quotes = {
     ),
 }
 
+HUANG2015: Quotes = {
+    "table 4.1": (
+        "Ground Truth Estimation without Optimization Estimation with Optimization",
+        "50m 46m 59m",
+        "100m 88m 103m",
+        "200m 140m 222m",
+        "350m 193m 279m",
+        "400m 255m 288m",
+        "500m Infinity Infinity",
+    ),
+    "table 4.2": (
+        "Ratio 25m 30m 35m 40m 45m",
+        "0m 100 100 100 100 100",
+        "5m 84.9044 92.1565 77.1763 92.0751",
+        "10m 78.2449 71.1230 71.0602",
+        "15m 60.3865 65.4866",
+        "20m 55.6010",
+    ),
+    "table 4.3": (
+        "Ground Truth New Approach of Estimation Old Approach of Estimation",
+        "50m 60m 59m",
+        "100m 95m 103m",
+        "200m 180m 222m",
+        "350m 340m 279m",
+        "400m 380m 288m",
+        "500m 480m Infinity",
+    ),
+    "table 5.1": (
+        "Tracking Distance of Ground Truth Visible Range 100m 200m 300m 400m 500m",
+        "10 % 106 247 417 INF INF",
+        "20 % 99 205 402 895 INF",
+        "30 % 103 189 364 691 714",
+        "40 % 95 205 342 459 512",
+        "50 % 91 201 298 388 523",
+        "60 % 94 392",
+    ),
+    "table 5.2": (
+        "Distance Difference 50m 100m 200m 400m",
+        "1.25m 61 94.9 202",
+        "2.50m 59 93 186",
+        "3.75m 58 94 178",
+        "5.00m 61 96 200 409",
+        "7.50m 57 91 181",
+        "10.00m 59 95 180 376",
+        "15.00m 62 93 181",
+        "20.00m 55 94 188 409",
+        "30.00m 95",
+        "40.00m 402",
+    ),
+    "table 5.3": (
+        "Position of Reference Image 100m 200m 300m 400m 500m",
+        "25m 97 200 298 388 512",
+        "30m 95 198 296 380 484",
+        "35m 95 203 281 362 479",
+        "40m 91 203 290 373 429",
+        "50m 97 203 267 344 434",
+        "60m 102 228 316 349 437",
+        "70m 112 310 323 373 470",
+    ),
+}
+"""The tables of the thesis, in order; INF and Infinity are infinite."""
+
 GALLEN2014: Quotes = {
     "table I": ("1 - light fog > 300", "2 - fog 100 to 300", "3 - dense fog <100"),
     "equation 11": ("we are able to compute the corresponding Vmet threshold as Vhigh|fog = Vlow|fog ≈ 100 m.",),
@@ -73,6 +139,7 @@ GALLEN2014: Quotes = {
 }
 
 QUOTES: dict[str, Quotes] = {
+    "huang2015": HUANG2015,
     "negru2013": NEGRU2013,
     "zhu2015": ZHU2015,
     "belaroussi2015": BELAROUSSI2015,
@@ -98,6 +165,15 @@ def belaroussi2015_cells() -> Iterable[PaperCell]:
     return belaroussi2015.paper_cells("1400 px", records)
 
 
+def huang2015_cells() -> Iterable[PaperCell]:
+    figures = huang2015_figures.figures(huang2015_figures.TABLES)
+    nothing = Estimate.invalid("huang2015", "not run")
+    variants = dict.fromkeys(huang2015_figures.VARIANTS, nothing)
+    after = {figure.after: nothing for figure in figures}
+    results = {figure.case: dict.fromkeys(variants, after) for figure in figures if figure.case}
+    return huang2015_figures.cells(figures, results, dict.fromkeys(huang2015.TABLE_4_1, variants))
+
+
 def gallen2014_cells() -> Iterable[PaperCell]:
     counts = dict.fromkeys(("published_each", "published_of_25", "largest_each", "largest_of_25"), 1)
     drives = [{"visibility_m": 80.0, "with_halos": 1, **counts}]
@@ -111,6 +187,7 @@ def gallen2014_cells() -> Iterable[PaperCell]:
 
 
 CELLS = {
+    "huang2015": huang2015_cells,
     "negru2013": negru2013.paper_cells,
     "zhu2015": zhu2015_cells,
     "belaroussi2015": belaroussi2015_cells,
@@ -121,7 +198,8 @@ CELLS = {
 
 def numbers(quotes: Iterable[str]) -> set[float]:
     """Every number of some quotes; commas between digits part thousands."""
-    return {float(found.replace(",", "")) for quote in quotes for found in re.findall(r"\d[\d,]*(?:\.\d+)?", quote)}
+    pattern = r"\d[\d,]*(?:\.\d+)?|\bINF(?:INITY)?\b"
+    return {float(found.replace(",", "")) for quote in quotes for found in re.findall(pattern, quote, re.IGNORECASE)}
 
 
 @pytest.mark.parametrize("paper", CELLS)
@@ -143,8 +221,42 @@ def test_every_share_of_zhu2015_is_compared() -> None:
     assert shares == {cell.paper for cell in zhu2015_cells() if cell.place == "table 2"} - {90.0}
 
 
+def test_every_figure_of_huang2015_is_compared_in_the_order_of_the_thesis() -> None:
+    for place, (_, *rows) in HUANG2015.items():
+        found = [cell.paper for cell in huang2015_cells() if cell.place == place]
+        texts = [row.replace("%", "").split() for row in rows]
+        printed = [float(text.removesuffix("m").removesuffix("inity").lower()) for row in texts for text in row[1:]]
+        if place == "table 4.2":
+            # Its first row is each picture over itself.
+            printed = [figure for figure in printed if figure != 100.0]
+        assert found == printed, place
+
+
 def test_gallen2014_is_run_with_the_figures_of_its_paper() -> None:
     assert set(gallen2014.REFERENCES) < numbers(GALLEN2014["section IV-C"])
     assert {gallen2014.LIDAR, *PUBLISHED_VISIBILITIES[:-1]} == numbers(GALLEN2014["figure 12"])
     assert {gallen2014.CAMERA.width, gallen2014.CAMERA.height} < numbers(GALLEN2014["section IV-A"])
     assert WINDOW in numbers(GALLEN2014["section IV-B"])
+
+
+@pytest.mark.parametrize(
+    ("ours", "options", "reached"),
+    [
+        (78.0, {}, True),
+        (80.0, {}, False),
+        (None, {}, False),
+        (math.inf, {}, False),
+        (107.0, {"truth": 100.0}, True),
+        (129.0, {"truth": 100.0}, False),
+        (72.1, {"claim": "at_most"}, False),
+        (71.0, {"claim": "at_most"}, True),
+        (71.0, {"claim": "at_least"}, False),
+        (74.0, {"tolerance": 1.5, "absolute": True}, False),
+    ],
+)
+def test_a_figure_is_reached_or_bold(ours: float | None, options: dict[str, Any], *, reached: bool) -> None:
+    cell = PaperCell("table 1", "row", "column [m]", 72.0, None, ours, **options)
+    assert cell.reached(ours) is reached
+    assert cell.shown()[4] == "**—**"
+    assert cell.shown()[5].startswith("**") is not reached
+    assert json.dumps(cell.record(), allow_nan=False)

@@ -88,8 +88,8 @@ def _span(values: Iterator[float]) -> str:
 
 def _demand_words(scenario: Scenario) -> str:
     if scenario.road is not None:
-        told = scenario.demand
-        rates = {} if told is None else {key: value for key, value in told if key.endswith("_vph") and value}
+        demand = scenario.demand
+        rates = {} if demand is None else {key: value for key, value in demand if key.endswith("_vph") and value}
         flows = ", ".join(f"{key.removesuffix('_vph').replace('_', ' ')} {value:g}" for key, value in rates.items())
         mix = {name: share for name, share in usual_mix(scenario.road.template) if share}
         return (f"Vehicles per hour: {flows} ({_shares(mix)})." if flows else "No traffic flows.") + _actors(scenario)

@@ -4,7 +4,7 @@ import csv
 import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from importlib.resources import files
 from typing import ClassVar, Literal, Protocol
 
 from fogsim.values import Step
@@ -41,7 +41,7 @@ class Definition:
     meaning : str
         Complete sentences.
     numerator, denominator : str
-        Of what the value is the quotient; an empty numerator stands for a count, a sum or an extreme of one run.
+        What the value is the quotient of; an empty numerator stands for a count, a sum or an extreme of one run.
     denominator_moves : bool
         Whether a policy moves the denominator by making traffic slower. Such a metric never ranks policies.
     better : "lower", "higher" or None
@@ -85,7 +85,8 @@ _DIRECTIONS: Mapping[str, Literal["lower", "higher"] | None] = {"": None, "lower
 
 @functools.cache
 def _table() -> list[dict[str, str]]:
-    return list(csv.DictReader((Path(__file__).parent / "definitions.csv").read_text(encoding="utf-8").splitlines()))
+    text = files("fogsim.metrics").joinpath("definitions.csv").read_text(encoding="utf-8")
+    return list(csv.DictReader(text.splitlines()))
 
 
 class Metric(Protocol):

@@ -191,7 +191,7 @@ def stopping_distance_difference(
     Parameters
     ----------
     gap, speed, leader_speed, reaction_time, deceleration
-        As of `potential_collision_speed`.
+        See `potential_collision_speed`.
 
     Returns
     -------

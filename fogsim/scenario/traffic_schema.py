@@ -169,8 +169,8 @@ class Traffic(Section):
     """With `ego: none`: simulated time before the run begins."""
 
     cohort_s: Period | None = None
-    """With `ego: none`: vehicles due to depart in the first so many seconds of the run are its cohort, of which metrics
-    per cohort vehicle are. The run ends when all of them have left, or after `duration_s`."""
+    """With `ego: none`: vehicles due to depart in this time from the run's start form the cohort of the metrics per
+    cohort vehicle. The run ends when all of them have left, and after `duration_s` at the latest."""
 
     advice_deceleration_mps2: Deceleration = 2.0
     """How hard an advised vehicle slows down to the advice."""

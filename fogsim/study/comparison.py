@@ -120,16 +120,20 @@ def moved_denominators(study: Study, rows: Sequence[Row]) -> list[str]:
             if abs(change) > MOVED_SHARE:
                 said.append(
                     f"{words.label}: {here:.3g} {words.unit} with {policy}, {baseline:.3g} {words.unit} under the "
-                    f"baseline ({signed(100.0 * change, 2)} %). What is divided by it compares different traffic."
+                    f"baseline ({signed(100.0 * change, 2)} %). Metrics divided by it compare different amounts of "
+                    "traffic."
                 )
-    for policy, both in pairs:
-        of_cohort = [_paired_values(both, f"traffic_cohort_{key}") for key in ("unfinished", "vehicles")]
-        unfinished, vehicles = (float(values[:, 1].sum()) for values in of_cohort)
-        if unfinished > MOVED_SHARE * vehicles:
-            said.append(
-                f"Cohort: {100.0 * unfinished / vehicles:.0f} % of its vehicles have not left when the run ends with "
-                f"{policy}, and their later conflicts are not counted; raise duration_s."
-            )
+    cohorts: dict[str, NDArray[np.float64]] = {}
+    for row in rows:
+        counts = [number_of(row.get(f"traffic_cohort_{key}")) or 0.0 for key in ("unfinished", "vehicles")]
+        cell = " · ".join(str(row[name]) for name in study.factors)
+        cohorts[cell] = cohorts.get(cell, np.zeros(2)) + np.array(counts)
+    said += [
+        f"Cohort: {100.0 * unfinished / vehicles:.0f} % of its vehicles have not left when the run ends with {cell}; "
+        "their later conflicts are not counted. Raise duration_s."
+        for cell, (unfinished, vehicles) in cohorts.items()
+        if unfinished > MOVED_SHARE * vehicles
+    ]
     return said
 
 

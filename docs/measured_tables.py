@@ -93,6 +93,7 @@ MEASUREMENTS = (
     benchmark("stereo", 3, times="ms"),
     benchmark("belief", 5),
     benchmark("disappearing_vehicles", 5, ("disappearing vehicles",), times="ms"),
+    benchmark("paper_methods", 4, ("paper methods",)),
     benchmark("night_estimators", 5, ("night-estimators",), times="ms"),
     Measurement(
         "restoration",

@@ -25,7 +25,7 @@ from fogsim.atmosphere.lamps.veil import FOLD_DISTANCE, INTERVALS, lit_air, ray_
 from fogsim.atmosphere.lamps.veil_kernels import VeilRays
 from fogsim.atmosphere.visibility.night_visibility import FogKind, high_beam_veil
 from fogsim.lighting.beams import front_fog_beam, high_beam, low_beam, luminous_flux, scaled_beam
-from fogsim.reproduce.night.limits import clear_low_sight, equal_sight
+from fogsim.reproduce.night.limits import limits
 from fogsim.scene.lamps import FULL, SIGNAL_LOBES, STREET_LOBE
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Beam
@@ -130,40 +130,19 @@ def glows() -> Rows:
     return table
 
 
-def equal_or_less(low: Beam, kind: FogKind, veil_share: float) -> str:
-    """V_met at which high and low beams show equally far (gallen2014 eq. 11)."""
-    found = equal_sight(low, kind, veil_share)
-    return "< 20" if found <= 20.0 else f"{found:.0f}"
-
-
-def limits() -> Rows:
-    """What comes out of the paper's limits, with beams of several strengths."""
+def fog_limits() -> Rows:
+    """The paper's limits as printed, with each beam's own veil, and with factors chosen to reach them."""
     third = scaled_beam(low_beam(), 0.3)
-    several = [scaled_beam(low_beam(), strength) for strength in (1.0, 0.5, 0.25)]
-    return [
-        ("", "radiation", "advection", "paper"),
-        ("high beam × 1, low beam × 0.3, low beam's veil 0.1 of the high beam's", "", "", ""),
-        (
-            "V_met at which both beams show equally far (eq. 11)",
-            *(f"{equal_or_less(third, kind, 0.1)} m" for kind in FogKind),
-            "100 m",
-        ),
-        (
-            "V_met at which high beams show as far as low beams in clear air (eq. 12)",
-            *(f"{clear_low_sight(third, kind):.0f} m" for kind in FogKind),
-            "300 m",
-        ),
-        (
-            "low beam as measured in the US (× 1): eq. 12",
-            *(f"{clear_low_sight(low_beam(), kind):.0f} m" for kind in FogKind),
-            "300 m",
-        ),
-        (
-            "one veil for both beams, low × 1 / 0.5 / 0.25: eq. 11",
-            *(" / ".join(equal_or_less(one, kind, 1.0) for one in several) + " m" for kind in FogKind),
-            "100 m",
-        ),
-    ]
+    forms = {
+        "as printed: one veil (eq. 9) for both beams": (low_beam(), 1.0),
+        "each beam's own veil, by FogSim's model": (low_beam(), None),
+        "low beams × 0.3, with 0.1 of the veil (chosen to reach the figures)": (third, 0.1),
+    }
+    table: Rows = [("", "radiation: eq. 11", "advection: eq. 11", "radiation: eq. 12", "advection: eq. 12")]
+    for name, (low, veil_share) in forms.items():
+        pairs = [limits(low, kind, veil_share) for kind in FogKind]
+        table.append((name, *(f"{pair[at]:.0f} m" for at in (0, 1) for pair in pairs)))
+    return [*table, ("the paper", "100 m", "100 m", "300 m", "300 m")]
 
 
 def lobes() -> Rows:
@@ -243,7 +222,7 @@ def directions() -> Rows:
 
 def main() -> None:
     """Print them all."""
-    for table in (veils, veils_of_gallen, glows, lobes, lamp_fluxes, limits, directions):
+    for table in (veils, veils_of_gallen, glows, lobes, lamp_fluxes, fog_limits, directions):
         heading, *rows = table()
         lines = [heading, tuple("---" for _ in heading), *rows]
         print("\n".join("| " + " | ".join(cells) + " |" for cells in lines) + "\n")

@@ -1,9 +1,7 @@
 """Write those tables of the docs that are measured: ``python docs/make_measured_tables.py [--check] [NAME …]``.
 
-Without names all of them (minutes, for zhu2015 and drivers). ``--check`` writes nothing and says which are out of date;
-the last digit may differ by one, as rounding on another processor may. Three benchmarks write their own tables:
-``python benchmarks/estimator_accuracy.py --docs``, ``estimator_targets.py``, ``lead_accuracy.py``. The page on
-performance has an excerpt of the first, so write it after that. ``make tables`` does all of it in order.
+Without names it writes all of them (minutes, for zhu2015 and drivers). ``--check`` writes nothing and lists those that
+are out of date; the last digit may differ by one, as rounding on another processor may.
 """
 
 import argparse
@@ -12,13 +10,11 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from make_tables import END, HERE, filled
-from page_tables import same
+from page_tables import ROOT, block, filled, lines_of, same, write_table
 
-ROOT = HERE.parent
 sys.path.insert(0, str(ROOT / "benchmarks"))
 
-import night_deviations  # noqa: E402 - from the folder that was just named
+import night_deviations
 
 if TYPE_CHECKING:
     from fogsim.reproduce import Reproduction
@@ -35,7 +31,7 @@ EXCERPT = {
 
 def excerpt() -> Rows:
     """Errors of some methods with an untold vehicle ahead, as the page on estimators has them, to two digits."""
-    page = (HERE / "explanation" / "estimators.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "explanation" / "estimators.md").read_text(encoding="utf-8")
     table = page.split("<!-- table: accuracy -->", 1)[1].split("\n\n")[2].splitlines()
     heading, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table]
     found = {row[0]: row[2:] for row in rows if row[1] == "untold"}
@@ -53,29 +49,40 @@ def _short(number: str) -> str:
     return f"{float(number):.1f}" if float(number) < 9.95 else f"{float(number):.0f}"
 
 
-def zhu2015() -> Rows:
-    """What `fogsim reproduce zhu2015` prints."""
-    from fogsim.reproduce import REPRODUCTIONS  # noqa: PLC0415 - heavy, and the other tables do not need it
-
-    return list(REPRODUCTIONS["zhu2015"]().table)
+PAPERS = ("negru2013", "zhu2015", "huang2015", "belaroussi2015", "gallen2014")
+"""Papers whose published figures are compared cell by cell."""
 
 
 @functools.cache
-def reproduced_drivers() -> "Reproduction":
-    """What `fogsim reproduce drivers` tells; minutes."""
+def reproduced(name: str) -> "Reproduction":
+    """What `fogsim reproduce NAME` finds; minutes."""
     from fogsim.reproduce import REPRODUCTIONS  # noqa: PLC0415 - heavy, and the other tables do not need it
 
-    return REPRODUCTIONS["drivers"]()
+    return REPRODUCTIONS[name]()
+
+
+def paper_cells(name: str) -> Rows:
+    """Every published figure of a paper next to ours, misses in bold, and how many are reached."""
+    from fogsim.reproduce.paper_cells import CELL_HEADING, reached_counts  # noqa: PLC0415 - as above
+
+    cells = reproduced(name).cells
+    reached = map(str, reached_counts(cells))
+    return [CELL_HEADING, *(cell.shown() for cell in cells), ("reached", "", "", f"of {len(cells)}", *reached)]
+
+
+def zhu2015() -> Rows:
+    """Classes and errors of zhu2015, on free roads and behind a car."""
+    return list(reproduced("zhu2015").table)
 
 
 def drivers() -> Rows:
     """Published findings of traffic in fog, and ours."""
-    return list(reproduced_drivers().table)
+    return list(reproduced("drivers").table)
 
 
 def drivers_traffic() -> Rows:
     """The default drivers' traffic by demand and visibility."""
-    return list(reproduced_drivers().tables[1].rows)
+    return list(reproduced("drivers").tables[1].rows)
 
 
 TABLES: dict[str, tuple[str, Callable[[], Rows]]] = {
@@ -85,8 +92,9 @@ TABLES: dict[str, tuple[str, Callable[[], Rows]]] = {
     "night-glows": ("docs/explanation/night.md", night_deviations.glows),
     "night-lobes": ("docs/explanation/night.md", night_deviations.lobes),
     "night-lamps": ("docs/explanation/night.md", night_deviations.lamp_fluxes),
-    "night-limits": ("docs/explanation/night.md", night_deviations.limits),
+    "night-limits": ("docs/explanation/night.md", night_deviations.fog_limits),
     "night-directions": ("docs/explanation/night.md", night_deviations.directions),
+    **{f"paper-{name}": ("docs/explanation/estimators.md", functools.partial(paper_cells, name)) for name in PAPERS},
     "zhu2015": ("docs/explanation/estimators.md", zhu2015),
     "drivers-published": ("docs/explanation/drivers.md", drivers),
     "drivers-traffic": ("docs/explanation/drivers.md", drivers_traffic),
@@ -102,11 +110,6 @@ def chosen(names: list[str]) -> list[str]:
     return [known for known in TABLES if not names or any(known.startswith(name) for name in names)]
 
 
-def kept_table(text: str, marker: str) -> str:
-    """The table that a page has."""
-    return text.split(f"<!-- table: {marker} -->", 1)[1].split(END, 1)[0]
-
-
 def main() -> int:
     """Write the tables, or say which are not up to date."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -118,12 +121,11 @@ def main() -> int:
         page, measured = TABLES[name]
         path = ROOT / page
         heading, *rows = measured()
-        text = path.read_text(encoding="utf-8")
-        new = filled(text, name, heading, rows)
-        if not same(kept_table(text, name), kept_table(new, name)):
+        lines, text = lines_of(heading, rows), path.read_text(encoding="utf-8")
+        if not same(block(text, name), block(filled(text, name, lines), name)):
             stale.append(f"{page}: the table {name} is not up to date: run python docs/make_measured_tables.py {name}")
             if not arguments.check:
-                path.write_text(new, encoding="utf-8")
+                write_table(path, name, lines)
     if arguments.check and stale:
         print("\n".join(stale))  # noqa: T201 - the lines are the result
     return int(bool(arguments.check and stale))

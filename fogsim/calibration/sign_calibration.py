@@ -68,7 +68,7 @@ def measure_operating_range(
             raise InputError(f"{name}: expected at least {least}, got {value}")
     fogs = tuple(float(v) for v in visibilities)
     found: dict[float, list[_Approach]] = {v: [] for v in fogs}
-    part, noise = _cropped(camera), PoseNoise()
+    part, noise = cropped(camera), PoseNoise()
     reach = min(max(80.0, 1.3 * fogs[-1]), 0.25 * camera.focal_length * diameter)
     if reach - _NEAREST < step:
         raise InputError(
@@ -140,8 +140,8 @@ def _range_of(looks: Sequence[tuple[float, bool]]) -> float:
     return farthest
 
 
-def _cropped(camera: Camera) -> Camera:
-    """The part of a camera's picture that signs on the right of the road pass through."""
+def cropped(camera: Camera) -> Camera:
+    """Camera of the part of an image that signs on the right of the road pass through."""
     (u0, _), f, horizon = camera.principal_point, camera.focal_length, camera.horizon_row
     left, right = max(round(u0 - 0.1 * f), 0), min(round(u0 + 0.8 * f), camera.width)
     top, bottom = max(round(horizon - 0.25 * f), 0), min(round(horizon + 0.1 * f), camera.height)

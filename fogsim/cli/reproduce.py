@@ -1,6 +1,7 @@
 """``fogsim reproduce``: papers' evaluations run again."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,7 +11,7 @@ from rich.table import Table
 
 from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
 from fogsim.cli.progress import progress_bar
-from fogsim.errors import UnknownNameError
+from fogsim.errors import InputError, UnknownNameError
 from fogsim.interruption import interruptible
 
 if TYPE_CHECKING:
@@ -30,6 +31,8 @@ def reproduce_command(
         ),
     ],
     out: Annotated[Path | None, typer.Option(help="Folder for PAPER.png, a picture like the paper's.")] = None,
+    table: Annotated[str | None, typer.Option(help="Run only what this table of the paper needs, such as 5.1.")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer frames and seeds for the same figures.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Flat records, one a line, in place of the tables.")] = False,
 ) -> None:
     """Run a paper's evaluation again on FogSim's frames or traffic; its figures stand beside ours."""
@@ -38,19 +41,21 @@ def reproduce_command(
 
     if paper != ALL and paper not in REPRODUCTIONS:
         raise UnknownNameError("paper", paper, [*REPRODUCTIONS, ALL])
+    if paper == ALL and table is not None:
+        raise InputError(f"--table {table} needs one paper, not {ALL}")
     papers = REPRODUCTIONS if paper == ALL else (paper,)
     if out is not None:
         refuse_unwritable_folder(out)
         for name in papers:
             refuse_unwritable(_picture_path(out, name), "--out", makes_folder=True)
     for name in papers:
-        done = _evaluated(name, REPRODUCTIONS[name])
+        done = _evaluated(name, REPRODUCTIONS[name], quick=quick, table=table)
         _show(done, as_json=as_json)
         if out is not None:
             _save(done, out)
 
 
-def _evaluated(name: str, evaluation: "Evaluation") -> "Reproduction":
+def _evaluated(name: str, evaluation: "Evaluation", *, quick: bool, table: str | None) -> "Reproduction":
     """Run an evaluation under a bar; Ctrl-C ends the command in one line."""
     steps = "0 steps"
     with progress_bar(stderr) as progress:
@@ -63,31 +68,48 @@ def _evaluated(name: str, evaluation: "Evaluation") -> "Reproduction":
 
         try:
             with interruptible():
-                return evaluation(watch=watch)
+                return evaluation(quick=quick, table=table, watch=watch)
         except KeyboardInterrupt:
             progress.stop()
-            stderr.print(f"interrupted: {name} after {steps}; nothing of it is told or written", soft_wrap=True)
+            stderr.print(f"interrupted: {name} after {steps}; nothing of it is printed or written", soft_wrap=True)
             raise typer.Exit(INTERRUPTED) from None
 
 
 def _show(done: "Reproduction", *, as_json: bool) -> None:
+    from fogsim.reproduce.paper_cells import CELL_HEADING, reached_counts
+
     if as_json:
-        for record in (*done.records, *done.sweeps):
+        cells = [{"paper": done.paper, "table": "cells", **cell.record()} for cell in done.cells]
+        for record in (*cells, *done.records, *done.sweeps):
             typer.echo(json.dumps(record, allow_nan=False))
         return
-    # Files and pipes have no width at which rows must be broken.
-    wide = stdout if stdout.is_terminal else Console(highlight=False, emoji=False, width=_UNBROKEN)
+    if done.cells:
+        # A file shows no bold, so a miss is marked as in Markdown.
+        miss = "[bold]{}[/]" if stdout.is_terminal else "**{}**"
+        rows = [(*map(escape, shown[:3]), *shown[3:]) for shown in (cell.shown(miss) for cell in done.cells)]
+        _print_table(f"{done.paper}: the paper's figures and ours, misses in bold", CELL_HEADING, rows)
+        published, corrected = reached_counts(done.cells)
+        summary = (
+            f"Of {len(done.cells)} published figures {published} are reached as published and {corrected} corrected."
+        )
+        stdout.print(summary, soft_wrap=True, end="\n\n")
     for shown in done.all_tables:
-        heading, *rows = shown.rows
-        table = Table(*map(escape, heading), box=None, pad_edge=False)
-        for row in rows:
-            table.add_row(*map(escape, row))
-        stdout.print(f"[italic]{escape(shown.title)}[/]", soft_wrap=True)
-        wide.print(table)
+        heading, *plain = shown.rows
+        _print_table(shown.title, heading, [tuple(map(escape, row)) for row in plain])
         if done.tables:
             stdout.print()
     for note in done.notes:
         stdout.print(f"- {escape(note)}", soft_wrap=True)
+
+
+def _print_table(title: str, heading: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    # Files and pipes have no width at which rows must be broken.
+    wide = stdout if stdout.is_terminal else Console(highlight=False, emoji=False, width=_UNBROKEN)
+    table = Table(*map(escape, heading), box=None, pad_edge=False)
+    for row in rows:
+        table.add_row(*row)
+    stdout.print(f"[italic]{escape(title)}[/]", soft_wrap=True)
+    wide.print(table)
 
 
 def _picture_path(folder: Path, paper: str) -> Path:

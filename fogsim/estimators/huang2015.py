@@ -4,7 +4,7 @@ import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 from fogsim.errors import InputError
 from fogsim.estimators.huang2015_lead import Huang2015Lead
@@ -104,6 +104,10 @@ class Huang2015:
         From the own front bumper, where ranges begin, back to the camera [m].
     blur : float
         Standard deviation of the lens' blur beside the pixels' own size [px].
+    range_from : {"sensor", "camera"}
+        Where ranges of the vehicle ahead are from (see `Huang2015Lead`).
+    vehicle_width : float, optional
+        Width of the vehicle for ranges from the camera, where it is known [m].
     pitch_deviation : float
         Standard deviation of the true pitch about the assumed one [rad].
     """
@@ -119,11 +123,21 @@ class Huang2015:
         way_scale: Annotated[float, Range(0.01, 1e9, "m")] = 200.0,
         setback: Annotated[float, Range(0.0, 10.0, "m")] = 0.0,
         blur: Annotated[float, Range(0.0, 10.0, "px")] = 0.0,
+        range_from: Literal["sensor", "camera"] = "sensor",
+        vehicle_width: Annotated[float, Range(0.5, 4.0, "m")] | None = None,
         pitch_deviation: PitchDeviation = PITCH_DEVIATION,
     ) -> None:
         self._check = ObservationCheck(camera)
         self._rough = Huang2015Rough(camera, as_published=as_published, pitch_deviation=pitch_deviation)
-        self._lead = Huang2015Lead(camera, as_published=as_published, setback=setback, blur=blur)
+        self._lead = Huang2015Lead(
+            camera,
+            as_published=as_published,
+            setback=setback,
+            blur=blur,
+            range_from=range_from,
+            vehicle_width=vehicle_width,
+            pitch_deviation=pitch_deviation,
+        )
         self._as_published = as_published
         self._scales = (time_scale, way_scale)
         self.reset()

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.estimators.huang2015_ratios import RANGE_DEVIATION
+from fogsim.linear_algebra import matrix_product
 from fogsim.values.camera import Camera
 from fogsim.vision.light.clipped_sky import clipping, darker_by
 from fogsim.vision.light.luminance import linear_luminance
@@ -16,7 +17,7 @@ from fogsim.vision.lines.horizon import PITCH_DEVIATION, levelled
 from fogsim.vision.region.road_image import MIN_AIRLIGHT, CannotTellError
 from fogsim.vision.vehicle.airlight import airlight_beside, hidden_beside
 from fogsim.vision.vehicle.contrast_ratio import LOST, TOP, MeanLuminances, mean_luminances
-from fogsim.vision.vehicle.patch import Patch, Placement, rescale_position, shrink
+from fogsim.vision.vehicle.patch import Patch, Placement, pixel_shares, rescale_position, shrink
 from fogsim.vision.vehicle.rear_localisation import WIDTHS, RearBox
 from fogsim.vision.vehicle.registration import PlacementPrior, Regression, register
 from fogsim.vision.vehicle.vehicle_crop import MOST_NOISE, SkyReading, VehicleCrop, vehicle_crop
@@ -24,6 +25,10 @@ from fogsim.vision.vehicle.vehicle_crop import MOST_NOISE, SkyReading, VehicleCr
 HALF_WIDTH, MIDDLE, HALF_HEIGHT = 0.42, 0.42, 0.32
 """The part of a rear that is compared, in widths of the vehicle: half its width, its middle above the foot, and half
 its height [-]. It ends below the roof of the flattest car and above the shadow under it."""
+
+BODY_HALF_WIDTH, BODY_HEIGHTS = 0.34, (0.15, 0.7)
+"""The part whose variance is taken, in widths of the vehicle [-]. It lies on the body of every vehicle: beside a narrow
+roof there is sky, and under the bumper road, whose share of a larger window would change with its place."""
 
 MARGIN, MARGIN_PIXELS = 0.12, 8
 """What a stored picture holds around that part: widths of the vehicle [-] and pixels."""
@@ -72,7 +77,7 @@ class RearPatch:
     patch : Patch
         The picture, about the middle of its body.
     variance : float
-        Of the window's pixels, before it was shrunk [linear grey levels²].
+        Of the body's pixels, before the picture was shrunk [linear grey levels²].
     sky : SkyReading
         The airlight [linear grey levels].
     noise : float
@@ -135,7 +140,7 @@ class Comparison:
 
     @property
     def variance(self) -> float:
-        """Of the picture's window [linear grey levels²]."""
+        """Of the picture's body [linear grey levels²]."""
         return self.picture.variance
 
     @property
@@ -298,27 +303,38 @@ def lower(picture: RearPatch, widths: float) -> RearPatch:
 
 
 def _window_variance(patch: Patch) -> float:
-    """Variance of the pixels of the followed thing (eq. 4.12 with the square that it lacks); 0 if none are there."""
-    spans = (
-        slice(max(round(middle - half), 0), max(round(middle + half) + 1, 0))
-        for middle, half in ((patch.row, patch.half_height), (patch.column, patch.half_width))
+    """Variance over the body (eq. 4.12 with the square that it lacks), pixels at its edges by their share of it."""
+    width = patch.half_width / HALF_WIDTH
+    low, high = ((MIDDLE - height) * width + patch.row for height in BODY_HEIGHTS[::-1])
+    sizes = patch.luminance.shape
+    rows = pixel_shares(sizes[0], np.array([0.5 * (low + high)]), 0.5 * (high - low))
+    cols = pixel_shares(sizes[1], np.array([patch.column]), BODY_HALF_WIDTH * width)
+    inside = float(rows.sum() * cols.sum())
+    if inside <= 0.0:
+        return 0.0
+    mean, square = (
+        float(matrix_product(matrix_product(rows, power), cols.T)[0, 0]) / inside
+        for power in (patch.luminance, patch.luminance**2)
     )
-    pixels = patch.luminance[tuple(spans)]
-    return float(pixels.var()) if pixels.size else 0.0
+    return max(square - mean**2, 0.0)
 
 
-def expected_placement(reference: RearPatch, picture: RearPatch) -> PlacementPrior:
-    """Where the reference is expected in the next frame: as before, but for pitch, steering and the range's noise.
+def expected_placement(
+    reference: RearPatch, picture: RearPatch, range_deviation: float = RANGE_DEVIATION
+) -> PlacementPrior:
+    """Where the reference is expected in the next frame: as before, but for pitch, steering and noise of the range [m].
 
     Parameters
     ----------
     reference, picture : RearPatch
         The two.
+    range_deviation : float
+        Standard deviation of the range [m].
     """
     nearness = 1.0 / picture.distance + 1.0 / reference.distance
     placement = Placement(picture.patch.column, picture.patch.row, picture.width / reference.width)
     return PlacementPrior(
-        placement, 1.0 + STEERING * picture.width, 0.5 + picture.pitch_deviation, RANGE_DEVIATION * nearness
+        placement, 1.0 + STEERING * picture.width, 0.5 + picture.pitch_deviation, range_deviation * nearness
     )
 
 

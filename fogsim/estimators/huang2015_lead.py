@@ -1,13 +1,15 @@
 """Accurate visibility from pictures of the tracked vehicle ahead (Huang 2015, section 4.3)."""
 
 import math
-from typing import Annotated
+from dataclasses import replace
+from functools import partial
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
-from fogsim.estimators.huang2015_comparison import Comparison
+from fogsim.estimators.huang2015_comparison import Comparison, crop_vehicle
 from fogsim.estimators.huang2015_ratios import (
     RANGE_DEVIATION,
     Regressions,
@@ -21,8 +23,11 @@ from fogsim.estimators.image_check import ObservationCheck
 from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
-from fogsim.values.observation import Observation
+from fogsim.values.observation import LeadMeasurement, Observation
+from fogsim.vision.light.pixel_kernels import Pixels
+from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation
 from fogsim.vision.region.road_image import CannotTellError
+from fogsim.vision.vehicle.camera_range import CameraRange, registered_deviation
 
 Floats = NDArray[np.float64]
 
@@ -35,6 +40,9 @@ LEAST_CHANGE = 10.0
 WORST = 1.0
 """Relative standard deviation of k beyond which it is as good as unknown [-]."""
 
+LARGEST_SCALE_DEVIATION = 0.3
+"""Relative standard deviation of all ranges together beyond which ranges from the camera say nothing [-]."""
+
 CURVE_STEP, CURVE_END = 5.0, 200.0
 """Ranges of the confidence curve in the diagnostics [m]."""
 
@@ -43,9 +51,10 @@ CURVE_STEP, CURVE_END = 5.0, 200.0
 class Huang2015Lead:
     """Contrast of the tracked vehicle ahead against its range (Huang 2015, section 4.3).
 
-    The range of the radar and the calibration say where the vehicle's rear must be; its edges and symmetry say where
-    it is, and from then on its picture is registered from frame to frame. Where its range changes, its variance falls
-    as e^(−2kd) (eq. 4.15). The confidence of an image at a range is what is left of that variance.
+    The radar's range and the calibration give where the vehicle's rear must be; its edges and symmetry show where it
+    is, and from then on its picture is registered from frame to frame. Where its range changes, its variance falls as
+    e^(−2kd) (eq. 4.15). The confidence of an image at a range is what is left of that variance. Without a radar,
+    ``range_from="camera"`` measures ranges in the image.
 
     As published, variances of the windows are compared two by two: a table of ratios by difference of range, those
     beyond ± 50 % of their row's median dropped, means, least squares over k ≤ 0.09 1/m. Camera noise adds to every
@@ -74,6 +83,13 @@ class Huang2015Lead:
         would be taken for fog: with 0.7 px that are not given, 120 m come out as some 105 m.
     spacing : float, optional
         Change of range between pictures that are kept [m]: 2.5 m, as published 5 m.
+    range_from : {"sensor", "camera"}
+        Whether ranges are the sensor's, or measured in the image: by the vehicle's width, known or from where it stands
+        on a level road. Ranges from the camera have an error in common, which the deviation of k includes.
+    vehicle_width : float, optional
+        Width of the vehicle for ranges from the camera, where it is known [m].
+    pitch_deviation : float
+        Standard deviation of the true pitch about the assumed one, for ranges from the camera [rad].
     """
 
     method = "huang2015_lead"
@@ -86,20 +102,32 @@ class Huang2015Lead:
         setback: Annotated[float, Range(0.0, 10.0, "m")] = 0.0,
         blur: Annotated[float, Range(0.0, 10.0, "px")] = 0.0,
         spacing: Annotated[float, Range(0.1, 100.0, "m")] | None = None,
+        range_from: Literal["sensor", "camera"] = "sensor",
+        vehicle_width: Annotated[float, Range(0.5, 4.0, "m")] | None = None,
+        pitch_deviation: PitchDeviation = PITCH_DEVIATION,
     ) -> None:
+        if vehicle_width is not None and range_from == "sensor":
+            raise InputError('vehicle_width needs range_from="camera": ranges of the sensor need no width')
         usual = PUBLISHED_SPACING if as_published else SPACING
         self._spacing = usual if spacing is None else spacing
         self._blur = blur
         self._camera, self._check = camera, ObservationCheck(camera)
         self._as_published = as_published
-        self._setback = setback
+        by_camera = range_from == "camera"
+        self._setback = 0.0 if by_camera else setback
+        self._camera_range = CameraRange(camera, vehicle_width, pitch_deviation) if by_camera else None
         self.reset()
 
     def reset(self) -> None:
         """Forget the vehicle ahead."""
         self._check.reset()
-        self._track = self._new_track()
+        self._forget()
         self._tracks = 0
+
+    def _forget(self) -> None:
+        self._track = self._new_track()
+        if self._camera_range is not None:
+            self._camera_range.reset()
 
     @property
     def tracks(self) -> int:
@@ -107,7 +135,7 @@ class Huang2015Lead:
         return self._tracks
 
     def _new_track(self) -> LeadTrack:
-        smoothed_by = 0.0 if self._as_published else RANGE_DEVIATION
+        smoothed_by = 0.0 if self._as_published or self._camera_range is not None else RANGE_DEVIATION
         return LeadTrack(self._camera, self._setback, self._spacing, self._blur, smoothed_by)
 
     def update(self, observation: Observation) -> Estimate:
@@ -116,7 +144,7 @@ class Huang2015Lead:
         Parameters
         ----------
         observation : Observation
-            Its image and the range of its lead vehicle are used.
+            Its image is used, and the range of its lead vehicle unless ranges are from the camera.
 
         Returns
         -------
@@ -132,24 +160,31 @@ class Huang2015Lead:
             If camera, image or time do not fit (see `fogsim.estimators.image_check`), or the range is NaN.
         """
         image = self._check.kernel_image(observation)
-        if observation.lead is None:
-            self._miss()
-            return Estimate.invalid(self.method, "no vehicle is tracked ahead")
-        if math.isnan(observation.lead.distance):
-            raise InputError("the distance of a lead measurement must be a number, got NaN")
         try:
-            if not self._track.follows(observation.lead.distance):
+            lead, deviation = self._range(image, observation.lead)
+            if not self._track.follows(lead.distance):
                 self._track = self._new_track()
                 self._tracks += 1
-            self._track.see(image, observation.lead, observation.time)
+            self._track.see(image, lead, observation.time, deviation)
         except CannotTellError as reason:
             self._miss()
             return Estimate.invalid(self.method, str(reason))
         return self._estimate()
 
+    def _range(self, image: Pixels, lead: LeadMeasurement | None) -> tuple[LeadMeasurement, float]:
+        """Range of the vehicle ahead and its standard deviation [m]."""
+        if self._camera_range is not None:
+            distance, deviation = self._camera_range.measure(partial(crop_vehicle, image, self._camera))
+            return LeadMeasurement(distance, math.nan), deviation
+        if lead is None:
+            raise CannotTellError("no vehicle is tracked ahead")
+        if math.isnan(lead.distance):
+            raise InputError("the distance of a lead measurement must be a number, got NaN")
+        return lead, RANGE_DEVIATION
+
     def _miss(self) -> None:
         if self._track.miss():
-            self._track = self._new_track()
+            self._forget()
 
     def _estimate(self) -> Estimate:
         found = self._track.comparisons
@@ -163,18 +198,27 @@ class Huang2015Lead:
             "window": None if window is None else (window.column, window.foot, window.width),
             "range_change": change,
         }
+        if self._camera_range is not None and self._camera_range.scale_deviation > LARGEST_SCALE_DEVIATION:
+            return Estimate.invalid(self.method, "where the vehicle stands is too uncertain", **diagnostics)
         if change < LEAST_CHANGE or distances.size < (2 if self._as_published else 3):
             return Estimate.invalid(self.method, "the vehicle's range has not changed enough", **diagnostics)
         measured = self._published() if self._as_published else self._corrected()
         if measured is None or not math.isfinite(measured[1]):
             return Estimate.invalid(self.method, "the vehicle's contrast follows no law of fog", **diagnostics)
-        extinction, deviation = measured
+        extinction, deviation = self._scaled(*measured)
         road = self._track.road
         if not self._as_published and road is not None and road.is_lit(extinction, deviation):
             return Estimate.invalid(self.method, "lamps light the road: this is a daytime method", **diagnostics)
         curve = np.arange(0.0, CURVE_END + CURVE_STEP, CURVE_STEP)
         diagnostics |= {"confidence_distances": curve, "confidence": image_confidence(extinction, curve)}
         return Estimate(self.method, extinction, deviation, diagnostics=diagnostics)
+
+    def _scaled(self, extinction: float, deviation: float) -> tuple[float, float]:
+        """Extinction and its deviation [1/m] with the scale of ranges from the camera and its deviation."""
+        if self._camera_range is None:
+            return extinction, deviation
+        scale, by_scale = self._camera_range.scale, self._camera_range.scale_deviation
+        return extinction / scale, math.hypot(deviation, by_scale * extinction) / scale
 
     def _published(self) -> tuple[float, float] | None:
         found = [c for c in self._track.comparisons if c.variance > 0]
@@ -186,7 +230,10 @@ class Huang2015Lead:
 
     def _corrected(self) -> tuple[float, float] | None:
         found = self._track.comparisons
-        fit = fitted_extinction(_regressions(found))
+        data = _regressions(found)
+        if self._camera_range is not None:
+            data = replace(data, range_deviation=registered_deviation(self._camera, data.distance))
+        fit = fitted_extinction(data)
         if fit is None:
             return None
         if fit.extinction <= fit.deviation:

@@ -169,6 +169,8 @@ class Regressions:
         Mean luminance of each picture and its deviation; ``inf`` where the sky is saturated [-].
     near_mean : (n,) float64
         Mean luminance of the same pixels of the reference [-].
+    range_deviation : float or (n,) float64
+        Standard deviation of the ranges [m].
     """
 
     distance: Floats
@@ -177,6 +179,7 @@ class Regressions:
     mean: Floats
     mean_deviation: Floats
     near_mean: Floats
+    range_deviation: Floats | float = RANGE_DEVIATION
 
 
 @dataclass(frozen=True, slots=True)
@@ -266,7 +269,7 @@ def _predicted(state: Floats, apart: Floats, data: Regressions, priors: Floats) 
     slopes = (1.0 + detail) * np.stack([-apart * t, shape, zero, t / (1.0 + detail), zero], axis=1)
     means = np.stack([apart * seen, -seen / level, 1.0 - t * kept, zero, -known * t * smaller], axis=1)
     # A range that is off by δ changes either by k δ; near pixels are of a range, too.
-    by_range = (RANGE_DEVIATION * extinction) ** 2
+    by_range = (data.range_deviation * extinction) ** 2
     slope_spread = np.sqrt(data.slope_deviation**2 + (SLOPE_SHARE**2 + by_range) * t**2)
     mean_spread = np.sqrt(data.mean_deviation**2 + MEAN_SHARE**2 + (MEAN_CONTRAST_SHARE**2 + by_range) * seen**2)
     values = np.concatenate([(1.0 + detail) * t, 1.0 + excess - seen, [excess, detail, drift]])

@@ -98,7 +98,7 @@ class LeadTrack(TrackedVehicle[Comparison]):
         """
         return self.reference is not None and abs(distance + self._setback - self._last_distance) <= MOST_JUMP
 
-    def see(self, image: Pixels, measured: LeadMeasurement, time: float) -> None:
+    def see(self, image: Pixels, measured: LeadMeasurement, time: float, deviation: float = RANGE_DEVIATION) -> None:
         """Look for the vehicle in the next frame.
 
         Parameters
@@ -109,6 +109,8 @@ class LeadTrack(TrackedVehicle[Comparison]):
             Range and relative speed by the radar.
         time : float
             [s].
+        deviation : float
+            Standard deviation of the range [m]; where it is larger than a radar's, registration measures it again.
 
         Raises
         ------
@@ -122,7 +124,7 @@ class LeadTrack(TrackedVehicle[Comparison]):
         if self.reference is None:
             self._begin(crop, number)
         else:
-            self._follow(crop, number, self.reference.picture)
+            self._follow(crop, number, self.reference.picture, deviation)
         self._missed = 0
 
     def _begin(self, crop: VehicleCrop, number: int) -> None:
@@ -136,15 +138,19 @@ class LeadTrack(TrackedVehicle[Comparison]):
         self.reference, self.detections = comparison, [comparison]
         self._remember(window.column, window.foot, crop.depth)
 
-    def _follow(self, crop: VehicleCrop, number: int, reference: RearPatch) -> None:
+    def _follow(self, crop: VehicleCrop, number: int, reference: RearPatch, deviation: float) -> None:
         distance = crop.depth
         expected = self._expected(distance, reference)
         full = cut_patch(crop, expected, number, self._blur)
         picture, most = shrink_broad(full), self._most_contrast(distance)
-        prior = expected_placement(reference, picture)
+        prior = expected_placement(reference, picture, deviation)
         comparison = compare(reference, picture, prior, most)
         if comparison is None or _exceeds(comparison, most):
             raise CannotTellError("the vehicle ahead was lost")
+        if deviation != RANGE_DEVIATION:
+            distance *= prior.placement.scale / comparison.regression.placement.scale
+            picture = replace(picture, distance=distance)
+            comparison = replace(comparison, picture=picture, distance=distance)
         at, by = comparison.regression.placement, prior.placement
         moved = (at.column - by.column) / picture.scale, (at.row - by.row) / picture.scale
         self._remember(expected.column + moved[0], expected.foot + moved[1], distance)

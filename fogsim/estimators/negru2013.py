@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.estimators.image_check import ObservationCheck
-from fogsim.estimators.negru2013_band import SeenBand, fog_slope, narrowed_curve, road_band, road_curve
+from fogsim.estimators.negru2013_band import SeenBand, fog_limits, fog_slope, narrowed_curve, road_band, road_curve
 from fogsim.estimators.repairs import Repair, chosen
 from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
@@ -25,7 +25,7 @@ from fogsim.vision.lines.gradient_lines import consensus_vanishing_point
 from fogsim.vision.lines.horizon import PITCH_DEVIATION, Horizon, PitchDeviation, calibrated_horizon, weighted_mean
 from fogsim.vision.lines.road_lines import road_vanishing_point
 from fogsim.vision.lines.vanishing_point import VanishingPoint
-from fogsim.vision.region.curve_checks import SURE_OF_FOG, check_law, seen_up_to, told
+from fogsim.vision.region.curve_checks import SURE_OF_FOG, check_law, detection_limit, seen_up_to, told
 from fogsim.vision.region.inflection import (
     FogModel,
     Parameters,
@@ -34,11 +34,16 @@ from fogsim.vision.region.inflection import (
     printed_inflection,
     printed_parameters,
 )
-from fogsim.vision.region.law import extinction_deviation
+from fogsim.vision.region.law import extinction_deviation, law_fit
 from fogsim.vision.region.profile import RoadCurve, band_profile
+from fogsim.vision.region.region_kernels import GrowthLimits
 from fogsim.vision.region.road_image import MIN_CONTRAST, MIN_ROWS, SATURATED, CannotTellError, RoadImage, road_image
+from fogsim.vision.region.road_region import constant_limits
 from fogsim.vision.region.subpixel_inflection import subpixel_inflections
 from fogsim.vision.strips.strip_curves import lowest_road_row
+
+GROWTH_SHARE = 0.8
+"""ρ of the published region growing [-]; the paper takes its limits from Hautière et al. (2006), without values."""
 
 MAX_ASIDE = 0.1
 """Share of the image's width by which a clear road may lie beside the vanishing column [-]."""
@@ -80,6 +85,11 @@ class Negru2013Repair(Repair):
         "edges include the fog's own gradient, which stops the region where it is steepest or where road meets sky",
         "each row's gradient is taken away as far as fog can make it",
     )
+    GROWTH_BY_FOG = (
+        "growth_by_fog",
+        "pixels join the region that are similar to the seed and to the pixel below; how similar is not printed",
+        "similar is what differs by no more than the steepest fog of its row, airlight / (e (v − v_h)), and noise",
+    )
     BAND_AHEAD = (
         "band_ahead",
         "the widest vertical band, wherever it lies, which may be verge, and far away is wider than the road",
@@ -103,6 +113,13 @@ class Negru2013Repair(Repair):
         "a vehicle ahead joins the region or ends it",
         "the band lies beside the tracked vehicle",
     )
+    REFUSALS = (
+        "refusals",
+        "the point of least error is the inflection, whatever its model; without one, or without a band, there is no"
+        " fog, so that a wall and a traffic jam are clear air",
+        "no estimate where the model is not one of fog over this road (its airlight is not the sky's, its contrast is"
+        " small, the curve fits badly), or where the road is hidden or ends below the horizon",
+    )
     SINGLE_FRAMES = (
         "single_frames",
         "of the last N frames the best counts, which holds on to old fog (hundreds of frames for the horizon)",
@@ -124,20 +141,23 @@ class Negru2013:
     (they give A = 162 where the truth is 200, and mostly choose a wrong row). What the corrected form (the default)
     does otherwise is listed in `Negru2013Repair`, and can be switched one by one.
 
-    A region that reaches the horizon without an inflection gives k = 0 with the detection limit as its deviation;
-    whatever else stands in the way gives an invalid estimate with the reason in its diagnostics. Daytime only, flat
-    road, road darker than the airlight.
+    A region that reaches the horizon without an inflection gives k = 0 with the detection limit as its deviation. An
+    image that shows no road by day gives an invalid estimate with the reason in its diagnostics, in either form.
+    Daytime only, flat road, road darker than the airlight.
 
     Parameters
     ----------
     camera : Camera
         The assumed calibration.
     as_published : bool
-        Make no repairs but that of the signs, without which it finds nothing.
+        Make no repairs, except that of the signs, without which every estimate is far off.
     repairs : {'all', 'none'} or list of str
         Which of the repairs are made.
     printed_signs : bool
         Take eqs. 17 and 18 with their wrong signs, whatever else is repaired.
+    growth : float
+        G_max, the largest step of luminance between rows, as published [linear grey levels]. The paper prints none; 8
+        has the least mean error in the last table of `fogsim reproduce negru2013`, whose drives are not its scenes.
     vanishing_point : bool
         Look for the vanishing point of the road's lines; else the calibration alone gives the horizon.
     horizon_frames, inflection_frames : int
@@ -160,6 +180,7 @@ class Negru2013:
         as_published: bool = False,
         repairs: Literal["all", "none"] | Sequence[Negru2013Repair] = "all",
         printed_signs: bool = False,
+        growth: Annotated[float, Range(0.0, 255.0)] = 8.0,
         vanishing_point: bool = True,
         horizon_frames: Annotated[int, Range(1, 100_000)] = 500,
         inflection_frames: Annotated[int, Range(1, 10_000)] = 5,
@@ -169,6 +190,7 @@ class Negru2013:
         self._camera, self._assumed = camera, calibrated_horizon(camera, pitch_deviation)
         made = chosen(Negru2013Repair, repairs, as_published=as_published, published=(Negru2013Repair.SIGNS,))
         self._repairs = made - {Negru2013Repair.SIGNS} if printed_signs else made
+        self._growth = growth
         self._looks_for_lines = vanishing_point
         alone = Negru2013Repair.SINGLE_FRAMES in self._repairs
         self._detector = CannyDeriche()
@@ -220,7 +242,12 @@ class Negru2013:
         diagnostics["horizon_row"] = horizon.row
         ahead = Negru2013Repair.BAND_AHEAD in self._repairs
         hiding = lead if Negru2013Repair.LEAD_LEFT_OUT in self._repairs else None
-        band = road_band(road, edges, slope, self._camera, widest=not ahead, lead=hiding)
+        try:
+            band = road_band(road, edges, self._limits(road, edges, slope), self._camera, widest=not ahead, lead=hiding)
+        except CannotTellError:
+            if self._refuses:
+                raise
+            return self._no_fog(0.0, horizon, diagnostics)
         diagnostics["band"] = (band.left, band.right, band.top + road.first_row, band.bottom + road.first_row)
         here = replace(band, left=band.left - road.first_column, right=band.right - road.first_column)
         seen = SeenBand(road, horizon, band, band_profile(road.luminance, here))
@@ -233,16 +260,19 @@ class Negru2013:
         whole = Negru2013Repair.SUBPIXEL_INFLECTION not in self._repairs
         model = self._whole_row(curve, seen) if whole else self._between_rows(curve, seen, paved)
         if model is None:
-            self._check_clear_view(seen)
-            # An inflection needs a row on either side: the topmost that could have been seen is the second.
-            rows = max(float(curve.below_horizon[0]), 1.0) + 1.0
-            limit = 2.0 / self._camera.row_distance * math.hypot(rows, horizon.standard_deviation)
-            return Estimate(self.method, 0.0, limit, diagnostics=diagnostics)
+            if self._refuses:
+                self._check_clear_view(seen)
+            return self._no_fog(float(curve.below_horizon[0]), horizon, diagnostics)
         self._models.append(model)
         model = min(self._models, key=lambda m: m.residual / max(m.airlight - m.road, 1e-9))
         inflection = horizon.row + 0.5 * model.extinction * self._camera.row_distance
         found = {"inflection_row": inflection, "airlight": model.airlight, "road": model.road}
         return Estimate(self.method, model.extinction, model.standard_deviation, diagnostics=diagnostics | found)
+
+    def _no_fog(self, top: float, horizon: Horizon, diagnostics: dict[str, object]) -> Estimate:
+        """Clear air to the detection limit of a road seen up to some rows below the horizon [px]."""
+        limit = detection_limit(top, horizon.standard_deviation, self._camera.row_distance)
+        return Estimate(self.method, 0.0, limit, diagnostics=diagnostics)
 
     def _road(self, image: NDArray[np.uint8] | NDArray[np.uint16]) -> tuple[RoadImage, LinearPixels]:
         """Road from a little above the horizon down to the image's bottom or (repaired) the own bonnet."""
@@ -262,8 +292,8 @@ class Negru2013:
     def _whole_row(self, curve: RoadCurve, seen: SeenBand) -> FogModel | None:
         """Fog from the row of the inflection; None where there is no credible one."""
         inflection = best_inflection if Negru2013Repair.SIGNS in self._repairs else printed_inflection
-        model = _credible(inflection(curve), curve, seen.road)
-        if model is None:
+        model = inflection(curve)
+        if model is None or (self._refuses and not _is_credible(model, curve, seen.road)):
             return None
         by_horizon = model.horizon_sensitivity * seen.horizon.standard_deviation
         deviation = math.hypot(model.standard_deviation, by_horizon, ALBEDO_DEVIATION * model.extinction)
@@ -282,11 +312,11 @@ class Negru2013:
         deviation = extinction_deviation(curve, extinction, self._extinctions, seen.horizon.standard_deviation)
         beside = min(max(2.0 * paved / (extinction * curve.row_distance) - 1.0, 0.0), 1.0)
         deviation = math.hypot(deviation, OTHER_GROUND * beside * extinction)
-        if extinction < SURE_OF_FOG * deviation:
+        if self._refuses and extinction < SURE_OF_FOG * deviation:
             told(extinction, deviation)
             return None
         try:
-            airlight, dark = check_law(curve, extinction, seen.road)
+            airlight, dark = self._checked_law(curve, extinction, seen.road)
         except CannotTellError:
             # What hides the road is the better reason.
             seen_up_to(curve)
@@ -294,6 +324,17 @@ class Negru2013:
         _, square = subpixel_inflections(curve, curve.luminance[:, None], self._parameters)
         per_row = -2.0 / curve.row_distance
         return FogModel(extinction, dark, airlight, deviation, per_row, math.sqrt(float(square[0])))
+
+    def _checked_law(self, curve: RoadCurve, extinction: float, road: RoadImage) -> tuple[float, float]:
+        """Airlight and road of an extinction; refused, if refusals are made, where the curve follows no such law."""
+        if self._refuses:
+            return check_law(curve, extinction, road)
+        fit = law_fit(curve, extinction)
+        return fit.airlight, fit.road
+
+    @property
+    def _refuses(self) -> bool:
+        return Negru2013Repair.REFUSALS in self._repairs
 
     @property
     def _parameters(self) -> Parameters:
@@ -308,6 +349,11 @@ class Negru2013:
         if edges.threshold > road.contrast:
             raise CannotTellError("noise or texture drowns the contrast of road and airlight")
         return edges
+
+    def _limits(self, road: RoadImage, edges: Edges, slope: NDArray[np.float32]) -> GrowthLimits:
+        if Negru2013Repair.GROWTH_BY_FOG not in self._repairs:
+            return constant_limits(slope.size, self._growth, self._growth * GROWTH_SHARE, self._growth)
+        return fog_limits(road, edges, slope)
 
     def _horizon(self, edges: Edges, road: RoadImage, pixels: LinearPixels) -> tuple[Horizon, float]:
         """Horizon and vanishing column: assumed and seen ones, weighed (repaired), or the best of late (published)."""
@@ -349,14 +395,12 @@ class Negru2013:
             raise CannotTellError("what is seen of the road goes on above the horizon: it is no road")
 
 
-def _credible(model: FogModel | None, curve: RoadCurve, road: RoadImage) -> FogModel | None:
-    """Pass a model only if it is one of fog over this road and its inflection was seen.
+def _is_credible(model: FogModel, curve: RoadCurve, road: RoadImage) -> bool:
+    """Whether a model is one of fog over this road and its inflection was seen.
 
     The airlight is what is seen at the horizon: where that is much brighter than the model says, the model has fitted
     a road that brightens with distance, and no fog.
     """
-    if model is None or not 0.0 < model.extinction < math.inf:
-        return None
     drop = model.airlight - model.road
     inflection = 0.5 * model.extinction * curve.row_distance
     seen = curve.below_horizon[0] + 1.0 <= inflection <= curve.below_horizon[-1]
@@ -364,4 +408,4 @@ def _credible(model: FogModel | None, curve: RoadCurve, road: RoadImage) -> FogM
     # A saturated sky is at least as bright as it looks.
     excess = model.airlight - road.airlight
     airlight = excess >= -0.3 * road.contrast and (excess <= 0.3 * road.contrast or road.airlight >= SATURATED)
-    return model if seen and contrast and airlight else None
+    return bool(seen and contrast and airlight)

@@ -12,6 +12,7 @@ from fogsim.vision.lines.horizon import Horizon
 from fogsim.vision.region.corridor import corridor_curve, hide_vehicle
 from fogsim.vision.region.inflection import steepest_slope
 from fogsim.vision.region.profile import RoadCurve, path_lengths
+from fogsim.vision.region.region_kernels import GrowthLimits
 from fogsim.vision.region.road_image import MIN_ROWS, SATURATED, CannotTellError, RoadImage
 from fogsim.vision.region.road_region import Band, crossing_band, cumulative_limits, grow_region
 
@@ -63,10 +64,16 @@ def fog_slope(road: RoadImage, horizon: Horizon) -> NDArray[np.float32]:
     return np.minimum(steepest_slope(below_horizon, road.airlight), SIMILARITY * road.contrast).astype(np.float32)
 
 
+def fog_limits(road: RoadImage, edges: Edges, slope: NDArray[np.float32]) -> GrowthLimits:
+    """Limits of a region whose neighbouring rows differ by no more than what fog of the given slopes and noise make."""
+    steps = slope + np.float32(edges.threshold)
+    return cumulative_limits(steps, SIMILARITY * road.contrast + edges.threshold)
+
+
 def road_band(
     road: RoadImage,
     edges: Edges,
-    slope: NDArray[np.float32],
+    limits: GrowthLimits,
     camera: Camera,
     *,
     widest: bool = False,
@@ -80,8 +87,8 @@ def road_band(
         The picture.
     edges : Edges
         Its edges.
-    slope : (rows,) float32
-        What fog can change from row to row, see `fog_slope`.
+    limits : GrowthLimits
+        What a pixel may differ by to join the region.
     camera : Camera
         The assumed calibration.
     widest : bool
@@ -95,8 +102,7 @@ def road_band(
     CannotTellError
         If no vertical band crosses the road's region.
     """
-    blurred, steps = smoothed(road.luminance), slope + np.float32(edges.threshold)
-    limits = cumulative_limits(steps, SIMILARITY * road.contrast + edges.threshold)
+    blurred = smoothed(road.luminance)
     region = grow_region(blurred, edges.pixels, limits)
     hide_vehicle(region, road, camera, lead, HALF_BODY)
     cols, centre = camera.width, camera.principal_point[0] - road.first_column

@@ -23,6 +23,10 @@ from fogsim.vision.region.road_image import CannotTellError
 FRAMES = 3
 """Frames whose inflections are averaged, and equal classes that make a state."""
 
+GROWTH, GROWTH_SHARE = 2.0, 0.8
+"""G_max of the published growth [linear grey levels], of least mean error in the last table of `fogsim reproduce
+zhu2015`, and ρ, which changes nothing there [-]; the paper prints neither."""
+
 
 def zhu_category(visibility: float) -> FogCategory:
     """Class of a visibility by zhu2015, table 1: no fog from 1000 m, low from 300 m, moderate from 100 m, else dense.
@@ -71,24 +75,27 @@ class Zhu2015:
     (weights by frequency, the extremes dropped), V = 3 λ / (2 (v_i − v_h)), four classes, and a state that changes
     after three equal ones.
 
-    As published the inflection is where the region ends, which cannot work: in dense fog the road fades into the sky
-    without an edge and the region grows beyond the horizon ("no fog"), and in thin fog, which is steeper from row to
-    row, it stops far below the inflection; a smaller G_max makes all fog dense (`fogsim reproduce zhu2015`). What the
-    corrected form (the default) does instead is listed in `Zhu2015Repair`, and can be switched one by one. Further
+    As published the region grows between the two lines (section 4), and where its columns end is the inflection, which
+    cannot work: the columns beside the lane's middle end at the lines far below the inflection, so that with any G_max
+    all air is thick fog. A region over the whole image grows beyond the horizon in dense fog ("no fog"), for the road
+    fades into the sky without an edge, and stops too low in thin fog, which is steeper from row to row (`fogsim
+    reproduce zhu2015`). What the corrected form (the default) does instead is listed in `Zhu2015Repair`, and can be
+    switched one by one. Further
     errors of the paper: eq. 4 lacks the squares in its Gaussian, eqs. 13 and 14 contradict each other (13's sign of θ
     holds for a camera that looks up), eqs. 18 to 20 have v₀ for v_h and e^(−k·−kλ/…) for e^(−kλ/(v − v_h)), and the
     bound on ρ in section 3.2 is the whole diagonal of what is looked at, which limits nothing. The angle that is
     limited to 10° … 170° is here that of the line to the rows, as the paper words it; its eq. 7 has the normal's, by
     which upright lines would go and the horizon stay.
 
-    Daytime, flat and straight road, road darker than the airlight.
+    Where the lines do not meet the calibration gives the horizon, and an image that shows no road by day is refused, in
+    either form. Daytime, flat and straight road, road darker than the airlight.
 
     Parameters
     ----------
     camera : Camera
         The assumed calibration.
     as_published : bool
-        Make no repairs: the region's end is the inflection, whole Hough cells are lines.
+        Make no repairs: the end of the region between the lane lines is the inflection, whole Hough cells are lines.
     repairs : {'all', 'none'} or list of str
         Which of the repairs are made.
     growth : float
@@ -112,8 +119,8 @@ class Zhu2015:
         *,
         as_published: bool = False,
         repairs: Literal["all", "none"] | Sequence[Zhu2015Repair] = "all",
-        growth: Annotated[float, Range(0.0, 255.0)] = 6.0,
-        growth_share: Annotated[float, Range(0.0, 1.0)] = 0.8,
+        growth: Annotated[float, Range(0.0, 255.0)] = GROWTH,
+        growth_share: Annotated[float, Range(0.0, 1.0)] = GROWTH_SHARE,
         pitch_deviation: PitchDeviation = PITCH_DEVIATION,
     ) -> None:
         self._camera, self._check = camera, ObservationCheck(camera)

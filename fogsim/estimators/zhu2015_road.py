@@ -1,12 +1,14 @@
 """What zhu2015 sees of the road in one frame: lane lines, horizon, region, and the inflection of its rows."""
 
 import math
+from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.estimators.negru2013_band import fog_limits, fog_slope
 from fogsim.estimators.repairs import Repair
 from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
@@ -17,17 +19,17 @@ from fogsim.vision.lines.lane_lines import (
     LaneLine,
     hough_lines,
     lane_vanishing_point,
+    longest_pair,
     published_vanishing_point,
     refined_lines,
 )
 from fogsim.vision.region.corridor import corridor_curve, hide_vehicle
 from fogsim.vision.region.curve_checks import check_law, detection_limit, is_clear, seen_up_to, told
-from fogsim.vision.region.inflection import steepest_slope
 from fogsim.vision.region.law import extinction_deviation
 from fogsim.vision.region.profile import RoadCurve
 from fogsim.vision.region.region_kernels import GrowthLimits, region_tops
 from fogsim.vision.region.road_image import MIN_ROWS, SATURATED, CannotTellError, RoadImage, road_image
-from fogsim.vision.region.road_region import constant_limits, cumulative_limits, grow_region
+from fogsim.vision.region.road_region import constant_limits, grow_region
 from fogsim.vision.region.steepest import fog_of_steepest_rows, highest_place, steepest_rows
 
 LOWEST_ANGLE = math.radians(10.0)
@@ -39,9 +41,6 @@ the rows is many columns wide."""
 
 LINES = 8
 """Lines of either half that are refined."""
-
-SIMILARITY = 0.25
-"""Steepest fog in contrasts of road to airlight a row; a silhouette takes at least 0.34 [-]."""
 
 BENT_ROAD = 0.2
 """Deviation of the row where lane lines meet from the horizon, for roads bend and undulate [px]."""
@@ -100,8 +99,9 @@ class Zhu2015Repair(Repair):
     )
     OWN_LANE = (
         "own_lane",
-        "the whole region counts, which in fog spreads over the verge",
-        "what of it lies within 2.5 m of the lane lines' vanishing column, as the lane narrows",
+        "the region grows between the two longest lines (section 4), which may be any lines, and over the whole image"
+        " where they are not found; in fog it spreads over the verge",
+        "what of the region lies within 2.5 m of the lane lines' vanishing column counts, as the lane narrows",
     )
     LEAD_LEFT_OUT = (
         "lead_left_out",
@@ -171,8 +171,7 @@ def seen_road(
     assumed = calibrated_horizon(camera, pitch_deviation)
     road = road_image(image, camera, assumed, linear=Zhu2015Repair.LINEAR_LUMINANCE in repairs)
     blurred = smoothed(road.luminance)
-    below = np.arange(blurred.shape[0], dtype=np.float64) + (road.first_row - assumed.row)
-    slope = np.minimum(steepest_slope(below, road.airlight), SIMILARITY * road.contrast).astype(np.float32)
+    slope = fog_slope(road, assumed)
     edges = edge_map(blurred, slope if Zhu2015Repair.FOG_DRAWS_NO_EDGES in repairs else np.zeros_like(slope))
     if edges.threshold > road.contrast:
         raise CannotTellError("noise or texture drowns the contrast of road and airlight")
@@ -183,7 +182,10 @@ def seen_road(
     else:
         lines = hough_lines(edges.pixels, math.ceil(assumed.row - road.first_row) + 1, LOWEST_ANGLE)
         point = published_vanishing_point(lines)
-    region = grow_region(blurred, edges.pixels, _limits(slope, road, edges, growth, repairs))
+    blocked = edges.pixels
+    if Zhu2015Repair.OWN_LANE not in repairs:
+        blocked = blocked | _outside_lines(lines, blocked.shape)
+    region = grow_region(blurred, blocked, _limits(slope, road, edges, growth, repairs))
     hidden = hide_vehicle(region, road, camera, lead) if Zhu2015Repair.LEAD_LEFT_OUT in repairs else 0.0
     horizon = assumed
     if point is not None:
@@ -205,8 +207,17 @@ def _limits(
     if Zhu2015Repair.GROWTH_BY_FOG not in repairs:
         step, share = growth
         return constant_limits(slope.size, step, step * share, step)
-    steps = (slope + edges.threshold).astype(np.float32)
-    return cumulative_limits(steps, SIMILARITY * road.contrast + edges.threshold)
+    return fog_limits(road, edges, slope)
+
+
+def _outside_lines(lines: Sequence[LaneLine], shape: tuple[int, ...]) -> NDArray[np.uint8]:
+    """1 outside the longest line of either half, from where they meet down; 0 everywhere if a half has none."""
+    pair = longest_pair(lines)
+    if pair is None:
+        return np.zeros(shape, np.uint8)
+    rows, cols = np.arange(shape[0])[:, None], np.arange(shape[1])
+    left, right = (line.offset + line.slope * rows for line in pair)
+    return ((cols < left) | (cols > right)).astype(np.uint8)
 
 
 def _sure_lines(

@@ -11,8 +11,8 @@ from fogsim.reproduce.result import Reproduction, Watch, unwatched
 class Evaluation(Protocol):
     """Reruns a paper's evaluation."""
 
-    def __call__(self, *, watch: Watch = unwatched) -> Reproduction:
-        """Run it; the watch is told of every step."""
+    def __call__(self, *, quick: bool = False, table: str | None = None, watch: Watch = unwatched) -> Reproduction:
+        """Run it: with fewer frames if quick, only what one table of the paper needs; the watch counts the steps."""
 
 
 REPRODUCTIONS: Registry[Evaluation] = Registry(

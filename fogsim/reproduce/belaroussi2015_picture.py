@@ -21,21 +21,7 @@ def picture(
     ranges: Sequence[tuple[str, OperatingRange]],
     published: Mapping[float, float | None],
 ) -> NDArray[np.uint8]:
-    """Draw the operating ranges on the left, estimates on the right.
-
-    Parameters
-    ----------
-    records : sequence of mapping
-        Of the reproduction.
-    ranges : sequence of (str, OperatingRange)
-        Names of the cameras, and how far the detector sees with them.
-    published : mapping from float to float or None
-        True visibilities and the paper's estimates [m].
-
-    Returns
-    -------
-    (rows, cols, 3) uint8
-    """
+    """Draw operating ranges by camera on the left, estimates and the paper's on the right: (rows, cols, 3) uint8."""
     figure = Figure(figsize=(12.0, 5.0), dpi=100, layout="constrained")
     left, right = figure.subplots(1, 2)
     _draw_ranges(left, ranges)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.calibration.staged_road import AIRLIGHT, StagedVehicle, foggy_radiance, staged_traffic
-from fogsim.camera import Sensor, expose
+from fogsim.camera import Sensor, averaged, expose, supersampled
 from fogsim.render import Renderer
 from fogsim.scene import vehicle_batches
 from fogsim.units import extinction_from_visibility
@@ -26,69 +26,39 @@ OWN_SPEED, FASTER = 20.0, 5.0
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """What a camera saw without air.
-
-    Attributes
-    ----------
-    view : View
-        What there is.
-    camera : Camera
-        The true calibration.
-    pose : CameraPose
-        Where it was.
-    """
+    """View without air of the true camera at its pose, with so many samples a pixel side."""
 
     view: View
     camera: Camera
     pose: CameraPose
+    samples: int = 1
 
 
 def drawn(
-    renderer: Renderer, camera: Camera, vehicle: StagedVehicle | None, ahead: float, driven: float = 0.0
+    renderer: Renderer,
+    camera: Camera,
+    vehicle: StagedVehicle | None,
+    ahead: float,
+    driven: float = 0.0,
+    samples: int = 1,
 ) -> Scene:
-    """Draw the road with a vehicle ahead.
-
-    Parameters
-    ----------
-    renderer : Renderer
-        That of the road.
-    camera : Camera
-        The true calibration.
-    vehicle : StagedVehicle or None
-        None for an empty road.
-    ahead : float
-        From the camera to the vehicle's rear [m].
-    driven : float
-        How far along the road the camera is [m].
-    """
+    """Draw the road from a camera that has driven so far [m], with a vehicle, if any, whose rear is ahead [m]."""
     pose = CameraPose((driven, 0.0, camera.mount_height), heading=0.0)
     batches = (
         ()
         if vehicle is None
         else vehicle_batches(staged_traffic([(driven + ahead, vehicle)], OWN_SPEED + FASTER), None)
     )
-    return Scene(renderer.render(batches, camera, pose), camera, pose)
+    return Scene(renderer.render(batches, supersampled(camera, samples), pose), camera, pose, samples)
 
 
 def fogged(
     scene: Scene, visibility: float, levels: float, rng: np.random.Generator, *, noisy: bool = True
 ) -> NDArray[np.uint8]:
-    """Image of a scene in homogeneous fog.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    visibility : float
-        V_met [m].
-    levels : float
-        Linear pixel value of the airlight, of 255.
-    rng : numpy.random.Generator
-        Noise.
-    noisy : bool
-        Whether the sensor has photon and read noise.
-    """
-    radiance = foggy_radiance(scene.view, scene.pose, scene.camera, extinction_from_visibility(visibility))
+    """Image of a scene in homogeneous fog of V_met [m], its airlight exposed to so many linear levels of 255."""
+    drawn_by = supersampled(scene.camera, scene.samples)
+    samples = foggy_radiance(scene.view, scene.pose, drawn_by, extinction_from_visibility(visibility))
+    radiance = averaged(samples, scene.samples)
     sensor = Sensor(AIRLIGHT * 255.0 / levels)
     sensor = sensor if noisy else replace(sensor, full_well=1e9, read_noise=0.0)
     return expose(radiance, sensor, scene.camera.response, rng).astype(np.uint8)
@@ -96,50 +66,22 @@ def fogged(
 
 @dataclass(frozen=True, slots=True)
 class Chase:
-    """How a vehicle is followed.
-
-    Attributes
-    ----------
-    camera : Camera
-        The calibration, true and assumed.
-    vehicle : StagedVehicle
-        The vehicle.
-    levels : float
-        Linear pixel value of the airlight, of 255.
-    range_deviation : float
-        Noise of the radar [m].
-    noisy : bool
-        Whether the sensor has noise.
-    """
+    """How a vehicle is followed: airlight in linear levels of 255, noise of the radar [m] and of the sensor."""
 
     camera: Camera
     vehicle: StagedVehicle
     levels: float = 200.0
     range_deviation: float = 0.25
     noisy: bool = True
+    samples: int = 1
 
     def seen(
         self, renderer: Renderer, wanted: Mapping[float, Sequence[float]], rng: np.random.Generator
     ) -> Iterator[tuple[float, dict[float, Observation]]]:
-        """Every range once, in every fog that is wanted there.
-
-        Parameters
-        ----------
-        renderer : Renderer
-            That of the road.
-        wanted : mapping of float to sequence of float
-            Visibilities by range, both [m]; in the order in which they are driven.
-        rng : numpy.random.Generator
-            Noise of sensor and radar.
-
-        Yields
-        ------
-        tuple of float and dict
-            Range and what the vehicle has by visibility.
-        """
+        """Each range [m], in the order given, with what the vehicle has in every visibility [m] wanted there."""
         for ahead, visibilities in wanted.items():
             time = abs(ahead - next(iter(wanted))) / FASTER
-            scene = drawn(renderer, self.camera, self.vehicle, ahead, time * OWN_SPEED)
+            scene = drawn(renderer, self.camera, self.vehicle, ahead, time * OWN_SPEED, self.samples)
             lead = LeadMeasurement(ahead + self.range_deviation * float(rng.normal()), FASTER)
             yield (
                 ahead,

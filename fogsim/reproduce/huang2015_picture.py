@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from fogsim.estimators import make
+from fogsim.estimators.huang2015_comparison import BODY_HALF_WIDTH, BODY_HEIGHTS
 from fogsim.estimators.huang2015_ratios import image_confidence
 from fogsim.render import Renderer
 from fogsim.reproduce.huang2015_chase import Chase
@@ -26,36 +27,14 @@ COLOURS = {"published": "tab:orange", "corrected": "tab:blue"}
 
 @dataclass(frozen=True, slots=True)
 class Tracked:
-    """What came of following the vehicle in one fog.
-
-    Attributes
-    ----------
-    visibility : float
-        True V_met [m].
-    estimates : mapping of str to Estimate
-        By variant.
-    """
+    """Estimates by variant after the vehicle was followed in fog of a true V_met [m]."""
 
     visibility: float
     estimates: Mapping[str, Estimate]
 
 
 def picture(renderer: Renderer, chase: Chase, shown: Sequence[Tracked]) -> NDArray[np.uint8]:
-    """Draw patches over range, and confidence curves below them.
-
-    Parameters
-    ----------
-    renderer : Renderer
-        That of the road.
-    chase : Chase
-        How the vehicle is followed.
-    shown : sequence of Tracked
-        One row of patches and one curve each.
-
-    Returns
-    -------
-    (rows, cols, 3) uint8
-    """
+    """Draw a row of patches over range for each fog, and confidence curves below them."""
     figure = Figure(figsize=(12.8, 3.2 + 1.7 * len(shown)), dpi=100, layout="constrained")
     FigureCanvasAgg(figure)
     grid = figure.add_gridspec(len(shown) + 1, 1, height_ratios=[*([1.0] * len(shown)), 2.0])
@@ -100,11 +79,8 @@ def _patch(axes: Axes, piece: NDArray[np.uint8], window: tuple[float, float, flo
     axes.set_ylabel(name)
     if window is not None:
         column, foot, width = window
-        # What is compared: see huang2015_comparison.
-        sides, ends = (
-            column + 0.42 * width * np.array([-1, 1, 1, -1, -1]),
-            foot - width * np.array([0.1, 0.1, 0.74, 0.74, 0.1]),
-        )
+        sides = column + BODY_HALF_WIDTH * width * np.array([-1, 1, 1, -1, -1])
+        ends = foot - width * np.array(BODY_HEIGHTS)[[0, 0, 1, 1, 0]]
         axes.plot(sides, ends, color="tab:green", linewidth=1.2)
 
 

@@ -1,16 +1,15 @@
 """Figures of Huang's thesis (2015), as printed; visibilities in metres."""
 
 from collections.abc import Mapping
+from math import inf
 
-INFINITE = "∞"
-
-TABLE_4_1: Mapping[float, tuple[float | str, float | str]] = {
+TABLE_4_1: Mapping[float, tuple[float, float]] = {
     50.0: (46.0, 59.0),
     100.0: (88.0, 103.0),
     200.0: (140.0, 222.0),
     350.0: (193.0, 279.0),
     400.0: (255.0, 288.0),
-    500.0: (INFINITE, INFINITE),
+    500.0: (inf, inf),
 }
 """True visibility: that of the inflection, and after the optimisation."""
 
@@ -22,12 +21,19 @@ TABLE_4_2: Mapping[float, Mapping[float, float]] = {
 }
 """Ratios of variances [%] by difference of range and far range."""
 
-TABLE_4_3: Mapping[float, float] = {50.0: 60.0, 100.0: 95.0, 200.0: 180.0, 350.0: 340.0, 400.0: 380.0, 500.0: 480.0}
-"""True visibility: from the vehicle."""
+TABLE_4_3: Mapping[float, tuple[float, float]] = {
+    50.0: (60.0, 59.0),
+    100.0: (95.0, 103.0),
+    200.0: (180.0, 222.0),
+    350.0: (340.0, 279.0),
+    400.0: (380.0, 288.0),
+    500.0: (480.0, inf),
+}
+"""True visibility: from the vehicle ("new approach"), and from the road ("old approach")."""
 
-TABLE_5_1: Mapping[float, Mapping[float, float | str]] = {
-    0.1: {100.0: 106.0, 200.0: 247.0, 300.0: 417.0, 400.0: INFINITE, 500.0: INFINITE},
-    0.2: {100.0: 99.0, 200.0: 205.0, 300.0: 402.0, 400.0: 895.0, 500.0: INFINITE},
+TABLE_5_1: Mapping[float, Mapping[float, float]] = {
+    0.1: {100.0: 106.0, 200.0: 247.0, 300.0: 417.0, 400.0: inf, 500.0: inf},
+    0.2: {100.0: 99.0, 200.0: 205.0, 300.0: 402.0, 400.0: 895.0, 500.0: inf},
     0.3: {100.0: 103.0, 200.0: 189.0, 300.0: 364.0, 400.0: 691.0, 500.0: 714.0},
     0.4: {100.0: 95.0, 200.0: 205.0, 300.0: 342.0, 400.0: 459.0, 500.0: 512.0},
     0.5: {100.0: 91.0, 200.0: 201.0, 300.0: 298.0, 400.0: 388.0, 500.0: 523.0},

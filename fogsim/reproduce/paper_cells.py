@@ -1,7 +1,16 @@
 """Published figures next to ours, one cell of a paper's table at a time."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
+
+from fogsim.errors import InputError, UnknownNameError
+
+CELL_HEADING = ("place", "row", "column", "paper", "as published", "corrected")
+"""Headings of the rows of `PaperCell.shown`."""
+
+_SIGNS = {"equal": "", "at_most": "≤ ", "at_least": "≥ "}
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +35,8 @@ class PaperCell:
         Largest deviation that counts as reached: relative for values, 0 for limits; in the figure's unit if `absolute`.
     absolute : bool
         Whether the tolerance is in the figure's own unit, as for shares in percent.
+    truth : float or None
+        What was estimated, if it is known: a result no farther from it than the published one is reached, too.
     """
 
     place: str
@@ -37,6 +48,7 @@ class PaperCell:
     claim: Literal["equal", "at_most", "at_least"] = "equal"
     tolerance: float = 0.1
     absolute: bool = False
+    truth: float | None = None
 
     def reached(self, ours: float | None) -> bool:
         """Whether a result agrees with the published figure."""
@@ -46,4 +58,54 @@ class PaperCell:
             return ours <= self.paper if self.claim == "at_most" else ours >= self.paper
         if self.paper == float("inf") or ours == float("inf"):
             return ours == self.paper
+        if self.truth is not None and abs(ours - self.truth) <= abs(self.paper - self.truth):
+            return True
         return abs(ours - self.paper) <= (self.tolerance if self.absolute else self.tolerance * abs(self.paper))
+
+    def shown(self, miss: str = "**{}**") -> tuple[str, ...]:
+        """Row of a table, ours to as many decimals as the paper prints and those that are not reached as `miss`."""
+        cells = [_SIGNS[self.claim] + _figure(self.paper)]
+        for ours in (self.as_published, self.corrected):
+            figure = "—" if ours is None else _figure(ours, like=self.paper)
+            cells.append(figure if self.reached(ours) else miss.format(figure))
+        return (self.place, self.row, self.column, *cells)
+
+    def record(self) -> dict[str, str | float | bool | None]:
+        """Flat record for JSON, which has no infinity: "inf" stands for it."""
+        figures = {"figure": self.paper, "as_published": self.as_published, "corrected": self.corrected}
+        return {
+            "place": self.place,
+            "row": self.row,
+            "column": self.column,
+            "claim": self.claim,
+            **{name: "inf" if figure == math.inf else figure for name, figure in figures.items()},
+            "as_published_reached": self.reached(self.as_published),
+            "corrected_reached": self.reached(self.corrected),
+        }
+
+
+def _figure(value: float, like: float | None = None) -> str:
+    if math.isinf(value):
+        return "∞"
+    decimals = 0 if like is None or math.isinf(like) else len(f"{like:g}".partition(".")[2])
+    return f"{value:g}" if like is None else f"{value:.{decimals}f}"
+
+
+def reached_counts(cells: Sequence[PaperCell]) -> tuple[int, int]:
+    """How many of a paper's figures are reached as published and corrected."""
+    return sum(cell.reached(cell.as_published) for cell in cells), sum(cell.reached(cell.corrected) for cell in cells)
+
+
+def chosen_tables(known: Sequence[str], table: str | None) -> tuple[str, ...]:
+    """Tables of a paper that are run: all by default.
+
+    Raises
+    ------
+    InputError
+        If the paper has no such table.
+    """
+    if table is not None and not known:
+        raise InputError(f"table {table}: this evaluation has no numbered tables, so none can be chosen")
+    if table is not None and table not in known:
+        raise UnknownNameError("table", table, known)
+    return tuple(known) if table is None else (table,)

@@ -16,38 +16,16 @@ Watch = Callable[[int, int], None]
 
 
 def unwatched(done: int, total: int) -> None:
-    """Watch that shows nothing.
-
-    Parameters
-    ----------
-    done : int
-        Steps that are done.
-    total : int
-        How many there are.
-    """
+    """Watch that shows nothing."""
 
 
 def found_visibility(estimate: Estimate | None) -> float | None:
-    """Visibility of fog that a method has found [m]; None where it could not tell or saw no fog.
-
-    Parameters
-    ----------
-    estimate : Estimate or None
-        What the method said, if it was asked.
-    """
+    """Visibility of the fog that a method has found [m]; None without an estimate, and where it sees no fog."""
     return estimate.visibility if estimate is not None and estimate.valid and estimate.extinction > 0.0 else None
 
 
 class Steps:
-    """Counts the steps of an evaluation, of similar length each, and tells of every one.
-
-    Parameters
-    ----------
-    total : int
-        How many there are.
-    watch : Watch
-        Who is told, first of none.
-    """
+    """Counts the steps of an evaluation, of similar length each, and calls a watch after every one and at the start."""
 
     def __init__(self, total: int, watch: Watch) -> None:
         self._done, self._total, self._watch = 0, total, watch
@@ -65,15 +43,7 @@ Rows = tuple[tuple[str, ...], ...]
 
 @dataclass(frozen=True, slots=True)
 class TitledTable:
-    """One of several tables.
-
-    Attributes
-    ----------
-    title : str
-        What it is, and of which table of the paper.
-    rows : tuple of tuples of str
-        The headings, then the rows; the paper's figure stands beside ours.
-    """
+    """One of several tables: its title, and its headings and rows."""
 
     title: str
     rows: Rows

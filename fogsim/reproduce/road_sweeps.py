@@ -23,24 +23,18 @@ VISIBILITIES = (50.0, 100.0, 200.0, 400.0)
 DRIVES, FRAMES = 6, 3
 """Drives of each setting, and their frames, of which the last one's estimate counts."""
 
+GROWTHS = (0.5, 1.0, 2.0, 4.0, 6.0, 8.0, 12.0, 20.0, 40.0)
+"""G_max of region growing as published [grey levels]."""
+
 Form = Mapping[str, object]
 """Options of an estimator."""
 
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """What is other than in the first of the sweeps.
+    """A camera, how much the road's albedo changes along the way [-], and a sensor.
 
-    Attributes
-    ----------
-    name : str
-        In words.
-    camera : Camera
-        The assumed calibration; the pitch is off by 0.1° and sways by 0.05°.
-    wear : float
-        Change of the road's albedo along the way [-].
-    sensor : Sensor
-        Noise and exposure.
+    The true pitch is off the assumed one by 0.1° and sways by 0.05°.
     """
 
     name: str
@@ -76,21 +70,7 @@ class Driven:
 def driven(
     renderer: Renderer, setting: Setting, visibilities: Sequence[float], drives: int, steps: Steps
 ) -> list[Driven]:
-    """Drive along the road alone, in every fog.
-
-    Parameters
-    ----------
-    renderer : Renderer
-        Of the road.
-    setting : Setting
-        Camera, road and sensor.
-    visibilities : sequence of float
-        V_met [m].
-    drives : int
-        How many.
-    steps : Steps
-        Told of every drive.
-    """
+    """Observations of drives along the road alone, in every fog; visibilities in [m]."""
     found = []
     for number in range(drives):
         rng = np.random.default_rng([2013, number])
@@ -103,32 +83,14 @@ def driven(
 
 
 def last_estimate(method: str, camera: Camera, form: Form, one: Driven) -> Estimate:
-    """What a form of a method says after the last frame of a drive.
-
-    Parameters
-    ----------
-    method : str
-        Its name.
-    camera : Camera
-        The assumed calibration.
-    form : mapping
-        Its options.
-    one : Driven
-        The drive.
-    """
+    """Estimate of a form of a method after the last frame of a drive."""
     estimator = make(method, camera, **form)
     found = [estimator.update(observation) for observation in one.observations]
     return found[-1]
 
 
 def without_each(kind: type[Repair]) -> dict[str, Form]:
-    """Forms of a method: all repairs, and all but each.
-
-    Parameters
-    ----------
-    kind : type
-        The repairs that there are.
-    """
+    """Forms of a method with all repairs, and with all but each."""
     forms: dict[str, Form] = {"all repairs": {}}
     for left_out in kind:
         forms[f"without {left_out.value}"] = {"repairs": [one.value for one in kind if one is not left_out]}
@@ -136,58 +98,50 @@ def without_each(kind: type[Repair]) -> dict[str, Form]:
 
 
 def steps_of(drives: int = DRIVES) -> int:
-    """Steps that `swept` takes.
-
-    Parameters
-    ----------
-    drives : int
-        Drives of each setting.
-    """
+    """Steps that `swept` takes, by drives of each setting."""
     return len(SETTINGS) * drives
 
 
+def over_growths(name: str, form: Form) -> dict[str, Form]:
+    """A form of a method whose region grows with each of `GROWTHS`."""
+    return {f"{name}, G_max {growth:g}": {**form, "growth": growth} for growth in GROWTHS}
+
+
 def swept(
-    method: str, kind: type[Repair], renderer: Renderer, steps: Steps, drives: int = DRIVES
-) -> tuple[list[dict[str, Cell]], tuple[TitledTable, TitledTable]]:
-    """Errors of a method, as published and corrected, over settings, and with each repair switched off.
+    method: str,
+    kind: type[Repair],
+    renderer: Renderer,
+    steps: Steps,
+    drives: int = DRIVES,
+    left_open: Mapping[str, Form] | None = None,
+) -> tuple[list[dict[str, Cell]], tuple[TitledTable, ...]]:
+    """Errors of a method, as published and corrected, over settings, with each repair off, and over what is left open.
 
-    Parameters
-    ----------
-    method : str
-        Its name.
-    kind : type
-        Its repairs.
-    renderer : Renderer
-        Of the road.
-    steps : Steps
-        Told of every drive.
-    drives : int
-        Drives of each setting.
-
-    Returns
-    -------
-    (list of records, (TitledTable, TitledTable))
-        A record for each setting, form and visibility: share of drives with an estimate of fog, median error and bias.
+    `left_open` has forms with other values of what the paper leaves open, by name; they run in the first setting. A
+    record for each setting, form and visibility has the share of drives where fog is found, median error and bias.
     """
     both: dict[str, Form] = {"published": {"as_published": True}, "corrected": {}}
+    left_open = left_open or {}
     records: list[dict[str, Cell]] = []
     for setting in SETTINGS:
         seen = driven(renderer, setting, VISIBILITIES, drives, steps)
-        forms = both | (without_each(kind) if setting is SETTINGS[0] else {})
+        forms = both | ({**without_each(kind), **left_open} if setting is SETTINGS[0] else {})
         for name, form in forms.items():
             for visibility in VISIBILITIES:
                 here = [one for one in seen if one.visibility == visibility]
                 estimates = [last_estimate(method, setting.camera, form, one) for one in here]
                 records.append(_record(method, setting, name, visibility, estimates))
-    titles = (
-        f"Sweeps of {method}: |error| of V_met, median [%], and share of drives that tell, by V_met",
-        f"Repairs of {method}, each switched off: |error| of V_met, median [%], and share of drives that tell",
+    shown = {
+        "Sweeps of {}": [(setting.name, name) for setting in SETTINGS for name in both],
+        "Repairs of {}, each switched off": [(SETTINGS[0].name, name) for name in ("published", *without_each(kind))],
+        "What the paper of {} leaves open": [(SETTINGS[0].name, name) for name in left_open],
+    }
+    figures = "|error| of V_met, median [%], and share of drives where fog is found, by V_met"
+    return records, tuple(
+        TitledTable(f"{title.format(method)}: {figures}", _rows(records, wanted))
+        for title, wanted in shown.items()
+        if wanted
     )
-    rows = (
-        _rows(records, [(setting.name, name) for setting in SETTINGS for name in both]),
-        _rows(records, [(SETTINGS[0].name, name) for name in ("published", *without_each(kind))]),
-    )
-    return records, (TitledTable(titles[0], rows[0]), TitledTable(titles[1], rows[1]))
 
 
 def _record(

@@ -43,16 +43,9 @@ START, END = 0.0, 500.0
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """What there is to see at one instant of a drive, before any air.
+    """The true camera's view of one instant of a drive without air, its pose, and the sensed vehicle ahead, if any.
 
-    Attributes
-    ----------
-    view : View
-        The view of the true camera.
-    pose : CameraPose
-        Where it is; its grade is the pitch that the vehicle does not know of.
-    lead : LeadMeasurement or None
-        What a range sensor says of the vehicle ahead.
+    The grade of the pose is the pitch that the vehicle does not know of.
     """
 
     view: View
@@ -70,25 +63,7 @@ def drive(
     wear: float = WEAR,
     period: float = PERIOD,
 ) -> Iterator[Moment]:
-    """Drive along the road.
-
-    Parameters
-    ----------
-    renderer : Renderer
-        Of the road.
-    camera : Camera
-        The assumed calibration; the true pitch differs from it.
-    frames : int
-        How many instants.
-    lead : bool
-        Whether a vehicle drives ahead and is tracked.
-    rng : numpy Generator
-        What decides on place, pitch, wear and the vehicle ahead.
-    wear : float
-        Change of the road's albedo along the way [-].
-    period : float
-        Between frames [s].
-    """
+    """Drive along a road with a given wear [-], a frame every `period` [s], with or without a tracked vehicle ahead."""
     front, error = rng.uniform(START, END), rng.normal(0.0, PITCH_ERROR)
     gap, closing = rng.uniform(NEAREST, FARTHEST), rng.uniform(-1.0, 1.0)
     knots = 1.0 + wear * rng.uniform(-1.0, 1.0, 128)
@@ -105,19 +80,7 @@ def drive(
 
 
 def worn(view: View, camera: Camera, pose: CameraPose, knots: Floats) -> View:
-    """View of a level road whose albedo differs along the way.
-
-    Parameters
-    ----------
-    view : View
-        The view of the road as drawn.
-    camera : Camera
-        Its calibration, without roll.
-    pose : CameraPose
-        Where it is; its heading is that of the road, along x.
-    knots : (n,) float64
-        Factors of the albedo, `WEAR_LENGTH` apart and straight in between; repeated.
-    """
+    """View of a level road along x whose albedo is multiplied by factors `WEAR_LENGTH` apart, straight in between."""
     # A row shows the mean over the piece of road between its borders, which far away is longer than the wear.
     borders = _ahead(np.arange(camera.height + 1, dtype=np.float64) - 0.5, camera, pose) + pose.position[0]
     factor = np.diff(_wear_integral(borders, knots)) / np.diff(borders)
@@ -158,21 +121,7 @@ def _wear_integral(places: Floats, knots: Floats) -> Floats:
 def observed(
     moment: Moment, camera: Camera, visibility: float, rng: np.random.Generator, sensor: Sensor = SENSOR
 ) -> Observation:
-    """What the vehicle has at an instant in homogeneous fog.
-
-    Parameters
-    ----------
-    moment : Moment
-        The instant.
-    camera : Camera
-        The assumed calibration.
-    visibility : float
-        Meteorological visibility [m]; ``inf`` for clear air.
-    rng : numpy Generator
-        The sensor's noise.
-    sensor : Sensor
-        The sensor.
-    """
+    """What the vehicle observes at an instant in homogeneous fog of a visibility [m]; ``inf`` for clear air."""
     radiance = foggy_radiance(moment.view, moment.pose, camera, extinction_from_visibility(visibility))
     image = expose(radiance, sensor, camera.response, rng)
     return Observation(image, speed=SPEED, lead=moment.lead)

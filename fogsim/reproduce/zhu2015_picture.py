@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from fogsim.estimators import make
+from fogsim.estimators.zhu2015 import GROWTH, GROWTH_SHARE
 from fogsim.estimators.zhu2015_road import SeenRoad, Zhu2015Repair, seen_road
 from fogsim.recorders.style import font
 from fogsim.reproduce.zhu2015_drive import Moment, observed
@@ -14,9 +15,6 @@ from fogsim.vision.region.road_region import region_medians
 
 PICTURED = (60.0, 200.0, 600.0, float("inf"))
 """Visibilities of the picture [m], one of each class."""
-
-GROWTH, GROWTH_SHARE = 6.0, 0.8
-"""G_max [linear grey levels] and ρ [-] of the estimator as published."""
 
 SHOWN = 10_000
 """Visibility beyond which a number would say nothing [m]."""
@@ -29,19 +27,7 @@ RED, BLUE, GREEN, YELLOW = (230, 30, 30), (30, 60, 255), (60, 200, 90), (255, 21
 
 
 def picture(moment: Moment, camera: Camera) -> NDArray[np.uint8]:
-    """Draw an instant in four fogs, as published on the left and corrected on the right.
-
-    Parameters
-    ----------
-    moment : Moment
-        The instant.
-    camera : Camera
-        The assumed calibration.
-
-    Returns
-    -------
-    (rows, cols, 3) uint8
-    """
+    """Draw an instant in four fogs, as published on the left and corrected on the right: (rows, cols, 3) uint8."""
     rows = []
     for visibility in PICTURED:
         seen = observed(moment, camera, visibility, np.random.default_rng(0))

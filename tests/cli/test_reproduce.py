@@ -16,7 +16,7 @@ from tests.test_interruption import raise_as_numba_does
 DONE = Reproduction("negru2013", ({"paper": "negru2013"},), (("a",), ("1",)), (), np.zeros((2, 2, 3), np.uint8))
 
 
-def evaluation(watch) -> Reproduction:
+def evaluation(quick, table, watch) -> Reproduction:
     for step in range(5):
         watch(step, 4)
     return DONE
@@ -52,7 +52,7 @@ def test_elsewhere_nothing_is_shown(reproduce) -> None:
 @pytest.mark.parametrize("terminal", [True, False])
 @pytest.mark.parametrize("in_kernel", [True, False])
 def test_an_interruption_ends_in_one_line(reproduce, *, terminal: bool, in_kernel: bool) -> None:
-    def interrupted(watch) -> Reproduction:
+    def interrupted(quick, table, watch) -> Reproduction:
         watch(0, 4)
         watch(1, 4)
         if in_kernel:
@@ -63,5 +63,5 @@ def test_an_interruption_ends_in_one_line(reproduce, *, terminal: bool, in_kerne
     assert (code, out) == (130, "")
     # What the bar drew and wiped again is control sequences and what stands between them and a carriage return.
     lines = [line for line in re.sub(r"\x1b\[[0-9;?]*[A-Za-z]|.*\r", "", err).split("\n") if line.strip()]
-    assert lines[-1] == "interrupted: negru2013 after 1 of 4 steps; nothing of it is told or written"
+    assert lines[-1] == "interrupted: negru2013 after 1 of 4 steps; nothing of it is printed or written"
     assert terminal or len(lines) == 1

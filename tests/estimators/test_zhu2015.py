@@ -108,10 +108,20 @@ def test_the_vanishing_point_is_found_to_a_fraction_of_a_pixel(render, road):
         assert column == pytest.approx(told.principal_point[0], abs=1.0)
 
 
-def test_as_published_the_row_where_the_region_ends_is_no_inflection(render, road):
-    # Dense fog has no edge that would stop the region below the horizon, so it is found thinner than thin fog.
-    dense = estimate(render(road.but(visibility=50.0)), road.camera, as_published=True)
-    thin = estimate(render(road.but(visibility=500.0)), road.camera, as_published=True)
+def test_as_published_the_region_between_the_lines_makes_all_air_thick_fog(render, road):
+    for visibility in (50.0, 500.0, 1e6):
+        image = render(road.but(visibility=visibility))
+        for growth in (2.0, 6.0, 20.0):
+            found = estimate(image, road.camera, as_published=True, growth=growth)
+            assert found.diagnostics["class"] is FogCategory.DENSE
+
+
+def test_a_region_over_the_whole_image_grows_into_the_sky_in_dense_fog(render, road):
+    dense, thin = (
+        estimate(render(road.but(visibility=visibility)), road.camera, repairs=["own_lane"])
+        for visibility in (50.0, 500.0)
+    )
+    assert dense.diagnostics["class"] is FogCategory.NONE
     assert dense.visibility > thin.visibility
 
 

@@ -170,7 +170,7 @@ def visibility_distance(
     kind : FogKind
         Radiation or advection fog.
     veil_share : float
-        Veil of this beam relative to that of high beams [-]: 1 for high beams, about 0.1 for low beams.
+        Veil of this beam over that of high beams [-]: 1 as published; 0.20 to 0.33 for a US low beam, by photons.
     pavement, observer : Pavement, Observer
         What is looked at, and by whom.
     glare : float

@@ -57,12 +57,12 @@ class Gallen2014Veil:
     """Correlation of the mean of some frames with references of the own head lamps' veil (Gallen et al. 2014).
 
     Each reference is compared inside its own mask, by Otsu's threshold, by the zero-mean normalised cross-correlation;
-    the best score detects fog. The visibility is that at the top of exp(a V² + b V + c) through the scores of six
-    references (equation 13), and its error the published one, or a quarter if that is more.
+    the best score detects fog. The visibility is that at the top of exp(a V² + b V + c) through the scores (equation
+    13), and its error the published one, or a quarter if that is more.
 
-    As published, that top lies far off where references are far apart: the scores of ideal pictures give half as much
-    again to five times the visibility above 100 m. By default references in equal steps of ln V, one mask for all, and
-    a parabola in ln V through Fisher's z of the three best take their place. Road, albedo and amplitude stay unused, so
+    As published, that top lies far off where references are far apart: with the paper's six it is near 1100 m in any
+    fog thinner than 80 m. By default references in equal steps of ln V, one mask for all, and a parabola in ln V
+    through Fisher's z of the three best take their place. Road, albedo and amplitude stay unused, so
     in thin fog, where the veil's shape hardly depends on the visibility, both read what the road does; `NightRoad` does
     not.
 
@@ -79,7 +79,7 @@ class Gallen2014Veil:
     threshold : float
         Score from which on there is fog; 0.4 in figure 11.
     as_published : bool
-        Whether the visibility is found to the letter of the paper.
+        Whether the visibility is found as the paper has it; docs/explanation/night.md lists what this adds.
 
     Raises
     ------

@@ -133,7 +133,7 @@ def visibility_by_parabola(scores: VeilScores) -> float | None:
     Returns
     -------
     float or None
-        None where the parabola has no top between the references.
+        None where the parabola has no top above 0.
     """
     some = np.nan_to_num(scores.score, nan=-1.0) > 0.0
     if np.count_nonzero(some) < LEAST_SCORES:
@@ -143,8 +143,7 @@ def visibility_by_parabola(scores: VeilScores) -> float | None:
     powers = (scores.visibility[some] / scale)[:, None] ** np.arange(2, -1, -1)
     side = matrix_product(np.ascontiguousarray(powers.T), np.log(scores.score[some]))
     a, b, _ = matrix_product(inverse_of(matrix_product(powers.T, powers)), side).tolist()
-    top = -b / (2.0 * a) * scale if a < 0.0 else math.nan
-    return top if scores.visibility[some].min() <= top <= scale else None
+    return -b / (2.0 * a) * scale if a < 0.0 < b else None
 
 
 def visibility_by_peak(scores: VeilScores) -> float | None:

@@ -118,13 +118,15 @@ class Belaroussi2015:
         self._horizon = camera.horizon_row
         self.reset()
 
-    def calibrated(self, measured: OperatingRange) -> Self:
+    def calibrated(self, measured: OperatingRange, watch: SignWatch | None = None) -> Self:
         """Take a calibration that was not read from a file.
 
         Parameters
         ----------
         measured : OperatingRange
             Of this camera.
+        watch : SignWatch, optional
+            Looks for signs in place of this estimator's own, such as one that several estimators share.
 
         Raises
         ------
@@ -137,6 +139,8 @@ class Belaroussi2015:
                 f"camera has {self._camera.focal_length:g} px: calibrate it for this camera"
             )
         self._given, self._trouble = measured, ""
+        if watch is not None:
+            self._watch = watch
         return self
 
     def take_calibrations(self, source: Calibrations) -> None:

@@ -15,6 +15,7 @@ from fogsim.render import Renderer
 from fogsim.reproduce.airlight.conditions import conditions
 from fogsim.reproduce.airlight.picture import picture
 from fogsim.reproduce.huang2015_chase import drawn
+from fogsim.reproduce.paper_cells import chosen_tables
 from fogsim.reproduce.result import Cell, Reproduction, Rows, Steps, TitledTable, Watch, unwatched
 from fogsim.reproduce.road_sweeps import CAMERA
 from fogsim.reproduce.zhu2015_drive import SPEED, drive
@@ -58,17 +59,7 @@ NOTES = (
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One fog.
-
-    Attributes
-    ----------
-    albedo : float or None
-        Of the land; None for Koschmieder's fog.
-    visibility : float
-        V_met [m].
-    droplets : Droplets
-        Their sizes.
-    """
+    """One fog; albedo of the land, None for Koschmieder's fog, and visibility [m]."""
 
     albedo: float | None
     visibility: float
@@ -77,19 +68,7 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What is run.
-
-    Attributes
-    ----------
-    albedos : tuple of float or None
-        Of the land around; None for Koschmieder's fog.
-    visibilities : tuple of float
-        V_met [m].
-    heights : tuple of float
-        Of the camera above the road [m]: a car's and a lorry's.
-    drives : int
-        Drives for each camera, without and with a vehicle ahead.
-    """
+    """What is run: albedos (None for Koschmieder's fog), visibilities [m], camera heights [m], drives a camera."""
 
     albedos: tuple[float | None, ...] = (None, 0.05, 0.1, 0.2, 0.4, 0.8)
     visibilities: tuple[float, ...] = (50.0, 100.0, 200.0, 400.0)
@@ -102,17 +81,19 @@ class Plan:
         return tuple(Case(albedo, visibility) for albedo in self.albedos for visibility in self.visibilities)
 
 
-WHOLE = Plan()
-"""What the command runs."""
-
-
-def reproduce(plan: Plan = WHOLE, *, watch: Watch = unwatched) -> Reproduction:
+def reproduce(
+    plan: Plan | None = None, *, quick: bool = False, table: str | None = None, watch: Watch = unwatched
+) -> Reproduction:
     """Let every daytime method read frames of both fogs.
 
     Parameters
     ----------
-    plan : Plan
-        What is run.
+    plan : Plan, optional
+        A part of it; all by default.
+    quick : bool
+        One drive for each camera.
+    table : str, optional
+        Refused, for the evaluation follows no paper's tables.
     watch : Watch
         Told of every drive.
 
@@ -122,6 +103,8 @@ def reproduce(plan: Plan = WHOLE, *, watch: Watch = unwatched) -> Reproduction:
         A record for each height, albedo, visibility and method: share of drives with an estimate of fog, the median of
         what they read, and how often the 90 % interval holds the truth.
     """
+    chosen_tables((), table)
+    plan = plan or (Plan(drives=1) if quick else Plan())
     steps = Steps(len(plan.heights) * 2 * plan.drives, watch)
     records: list[Mapping[str, Cell]] = []
     with road_renderer() as renderer:
@@ -147,24 +130,7 @@ def reproduce(plan: Plan = WHOLE, *, watch: Watch = unwatched) -> Reproduction:
 def drive_alone(
     renderer: Renderer, camera: Camera, cases: Sequence[Case], number: int
 ) -> Iterator[tuple[Case, str, Estimate]]:
-    """Drive along the road alone, in every fog.
-
-    Parameters
-    ----------
-    renderer : Renderer
-        Holds the road's scene.
-    camera : Camera
-        The true calibration, and the told one.
-    cases : sequence of Case
-        The fogs.
-    number : int
-        Of the drive, which is its seed.
-
-    Yields
-    ------
-    tuple
-        Fog, method, and what that reads at the end.
-    """
+    """Drive along the road alone: the fog, each method, and its estimate at the end."""
     rng = np.random.default_rng([21, number])
     moments = list(drive(renderer, camera, FRAMES, lead=False, rng=rng, period=PERIOD))
     for case in cases:
@@ -182,18 +148,7 @@ def drive_alone(
 def follow(
     renderer: Renderer, camera: Camera, cases: Sequence[Case], number: int
 ) -> Iterator[tuple[Case, str, Estimate]]:
-    """Follow a vehicle that drives away, in every fog.
-
-    Parameters
-    ----------
-    renderer, camera, cases, number
-        As of `drive_alone`.
-
-    Yields
-    ------
-    tuple
-        Fog, method, and what that reads at the end.
-    """
+    """Follow a vehicle that drives away: the fog, each method, and its estimate at the end."""
     rng = np.random.default_rng([22, number])
     estimators = {case: make(CHASE_METHODS[0], camera, setback=0.0) for case in cases}
     last: dict[Case, Estimate] = {}

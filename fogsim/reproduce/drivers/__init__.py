@@ -6,9 +6,10 @@ from fogsim.reproduce.drivers.motorway import drive
 from fogsim.reproduce.drivers.pairs import PairMeasures, follow
 from fogsim.reproduce.drivers.passages import Measures, measured
 from fogsim.reproduce.drivers.picture import picture
-from fogsim.reproduce.drivers.plan import SIGNED, SIGNS, Case, Pair, Plan
+from fogsim.reproduce.drivers.plan import REPORT_SEEDS, SIGNED, SIGNS, Case, Pair, Plan
 from fogsim.reproduce.drivers.results import Results
 from fogsim.reproduce.drivers.tables import records, tables
+from fogsim.reproduce.paper_cells import chosen_tables
 from fogsim.reproduce.result import Reproduction, Steps, Watch, unwatched
 from fogsim.units import KMH_PER_MPS
 
@@ -24,13 +25,19 @@ NOTES = (
 )
 
 
-def reproduce(plan: Plan | None = None, *, watch: Watch = unwatched) -> Reproduction:
+def reproduce(
+    plan: Plan | None = None, *, quick: bool = False, table: str | None = None, watch: Watch = unwatched
+) -> Reproduction:
     """Let traffic drive by demand and visibility, and set it beside what is published.
 
     Parameters
     ----------
     plan : Plan, optional
         A part of it; all by default.
+    quick : bool
+        Run two seeds of the default plan.
+    table : str, optional
+        Refused, for the evaluation follows no one paper's tables.
     watch : Watch
         Told of every run that is done.
 
@@ -39,7 +46,8 @@ def reproduce(plan: Plan | None = None, *, watch: Watch = unwatched) -> Reproduc
     Reproduction
         A record for each measure of each case, and one for each published finding.
     """
-    plan = plan or Plan()
+    chosen_tables((), table)
+    plan = plan or (Plan(seeds=REPORT_SEEDS[:2]) if quick else Plan())
     cases: tuple[Case | Pair, ...] = (*plan.cases, *plan.pairs)
     steps = Steps(len(cases) * len(plan.seeds) + 1, watch)
     runs: dict[Case | Pair, tuple[Measures | PairMeasures, ...]] = {}

@@ -1,6 +1,7 @@
 """Lane lines by a Hough transform of limited angle, to a fraction of a pixel, and their vanishing point."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -192,6 +193,12 @@ def _least_squares(rows: Floats, cols: Floats) -> LaneLine | None:
     return LaneLine(slope, offset, rows.size, centre, math.sqrt(spread))
 
 
+def longest_pair(lines: Sequence[LaneLine]) -> tuple[LaneLine, LaneLine] | None:
+    """Longest line left and right of the vanishing point, of lines in order of length; None if a side has none."""
+    left, right = (next((line for line in lines if side * line.slope < 0), None) for side in HALVES)
+    return None if left is None or right is None else (left, right)
+
+
 def published_vanishing_point(lines: list[LaneLine]) -> VanishingPoint | None:
     """Intersection of the longest line of either half, as published.
 
@@ -205,10 +212,10 @@ def published_vanishing_point(lines: list[LaneLine]) -> VanishingPoint | None:
     VanishingPoint or None
         None if a half has no line; its deviation is that of 1° and 1 px at either line.
     """
-    pair = [next((line for line in lines if side * line.slope < 0), None) for side in HALVES]
-    first, second = pair
-    if first is None or second is None:
+    pair = longest_pair(lines)
+    if pair is None:
         return None
+    first, second = pair
     both = sloped_lines([first.offset, second.offset], [first.slope, second.slope])
     row = float(crossings(both, np.zeros(1, np.int64), np.ones(1, np.int64), 0.0)[0, 1])
     return VanishingPoint(first.column(row), row, 15.0, 2, first.votes + second.votes)

@@ -85,11 +85,11 @@ def box_weights(
     # A near pixel is itself a mean over 1 and blurred: squares of widths add, as variances do, and a box of width w
     # has the variance w²/12.
     half = 0.5 * math.sqrt(max((1.0 + 12.0 * blur**2) * (scale**-2 - 1.0), LEAST_BOX**2))
-    return _overlaps(near_size, centre + (far - far_centre) / scale, half)
+    return pixel_shares(near_size, centre + (far - far_centre) / scale, half)
 
 
 @kernel
-def _overlaps(size: int, middle: Floats, half: float) -> Floats:
+def pixel_shares(size: int, middle: Floats, half: float) -> Floats:
     """Shares of boxes about middles that lie on each of so many pixels."""
     shares = np.zeros((middle.size, size))
     for i in range(middle.size):

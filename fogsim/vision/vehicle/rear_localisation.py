@@ -51,6 +51,9 @@ REACH, STANDS_OUT = math.radians(0.3), 2.5
 """How far from where the calibration has it the foot is looked for [rad], and the least step there over the usual one;
 where none stands out so, the calibration says more [-]."""
 
+TYRES = 0.12
+"""Share of a vehicle's width at either side in which the foot is searched [-]: between its wheels bright road shows."""
+
 
 @dataclass(frozen=True, slots=True)
 class RearBox:
@@ -64,11 +67,14 @@ class RearBox:
         Row at which it stands on the road [px].
     width : float
         [px].
+    evidence : float
+        How clearly the foot stands out, ln(1 + (step over the usual one)²) [-].
     """
 
     column: float
     foot: float
     width: float
+    evidence: float = 0.0
 
 
 def search_window(camera: Camera, distance: float) -> tuple[slice, slice] | None:
@@ -133,8 +139,10 @@ def localise_rear(
     if pair is None:
         return None
     left, right = pair
-    foot = _refined_foot(luminance[:, math.ceil(left) + 1 : math.floor(right)], foot, camera, noise)
-    return RearBox(0.5 * (left + right) + origin[0], foot + origin[1], right - left)
+    between = luminance[:, math.ceil(left) + 1 : math.floor(right)]
+    tyre = max(round(TYRES * (right - left)), 1)
+    foot, evidence = _refined_foot(np.hstack([between[:, :tyre], between[:, -tyre:]]), foot, camera, noise)
+    return RearBox(0.5 * (left + right) + origin[0], foot + origin[1], right - left, evidence)
 
 
 def _span(first: float, last: float, size: int) -> slice | None:
@@ -220,12 +228,12 @@ def _symmetry(pixels: NDArray[np.float32]) -> float:
     return float((centred * centred[:, ::-1]).sum()) / power if power > 0 else 0.0
 
 
-def _refined_foot(strip: NDArray[np.float32], foot: float, camera: Camera, noise: float) -> float:
-    """Row near where the foot should be at which the road begins, brighter than tyres and shadow above it."""
+def _refined_foot(strip: NDArray[np.float32], foot: float, camera: Camera, noise: float) -> tuple[float, float]:
+    """Row near where the foot should be at which the road begins, brighter than tyres and shadow, and its evidence."""
     reach = max(camera.focal_length * REACH, 1.5)
     first, last = max(int(foot - reach), 1), min(math.ceil(foot + reach), strip.shape[0] - 2)
     if last - first < 2 or strip.shape[1] < 2:
-        return foot
+        return foot, 0.0
     rows = strip[first - 1 : last + 2].mean(axis=1, dtype=np.float64)
     step = np.gradient(rows)
     # What the assumed pitch says counts as much as a step does that stands out of the noise and of the other steps.
@@ -234,5 +242,6 @@ def _refined_foot(strip: NDArray[np.float32], foot: float, camera: Camera, noise
     evidence = np.log1p((np.maximum(step, 0.0) / other) ** 2) - 0.5 * at**2
     best = int(np.argmax(evidence[1:-1])) + 1
     if step[best] < STANDS_OUT * other:
-        return foot
-    return best + vertex(-np.maximum(step, 0.0), best) + first - 1
+        return foot, 0.0
+    row = best + vertex(-np.maximum(step, 0.0), best) + first - 1
+    return row, math.log1p((float(step[best]) / other) ** 2)

@@ -1,0 +1,210 @@
+"""Each figure of huang2015's tables, the chase that FogSim runs in its place, and both compared."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fogsim.reproduce.huang2015_published import TABLE_4_1, TABLE_4_2, TABLE_4_3, TABLE_5_1, TABLE_5_2, TABLE_5_3
+from fogsim.reproduce.paper_cells import PaperCell
+from fogsim.reproduce.result import Cell, Rows
+from fogsim.units import extinction_from_visibility
+from fogsim.values import Estimate
+
+TABLES = ("4.1", "4.2", "4.3", "5.1", "5.2", "5.3")
+VARIANTS = ("published", "corrected")
+
+STEP, FIRST, LAST = 5.0, 25.0, 90.0
+"""Ranges at which the thesis clips [m]; table 5.1 has tracks that end beyond."""
+
+VISIBILITY_4_2 = 150.0
+"""V_met of table 4.2 [m]."""
+
+FARTHEST = 10_000.0
+"""Visibility from which a result counts as infinite [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A vehicle followed in one fog: ranges [m] in steps of `interval` from `start`; back from 90 m, or with noise."""
+
+    visibility: float
+    interval: float = STEP
+    start: float = FIRST
+    back: bool = False
+    noisy: bool = False
+
+    def frames(self, last: float = LAST) -> list[float]:
+        """Ranges up to the last one [m], with more than are kept where larger jumps would lose the vehicle."""
+        step = min(self.interval, STEP) if self.interval % STEP == 0 else self.interval
+        ranges = [float(r) for r in np.arange(self.start, last + 1e-9, step)]
+        return ranges[::-1] if self.back else ranges
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A figure of the thesis: its place, and the chase and range after which ours is read; no chase: from the road.
+
+    `pair` are the near and the far range [m] of table 4.2; `first` is an estimate before the search of section 4.2.4.
+    """
+
+    table: str
+    row: str
+    column: str
+    paper: float
+    visibility: float
+    case: Case | None = None
+    after: float = LAST
+    pair: tuple[float, float] | None = None
+    first: bool = False
+
+
+Results = Mapping[Case, Mapping[str, Mapping[float, Estimate]]]
+"""Estimates by case, variant and range of the latest frame [m]."""
+
+Rough = Mapping[float, Mapping[str, Estimate]]
+"""Estimates from the road alone, by visibility [m] and variant."""
+
+
+def figures(tables: Sequence[str]) -> list[Figure]:
+    """All figures of some tables of the thesis."""
+    return [figure for figure in (*_of_chapter_4(), *_of_chapter_5()) if figure.table in tables]
+
+
+def _of_chapter_4() -> Iterator[Figure]:
+    for v, (first, optimised) in TABLE_4_1.items():
+        yield Figure("4.1", _fog(v), "first", first, v, first=True)
+        yield Figure("4.1", _fog(v), "optimised", optimised, v)
+    case, farthest = Case(VISIBILITY_4_2), max(TABLE_4_2[STEP])
+    for apart, ratios in TABLE_4_2.items():
+        for far, ratio in ratios.items():
+            row, column = f"{apart:g} m apart [%]", f"far one at {far:g} m"
+            yield Figure("4.2", row, column, ratio, VISIBILITY_4_2, case, farthest, (far - apart, far))
+    for v, (vehicle, road) in TABLE_4_3.items():
+        yield Figure("4.3", _fog(v), "from the vehicle", vehicle, v, Case(v))
+        yield Figure("4.3", _fog(v), "from the road", road, v)
+
+
+def _of_chapter_5() -> Iterator[Figure]:
+    for share, row in TABLE_5_1.items():
+        for v, paper in row.items():
+            after = FIRST + STEP * max(round(share * v / STEP), 2)
+            yield Figure("5.1", f"track of {100 * share:g} % of V_met", _fog(v), paper, v, Case(v), after)
+    for interval, row in TABLE_5_2.items():
+        for v, paper in row.items():
+            case = Case(v, interval)
+            after = case.frames()[-1]
+            yield Figure("5.2", f"every {interval:g} m", _fog(v), paper, v, case, after)
+    for start, row in TABLE_5_3.items():
+        for v, paper in row.items():
+            yield Figure("5.3", f"from {start:g} m", _fog(v), paper, v, Case(v, start=start))
+
+
+def _fog(visibility: float) -> str:
+    return f"V_met {visibility:g} m"
+
+
+def wanted_cases(wanted: Sequence[Figure], more: Sequence[Case]) -> dict[Case, float]:
+    """Every case once, with the last range that is needed [m]."""
+    cases = dict.fromkeys(more, LAST)
+    for figure in wanted:
+        if figure.case is not None:
+            cases[figure.case] = max(cases.get(figure.case, 0.0), figure.after)
+    return cases
+
+
+def _estimate(figure: Figure, variant: str, results: Results, rough: Rough) -> Estimate:
+    if figure.case is None:
+        return rough[figure.visibility][variant]
+    return results[figure.case][variant][figure.after]
+
+
+def seen_visibility(estimate: Estimate) -> float | None:
+    """Visibility of a valid estimate [m], infinite beyond `FARTHEST`; None if it is not valid."""
+    if not estimate.valid:
+        return None
+    return estimate.visibility if estimate.visibility < FARTHEST else math.inf
+
+
+def _ours(figure: Figure, variant: str, estimate: Estimate) -> float | None:
+    if figure.first:
+        first = estimate.diagnostics.get("first_extinction")
+        return math.log(20.0) / first if isinstance(first, float) else None
+    if figure.pair is None:
+        return seen_visibility(estimate)
+    if not estimate.valid:
+        return None
+    if variant == "corrected":
+        # It compares no variances: what its extinction makes of theirs.
+        return _ratio(figure.pair, estimate.extinction)
+    distances, variances = (np.asarray(estimate.diagnostics[name]) for name in ("distances", "variances"))
+    near, far = (float(variances[np.argmin(np.abs(distances - at))]) for at in figure.pair)
+    return 100.0 * far / near
+
+
+def _ratio(pair: tuple[float, float], extinction: float) -> float:
+    """Far variance over the near one, e^(−2k (d₂ − d₁)) [%]."""
+    return 100.0 * math.exp(-2.0 * extinction * (pair[1] - pair[0]))
+
+
+def cells(wanted: Sequence[Figure], results: Results, rough: Rough) -> list[PaperCell]:
+    """Every figure of the thesis with ours."""
+    found = []
+    for figure in wanted:
+        published, corrected = (_ours(figure, name, _estimate(figure, name, results, rough)) for name in VARIANTS)
+        place = f"table {figure.table}"
+        found.append(PaperCell(place, figure.row, figure.column, figure.paper, published, corrected))
+    return found
+
+
+def records(wanted: Sequence[Figure], more: Sequence[Case], results: Results, rough: Rough) -> list[dict[str, Cell]]:
+    """A flat record for each figure, and for each further case, and variant: the truth and what was found."""
+    asked = [*wanted, *(_further(case) for case in more)]
+    found: list[dict[str, Cell]] = []
+    for figure in asked:
+        for name in VARIANTS:
+            estimate = _estimate(figure, name, results, rough)
+            visibility = seen_visibility(estimate)
+            known = visibility is not None and visibility < FARTHEST
+            found.append(
+                {
+                    "paper": "huang2015",
+                    "table": figure.table,
+                    "row": figure.row,
+                    "column": figure.column,
+                    "variant": name,
+                    "visibility_m": figure.visibility,
+                    "found_m": visibility if known else None,
+                    "deviation_rel": estimate.standard_deviation / estimate.extinction if known else None,
+                }
+            )
+    return found
+
+
+def _further(case: Case) -> Figure:
+    way = "on the way back" if case.back else "noisy"
+    after = case.frames()[-1]
+    return Figure("beyond", _fog(case.visibility), way, math.nan, case.visibility, case, after)
+
+
+def error_table(wanted: Sequence[Figure], compared: Sequence[PaperCell]) -> Rows:
+    """Median error of each table against the truth: the thesis', and ours where the thesis has a finite figure."""
+    rows: list[tuple[str, ...]] = [("table", "figures", "thesis", *VARIANTS)]
+    for table in dict.fromkeys(figure.table for figure in wanted):
+        here = [(f, c) for f, c in zip(wanted, compared, strict=True) if f.table == table and math.isfinite(c.paper)]
+        columns = ([c.paper for _, c in here], [c.as_published for _, c in here], [c.corrected for _, c in here])
+        truths = [_truth(figure) for figure, _ in here]
+        rows.append((table, str(len(here)), *(_median_error(column, truths) for column in columns)))
+    return tuple(rows)
+
+
+def _truth(figure: Figure) -> float:
+    if figure.pair is None:
+        return figure.visibility
+    return _ratio(figure.pair, extinction_from_visibility(figure.visibility))
+
+
+def _median_error(found: Sequence[float | None], truths: Sequence[float]) -> str:
+    errors = [100.0 * abs(a / b - 1.0) for a, b in zip(found, truths, strict=True) if a is not None]
+    return f"{np.median(errors):.1f} % of {len(errors)}" if errors else "—"

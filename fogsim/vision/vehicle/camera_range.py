@@ -1,0 +1,144 @@
+"""Range of the vehicle ahead from its picture alone: where it stands on the road, or its known width."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.values.camera import Camera
+from fogsim.vision.region.road_image import CannotTellError
+from fogsim.vision.vehicle.rear_localisation import STANDS_OUT, WIDTHS, RearBox, localise_rear
+from fogsim.vision.vehicle.vehicle_crop import VehicleCrop
+
+NEAREST, STEP = 8.0, 1.1
+"""Nearest range at which an unknown vehicle is searched [m], and the ratio of each range to the next [-]."""
+
+LEAST_WIDTH = 8.0
+"""Narrowest vehicle that is searched [px]."""
+
+USUAL_WIDTH, WIDTH_SPREAD = 1.8, 0.15
+"""Median width of vehicles [m], and its relative standard deviation: cars 1.6 to 1.95 m, lorries 2.55 m [-]."""
+
+KNOWN_WIDTH = 0.02
+"""Relative standard deviation of a width that is given: edges are rounded [-]."""
+
+CONSISTENT = 0.1
+"""Largest relative difference of a range by the contact with the road from the range that is tried [-]."""
+
+EDGE, REGISTERED = 0.3, 0.1
+"""Standard deviation of the width between two edges, and of one by registration [px]."""
+
+MOST_JUMP = 12.0
+"""Change of range between frames by more than which the vehicle is another one [m]."""
+
+
+def registered_deviation(camera: Camera, distance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Standard deviation of ranges whose pictures were registered [m]."""
+    return np.asarray(REGISTERED * distance**2 / (USUAL_WIDTH * camera.focal_length))
+
+
+class CameraRange:
+    """Ranges to a vehicle by the width of its picture, d = f W / w.
+
+    Its width W is known, or follows from the row at which it stands on the road, d = λ / (v − v_h): weighted over its
+    pictures, for the nearest show it best. An error of W is common to all ranges, and so goes into k as a factor.
+
+    Parameters
+    ----------
+    camera : Camera
+        The assumed calibration.
+    width : float or None
+        The vehicle's known width [m].
+    pitch_deviation : float
+        Standard deviation of the true pitch about the assumed one [rad].
+    """
+
+    def __init__(self, camera: Camera, width: float | None, pitch_deviation: float) -> None:
+        self._camera, self._known, self._pitch_deviation = camera, width, pitch_deviation
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the vehicle."""
+        self._distance: float | None = None
+        self._first_width, self._weighted, self._weight, self._nearest = 0.0, 0.0, 0.0, math.inf
+
+    @property
+    def scale(self) -> float:
+        """What true ranges are over the measured ones, by all pictures so far [-]."""
+        return 1.0 if self._known else math.exp(self._weighted / self._weight) / self._first_width
+
+    @property
+    def scale_deviation(self) -> float:
+        """Relative standard deviation of all ranges together [-]."""
+        if self._known:
+            return KNOWN_WIDTH
+        # The pitch may be off by as much in every picture; the nearest shows that least.
+        return self._pitch_deviation * self._nearest / self._camera.mount_height
+
+    def measure(self, crop_at: Callable[[float], VehicleCrop]) -> tuple[float, float]:
+        """Range from the camera, and its standard deviation that is not common to all [m].
+
+        Parameters
+        ----------
+        crop_at : callable
+            Crop of the image where a vehicle at some range [m] can be.
+
+        Raises
+        ------
+        CannotTellError
+            If no vehicle stands out.
+        """
+        box = self._search(crop_at) if self._distance is None else self._follow(crop_at, self._distance)
+        width = self._known or self._first_width
+        distance = width * self._camera.focal_length / box.width
+        if self._distance is not None and abs(distance - self._distance) > MOST_JUMP:
+            raise CannotTellError("the vehicle ahead no longer stands out")
+        self._distance = distance
+        contact = self._contact(box)
+        if contact is not None and not self._known:
+            weight = contact**-2.0
+            self._weighted += weight * math.log(box.width * contact / self._camera.focal_length)
+            self._weight += weight
+            self._nearest = min(self._nearest, contact)
+        return distance, EDGE * distance / box.width
+
+    def _contact(self, box: RearBox) -> float | None:
+        """Range by the row at which a vehicle stands [m]; None where its foot does not stand out."""
+        below = box.foot - self._camera.horizon_row
+        clear = box.evidence > math.log1p(STANDS_OUT**2) and below > 1.0
+        return self._camera.row_distance / below if clear else None
+
+    def _search(self, crop_at: Callable[[float], VehicleCrop]) -> RearBox:
+        farthest = WIDTHS[1] * self._camera.focal_length / LEAST_WIDTH
+        count = max(math.ceil(math.log(max(farthest, NEAREST) / NEAREST) / math.log(STEP)), 1)
+        found: list[tuple[float, RearBox]] = []
+        reason = "no vehicle stands out ahead"
+        for tried in np.geomspace(NEAREST, NEAREST * STEP**count, count + 1):
+            try:
+                box = _localised(crop_at(float(tried)), float(tried))
+            except CannotTellError as why:
+                reason = str(why)
+                continue
+            contact = None if box is None else self._contact(box)
+            if box is None or contact is None or abs(math.log(contact / tried)) > CONSISTENT:
+                continue
+            width, spread = self._known or USUAL_WIDTH, KNOWN_WIDTH + CONSISTENT if self._known else WIDTH_SPREAD
+            unusual = math.log(box.width * contact / self._camera.focal_length / width) / spread
+            found.append((box.evidence - 0.5 * unusual**2, box))
+        if not found:
+            raise CannotTellError(reason)
+        best = max(found, key=lambda one: one[0])[1]
+        contact = self._contact(best)
+        self._first_width = best.width * (contact or 0.0) / self._camera.focal_length
+        return best
+
+    def _follow(self, crop_at: Callable[[float], VehicleCrop], distance: float) -> RearBox:
+        box = _localised(crop_at(distance), distance)
+        if box is None:
+            raise CannotTellError("the vehicle ahead no longer stands out")
+        return box
+
+
+def _localised(crop: VehicleCrop, distance: float) -> RearBox | None:
+    return localise_rear(crop.luminance, crop.origin, crop.camera, distance, crop.noise)

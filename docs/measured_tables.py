@@ -113,6 +113,7 @@ MEASUREMENTS = (
         (DEVIATIONS, *(f"tests/data/monte_carlo_{name}.csv" for name in ("veil", "halo", "lobes"))),
         tuple(f"night-{name}" for name in NIGHT),
     ),
+    benchmark("paper_methods", 3, ("paper methods",)),
     benchmark("stereo", 1, times="ms"),
     benchmark("belief", 2),
     benchmark("disappearing_vehicles", 2, ("disappearing vehicles",), times="ms"),

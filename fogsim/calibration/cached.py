@@ -71,7 +71,7 @@ def supply(estimator: Estimator) -> None:
         estimator.take_calibrations(CachedCalibrations())
 
 
-def _cached(kind: type[_T], name: str, camera: Camera, measure: Callable[[Watch], _T]) -> _T:
+def _cached(kind: Callable[..., _T], name: str, camera: Camera, measure: Callable[[Watch], _T]) -> _T:
     """The calibration from the cache; measured if it is not there, by one process at a time."""
     key = hashlib.sha256(repr((name, camera, _code())).encode()).hexdigest()[:24]
     folder = cache_directory() / "calibrations"
@@ -89,7 +89,7 @@ def _cached(kind: type[_T], name: str, camera: Camera, measure: Callable[[Watch]
         return made
 
 
-def _decoded(kind: type[_T], kept: bytes) -> _T:
+def _decoded(kind: Callable[..., _T], kept: bytes) -> _T:
     values = json.loads(kept)
     return kind(**{name: tuple(value) if isinstance(value, list) else value for name, value in values.items()})
 

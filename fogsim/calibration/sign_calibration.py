@@ -25,7 +25,6 @@ SHARE = 0.8
 """Share of looks that find a sign within the operating range (Belaroussi & Gruyer 2015, section 3.2)."""
 
 _NEAREST = 8.0  # place of the last look before the sign [m]
-_FARTHEST = 2.5  # distance of a sign over V_met beyond which it is not looked for [-]
 _LEVELS = (140.0, 170.0, 200.0, 230.0, 250.0)  # of the airlight, 0 … 255
 _QUARTILES = 1.349  # between the quartiles of a normal distribution [standard deviations]
 
@@ -81,9 +80,7 @@ def measure_operating_range(
         rng = np.random.default_rng((seed, number))
         sign = sign_beside("s", KINDS[number % len(KINDS)], reach, diameter, rng)
         places = np.arange(rng.uniform(0.0, step), reach - _NEAREST, step)
-        drive = SignDrive(
-            part, (sign,), tuple(places.tolist()), noise, float(rng.choice(_LEVELS)), reach + 5.0, farthest=_FARTHEST
-        )
+        drive = SignDrive(part, (sign,), tuple(places.tolist()), noise, float(rng.choice(_LEVELS)), reach + 5.0)
         known = PoseDeviation(noise.position, heading=noise.heading, pitch=noise.pitch)
         looks = {v: _Approach(SignWatch(part, SETBACK, known)) for v in fogs}
         for seen in observed(drive, fogs, rng):

@@ -68,9 +68,6 @@ class SignDrive:
         How far ahead the map is read [m].
     known : tuple of Sign or None
         Signs as the map has them; None for those that stand there, each as far off as `noise` says.
-    farthest : float
-        Distance of the first sign, over the visibility, beyond which a fog has no images [-]; 2.5 leaves 0.06 % of a
-        sign's contrast, less than a grey level.
     """
 
     camera: Camera
@@ -80,7 +77,6 @@ class SignDrive:
     grey: float = 200.0
     reach: float = 400.0
     known: tuple[Sign, ...] | None = None
-    farthest: float = math.inf
 
 
 def observed(
@@ -114,8 +110,6 @@ def observed(
             signs = signs_ahead(known, place, rng.normal(0.0, noise.heading), drive.reach)
             seen = {}
             for visibility in visibilities:
-                if drive.signs[0].position[0] - x > drive.farthest * visibility:
-                    continue
                 light = foggy_radiance(view, pose, true, extinction_from_visibility(visibility))
                 image = expose(light, sensor, told.response, rng).astype(np.uint8)
                 seen[visibility] = Observation(Frame(x / SPEED, image, told), SPEED, None, signs, SETBACK)

@@ -142,14 +142,12 @@ def reproduce(
 def paper_cells(camera: str, records: Sequence[Mapping[str, Cell]]) -> Iterator[PaperCell]:
     """Final estimates, and largest errors by class of fog and of all, of one camera."""
     found = {record["visibility_m"]: record for record in records if record["camera"] == camera}
-    row, forms = f"f = {camera}, V_met {{:g}} m", ("cubic_m", "ours_m")
+    forms = ("cubic_m", "ours_m")
     for visibility, printed in PUBLISHED.items():
         if printed is not None:
-            published, corrected = (found[visibility][form] for form in forms)
-            column = "estimate [m]"
-            yield PaperCell(
-                "section 5.2", row.format(visibility), column, printed, _metres(published), _metres(corrected)
-            )
+            published, corrected = (_metres(found[visibility][form]) for form in forms)
+            row = f"f = {camera}, V_met {visibility:g} m"
+            yield PaperCell("section 5.2", row, "estimate [m]", printed, published, corrected, truth=visibility)
     overall = max(error for error, _ in LARGEST_ERRORS.values())
     for name, (largest, fogs) in {**LARGEST_ERRORS, "all fogs": (overall, tuple(PUBLISHED))}.items():
         published, corrected = (_largest_error([found[visibility] for visibility in fogs], form) for form in forms)

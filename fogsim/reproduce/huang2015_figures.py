@@ -152,8 +152,9 @@ def cells(wanted: Sequence[Figure], results: Results, rough: Rough) -> list[Pape
     """Every figure of the thesis with ours."""
     found = []
     for figure in wanted:
-        ours = [_ours(figure, name, _estimate(figure, name, results, rough)) for name in VARIANTS]
-        found.append(PaperCell(f"table {figure.table}", figure.row, figure.column, figure.paper, *ours))
+        published, corrected = (_ours(figure, name, _estimate(figure, name, results, rough)) for name in VARIANTS)
+        names = (f"table {figure.table}", figure.row, figure.column)
+        found.append(PaperCell(*names, figure.paper, published, corrected, truth=_truth(figure)))
     return found
 
 

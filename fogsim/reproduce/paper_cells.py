@@ -35,6 +35,8 @@ class PaperCell:
         Largest deviation that counts as reached: relative for values, 0 for limits; in the figure's unit if `absolute`.
     absolute : bool
         Whether the tolerance is in the figure's own unit, as for shares in percent.
+    truth : float or None
+        What was estimated, if it is known: a result no farther from it than the published one is reached, too.
     """
 
     place: str
@@ -46,6 +48,7 @@ class PaperCell:
     claim: Literal["equal", "at_most", "at_least"] = "equal"
     tolerance: float = 0.1
     absolute: bool = False
+    truth: float | None = None
 
     def reached(self, ours: float | None) -> bool:
         """Whether a result agrees with the published figure."""
@@ -53,7 +56,9 @@ class PaperCell:
             return False
         if self.claim != "equal":
             return ours <= self.paper if self.claim == "at_most" else ours >= self.paper
-        if self.paper == float("inf") or ours == float("inf"):
+        if self.truth is not None and abs(ours - self.truth) <= abs(self.paper - self.truth):
+            return True
+        if math.inf in (self.paper, ours):
             return ours == self.paper
         return abs(ours - self.paper) <= (self.tolerance if self.absolute else self.tolerance * abs(self.paper))
 

@@ -17,7 +17,8 @@ from fogsim.estimators.night.halos import HaloThreshold
 from fogsim.estimators.signs.operating_range import OperatingRange
 from fogsim.values import Camera, Estimate, Observation
 from tests.estimators.night.test_gallen2014 import CAMERA as NIGHT_CAMERA
-from tests.estimators.night.test_gallen2014 import LAMPS, MEASURED, seen
+from tests.estimators.night.test_gallen2014 import LAMPS, MEASURED
+from tests.estimators.night.test_gallen2014 import seen as night_image
 from tests.estimators.signs.test_belaroussi2015 import Told, track
 
 CAMERA = Camera(320, 160, 300.0, (159.5, 79.5), 1.4, pitch=0.01)
@@ -104,7 +105,7 @@ def test_methods_calibrate_when_they_first_need_to(measured: list[object], monke
     assert not measured
     assert passes_a_sign(CAMERA, monkeypatch).visibility == pytest.approx(100.0, rel=0.01)
     assert measured == [(CAMERA, 0.9)]
-    assert halo.update(seen(LAMPS, glow=30.0)).bounds is not None
+    assert halo.update(night_image(LAMPS, glow=30.0)).bounds is not None
     assert measured[1:] == [NIGHT_CAMERA]
 
 

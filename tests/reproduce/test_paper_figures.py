@@ -1,7 +1,10 @@
 """Every figure in a "paper" column is one that the paper prints: its text is quoted here with its place."""
 
+import json
+import math
 import re
 from collections.abc import Iterable
+from typing import Any
 
 import pytest
 
@@ -234,3 +237,27 @@ def test_gallen2014_is_run_with_the_figures_of_its_paper() -> None:
     assert {gallen2014.LIDAR, *PUBLISHED_VISIBILITIES[:-1]} == numbers(GALLEN2014["figure 12"])
     assert {gallen2014.CAMERA.width, gallen2014.CAMERA.height} < numbers(GALLEN2014["section IV-A"])
     assert WINDOW in numbers(GALLEN2014["section IV-B"])
+
+
+@pytest.mark.parametrize(
+    ("ours", "options", "reached"),
+    [
+        (78.0, {}, True),
+        (80.0, {}, False),
+        (None, {}, False),
+        (math.inf, {}, False),
+        (107.0, {"truth": 100.0}, True),
+        (129.0, {"truth": 100.0}, False),
+        (math.inf, {"truth": 100.0}, False),
+        (72.1, {"claim": "at_most"}, False),
+        (71.0, {"claim": "at_most"}, True),
+        (71.0, {"claim": "at_least"}, False),
+        (74.0, {"tolerance": 1.5, "absolute": True}, False),
+    ],
+)
+def test_a_figure_is_reached_or_bold(ours: float | None, options: dict[str, Any], *, reached: bool) -> None:
+    cell = PaperCell("table 1", "row", "column [m]", 72.0, None, ours, **options)
+    assert cell.reached(ours) is reached
+    assert cell.shown()[4] == "**—**"
+    assert cell.shown()[5].startswith("**") is not reached
+    assert json.dumps(cell.record(), allow_nan=False)

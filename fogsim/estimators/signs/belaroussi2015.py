@@ -219,9 +219,12 @@ class Belaroussi2015:
             if track.confirmed:
                 self._map_holds = True
                 self._missed.pop(sign_id, None)
-            elif track.misses >= MISSES and track.unseen_before is not None:
-                if (measured := self._range_of(track)) is not None:
-                    self._missed[sign_id] = measured, track.unseen_before, self._time
+            elif (
+                track.misses >= MISSES
+                and track.unseen_before is not None
+                and (measured := self._range_of(track)) is not None
+            ):
+                self._missed[sign_id] = measured, track.unseen_before, self._time
         self._missed = {
             sign_id: missed for sign_id, missed in self._missed.items() if self._time - missed[2] < self._fading_time
         }

@@ -20,19 +20,7 @@ ALBEDOS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """Fog, land and eye.
-
-    Attributes
-    ----------
-    name : str
-        In words.
-    albedo : float or None
-        Of the land; None for Koschmieder's fog.
-    visibility, top, eye : float
-        V_met, height of the layer and of the eye [m].
-    droplets : Droplets
-        Their sizes.
-    """
+    """Albedo of the land (None for Koschmieder's fog), and V_met, heights of the layer and of the eye [m]."""
 
     name: str
     albedo: float | None = 0.1
@@ -58,17 +46,7 @@ CONDITIONS = (
 
 
 def airlight(condition: Condition, elevation: float, distance: float | None = None) -> float:
-    """Airlight up to the road, or to a distance, over what the path takes from the light, in E / π.
-
-    Parameters
-    ----------
-    condition : Condition
-        The condition.
-    elevation : float
-        Of the line of sight [degrees].
-    distance : float or None
-        Along the line of sight [m]; None for the road, or a black sky behind the layer.
-    """
+    """Airlight up to the road, or to a distance [m], over the path's loss, in E / π, by elevation [degrees]."""
     slope = math.sin(math.radians(elevation))
     if distance is None:
         distance = condition.eye / -slope if slope < 0 else (condition.top - condition.eye) / max(slope, 1e-6)
@@ -83,13 +61,7 @@ def airlight(condition: Condition, elevation: float, distance: float | None = No
 
 
 def conditions() -> tuple[list[Mapping[str, Cell]], tuple[TitledTable, TitledTable]]:
-    """Airlight by albedo, and by what else there may be.
-
-    Returns
-    -------
-    (list of records, (TitledTable, TitledTable))
-        A record for each condition and elevation.
-    """
+    """Airlight by albedo, and by what else there may be."""
     lands = [replace(_USUAL, name=f"albedo {albedo:g}", albedo=albedo) for albedo in ALBEDOS]
     records: list[Mapping[str, Cell]] = []
     tables = []

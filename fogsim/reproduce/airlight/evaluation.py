@@ -59,17 +59,7 @@ NOTES = (
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One fog.
-
-    Attributes
-    ----------
-    albedo : float or None
-        Of the land; None for Koschmieder's fog.
-    visibility : float
-        V_met [m].
-    droplets : Droplets
-        Their sizes.
-    """
+    """One fog; albedo of the land, None for Koschmieder's fog, and visibility [m]."""
 
     albedo: float | None
     visibility: float
@@ -78,19 +68,7 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What is run.
-
-    Attributes
-    ----------
-    albedos : tuple of float or None
-        Of the land around; None for Koschmieder's fog.
-    visibilities : tuple of float
-        V_met [m].
-    heights : tuple of float
-        Of the camera above the road [m]: a car's and a lorry's.
-    drives : int
-        Drives for each camera, without and with a vehicle ahead.
-    """
+    """What is run: albedos (None for Koschmieder's fog), visibilities [m], camera heights [m], drives a camera."""
 
     albedos: tuple[float | None, ...] = (None, 0.05, 0.1, 0.2, 0.4, 0.8)
     visibilities: tuple[float, ...] = (50.0, 100.0, 200.0, 400.0)
@@ -152,24 +130,7 @@ def reproduce(
 def drive_alone(
     renderer: Renderer, camera: Camera, cases: Sequence[Case], number: int
 ) -> Iterator[tuple[Case, str, Estimate]]:
-    """Drive along the road alone, in every fog.
-
-    Parameters
-    ----------
-    renderer : Renderer
-        Holds the road's scene.
-    camera : Camera
-        The true calibration, and the told one.
-    cases : sequence of Case
-        The fogs.
-    number : int
-        Of the drive, which is its seed.
-
-    Yields
-    ------
-    tuple
-        Fog, method, and what that reads at the end.
-    """
+    """Drive along the road alone: the fog, each method, and its estimate at the end."""
     rng = np.random.default_rng([21, number])
     moments = list(drive(renderer, camera, FRAMES, lead=False, rng=rng, period=PERIOD))
     for case in cases:
@@ -187,18 +148,7 @@ def drive_alone(
 def follow(
     renderer: Renderer, camera: Camera, cases: Sequence[Case], number: int
 ) -> Iterator[tuple[Case, str, Estimate]]:
-    """Follow a vehicle that drives away, in every fog.
-
-    Parameters
-    ----------
-    renderer, camera, cases, number
-        As of `drive_alone`.
-
-    Yields
-    ------
-    tuple
-        Fog, method, and what that reads at the end.
-    """
+    """Follow a vehicle that drives away: the fog, each method, and its estimate at the end."""
     rng = np.random.default_rng([22, number])
     estimators = {case: make(CHASE_METHODS[0], camera, setback=0.0) for case in cases}
     last: dict[Case, Estimate] = {}

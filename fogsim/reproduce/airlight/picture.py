@@ -25,17 +25,7 @@ _COLOURS = {0.05: "C3", 0.1: "C1", 0.2: "C2", 0.4: "C0", 0.8: "C4"}
 
 
 def picture(records: Records) -> NDArray[np.uint8]:
-    """Draw the airlight by elevation, a dark road's luminance by distance, and what methods read of a car's camera.
-
-    Parameters
-    ----------
-    records : sequence of mapping
-        Records of the reproduction.
-
-    Returns
-    -------
-    (rows, cols, 3) uint8
-    """
+    """Draw the airlight by elevation, a dark road's luminance by distance, and estimates with a car's camera."""
     methods = list(dict.fromkeys(str(one["method"]) for one in records))
     figure = Figure(figsize=(15.0, 8.4), dpi=90, layout="constrained")
     axes = figure.subplots(2, math.ceil((len(methods) + 2) / 2)).ravel()

@@ -22,23 +22,7 @@ LORRIES = 0.12
 def drive(
     overrides: tuple[str, ...], demand: float, visibility: float, seed: int, seconds: float, advised: float = math.inf
 ) -> Passages:
-    """Let traffic drive, and tell who passed the loops.
-
-    Parameters
-    ----------
-    overrides : tuple of str
-        What is set in the drivers' scenario.
-    demand : float
-        Vehicles that want to enter, on both lanes [vehicles/h].
-    visibility : float
-        V_met [m]; ``inf`` in clear air.
-    seed : int
-        Seed of the run.
-    seconds : float
-        For how long the loops are watched, once the road has filled [s].
-    advised : float
-        Speed that signs advise to everyone [m/s]; ``inf`` for none.
-    """
+    """Vehicles that pass the loops, by demand on both lanes [1/h], visibility [m], seconds and advised speed [m/s]."""
     signs = StretchAdvice(advised, Stretch(edges=(EDGE,)), Display.MESSAGE_SIGN)
     command = Command(stretches=(signs,)) if math.isfinite(advised) else Command()
     seen = passed(overrides, 2, _demand(demand), visibility, seed, WARM_UP + seconds, command)

@@ -15,39 +15,15 @@ APART, BEHIND = 120.0, 3.0
 
 
 class PairMeasures(NamedTuple):
-    """What is measured of followers; NaN where nothing was there to be measured.
+    """What is measured of followers; NaN where nothing was there to be measured."""
 
-    Attributes
-    ----------
-    out_of_sight : float
-        Share of those whose gap is longer than V_met [-].
-    headway : float
-        Median time gap of all [s].
-    headway_in_sight : float
-        Mean time gap of those whose gap is at most V_met [s].
-    """
-
-    out_of_sight: float
-    headway: float
-    headway_in_sight: float
+    out_of_sight: float  # share with a gap longer than V_met [-]
+    headway: float  # median [s]
+    headway_in_sight: float  # mean where the gap is at most V_met [s]
 
 
 def follow(overrides: tuple[str, ...], leader_speed: float, visibility: float, seed: int, count: int) -> PairMeasures:
-    """Let drivers follow leaders of a given speed, and measure after 2.5 km.
-
-    Parameters
-    ----------
-    overrides : tuple of str
-        What is set in the drivers' scenario.
-    leader_speed : float
-        Speed that leaders are made to drive, whatever the fog [m/s].
-    visibility : float
-        V_met [m]; ``inf`` in clear air.
-    seed : int
-        Seed of the run.
-    count : int
-        How many pairs there are.
-    """
+    """Measure drivers behind leaders of a given speed [m/s] after 2.5 km in fog of a visibility [m]."""
     rows = "".join(
         f'<vehicle id="leader{i}" type="car" route="r" depart="{APART * (i + 1)}" departSpeed="{leader_speed}"/>'
         f'<vehicle id="behind{i}" type="car" route="r" depart="{APART * (i + 1) + BEHIND}" departSpeed="max"/>'
@@ -60,15 +36,7 @@ def follow(overrides: tuple[str, ...], leader_speed: float, visibility: float, s
 
 
 def measured_pairs(events: Iterable[Mapping[str, str]], visibility: float) -> PairMeasures:
-    """Measure followers.
-
-    Parameters
-    ----------
-    events : iterable of mappings
-        What loops saw, with ``vehID`` of leaders (``leader…``) and followers (``behind…``).
-    visibility : float
-        V_met [m].
-    """
+    """Measure followers (``behind…``) and leaders (``leader…``) by the events of loops."""
     left: dict[str, float] = {}
     rows: list[tuple[float, float]] = []
     for event in events:

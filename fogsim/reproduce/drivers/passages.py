@@ -20,34 +20,16 @@ By these the Transport and Road Research Laboratory judged what it saw on the M4
 
 
 class Passages(NamedTuple):
-    """Vehicles at a cross-section in the order in which they came, but for each lane's first.
+    """Vehicles (n,) at a cross-section in the order in which they came, but for each lane's first."""
 
-    Attributes
-    ----------
-    speed, leader_speed : (n,) float64
-        Own speed, and that of the vehicle before it in its lane [m/s].
-    headway : (n,) float64
-        Time between their fronts [s].
-    gap : (n,) float64
-        Distance to the vehicle before it [m].
-    """
-
-    speed: NDArray[np.float64]
-    leader_speed: NDArray[np.float64]
-    headway: NDArray[np.float64]
-    gap: NDArray[np.float64]
+    speed: NDArray[np.float64]  # [m/s]
+    leader_speed: NDArray[np.float64]  # [m/s]
+    headway: NDArray[np.float64]  # between their fronts [s]
+    gap: NDArray[np.float64]  # [m]
 
 
 def passages(events: Iterable[Mapping[str, str]], since: float) -> Passages:
-    """Put together what loops saw.
-
-    Parameters
-    ----------
-    events : iterable of mappings
-        What SUMO's instantaneous loops write: ``id`` of the loop, ``time``, ``state`` (enter, stay, leave), ``speed``.
-    since : float
-        Time before which nothing counts [s].
-    """
+    """Vehicles by the events of SUMO's instantaneous loops from a time on [s]."""
     rows: list[tuple[float, float, float, float]] = []
     before: dict[str, tuple[float, float]] = {}
     left: dict[str, float] = {}
@@ -65,64 +47,28 @@ def passages(events: Iterable[Mapping[str, str]], since: float) -> Passages:
 
 
 class Measures(NamedTuple):
-    """What is measured at one cross-section in one run; NaN where nothing was there to be measured.
+    """What is measured at one cross-section in one run; NaN where nothing was there to be measured."""
 
-    Attributes
-    ----------
-    flow : float
-        Vehicles on both lanes [1/h].
-    free_speed, free_speed_sd : float
-        Mean and standard deviation of free vehicles' speeds [km/h].
-    mean_speed, speed_sd : float
-        Those of all vehicles [km/h].
-    overdriving : float
-        Share of vehicles that are too fast to stop within V_met by the Highway Code [-].
-    overdriving_aashto : float
-        The same by FogSim's own 2.5 s and 3.4 m/s² (AASHTO) [-].
-    headway_15 : float
-        15th percentile of time headways [s].
-    headway_below_1, headway_below_2 : float
-        Shares of time headways below 1 s and 2 s [-].
-    following_headway, following_distance : float
-        Mean time headway [s] and gap [m] of those who follow.
-    speed_difference : float
-        Mean absolute difference of speed to the vehicle ahead of those who follow [m/s].
-    ttc_15, ttc_50 : float
-        15th and 50th percentile of the time to collision of those who follow and come closer [s].
-    ttc_below_10 : float
-        Share of those who follow whose time to collision is below 10 s [-].
-    """
-
-    flow: float
-    free_speed: float
-    free_speed_sd: float
-    mean_speed: float
-    speed_sd: float
-    overdriving: float
-    overdriving_aashto: float
-    headway_15: float
-    headway_below_1: float
-    headway_below_2: float
-    following_headway: float
-    following_distance: float
-    speed_difference: float
-    ttc_15: float
-    ttc_50: float
-    ttc_below_10: float
+    flow: float  # on both lanes [1/h]
+    free_speed: float  # [km/h]
+    free_speed_sd: float  # [km/h]
+    mean_speed: float  # [km/h]
+    speed_sd: float  # [km/h]
+    overdriving: float  # share that cannot stop within V_met, by the Highway Code [-]
+    overdriving_aashto: float  # by 2.5 s and 3.4 m/s² (AASHTO) [-]
+    headway_15: float  # percentile [s]
+    headway_below_1: float  # share [-]
+    headway_below_2: float  # share [-]
+    following_headway: float  # mean [s]
+    following_distance: float  # mean [m]
+    speed_difference: float  # mean absolute, of those who follow [m/s]
+    ttc_15: float  # percentile of those who follow and come closer [s]
+    ttc_50: float  # [s]
+    ttc_below_10: float  # share of those who follow [-]
 
 
 def measured(seen: Passages, visibility: float, seconds: float) -> Measures:
-    """Measure what was seen.
-
-    Parameters
-    ----------
-    seen : Passages
-        Who passed.
-    visibility : float
-        V_met [m]; ``inf`` in clear air.
-    seconds : float
-        For how long was watched [s].
-    """
+    """Measures of the vehicles that passed in fog of a visibility [m] within some seconds."""
     follows = seen.headway < FREE_ABOVE
     free, closing = seen.speed[~follows], (seen.speed - seen.leader_speed)[follows]
     gap = seen.gap[follows]

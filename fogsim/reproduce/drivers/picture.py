@@ -21,19 +21,7 @@ _CLEAR_AT = 600.0
 
 
 def picture(results: Results, plan: Plan) -> NDArray[np.uint8]:
-    """Draw it.
-
-    Parameters
-    ----------
-    results : Results
-        What was measured.
-    plan : Plan
-        What was run.
-
-    Returns
-    -------
-    (rows, cols, 3) uint8
-    """
+    """Draw it (rows, cols, 3)."""
     figure = Figure(figsize=(12.8, 8.6), dpi=100, layout="constrained")
     FigureCanvasAgg(figure)
     panels = figure.subplots(2, 2)

@@ -47,73 +47,33 @@ SIGNED_COMPLIANCE = "drivers.compliance.like=speed_limit_sign"
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One kind of traffic in one fog.
-
-    Attributes
-    ----------
-    population : str
-        Who drives: a name of the plan's populations, or `SIGNED`, the default drivers under the A16's signs.
-    demand : float
-        Vehicles that want to enter, on both lanes [vehicles/h].
-    visibility : float
-        V_met [m]; ``inf`` in clear air.
-    """
+    """Traffic of a population of the plan, or of `SIGNED`, the default drivers under the A16's signs, in one fog."""
 
     population: str
-    demand: float
-    visibility: float
+    demand: float  # on both lanes [vehicles/h]
+    visibility: float  # [m]; inf in clear air
 
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """Drivers who follow one leader each.
-
-    Attributes
-    ----------
-    population : str
-        Who follows: a name of the plan's populations or kinds.
-    leader_speed : float
-        Speed of the leaders [m/s].
-    visibility : float
-        V_met [m]; ``inf`` in clear air.
-    """
+    """Drivers of a population who follow one leader each."""
 
     population: str
-    leader_speed: float
-    visibility: float
+    leader_speed: float  # [m/s]
+    visibility: float  # [m]; inf in clear air
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Which part of the evaluation is run.
-
-    Attributes
-    ----------
-    seeds : tuple of int
-        Seeds of SUMO and of the drivers' traits.
-    demands : tuple of float
-        Vehicles that want to enter, on both lanes [vehicles/h].
-    visibilities : tuple of float
-        V_met [m]; clear air is among them.
-    populations : mapping of str to tuple of str
-        Who drives, each by the keys of a scenario that are set: ``drivers.…=…``.
-    seconds : float
-        For how long the cross-section is watched [s].
-    leader_speeds : tuple of float
-        Speeds of leaders whom one driver each follows [m/s].
-    followers : int
-        How many such drivers there are in a run.
-    kinds : mapping of str to tuple of str
-        Drivers who follow one leader of the first of these speeds each, as `populations`.
-    """
+    """Which part of the evaluation is run; populations and types of drivers by the scenario's keys that are set."""
 
     seeds: tuple[int, ...] = REPORT_SEEDS
-    demands: tuple[float, ...] = (SPARSE, MEDIUM, DENSE)
-    visibilities: tuple[float, ...] = (CLEAR, 300.0, 200.0, 150.0, 100.0, 70.0, 50.0, 30.0)
+    demands: tuple[float, ...] = (SPARSE, MEDIUM, DENSE)  # on both lanes [vehicles/h]
+    visibilities: tuple[float, ...] = (CLEAR, 300.0, 200.0, 150.0, 100.0, 70.0, 50.0, 30.0)  # [m]
     populations: Mapping[str, tuple[str, ...]] = field(default_factory=lambda: POPULATIONS)
-    seconds: float = 600.0
-    leader_speeds: tuple[float, ...] = (SLOW, FAST)
-    followers: int = 20
+    seconds: float = 600.0  # watched [s]
+    leader_speeds: tuple[float, ...] = (SLOW, FAST)  # [m/s]
+    followers: int = 20  # in a run
     kinds: Mapping[str, tuple[str, ...]] = field(default_factory=lambda: KINDS)
 
     @property
@@ -136,13 +96,7 @@ class Plan:
         return tuple(Pair(who, speed, visibility) for who, speed in followers for visibility in (CLEAR, PAIRS_IN))
 
     def overrides(self, case: Case | Pair) -> tuple[str, ...]:
-        """What is set in the scenario of a case's drivers.
-
-        Parameters
-        ----------
-        case : Case or Pair
-            One of the plan's.
-        """
+        """What is set in the scenario of a case's drivers."""
         if case.population == SIGNED:
             return (*self.populations[DEFAULT], SIGNED_COMPLIANCE)
         return {**self.kinds, **self.populations}[case.population]

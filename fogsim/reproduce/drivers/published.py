@@ -28,15 +28,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Size:
-    """A published number, or a range of them.
-
-    Attributes
-    ----------
-    low, high : float
-        Its ends; the same for one number. Both have the same sign.
-    unit : str
-        Their unit.
-    """
+    """A published number, or a range of them, of one sign."""
 
     low: float
     high: float
@@ -48,13 +40,7 @@ class Size:
         return f"{ends} {self.unit}"
 
     def verdict(self, value: float) -> Verdict:
-        """How near a value of ours is.
-
-        Parameters
-        ----------
-        value : float
-            In the same unit.
-        """
+        """How near a value of ours is."""
         if self.low <= value <= self.high:
             return Verdict.INSIDE
         ratio = value / min(self.low, self.high, key=lambda end: abs(value - end))
@@ -65,15 +51,7 @@ class Size:
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """A published statement that something lies between two numbers.
-
-    Attributes
-    ----------
-    low, high : float
-        The numbers.
-    unit : str
-        Their unit.
-    """
+    """A published statement that something lies between two numbers."""
 
     low: float
     high: float
@@ -84,29 +62,13 @@ class Bound:
         return f"{self.low:.3g} … {self.high:.3g} {self.unit}"
 
     def verdict(self, value: float) -> Verdict:
-        """Whether a value of ours lies there.
-
-        Parameters
-        ----------
-        value : float
-            In the same unit.
-        """
+        """Whether a value of ours lies there."""
         return Verdict.INSIDE if self.low <= value <= self.high else Verdict.OUTSIDE
 
 
 @dataclass(frozen=True, slots=True)
 class Sign:
-    """A published statement that something rises (or falls), without a number.
-
-    Attributes
-    ----------
-    rises : bool
-        Whether it rises.
-    unit : str
-        Unit of ours.
-    origin : float
-        What ours is if nothing changes: 0 of a difference, 1 of a ratio.
-    """
+    """A published statement that something rises or falls from an origin: 0 for a difference, 1 for a ratio."""
 
     rises: bool
     unit: str
@@ -117,123 +79,39 @@ class Sign:
         return f"{'>' if self.rises else '<'} {self.origin:.3g} {self.unit}"
 
     def verdict(self, value: float) -> Verdict:
-        """Whether a value of ours has the published sign.
-
-        Parameters
-        ----------
-        value : float
-            The difference or ratio.
-        """
+        """Whether a value of ours has the published sign."""
         return Verdict.RIGHT if (value > self.origin) == self.rises and value != self.origin else Verdict.WRONG
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """Looks up a population's measures.
-
-    Attributes
-    ----------
-    results : Results
-        All that was measured.
-    population : str
-        Whose.
-    """
+    """Looks up a population's measures; KeyError where they were not run."""
 
     results: Results
     population: str
 
     def __call__(self, measure: str, visibility: float, demand: float = MEDIUM) -> NDArray[np.float64]:
-        """Values of a measure, seed by seed (n,).
-
-        Parameters
-        ----------
-        measure : str
-            A field of `Measures`.
-        visibility : float
-            V_met [m].
-        demand : float
-            Vehicles that want to enter [1/h].
-
-        Raises
-        ------
-        KeyError
-            If that was not run.
-        """
+        """Values of a measure, seed by seed (n,), by visibility [m] and demand [1/h]."""
         return self.results.over_seeds(Case(self.population, demand, visibility), measure)
 
     def signed(self, measure: str, visibility: float) -> NDArray[np.float64]:
-        """Values under the A16's signs (n,), which only the default drivers have.
-
-        Parameters
-        ----------
-        measure, visibility
-            As in a call.
-
-        Raises
-        ------
-        KeyError
-            If that was not run.
-        """
+        """Values under the A16's signs (n,), which only the default drivers have."""
         population = SIGNED if self.population == DEFAULT else f"{self.population} {SIGNED}"
         return self.results.over_seeds(Case(population, MEDIUM, visibility), measure)
 
     def pair(self, measure: str, leader_speed: float, visibility: float) -> NDArray[np.float64]:
-        """Values of a measure of drivers behind one leader, seed by seed (n,).
-
-        Parameters
-        ----------
-        measure : str
-            A field of `PairMeasures`.
-        leader_speed : float
-            Speed of the leaders [m/s].
-        visibility : float
-            V_met [m].
-
-        Raises
-        ------
-        KeyError
-            If that was not run.
-        """
+        """Values of a measure of drivers behind one leader (n,), by the leader's speed [m/s] and visibility [m]."""
         return self.results.over_seeds(Pair(self.population, leader_speed, visibility), measure)
 
     def kind(self, name: str, measure: str, leader_speed: float, visibility: float) -> NDArray[np.float64]:
-        """Values of a kind of drivers behind one leader (n,), which stand beside the default drivers alone.
-
-        Parameters
-        ----------
-        name : str
-            The kind.
-        measure, leader_speed, visibility
-            As of `pair`.
-
-        Raises
-        ------
-        KeyError
-            If that was not run.
-        """
+        """Values of one type of drivers behind one leader (n,), compared with the default drivers alone."""
         who = name if self.population == DEFAULT else f"{self.population} {name}"
         return self.results.over_seeds(Pair(who, leader_speed, visibility), measure)
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """A published finding.
-
-    Attributes
-    ----------
-    name : str
-        Its key in records.
-    text : str
-        What was found, where.
-    source : str
-        Where it is published.
-    published : Size, Bound or Sign
-        What was found, as far as it can be compared.
-    ours : callable
-        From a `Look` to our values, seed by seed.
-    six : bool
-        Whether it is one of the six sizes that are to be met within 30 %.
-    """
+    """A published finding, and how to get ours, seed by seed; `six` are those to be met within 30 %."""
 
     name: str
     text: str
@@ -243,24 +121,12 @@ class Finding:
     six: bool = False
 
     def values(self, look: Look) -> NDArray[np.float64]:
-        """Ours, seed by seed (n,); none if what it takes was not run.
-
-        Parameters
-        ----------
-        look : Look
-            At a population.
-        """
+        """Ours, seed by seed (n,); none if what it takes was not run."""
         try:
             return self.ours(look)
         except KeyError:
             return np.empty(0)
 
     def verdict(self, value: float) -> Verdict:
-        """Whether a value of ours agrees.
-
-        Parameters
-        ----------
-        value : float
-            NaN if there is none.
-        """
+        """Whether a value of ours agrees; NaN stands for none."""
         return Verdict.UNKNOWN if math.isnan(value) else self.published.verdict(value)

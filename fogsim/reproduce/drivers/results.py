@@ -16,13 +16,7 @@ RESAMPLES = 4000
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """A mean over seeds with its 95 % interval, by bootstrap over seeds.
-
-    Attributes
-    ----------
-    mean, low, high : float
-        NaN where no run gave a value.
-    """
+    """A mean over seeds with its 95 % interval, by bootstrap over seeds; NaN where no run gave a value."""
 
     mean: float
     low: float
@@ -30,13 +24,7 @@ class Interval:
 
 
 def interval(values: NDArray[np.float64]) -> Interval:
-    """Mean over seeds and its interval; runs without a value do not count.
-
-    Parameters
-    ----------
-    values : (n,) float64
-        One for each seed.
-    """
+    """Mean over seeds (n,) and its interval; runs without a value do not count."""
     told = values[np.isfinite(values)]
     if not told.size:
         return Interval(np.nan, np.nan, np.nan)
@@ -47,24 +35,10 @@ def interval(values: NDArray[np.float64]) -> Interval:
 
 @dataclass(frozen=True, slots=True)
 class Results:
-    """All that was measured.
-
-    Attributes
-    ----------
-    runs : mapping of Case to tuple of Measures, and of Pair to tuple of PairMeasures
-        One for each seed, in the same order everywhere.
-    """
+    """Measures of each case and pair, one for each seed in the same order."""
 
     runs: Mapping[Case | Pair, tuple[Measures | PairMeasures, ...]]
 
     def over_seeds(self, case: Case | Pair, measure: str) -> NDArray[np.float64]:
-        """One measure of a case, seed by seed (n,).
-
-        Parameters
-        ----------
-        case : Case or Pair
-            The traffic and its fog.
-        measure : str
-            A field of `Measures`, or of `PairMeasures`.
-        """
+        """One measure of a case, seed by seed (n,)."""
         return np.array([getattr(run, measure) for run in self.runs[case]], np.float64)

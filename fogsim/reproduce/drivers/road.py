@@ -47,32 +47,7 @@ def passed(
     command: Command | None = None,
     events: tuple[Event, ...] = (),
 ) -> list[dict[str, str]]:
-    """Let traffic drive, and tell what the loops saw.
-
-    Parameters
-    ----------
-    overrides : tuple of str
-        What is set in the drivers' scenario.
-    lanes : int
-        Lanes of the road.
-    demand : str
-        SUMO's types and vehicles on route ``r``, after `FIRST_VEHICLE`.
-    visibility : float
-        V_met [m]; ``inf`` in clear air.
-    seed : int
-        Seed of the run.
-    seconds : float
-        For how long they drive [s].
-    command : Command, optional
-        What is in force all the time.
-    events : tuple of Event
-        What is scripted.
-
-    Returns
-    -------
-    list of dict
-        Attributes of SUMO's ``instantOut``, in the order in which it happened.
-    """
+    """Events that the loops record in fog of a visibility [m], by the attributes of SUMO's ``instantOut``."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         setup = replace(_setup(folder, overrides, lanes, demand), events=events)

@@ -29,15 +29,7 @@ _COLUMNS: Mapping[str, tuple[str, float, int]] = {
 
 
 def tables(results: Results, plan: Plan) -> tuple[TitledTable, ...]:
-    """Published findings with ours, then the traffic of every population.
-
-    Parameters
-    ----------
-    results : Results
-        What was measured.
-    plan : Plan
-        What was run.
-    """
+    """Published findings with ours, then the traffic of every population."""
     seeds, populations = f"{len(plan.seeds)} seeds", tuple(plan.populations)
     found = TitledTable(
         f"What is published, and ours ({seeds}, mean [95 % interval])", findings_table(results, populations)
@@ -49,15 +41,7 @@ def tables(results: Results, plan: Plan) -> tuple[TitledTable, ...]:
 
 
 def findings_table(results: Results, populations: Sequence[str]) -> Rows:
-    """Every finding with ours of some populations beside it.
-
-    Parameters
-    ----------
-    results : Results
-        What was measured.
-    populations : sequence of str
-        Whose.
-    """
+    """Every finding next to ours of some populations."""
     heading = ["published", "source", "size", *(cell for name in populations for cell in (name, "agrees"))]
     rows = [tuple(heading)]
     for finding in FINDINGS:
@@ -70,17 +54,7 @@ def findings_table(results: Results, populations: Sequence[str]) -> Rows:
 
 
 def compared(finding: Finding, results: Results, population: str) -> tuple[Interval, Verdict]:
-    """Ours of a population, and whether it agrees.
-
-    Parameters
-    ----------
-    finding : Finding
-        What is published.
-    results : Results
-        What was measured.
-    population : str
-        Whose.
-    """
+    """Ours of a population, and whether it agrees."""
     ours = interval(finding.values(Look(results, population)))
     return ours, finding.verdict(ours.mean)
 
@@ -119,15 +93,7 @@ def _metres(visibility: float) -> str:
 
 
 def records(results: Results, plan: Plan) -> tuple[Mapping[str, Cell], ...]:
-    """Flat records: one for each measure of each case and pair, then one for each finding of each population.
-
-    Parameters
-    ----------
-    results : Results
-        What was measured.
-    plan : Plan
-        What was run.
-    """
+    """Flat records: one for each measure of each case and pair, then one for each finding of each population."""
     described: list[tuple[Case | Pair, dict[str, Cell], tuple[str, ...]]] = [
         *((case, _case_record(case), Measures._fields) for case in plan.cases),
         *((pair, _pair_record(pair), PairMeasures._fields) for pair in plan.pairs),

@@ -82,7 +82,7 @@ class Size:
     fogs: int = 50
 
 
-_QUICK = Size(frames=60, scenes=16)
+_QUICK = Size(frames=60)
 
 
 def reproduce(
@@ -244,7 +244,7 @@ def _drive_rows(records: Sequence[Record]) -> Rows:
 
 
 def drive_cells(records: Sequence[Record], threshold: float) -> list[PaperCell]:
-    """Frames of all drives that are classified right, and the threshold that separates clear frames from foggy ones."""
+    """Frames of all drives that are classified right, and the threshold between clear and foggy frames."""
 
     def right(key: str) -> float:
         wrong = sum(one[key] if one["visibility_m"] is None else one["with_halos"] - one[key] for one in records)

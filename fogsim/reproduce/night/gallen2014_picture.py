@@ -51,7 +51,7 @@ def _draw_scores(axes: Axes, fogs: Records) -> None:
     for key in (key for key in fogs[0] if key.startswith("score_")):
         axes.plot(truth, _column(fogs, key), label=f"{key.removeprefix('score_')} m")
     axes.set(xscale="log", xlabel="true V_met [m]", ylabel="ZNCC", title="Figure 11: scores of six reference frames")
-    axes.legend(fontsize=8, title="V_met of the reference")
+    axes.legend(fontsize=8, title="V_met of the reference", loc="center right")
 
 
 def _draw_estimates(axes: Axes, fogs: Records) -> None:

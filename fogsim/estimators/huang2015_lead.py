@@ -170,8 +170,8 @@ class Huang2015Lead:
             return Estimate.invalid(self.method, str(reason))
         return self._estimate()
 
-    def _range(self, image: Pixels, lead: LeadMeasurement | None) -> tuple[LeadMeasurement, float]:
-        """Range of the vehicle ahead and its standard deviation [m]."""
+    def _range(self, image: Pixels, lead: LeadMeasurement | None) -> tuple[LeadMeasurement, float | None]:
+        """Range of the vehicle ahead, and its standard deviation if it is from the camera [m]."""
         if self._camera_range is not None:
             distance, deviation = self._camera_range.measure(partial(crop_vehicle, image, self._camera))
             return LeadMeasurement(distance, math.nan), deviation
@@ -179,7 +179,7 @@ class Huang2015Lead:
             raise CannotTellError("no vehicle is tracked ahead")
         if math.isnan(lead.distance):
             raise InputError("the distance of a lead measurement must be a number, got NaN")
-        return lead, RANGE_DEVIATION
+        return lead, None
 
     def _miss(self) -> None:
         if self._track.miss():

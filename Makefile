@@ -126,8 +126,8 @@ ci: $(VENV)/.installed-ci ## Everything that .ci/run checks
 	@$(MAKE) portability
 	@$(MAKE) --jobs=2 --output-sync=target browse cluster
 
-tables: $(VENV)/.installed-test ## Measure the docs' tables anew (a day; goes on if interrupted), say what moved; TABLES="belief …"
-	@$(BIN)/python docs/rerun_tables.py $(TABLES)
+tables: $(VENV)/.installed-test ## Measure the docs' tables whose code has changed (resumable); STUDIES=1: policy studies; TABLES="belief …"
+	@$(BIN)/python docs/rerun_tables.py $(TABLES) $(if $(STUDIES),--studies)
 
 clean: ## Remove the environment, results and caches
 	rm -rf $(VENV) runs dist build site .cache .mypy_cache .ruff_cache .pytest_cache

@@ -20,6 +20,8 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
+from docs_table import write_table
+
 from fogsim.errors import InputError
 from fogsim.scenario import build
 from fogsim.testing import collect, find_files
@@ -31,8 +33,6 @@ from fogsim.values.belief import certain_belief
 SOUND = "none: the sound device"
 
 ROOT = Path(__file__).resolve().parent.parent
-DOCS = ROOT / "docs" / "reference" / "tests.md"
-MARK, END = "<!-- table: broken devices -->", "<!-- end of broken devices -->"
 
 
 @dataclass
@@ -307,8 +307,7 @@ def main() -> int:
             records = pool.map(work, asked.devices, chunksize=1)
     print(json.dumps(records) if asked.json else table(records))
     if asked.docs:
-        head, rest = DOCS.read_text(encoding="utf-8").split(MARK)
-        DOCS.write_text(f"{head}{MARK}\n\n{table(records)}\n\n{END}{rest.split(END)[1]}", encoding="utf-8")
+        write_table("reference/tests.md", "broken devices", [table(records)])
     wrong = [one["device"] for one in records if bool(one["failed"]) == (one["device"] == SOUND)]
     for name in wrong:
         print(f"not as it should be: {name}", file=sys.stderr)

@@ -33,6 +33,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from docs_table import write_table
 from estimator_scenes import CAMERAS, Drive, Road, camera, drive, photograph, with_leader, without_leader
 from estimator_tables import BINS, TIMED, Row, records, tables
 from rich.console import Console
@@ -47,9 +48,6 @@ from fogsim.values.scene import USUAL_PAVEMENT
 AIRLIGHT_LEVELS = (120.0, 200.0, 255.0)
 METHODS = ("negru2013", "zhu2015", "huang2015_rough", "joint_road")
 PUBLISHED = ", as published"
-DOCS = Path(__file__).resolve().parent.parent / "docs" / "explanation" / "estimators.md"
-HEADING = "## Accuracy of single frames"
-MARK, END = "<!-- table: accuracy -->", "<!-- end of table -->"
 
 Unit = tuple[int, int]
 """Number of a camera and of an instant: what is measured in one go."""
@@ -165,16 +163,6 @@ def kept(path: Path | None, settings: list[Any]) -> dict[Unit, list[Row]]:
     return {tuple(unit): rows for unit, rows in map(json.loads, lines)}
 
 
-def write_docs(all_records: list[Row]) -> None:
-    """Put the tables into the docs, under what this file says of them."""
-    text = DOCS.read_text(encoding="utf-8")
-    before, rest = text.split(HEADING, 1)
-    after = rest.split(END, 1)[1]
-    told = "\n\n".join((__doc__ or "").split("\n\n")[1:3])
-    section = f"{HEADING}\n\n{told} Written by\n`python benchmarks/estimator_accuracy.py --docs`.\n\n{MARK}\n\n"
-    DOCS.write_text(f"{before}{section}{tables(all_records)}\n\n{END}{after}", encoding="utf-8")
-
-
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -193,7 +181,7 @@ def main() -> None:
     arguments = parser.parse_args()
     found = list(records(measure(arguments)))
     if arguments.docs:
-        write_docs(found)
+        write_table("explanation/estimators.md", "accuracy", [tables(found)])
     print(json.dumps(found, indent=2) if arguments.json else tables(found))
 
 

@@ -24,14 +24,11 @@ import json
 import sys
 from pathlib import Path
 
+from docs_table import write_table
 from rich.console import Console
 from rich.progress import track
 from target_pictures import KINDS, Row, measure_unit
 from target_tables import records, table
-
-DOCS = Path(__file__).resolve().parent.parent / "docs" / "explanation" / "estimators.md"
-HEADING = "## Targets"
-MARK, END = "<!-- table: targets -->", "<!-- end of targets -->"
 
 Unit = tuple[str, int]
 """Kind of a drawing, and its number."""
@@ -65,16 +62,6 @@ def kept(path: Path | None, seed: int) -> dict[Unit, list[Row]]:
     return {(kind, number): rows for (kind, number), rows in map(json.loads, lines)}
 
 
-def write_docs(shown: str) -> None:
-    """Put the table into the docs, under what this file says of it."""
-    text = DOCS.read_text(encoding="utf-8")
-    before, rest = text.split(HEADING, 1)
-    after = rest.split(END, 1)[1]
-    told = "\n\n".join((__doc__ or "").split("\n\n")[1:3])
-    section = f"{HEADING}\n\n{told} Written by\n`python benchmarks/estimator_targets.py --docs`.\n\n{MARK}\n\n"
-    DOCS.write_text(f"{before}{section}{shown}\n\n{END}{after}", encoding="utf-8")
-
-
 def some(text: str) -> int:
     """A whole number of at least 1."""
     if (number := int(text)) < 1:
@@ -94,7 +81,7 @@ def main() -> None:
     rows = measure(arguments.images, arguments.seed, arguments.keep)
     found = list(records(rows, ["--images", str(arguments.images), "--seed", str(arguments.seed)]))
     if arguments.docs:
-        write_docs(table(found))
+        write_table("explanation/estimators.md", "targets", [table(found)])
     print(json.dumps(found, indent=2) if arguments.json else table(found))
 
 

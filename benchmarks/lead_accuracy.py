@@ -19,10 +19,10 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from docs_table import write_table
 
 from fogsim.calibration.staged_road import StagedVehicle, road_renderer
 from fogsim.estimators import make
@@ -67,8 +67,6 @@ SETBACK = 1.7
 """From the own bumper, where ranges begin, back to the camera [m]."""
 
 MIDDLING = (50.0, 300.0)
-DOCS = Path(__file__).resolve().parent.parent / "docs" / "explanation" / "estimators.md"
-MARK, END = "<!-- table: lead accuracy -->", "<!-- end of lead accuracy -->"
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,14 +202,11 @@ def table(records: list[dict[str, Any]]) -> str:
 
 
 def write_docs(records: list[dict[str, Any]]) -> None:
-    """Put the tables into the docs: of all visibilities, then of what else changes."""
-    text = DOCS.read_text(encoding="utf-8")
-    before, rest = text.split(MARK, 1)
-    after = rest.split(END, 1)[1]
+    """Write the docs' tables: one by visibility, and one by what else changes."""
     parts = ("airlight", "camera", "vehicle")
     whole = [{k: v for k, v in r.items() if k not in parts} for r in records if all(r[p] == "all" for p in parts)]
     apart = [r for r in records if any(r[p] != "all" for p in parts) and "published" not in r["method"]]
-    DOCS.write_text(f"{before}{MARK}\n\n{table(whole)}\n\n{table(apart)}\n\n{END}{after}", encoding="utf-8")
+    write_table("explanation/estimators.md", "lead accuracy", [table(whole), "", table(apart)])
 
 
 def main() -> None:

@@ -16,10 +16,10 @@ import json
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from docs_table import lines_of, write_table
 
 from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.calibration.staged_night import SETBACK, NightRoad, NightScene
@@ -141,22 +141,16 @@ def main() -> None:
     if asked.json:
         print(json.dumps([*records, {"ms_1280x800": times}], indent=2))
     if asked.docs:
-        write_table(records, times)
+        write_docs(records, times)
 
 
-def write_table(records: list[dict[str, Any]], times: dict[str, float]) -> None:
-    """Put the table into docs/explanation/night.md."""
-    page = Path(__file__).parents[1] / "docs" / "explanation" / "night.md"
-    head, body, end = "<!-- table: night-estimators -->\n", [], "<!-- end of table -->"
-    keys = ("method", "variant", "median_pct", "p95_pct", "bands", "coverage", "clear", "valid")
-    body += ["| method | not as taken | median error [%] | p95 [%] | in bands | coverage | clear is clear | valid |"]
-    body += ["|" + " --- |" * len(keys)]
-    body += ["| " + " | ".join("–" if one[key] is None else str(one[key]) for key in keys) + " |" for one in records]
-    text = page.read_text(encoding="utf-8")
-    start = text.index(head) + len(head)
-    stop = text.index(end, start)
-    told = f"\nA picture of 1280×800 pixels takes {times['night_road']} and {times['gallen2014_veil']} ms.\n\n"
-    page.write_text(text[:start] + "\n" + "\n".join(body) + "\n" + told + text[stop:], encoding="utf-8")
+def write_docs(records: list[dict[str, Any]], times: dict[str, float]) -> None:
+    """Write the table of docs/explanation/night.md."""
+    columns = {"method": "method", "variant": "not as taken", "median_pct": "median error [%]", "p95_pct": "p95 [%]"}
+    columns |= {"bands": "in bands", "coverage": "coverage", "clear": "clear is clear", "valid": "valid"}
+    rows = [["–" if one[key] is None else str(one[key]) for key in columns] for one in records]
+    cost = f"A picture of 1280×800 pixels takes {times['night_road']} and {times['gallen2014_veil']} ms."
+    write_table("explanation/night.md", "night-estimators", [*lines_of([*columns.values()], rows), "", cost])
 
 
 if __name__ == "__main__":

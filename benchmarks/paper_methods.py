@@ -67,8 +67,8 @@ def _judged(errors: Errors, bounds: list[bool]) -> dict[str, Any]:
 
 def docs_table(found: list[dict[str, Any]]) -> list[str]:
     """Lines of the table of docs/explanation/estimators.md."""
-    heads = ("method", "scenario", "frames", "valid, %", "median/p95, %", "90 % intervals hold, %")
-    heads += ("bound alone, %", "bounds hold, %")
+    heads = ["method", "scenario", "frames", "valid, %", "median/p95, %", "90 % intervals hold, %"]
+    heads += ["bound alone, %", "bounds hold, %"]
     lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     for one in found:
         error = "–"

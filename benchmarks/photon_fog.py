@@ -12,19 +12,14 @@ Constants were chosen on pool 0, whose drives are others; pool 1 is what is repo
 
 import argparse
 import json
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from docs_table import lines_of, write_table
 from rich.console import Console
 from rich.progress import track
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "docs"))
-
-from make_tables import filled
 
 from fogsim.atmosphere import Droplets
 from fogsim.calibration.staged_road import road_renderer
@@ -33,7 +28,6 @@ from fogsim.reproduce.airlight.evaluation import EVEN_AIRLIGHT, Case, drive_alon
 from fogsim.reproduce.road_sweeps import CAMERA
 from fogsim.values import Estimate
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "explanation" / "airlight.md"
 ALBEDOS = (0.05, 0.1, 0.2, 0.4, 0.8)
 ALL_ALBEDOS = f"{ALBEDOS[0]:g} … {ALBEDOS[-1]:g}"
 VISIBILITIES = (50.0, 100.0, 150.0, 200.0, 300.0)
@@ -110,8 +104,7 @@ def write_docs(rows: list[dict[str, Any]]) -> None:
         cells = [told[method] for method in METHODS]
         texts = (f"{c['median_pct']}/{c['p95_pct']} ({c['held']}; {c['told']})" if c["told"] else "—" for c in cells)
         table.append((fog, albedo or "", *texts))
-    text = filled(PAGE.read_text(encoding="utf-8"), "mended", ("fog", "albedo", *METHODS), table)
-    PAGE.write_text(text, encoding="utf-8")
+    write_table("explanation/airlight.md", "mended", lines_of(("fog", "albedo", *METHODS), table))
 
 
 def main() -> None:

@@ -15,10 +15,10 @@ import inspect
 import json
 import math
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from docs_table import write_table
 
 import fogsim
 from fogsim.estimators import ESTIMATORS
@@ -58,9 +58,6 @@ PARAMETERS = {method: inspect.signature(ESTIMATORS[method]).parameters for metho
 
 SETTLED = 1.0
 """How much of a fault is not counted yet [s]."""
-
-DOCS = Path(__file__).resolve().parent.parent / "docs" / "reference" / "sensors.md"
-MARK, END = "<!-- table: sensor faults -->", "<!-- end of sensor faults -->"
 
 
 def steps(name: str, seed: int, asked: argparse.Namespace) -> Iterator[Step]:
@@ -162,9 +159,7 @@ def main() -> None:
     asked = parser.parse_args()
     records = [one for name in asked.faults for one in measure(name, asked)]
     if asked.docs:
-        before, rest = DOCS.read_text(encoding="utf-8").split(MARK, 1)
-        text = f"{before}{MARK}\n\n{table(records)}\n\n{END}{rest.split(END, 1)[1]}"
-        DOCS.write_text(text, encoding="utf-8")
+        write_table("reference/sensors.md", "sensor faults", [table(records)])
     print(json.dumps(records, indent=2) if asked.json else table(records))
 
 

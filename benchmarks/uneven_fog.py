@@ -12,7 +12,7 @@ The drives in clear air (V_met 2000 m and more; `--clear` minutes of them) count
 
 Constants were chosen on pool 0 (other seeds, visibilities and camera); pool 1 is what is reported.
 
-    python benchmarks/uneven_fog.py [--json] [--pool 1] [--methods joint_road …] [--clear 60] [--only bank] [--docs]
+    python benchmarks/uneven_fog.py [--json] [--pool 1] [--methods joint_road …] [--clear 75] [--only bank] [--docs]
 """
 
 import argparse
@@ -20,10 +20,10 @@ import json
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from docs_table import write_table
 from rich.console import Console
 from rich.progress import track
 
@@ -44,8 +44,8 @@ CAMERAS = (
     ("camera.width=640", "camera.height=480"),
     ("camera.width=800", "camera.height=600", "camera.field_of_view_deg=50", "camera.response=linear"),
 )
+METHODS = ("joint_road", "negru2013", "zhu2015", "huang2015_rough", "lead_contrast")
 CLEAR_ROADS = ("motorway_fog_bank", "graded_motorway", "clear_day", "ramp_merge")
-DOCS = Path(__file__).resolve().parents[1] / "docs" / "explanation" / "estimators.md"
 Row = dict[str, Any]
 
 
@@ -216,23 +216,14 @@ def table(rows: list[Row]) -> Iterator[str]:
             yield f"\nIn {row['hours']:.2f} h of clear air: {row['false_announcements']} false announcements."
 
 
-def write_docs(rows: list[Row]) -> None:
-    """Write the table into docs/explanation/estimators.md."""
-    text = DOCS.read_text(encoding="utf-8")
-    head, rest = text.split("<!-- table: uneven fog -->\n")
-    _, tail = rest.split("<!-- end of uneven fog -->")
-    body = "\n".join(table(rows))
-    DOCS.write_text(f"{head}<!-- table: uneven fog -->\n\n{body}\n\n<!-- end of uneven fog -->{tail}", encoding="utf-8")
-
-
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
     parser.add_argument("--docs", action="store_true", help="write the table of docs/explanation/estimators.md")
     parser.add_argument("--pool", type=int, choices=(0, 1), default=1, help="0: constants chosen on it")
-    parser.add_argument("--methods", nargs="+", default=["joint_road"], help="names of estimators")
-    parser.add_argument("--clear", type=float, default=60.0, help="minutes of driving in clear air")
+    parser.add_argument("--methods", nargs="+", default=METHODS, help="names of estimators")
+    parser.add_argument("--clear", type=float, default=75.0, help="minutes of driving in clear air")
     parser.add_argument("--only", help="only kinds of fog whose name begins so")
     arguments = parser.parse_args()
     plan = [*drives(arguments.pool), *clear_drives(arguments.pool, arguments.clear)]
@@ -242,7 +233,7 @@ def main() -> None:
         run(drive, arguments.methods, found)
     rows = list(records(found, arguments.pool))
     if arguments.docs:
-        write_docs(rows)
+        write_table("explanation/estimators.md", "uneven fog", table(rows))
     if arguments.json:
         print(json.dumps(rows, indent=2))
     else:

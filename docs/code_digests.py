@@ -1,9 +1,9 @@
-"""Which files the figures of a script rest on, with digests that comments and docstrings do not change.
+"""Which files the figures of a script depend on, with digests that comments and docstrings do not change.
 
-They are the modules of this repository that a script imports, and those that these import, also within functions; the
-files of data beside them; the shipped scenarios that they name. What runs is less, since modules import what they may
-need: where digests have changed figures may have moved, and where none has they have not. Imports of scripts in docs/
-are not followed, since these write tables of many kinds.
+They are the modules of this repository that a script imports, directly or not, also within functions; the data files
+next to them; and the shipped scenarios that they name. Less than that runs, since modules import what they may need:
+where digests have changed, figures may have moved; where none has, they have not. Scripts in docs/ count only
+where a measurement names them, and their imports are not followed, since these write tables of many kinds.
 """
 
 import ast
@@ -17,24 +17,16 @@ from pathlib import Path
 SOURCES = (
     ("fogsim", "fogsim"),
     ("envs/fogsim_envs", "fogsim_envs"),
-    *((folder, "") for folder in ("benchmarks", "docs", "tests/pictures", "tests/data", "tools")),
+    *((folder, "") for folder in ("benchmarks", "tests/pictures", "tests/data", "tools")),
 )
-"""Folders in which imports are looked for, with the package that they are, if any."""
+"""Folders in which imports are searched, each with the name of its package, if it is one."""
 
 DATA = {".csv", ".frag", ".json", ".npz", ".sumocfg", ".vert", ".xml", ".yaml"}
-"""Endings of files beside the code that results rest on."""
+"""Suffixes of the data files that results depend on."""
 
 
 class Checkout:
-    """Files of a checkout: what each imports, and its digest.
-
-    Parameters
-    ----------
-    root : Path
-        Of the checkout.
-    memory : Path, optional
-        File that remembers what was found in files of the same content: parsing all takes seconds.
-    """
+    """Imports and digests of a checkout's files; `memory` caches them, since parsing all takes seconds."""
 
     def __init__(self, root: Path, memory: Path | None = None) -> None:
         self.root, self._memory = root, memory
@@ -44,7 +36,7 @@ class Checkout:
         self._remembered = len(self._known)
 
     def files(self, entries: Iterable[str]) -> dict[str, str]:
-        """Digests of what scripts, data and folders rest on, by path; an entry that is not there is left out."""
+        """Digests of the files that scripts, data and folders depend on, by path; missing entries are left out."""
         to_do, found = [path for entry in entries for path in self._expanded(entry)], {}
         while to_do:
             path = to_do.pop()
@@ -58,7 +50,7 @@ class Checkout:
         return dict(sorted(found.items()))
 
     def changed(self, files: dict[str, str]) -> list[str]:
-        """Those of some files whose digests are others now, or that are gone."""
+        """The files whose digests have changed, or that are gone."""
         paths = [path for path, digest in files.items() if (self._look(path) or ("",))[0] != digest]
         self._remember()
         return paths
@@ -69,7 +61,7 @@ class Checkout:
         yield from (one.relative_to(self.root).as_posix() for one in inside if one.is_file())
 
     def _beside(self, path: str) -> Iterator[str]:
-        """Data in the folder of a module of a package, and in those below that are no packages."""
+        """Data in the folder of a package's module, and in subfolders that are not packages."""
         folder = (self.root / path).parent
         if path.endswith(".py") and (folder / "__init__.py").exists():
             for one in folder.iterdir():
@@ -77,7 +69,7 @@ class Checkout:
                     yield from self._expanded(one.relative_to(self.root).as_posix())
 
     def _named(self, name: str, by: str) -> Iterator[str]:
-        """Files of a module, of the packages that it is in, or of a shipped scenario: the package itself names none."""
+        """Files of a module, of its parent packages, or of a shipped scenario, which `fogsim` itself does not name."""
         if name in self._scenarios and (not by.startswith("fogsim/") or by.startswith("fogsim/reproduce/")):
             yield from self._expanded(name.replace(".", "/"))
         parts = self._lazy.get(name, name).split(".")
@@ -101,7 +93,7 @@ class Checkout:
 
     @cached_property
     def _lazy(self) -> dict[str, str]:
-        """Modules of the names that `fogsim` imports when they are asked for."""
+        """Modules of the names that `fogsim` imports on first use."""
         file = self.root / "fogsim" / "__init__.py"
         nodes = ast.walk(ast.parse(file.read_text(encoding="utf-8"))) if file.exists() else ()
         found = [node for node in nodes if isinstance(node, ast.ImportFrom)]
@@ -134,10 +126,7 @@ class Checkout:
 
 
 def flat(tree: ast.AST) -> str:
-    """A syntax tree as text, without texts that nothing reads, and the same from every version of Python.
-
-    Later versions have fields that earlier ones lack; those are empty where both can read the code.
-    """
+    """A syntax tree as text, the same from every version of Python, without docstrings and empty fields."""
     parts, to_do = [], [tree]
     while to_do:
         node = to_do.pop()
@@ -159,7 +148,7 @@ def _unread(node: object) -> bool:
 
 
 def imported(tree: ast.AST) -> Iterator[str]:
-    """Names of modules that code imports or has in texts, ``fogsim.NAME``, and words that may name a scenario."""
+    """Names of modules that code imports or names in strings, ``fogsim.NAME``, and words that may name a scenario."""
     to_do = [tree]
     while to_do:
         node = to_do.pop()

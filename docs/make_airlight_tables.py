@@ -1,7 +1,7 @@
 """Fill the tables of docs/explanation/airlight.md: ``python docs/make_airlight_tables.py [RECORDS]``.
 
-RECORDS is what ``fogsim reproduce airlight --json --out docs/pictures`` prints; without it only the table of photon
-counts between trees and under clouds is filled, from what ``benchmarks/monte_carlo.py surroundings`` wrote.
+RECORDS is what ``fogsim reproduce airlight --json --out docs/pictures`` prints. Without it only the table of photon
+counts between trees and under clouds is written, from the counts that ``benchmarks/monte_carlo.py surroundings`` wrote.
 """
 
 import csv
@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from make_tables import filled
+from page_tables import lines_of, write_table
 
 PAGE = Path(__file__).parent / "explanation" / "airlight.md"
 COUNTS = Path(__file__).parents[1] / "tests" / "data" / "monte_carlo_surroundings.csv"
@@ -63,20 +63,18 @@ def cell(record: Record) -> str:
 
 
 def main() -> None:
-    """Write the page anew."""
-    text = filled(PAGE.read_text(encoding="utf-8"), "surroundings", *surroundings())
+    """Write the tables."""
     if len(sys.argv) < 2:
-        PAGE.write_text(text, encoding="utf-8")
+        write_table(PAGE, "surroundings", lines_of(*surroundings()))
         return
     lines = Path(sys.argv[1]).read_text(encoding="utf-8").splitlines()
     records = [json.loads(line) for line in lines]
     for marker, lands in (("lands", True), ("conditions", False)):
-        text = filled(text, marker, *by_elevation(records, lands=lands))
+        write_table(PAGE, marker, lines_of(*by_elevation(records, lands=lands)))
     for marker, height in (("car", 1.3), ("lorry", 2.5)):
         visibilities = dict.fromkeys(one["visibility_m"] for one in records if "visibility_m" in one)
         headings = ("method", "fog", *(f"{visibility:.0f} m" for visibility in visibilities))
-        text = filled(text, marker, headings, list(read(records, height)))
-    PAGE.write_text(text, encoding="utf-8")
+        write_table(PAGE, marker, lines_of(headings, read(records, height)))
 
 
 if __name__ == "__main__":

@@ -11,15 +11,15 @@ Half an hour for all. ``--agent NAME=FILE`` adds a row for an agent of Stable-Ba
 import argparse
 import json
 import math
-import re
 import subprocess
 import sys
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from page_tables import ROOT, lines_of, write_table
 
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Lamp
@@ -28,7 +28,6 @@ from fogsim_envs.baselines import BASELINES
 from fogsim_envs.evaluation import bootstrap_interval
 from fogsim_envs.spaces import action_of
 
-PAGE = Path(__file__).parent / "reference" / "environments.md"
 DISCOUNTS = (1.0, 0.99)
 DENSITIES = {300.0: "300 vehicles/h", 2100.0: "2100 vehicles/h"}
 CORRIDOR_TERMS = ("delay", "overdriving", "conflict", "collision")
@@ -101,7 +100,7 @@ def corridor_rows(episodes: int) -> list[str]:
 def _measured(benchmark: str, episodes: int) -> list[dict[str, Any]]:
     command = [sys.executable, f"benchmarks/{benchmark}.py", "--json", "--episodes", str(episodes)]
     done = subprocess.run(  # noqa: S603 - our own program
-        command, cwd=PAGE.parent.parent, capture_output=True, text=True, check=True
+        command, cwd=ROOT, capture_output=True, text=True, check=True
     )
     return list(json.loads(done.stdout))
 
@@ -130,16 +129,9 @@ def _surrogate_cells(record: dict[str, Any]) -> list[str]:
     ]
 
 
-def table(text: str, name: str, header: list[str], body: list[str]) -> str:
-    """The page's text with a table put in."""
-    lines = ["| " + " | ".join(header) + " |", "|" + " --- |" * len(header), *body]
-    pattern = rf"(<!-- table: {re.escape(name)} -->\n).*?(\n<!-- end of table -->)"
-    new, count = re.subn(
-        pattern, lambda found: found[1] + "\n" + "\n".join(lines) + "\n" + found[2], text, flags=re.DOTALL
-    )
-    if count != 1:
-        raise SystemExit(f"docs/reference/environments.md has {count} places for the table {name!r}")
-    return new
+def write(name: str, headings: Sequence[str], body: Iterable[str]) -> None:
+    """Put a table into the page."""
+    write_table("reference/environments.md", name, [*lines_of(headings, ()), *body])
 
 
 def main() -> None:
@@ -164,20 +156,18 @@ def main() -> None:
         "rear lamp",
         "duration",
     ]
-    text = PAGE.read_text(encoding="utf-8")
     for env_id in asked.ids:
-        text = table(text, f"returns {env_id}", header, rows(env_id, asked.episodes, agents))
+        write(f"returns {env_id}", header, rows(env_id, asked.episodes, agents))
     if asked.density:
         fast = "fogsim/FogAdvisoryFast-v1"
-        text = table(text, "densities", ["policy", *DENSITIES.values()], density_rows(fast, asked.episodes))
+        write("densities", ["policy", *DENSITIES.values()], density_rows(fast, asked.episodes))
     if asked.surrogate:
         ratio = "median k / true k: real / drawn"
         header = ["light", "visibility ahead", "estimates", "valid: real / drawn", ratio, "KS distance"]
-        text = table(text, "surrogate", header, surrogate_rows(asked.episodes))
+        write("surrogate", header, surrogate_rows(asked.episodes))
     if asked.corridor:
         header = ["policy", "return", "gain over dark signs", "episodes with collisions", *CORRIDOR_TERMS]
-        text = table(text, "returns fogsim/FogCorridor-v1", header, corridor_rows(asked.episodes))
-    PAGE.write_text(text, encoding="utf-8")
+        write("returns fogsim/FogCorridor-v1", header, corridor_rows(asked.episodes))
 
 
 def _loaded(path: str) -> Any:

@@ -1,9 +1,7 @@
 """Write those tables of the docs that are measured: ``python docs/make_measured_tables.py [--check] [NAME …]``.
 
-Without names all of them (minutes, for zhu2015 and drivers). ``--check`` writes nothing and says which are out of date;
-the last digit may differ by one, as rounding on another processor may. Three benchmarks write their own tables:
-``python benchmarks/estimator_accuracy.py --docs``, ``estimator_targets.py``, ``lead_accuracy.py``. The page on
-performance has an excerpt of the first, so write it after that. ``make tables`` does all of it in order.
+Without names it writes all of them (minutes, for zhu2015 and drivers). ``--check`` writes nothing and lists those that
+are out of date; the last digit may differ by one, as rounding on another processor may.
 """
 
 import argparse
@@ -12,13 +10,11 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from make_tables import END, HERE, filled
-from page_tables import same
+from page_tables import ROOT, block, filled, lines_of, same, write_table
 
-ROOT = HERE.parent
 sys.path.insert(0, str(ROOT / "benchmarks"))
 
-import night_deviations  # noqa: E402 - from the folder that was just named
+import night_deviations
 
 if TYPE_CHECKING:
     from fogsim.reproduce import Reproduction
@@ -35,7 +31,7 @@ EXCERPT = {
 
 def excerpt() -> Rows:
     """Errors of some methods with an untold vehicle ahead, as the page on estimators has them, to two digits."""
-    page = (HERE / "explanation" / "estimators.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "explanation" / "estimators.md").read_text(encoding="utf-8")
     table = page.split("<!-- table: accuracy -->", 1)[1].split("\n\n")[2].splitlines()
     heading, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table]
     found = {row[0]: row[2:] for row in rows if row[1] == "untold"}
@@ -114,11 +110,6 @@ def chosen(names: list[str]) -> list[str]:
     return [known for known in TABLES if not names or any(known.startswith(name) for name in names)]
 
 
-def kept_table(text: str, marker: str) -> str:
-    """The table that a page has."""
-    return text.split(f"<!-- table: {marker} -->", 1)[1].split(END, 1)[0]
-
-
 def main() -> int:
     """Write the tables, or say which are not up to date."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -130,12 +121,11 @@ def main() -> int:
         page, measured = TABLES[name]
         path = ROOT / page
         heading, *rows = measured()
-        text = path.read_text(encoding="utf-8")
-        new = filled(text, name, heading, rows)
-        if not same(kept_table(text, name), kept_table(new, name)):
+        lines, text = lines_of(heading, rows), path.read_text(encoding="utf-8")
+        if not same(block(text, name), block(filled(text, name, lines), name)):
             stale.append(f"{page}: the table {name} is not up to date: run python docs/make_measured_tables.py {name}")
             if not arguments.check:
-                path.write_text(new, encoding="utf-8")
+                write_table(path, name, lines)
     if arguments.check and stale:
         print("\n".join(stale))  # noqa: T201 - the lines are the result
     return int(bool(arguments.check and stale))

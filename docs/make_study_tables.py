@@ -13,10 +13,11 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from make_tables import HERE, filled
+from page_tables import ROOT, filled, lines_of, write_table
 
-PAGE = HERE / "benchmarks" / "policies.md"
-PAGES = {"lighting_policies": HERE.parent / "scenarios" / "rural_night_fog" / "README.md"}
+DOCS = ROOT / "docs"
+PAGE = DOCS / "benchmarks" / "policies.md"
+PAGES = {"lighting_policies": ROOT / "scenarios" / "rural_night_fog" / "README.md"}
 """Pages of studies whose tables are not in docs/benchmarks/policies.md."""
 
 Cells = tuple[str, ...]
@@ -28,23 +29,25 @@ Column = tuple[str, str, float, int]
 
 SPEED: Column = ("traffic_mean_speed_mps", "mean speed [km/h]", 3.6, 1)
 SPREAD: Column = ("traffic_speed_standard_deviation_mps", "its sd [km/h]", 3.6, 1)
-DELAY: Column = ("traffic_delay_s_per_vehicle_km", "delay [s/km]", 1.0, 1)
-OVERDRIVING: Column = ("traffic_overdriving_time_share", "overdriving [% of time in fog]", 100.0, 0)
-CONFLICTS: Column = ("traffic_conflicts_per_vehicle_h", "conflicts [1/h]", 1.0, 2)
-BRAKING: Column = ("traffic_hard_braking_time_share", "hard braking [% of time]", 100.0, 2)
-COLLISIONS: Column = ("collisions", "collisions a run", 1.0, 2)
-EGO: Column = ("negative_margin_time_share", "ego too fast for its sight [% of time]", 100.0, 0)
+OVERDRIVEN: Column = ("traffic_overdriven_m_per_vehicle_km_in_fog", "overdriven in fog [m per vehicle-km]", 1.0, 0)
+MARGIN: Column = ("traffic_sight_margin_by_distance_m", "sight margin in fog, by distance [m]", 1.0, 0)
+CONFLICTS: Column = ("traffic_conflicts_per_cohort_vehicle", "conflicts per 100 vehicles", 100.0, 1)
+COLLISIONS: Column = ("traffic_collisions_per_cohort_vehicle", "collisions per 100 vehicles", 100.0, 1)
+DELAY: Column = ("traffic_delay_s_per_cohort_vehicle", "delay [s per vehicle]", 1.0, 0)
+SIGNS = (SPEED, DELAY, OVERDRIVEN, MARGIN, CONFLICTS, COLLISIONS)
+EGO: Column = ("overdriven_m_per_km_in_fog", "overdriven by the ego [m per km in fog]", 1.0, 0)
+CLOSEST: Column = ("minimum_time_to_collision_s", "least time to collision of the ego [s]", 1.0, 1)
 
 COLUMNS: Mapping[str, Sequence[Column]] = {
-    "motorway_policies": (SPEED, DELAY, OVERDRIVING, CONFLICTS, BRAKING, COLLISIONS, EGO),
-    "motorway_compliance": (SPEED, DELAY, OVERDRIVING, CONFLICTS, BRAKING, COLLISIONS),
+    "message_sign": SIGNS,
+    "motorway_policies": SIGNS,
     "estimators_in_the_loop": (
         ("belief_median_error_percent", "error of the belief [%]", 1.0, 1),
         ("mean_advised_speed_mps", "speed advised [km/h]", 3.6, 1),
         ("advised_time_share", "advised [% of time]", 100.0, 0),
         EGO,
-        OVERDRIVING,
-        COLLISIONS,
+        OVERDRIVEN,
+        ("collisions", "collisions a run", 1.0, 2),
     ),
     "who_tells_of_the_bank": (
         ("equipped_vehicles_mean", "other cameras near", 1.0, 1),
@@ -52,22 +55,15 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
         ("belief_200_m_ahead_median_error_percent", "belief 200 m ahead: error [%]", 1.0, 0),
         ("belief_200_m_ahead_coverage_share", "held [%]", 100.0, 0),
         EGO,
-        OVERDRIVING,
-        ("max_deceleration_mps2", "hardest braking [m/s²]", 1.0, 1),
+        OVERDRIVEN,
+        CLOSEST,
     ),
     "which_sensor": (
         ("dense_fog_known_before_m", "bank known before it [m]", 1.0, 0),
         ("advised_time_share", "advised [% of time]", 100.0, 0),
         ("mean_speed_mps", "speed of the ego [km/h]", 3.6, 0),
         EGO,
-        ("max_deceleration_mps2", "hardest braking [m/s²]", 1.0, 1),
-        COLLISIONS,
-    ),
-    "belief_over_places": (
-        ("belief_median_error_percent", "error here and now [%]", 1.0, 1),
-        ("belief_coverage_share", "held [%]", 100.0, 0),
-        ("dense_fog_known_before_m", "bank known before it [m]", 1.0, 0),
-        EGO,
+        CLOSEST,
         ("ego_collisions", "collisions of the ego a run", 1.0, 2),
     ),
     "lighting_policies": (
@@ -79,12 +75,12 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
         ("ego_collisions", "hits the dark car [% of runs]", 100.0, 0),
         ("ego_max_impact_speed_mps", "impact [km/h]", 3.6, 0),
     ),
-    "field_sizes": (SPEED, SPREAD, OVERDRIVING, CONFLICTS, ("traffic_collisions", "collisions a run", 1.0, 2)),
+    "field_sizes": (SPEED, SPREAD, OVERDRIVEN, MARGIN, ("traffic_collisions", "collisions a run", 1.0, 2)),
 }
 """Of each study: metrics, what the column is called, the factor to its unit, and digits after the point."""
 
 FIGURES: Mapping[str, Sequence[str]] = {
-    "motorway_policies": ("trade_off_traffic_conflicts_per_vehicle_km", "speed_over_road"),
+    "message_sign": ("trade_off_traffic_conflicts_per_cohort_vehicle", "speed_over_road"),
 }
 """Figures of a study's report that the page shows."""
 
@@ -133,15 +129,14 @@ def main() -> int:
             parser.error(f"no study of the docs is called {folder.name!r}; there are {', '.join(COLUMNS)}")
         heading, *rows = table(folder, COLUMNS[folder.name])
         page = PAGES.get(folder.name, PAGE)
-        text = page.read_text(encoding="utf-8")
-        new = filled(text, folder.name, heading, rows)
-        if new != text and arguments.check:
+        text, lines = page.read_text(encoding="utf-8"), lines_of(heading, rows)
+        if arguments.check and filled(text, folder.name, lines) != text:
             stale = True
             print(f"{page.name}: {folder.name} is not up to date")  # noqa: T201 - the line is the result
         elif not arguments.check:
-            page.write_text(new, encoding="utf-8")
+            write_table(page, folder.name, lines)
             for name in FIGURES.get(folder.name, ()):
-                shutil.copy(folder / "figures" / f"{name}.svg", HERE / "pictures" / f"{folder.name}_{name}.svg")
+                shutil.copy(folder / "figures" / f"{name}.svg", DOCS / "pictures" / f"{folder.name}_{name}.svg")
     return int(stale)
 
 

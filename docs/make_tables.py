@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
+from page_tables import filled, lines_of
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
@@ -23,7 +24,7 @@ from fogsim.estimators.zhu2015_road import Zhu2015Repair
 from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.lighting.legal import LAWS
-from fogsim.metrics import RunMetrics
+from fogsim.metrics import metric_definitions
 from fogsim.openscenario.actions import ACTIONS, LAMPS
 from fogsim.openscenario.entities import CLASSES
 from fogsim.openscenario.findings import ATTRIBUTES_PASSED_OVER, PASSED_OVER
@@ -42,7 +43,6 @@ from fogsim.traffic import COMPLIANCES, FOLLOWING_MODELS, SPEED_CHOICES
 from fogsim.traffic.drivers.following import OBSERVED_MIXTURE
 
 HERE = Path(__file__).resolve().parent
-END = "<!-- end of table -->"
 
 
 def scenario_keys(model: type[BaseModel] = Scenario, prefix: str = "") -> list[tuple[str, ...]]:
@@ -150,7 +150,14 @@ def event_columns() -> list[tuple[str, ...]]:
 
 def metrics() -> list[tuple[str, ...]]:
     """Keys of metrics.json."""
-    return [(f"`{key}`", meaning) for key, meaning in RunMetrics().summary().meanings.items()]
+    ranks = {"lower": "lower is better", "higher": "higher is better", None: "–"}
+    return [
+        (
+            *(f"`{key}`", one.meaning.replace("|", "\\|"), one.numerator or "–", one.denominator),
+            *("yes" if one.denominator_moves else "no", ranks[one.better]),
+        )
+        for key, one in metric_definitions().items()
+    ]
 
 
 def signals() -> list[tuple[str, ...]]:
@@ -301,7 +308,9 @@ TABLES = {
         "signals": (("signal", "unit or kind", "meaning", "needs"), signals),
     },
     "explanation/night.md": {"laws": (("rules", "what", "from, up to [m]", "source"), laws)},
-    "reference/metrics.md": {"metrics": (("key", "meaning"), metrics)},
+    "reference/metrics.md": {
+        "metrics": (("key", "meaning", "numerator", "denominator", "a policy moves it", "ranks policies"), metrics)
+    },
     "reference/results.md": {
         "columns": (("column", "type", "meaning"), columns),
         "traffic_columns": (("column", "type", "meaning"), traffic_columns),
@@ -312,28 +321,13 @@ TABLES = {
 """Tables by file and marker, with their headings and rows."""
 
 
-def filled(text: str, marker: str, headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
-    """Text with the table between a marker and the next end put in anew."""
-    begin = f"<!-- table: {marker} -->"
-    before, rest = text.split(begin, 1)
-    after = rest.split(END, 1)[1]
-    lines = [headings, tuple("---" for _ in headings), *rows]
-    table = "\n".join("| " + " | ".join(map(_cell, cells)) + " |" for cells in lines)
-    return f"{before}{begin}\n\n{table}\n\n{END}{after}"
-
-
-def _cell(text: str) -> str:
-    """Text that stays in one cell: in one line, with no pipe that would part it."""
-    return " ".join(text.split()).replace("|", r"\|")
-
-
 def pages() -> dict[Path, str]:
     """Every page with its tables as they should be."""
     result = {}
     for name, tables in TABLES.items():
         text = (HERE / name).read_text(encoding="utf-8")
         for marker, (headings, rows) in tables.items():
-            text = filled(text, marker, headings, rows())
+            text = filled(text, marker, lines_of(headings, rows()))
         result[HERE / name] = text
     return result
 

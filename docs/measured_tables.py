@@ -1,6 +1,6 @@
-"""The measured tables of the docs: the command that writes each, how long it takes, and what it rests on.
+"""The measured tables of the docs: the command that writes each, how long it takes, and what it depends on.
 
-A table that has no command, but figures, is in `UNWRITTEN`. Tables that come from the code alone are those of
+Tables whose figures no command writes are in `UNWRITTEN`. Tables that come from the code alone are those of
 docs/make_tables.py and docs/make_gallery.py.
 """
 
@@ -14,18 +14,22 @@ class Measurement:
     Attributes
     ----------
     name : str
-        As the command line has it. What a command needs to go on after an interruption it keeps in
-        ``runs/tables/NAME`` or ``runs/tables/NAME.kept``.
+        Its name on the command line. A command that can resume keeps its results in ``runs/tables/NAME`` or
+        ``runs/tables/NAME.kept``.
     commands : tuple of str
-        Command lines, one after the other, in the checkout.
+        Command lines, run one after the other from the root of the checkout.
     minutes : float
-        About how long they take together on two cores [min].
+        About how long they take together on two cores [min]; a stamp's measured time counts instead.
     rests_on : tuple of str
-        Scripts, modules, data and folders of scenarios; what these import is found.
+        Scripts, modules, data and folders of scenarios; the modules that these import are found.
     tables : tuple of str
-        Names of the tables, as their marks have them; by default the measurement's own.
+        Names of the tables in their marks; by default the measurement's own.
     times : str
-        What in the tables is time on the clock, which is other on each machine and in each run.
+        Which figures are times on the clock, which differ with the machine; the measurement then runs alone.
+    cores : int
+        How many cores its commands keep busy.
+    is_study : bool
+        Whether it is a policy study, which `make tables STUDIES=1` measures.
     """
 
     name: str
@@ -34,6 +38,8 @@ class Measurement:
     rests_on: tuple[str, ...]
     tables: tuple[str, ...] = ()
     times: str = ""
+    cores: int = 1
+    is_study: bool = False
 
     def __post_init__(self) -> None:
         """Name the table."""
@@ -42,13 +48,19 @@ class Measurement:
 
 
 def benchmark(
-    name: str, minutes: float, tables: tuple[str, ...] = (), options: str = "", *, times: str = "", more: str = ""
+    name: str,
+    minutes: float,
+    tables: tuple[str, ...] = (),
+    options: str = "",
+    *,
+    times: str = "",
+    more: str = "",
+    cores: int = 1,
 ) -> Measurement:
     """A script of benchmarks/ that writes its own tables with ``--docs``."""
     command = f"python benchmarks/{name}.py --docs{options}"
-    return Measurement(
-        name, (command, more) if more else (command,), minutes, (f"benchmarks/{name}.py",), tables, times
-    )
+    commands = (command, more) if more else (command,)
+    return Measurement(name, commands, minutes, (f"benchmarks/{name}.py",), tables, times, cores)
 
 
 def study(name: str, minutes: float) -> Measurement:
@@ -56,7 +68,8 @@ def study(name: str, minutes: float) -> Measurement:
     file, folder = f"scenarios/studies/{name}.yaml", f"runs/tables/{name}"
     commands = (f"fogsim study {file} -j 2 --out {folder}", f"python docs/make_study_tables.py {folder}")
     rests_on = (file, "fogsim/cli/study.py", "docs/make_study_tables.py")
-    return Measurement(name, commands, minutes, (*rests_on, *SIMULATIONS.get(name, ())))
+    rests_on = (*rests_on, *SIMULATIONS.get(name, ()))
+    return Measurement(name, commands, minutes, rests_on, cores=2, is_study=True)
 
 
 def paper(name: str, minutes: float, *more: str, module: str = "", times: str = "") -> Measurement:
@@ -66,7 +79,9 @@ def paper(name: str, minutes: float, *more: str, module: str = "", times: str = 
     return Measurement(name, (command,), minutes, (f"fogsim/reproduce/{module or name}.py",), tables, times)
 
 
-def environment(name: str, minutes: float, tables: tuple[str, ...], options: str, *rests_on: str) -> Measurement:
+def environment(
+    name: str, minutes: float, tables: tuple[str, ...], options: str, *rests_on: str, cores: int = 1
+) -> Measurement:
     """Tables of docs/make_environment_tables.py."""
     command = f"python docs/make_environment_tables.py --ids {options}"
     return Measurement(
@@ -75,11 +90,12 @@ def environment(name: str, minutes: float, tables: tuple[str, ...], options: str
         minutes,
         ("docs/make_environment_tables.py", "envs/fogsim_envs/evaluation.py", "envs/fogsim_envs/task", *rests_on),
         tables,
+        cores=cores,
     )
 
 
-SIMULATIONS = {"field_sizes": ("scenarios/studies/motorway",)}
-"""Folders of studies that run a SUMO simulation, and no scenario."""
+SIMULATIONS = dict.fromkeys(("field_sizes", "message_sign", "motorway_policies"), ("scenarios/studies/motorway",))
+"""Folders of studies that run no scenario of the catalogue."""
 
 ACCURACY_KEPT = " --keep runs/tables/estimator_accuracy.kept"
 TARGETS_KEPT = " --keep runs/tables/estimator_targets.kept"
@@ -97,9 +113,10 @@ MEASUREMENTS = (
         (DEVIATIONS, *(f"tests/data/monte_carlo_{name}.csv" for name in ("veil", "halo", "lobes"))),
         tuple(f"night-{name}" for name in NIGHT),
     ),
-    benchmark("stereo", 3, times="ms"),
-    benchmark("belief", 5),
-    benchmark("disappearing_vehicles", 5, ("disappearing vehicles",), times="ms"),
+    benchmark("paper_methods", 3, ("paper methods",)),
+    benchmark("stereo", 1, times="ms"),
+    benchmark("belief", 2),
+    benchmark("disappearing_vehicles", 2, ("disappearing vehicles",), times="ms"),
     benchmark("night_estimators", 5, ("night-estimators",), times="ms"),
     Measurement(
         "restoration",
@@ -109,17 +126,17 @@ MEASUREMENTS = (
         times="ms",
     ),
     benchmark("frames", 2, times="all"),
-    benchmark("photograph_roads", 5, ("photographs",)),
-    benchmark("sign_estimators", 10, ("sign estimators",), " --drives 12"),
-    benchmark("sensor_faults", 10, ("sensor faults",)),
-    benchmark("broken_devices", 15, ("broken devices",), " -j 2"),
-    benchmark("grades", 15),
+    benchmark("photograph_roads", 1, ("photographs",)),
+    benchmark("sign_estimators", 6, ("sign estimators",), " --drives 12"),
+    benchmark("sensor_faults", 6, ("sensor faults",)),
+    benchmark("broken_devices", 15, ("broken devices",), " -j 2", cores=2),
+    benchmark("grades", 6),
     benchmark("uneven_fog", 30, ("uneven fog",)),
-    benchmark("lead_accuracy", 20, ("lead accuracy",), times="ms"),
-    benchmark("estimator_targets", 40, ("targets",), TARGETS_KEPT),
+    benchmark("lead_accuracy", 4, ("lead accuracy",), times="ms"),
+    benchmark("estimator_targets", 3, ("targets",), TARGETS_KEPT),
     benchmark(
         "estimator_accuracy",
-        60,
+        10,
         ("accuracy", "excerpt"),
         ACCURACY_KEPT,
         times="ms",
@@ -150,34 +167,38 @@ MEASUREMENTS = (
     benchmark("photon_fog", 14, ("mended",), " --drives 2"),
     Measurement(
         "surroundings",
-        (f"python benchmarks/monte_carlo.py surroundings {PHOTONS}", "python docs/make_airlight_tables.py"),
-        60,
-        ("benchmarks/monte_carlo.py", "docs/make_airlight_tables.py"),
+        ("python docs/make_airlight_tables.py",),
+        0.1,
+        (PHOTONS, "docs/make_airlight_tables.py"),
     ),
-    study("belief_over_places", 40),
-    study("which_sensor", 20),
-    study("who_tells_of_the_bank", 40),
-    study("lighting_policies", 40),
+    study("message_sign", 2),  # 80 runs of 2.5 s on one core
+    study("motorway_policies", 8),  # 360 runs of 2.5 s
+    study("field_sizes", 10),  # 160 runs of 7.3 s
+    study("which_sensor", 8),  # 112 runs of 8.6 s
+    study("who_tells_of_the_bank", 11),  # 56 runs of 24 s
+    study("lighting_policies", 12),  # 108 runs of 13 s
     study("estimators_in_the_loop", 40),
-    study("motorway_compliance", 60),
-    study("field_sizes", 40),
-    study("motorway_policies", 180),
     environment(
-        "advisory", 15, ("returns fogsim/FogAdvisory-v1",), "fogsim/FogAdvisory-v1 --episodes 30", "fogsim/loop.py"
+        "advisory",
+        5,
+        ("returns fogsim/FogAdvisory-v1",),
+        "fogsim/FogAdvisory-v1 --episodes 30",
+        "fogsim/loop.py",
+        cores=2,
     ),
-    environment("advisory_fast", 8, ("returns fogsim/FogAdvisoryFast-v1",), "fogsim/FogAdvisoryFast-v1"),
-    environment("densities", 8, ("densities",), "--density"),
-    environment("surrogate", 10, ("surrogate",), "--surrogate --episodes 90", "benchmarks/surrogate.py"),
+    environment("advisory_fast", 2, ("returns fogsim/FogAdvisoryFast-v1",), "fogsim/FogAdvisoryFast-v1", cores=2),
+    environment("densities", 5, ("densities",), "--density"),
+    environment("surrogate", 3, ("surrogate",), "--surrogate --episodes 90", "benchmarks/surrogate.py"),
     environment(
         "corridor",
-        20,
+        6,
         ("returns fogsim/FogCorridor-v1",),
         "--corridor --episodes 8",
         "benchmarks/corridor.py",
         "envs/fogsim_envs/corridor",
     ),
 )
-"""All of them, the quick ones first."""
+"""All of them; a round measures the longest first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,11 +208,11 @@ class Unwritten:
     Attributes
     ----------
     page : str
-        Where they are.
+        Their page.
     about : str
-        What they tell.
+        Their subject.
     figures : str
-        Command that prints their figures, or whence they are.
+        The command that prints their figures, or their source.
     """
 
     page: str
@@ -200,12 +221,12 @@ class Unwritten:
 
 
 UNWRITTEN = (
-    Unwritten("docs/benchmarks/policies.md", "beside what was seen on real roads", "from `field_sizes`, by hand"),
+    Unwritten("docs/benchmarks/policies.md", "compared with real roads", "from `field_sizes`, by hand"),
     Unwritten("docs/explanation/drivers.md", "who sees what at night", "`fogsim.traffic.drivers.own_beams`, by hand"),
     Unwritten("docs/explanation/drivers.md", "how far a traffic light is seen", "Allard's law, by hand"),
     Unwritten("docs/explanation/drivers.md", "gaps accepted at a crossing", "`python benchmarks/junctions.py`"),
-    Unwritten("docs/explanation/drivers.md", "collisions behind who stands", "`python benchmarks/collisions.py`"),
-    Unwritten("docs/explanation/drivers.md", "networks that FogSim did not write", "`python benchmarks/networks.py`"),
+    Unwritten("docs/explanation/drivers.md", "collisions with standing vehicles", "`python benchmarks/collisions.py`"),
+    Unwritten("docs/explanation/drivers.md", "networks from other sources", "`python benchmarks/networks.py`"),
     Unwritten("docs/explanation/drivers.md", "cost beside SUMO's step", "`python benchmarks/traffic.py`"),
     Unwritten("docs/explanation/night.md", "pictures taken for fog, glow", "`python benchmarks/night_sources.py`"),
     Unwritten("docs/explanation/night.md", "sight by low and high beams", "`fogsim.lighting.own_sight`, by hand"),

@@ -1,11 +1,15 @@
-"""Tables between marks of pages, ``<!-- table: NAME -->`` … ``<!-- end of … -->``, and the line that dates one."""
+"""Tables between marks of pages, ``<!-- table: NAME -->`` … ``<!-- end of … -->``, and the dated line below each."""
 
+import contextlib
+import fcntl
 import hashlib
 import os
 import re
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+ROOT = Path(__file__).resolve().parents[1]
 NUMBER = r"\d+(?:\.\d+)?"
 MARK = re.compile(r"<!-- table: (.+?) -->\n")
 END = "<!-- end of "
@@ -23,22 +27,59 @@ def places(root: Path) -> dict[str, Path]:
 
 
 def block(text: str, name: str) -> str:
-    """What stands between a table's marks."""
+    """The text between a table's marks."""
     return _parts(text, name)[1]
 
 
 def with_block(text: str, name: str, new: str) -> str:
-    """A page's text with something else between a table's marks."""
+    """A page's text with other text between a table's marks."""
     before, _, after = _parts(text, name)
     return before + new + after
 
 
-def with_line(text: str, name: str, told: str) -> str:
-    """A page's text with the line below a table that says when it was measured."""
+@contextlib.contextmanager
+def locked(root: Path) -> Iterator[None]:
+    """Keep other processes from changing pages in the meantime: two commands may finish at the same moment."""
+    folder = os.open(root / "docs", os.O_RDONLY)
+    try:
+        fcntl.flock(folder, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(folder)
+
+
+def replace(page: Path, text: str) -> None:
+    """Write a page whole or, if interrupted, not at all."""
+    new = page.with_suffix(".new")
+    new.write_text(text, encoding="utf-8")
+    new.replace(page)
+
+
+def write_table(page: str | Path, name: str, lines: Iterable[str]) -> None:
+    """Put lines between a table's marks; the page's path is given from docs/."""
+    path = ROOT / "docs" / page
+    with locked(ROOT):
+        replace(path, filled(path.read_text(encoding="utf-8"), name, lines))
+
+
+def filled(text: str, name: str, lines: Iterable[str]) -> str:
+    """A page's text with lines between a table's marks."""
+    return with_block(text, name, "\n" + "\n".join(lines) + "\n\n")
+
+
+def lines_of(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """Lines of a table; each cell is put in one line, its pipes escaped."""
+    cells = ([" ".join(cell.split()).replace("|", r"\|") for cell in row] for row in (headings, *rows))
+    heading, *body = (f"| {' | '.join(row)} |" for row in cells)
+    return [heading, "|" + " --- |" * len(headings), *body]
+
+
+def with_line(text: str, name: str, origin: str) -> str:
+    """A page's text with a line below a table that states when it was measured."""
     text = re.sub(rf"\n\n\*Measured with [^\n]* <!-- measured: {re.escape(name)} -->", "", text)
     before, table, after = _parts(text, name)
     end, rest = after.split("\n", 1)
-    return before + table + end + LINE.format(told, name) + "\n" + rest
+    return before + table + end + LINE.format(origin, name) + "\n" + rest
 
 
 def _parts(text: str, name: str) -> tuple[str, str, str]:
@@ -54,19 +95,19 @@ def link(page: Path, to: Path, anchor: str = "") -> str:
 
 
 def grid(table: str) -> list[list[str]]:
-    """Cells by rows, without the rules below headings; a line that is no row is one cell."""
+    """Cells by row, without the rules below headings; a line that is not a row is one cell."""
     rows = [re.split(r"(?<!\\)\|", line.strip().strip("|")) for line in table.splitlines() if line.strip()]
     cells = [[cell.strip() for cell in row] for row in rows]
     return [row for row in cells if not all(re.fullmatch(r":?-+:?", cell) for cell in row)]
 
 
 def digest(table: str) -> str:
-    """Digest of what a table says."""
+    """Digest of a table's cells."""
     return hashlib.sha256(repr(grid(table)).encode()).hexdigest()[:12]
 
 
 def same(kept: str, measured: str) -> bool:
-    """Whether two texts differ in no more than the last digits of their numbers, by one."""
+    """Whether two texts differ only in the last digits of their numbers, by one."""
     ours, theirs = re.findall(NUMBER, kept), re.findall(NUMBER, measured)
     return re.split(NUMBER, kept) == re.split(NUMBER, measured) and all(
         len(one.partition(".")[2]) == len(other.partition(".")[2])
@@ -77,15 +118,7 @@ def same(kept: str, measured: str) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Moved:
-    """A cell of a table that says something else than before.
-
-    Attributes
-    ----------
-    table, row, column : str
-        Where it is: name, first cells of the row, heading.
-    old, new : str
-        What it said, and what it says.
-    """
+    """A table's cell that has changed: the row is named by its first cells, the column by its heading."""
 
     table: str
     row: str
@@ -95,7 +128,7 @@ class Moved:
 
 
 def moved(name: str, before: str, after: str) -> list[Moved]:
-    """Cells that differ by more than the last digit, and rows that are new or gone, or have other columns."""
+    """Cells that differ by more than one in the last digit, and rows that are new, gone or have other columns."""
     old, new = grid(before), grid(after)
     if [len(row) for row in old] == [len(row) for row in new]:
         pairs = list(zip(old, new, strict=True))
@@ -116,6 +149,6 @@ def moved(name: str, before: str, after: str) -> list[Moved]:
 
 
 def _label(row: list[str]) -> str:
-    """What a row is about: its first cells, three at most, up to the first of figures."""
-    figures = (place for place, cell in enumerate(row[:3]) if re.match(r"[-+−]?\d.*[./±\[]", cell))
+    """A row's name: its first cells, three at most, before the first with figures."""
+    figures = (number for number, cell in enumerate(row[:3]) if re.match(r"[-+−]?\d.*[./±\[]", cell))
     return " | ".join(row[: max(1, next(figures, 3))])

@@ -1,14 +1,14 @@
-"""Measure the tables of the docs anew, and say which figures moved: ``make tables``.
+"""Measure the tables of the docs again and report which figures moved: ``make tables``.
 
-    python docs/rerun_tables.py [NAME …] [--stale] [--dry-run]   # all, some, or those whose code has changed since
-    python docs/rerun_tables.py --list [NAME …]                  # what rests on which changed files
-    python docs/rerun_tables.py --check                          # exit code 1 if a page says what is not so
-    python docs/rerun_tables.py --page                           # lets the pages say what is so
-    python docs/rerun_tables.py --stamp NAME … [--commit C]      # for tables that their command wrote by itself
+    python docs/rerun_tables.py               # the tables whose code or data has changed since they were measured
+    python docs/rerun_tables.py --studies     # the same for the policy studies
+    python docs/rerun_tables.py NAME …        # these tables, changed or not
+    python docs/rerun_tables.py --all         # every table but the studies, changed or not
 
-Names are those of docs/measured_tables.py. Interrupted or killed, the same command goes on: what is finished is noted
-in runs/tables/progress.json, and long commands go on where they were. A command that fails leaves its tables as they
-were and does not stop the others; logs are runs/tables/NAME.log. What moved is in runs/tables/moved.md and moved.json.
+Names are those of docs/measured_tables.py. The other options do not measure. Run the same command again to resume:
+finished measurements are noted in runs/tables/progress.json, and long commands keep their own results. A command that
+fails leaves its tables as they were and does not stop the others. Logs are runs/tables/NAME.log; what moved is in
+runs/tables/moved.md and moved.json.
 """
 
 import argparse
@@ -17,24 +17,22 @@ import sys
 from pathlib import Path
 
 from measured_tables import MEASUREMENTS, Measurement
+from page_tables import ROOT
 from rich.console import Console
-from table_round import Round
+from table_round import CORES, Round, cores, forecast
 from table_stamps import Stamps
 
-ROOT = Path(__file__).resolve().parents[1]
 
-
-def listed(stamps: Stamps, chosen: list[Measurement]) -> str:
-    """What is measured, and which files have changed since."""
-    changed, lines = stamps.changed(), []
+def listed(stamps: Stamps, chosen: list[Measurement], *, with_files: bool) -> str:
+    """What would be measured, how long it takes and, if requested, which files have changed."""
+    changed, minutes = stamps.changed(), {one: stamps.minutes(one) for one in chosen}
+    lines = []
     for one in chosen:
         files, stamp = changed[one.name], stamps.read(one)
-        told = "no stamp" if files is None or stamp is None else f"{stamp.told}, {len(files)} files changed since"
-        lines += [
-            f"{one.name}: {', '.join(one.tables)}; {one.minutes:.0f} min; {told}",
-            *(f"    {file}" for file in files or ()),
-        ]
-    return "\n".join(lines)
+        state = f"{stamp.label}, {len(files)} files changed since" if files is not None and stamp else "never measured"
+        lines.append(f"{one.name}: {minutes[one]:.0f} min on {cores(one)} of {CORES} cores; {state}")
+        lines += [f"    {line}" for line in (files or () if with_files else one.commands)]
+    return "\n".join([*lines, f"{len(chosen)} to measure, about {forecast(minutes):.0f} min"])
 
 
 def say(text: str) -> None:
@@ -43,61 +41,65 @@ def say(text: str) -> None:
 
 
 def interrupted(*_: object) -> None:
-    """End as by Ctrl-C."""
+    """End as on Ctrl-C."""
     raise KeyboardInterrupt
 
 
 def main(root: Path = ROOT, measurements: tuple[Measurement, ...] = MEASUREMENTS) -> int:
-    """Do what the command line asks for."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     names = {one.name: one for one in measurements}
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(names))
-    parser.add_argument("--stale", action="store_true", help="only those whose code has changed since")
-    for option, told in (
-        ("--list", "say what has changed since"),
-        ("--check", "exit code 1 if a page says what is not so"),
-        ("--page", "let the pages say what is so"),
-        ("--stamp", "take tables as measured by the code of today"),
-        ("--dry-run", "print the commands"),
+    for option, meaning in (
+        ("--studies", "the policy studies instead of the other tables"),
+        ("--all", "also tables whose code has not changed"),
+        ("--dry-run", "print the commands and how long they would take"),
+        ("--list", "print which files have changed since the tables were measured"),
+        ("--check", "exit code 1 if a page does not state what was measured and what has changed since"),
+        ("--page", "write that into the pages"),
+        ("--stamp", "record tables as measured by the code as it is now"),
     ):
-        parser.add_argument(option, action="store_true", help=told)
+        parser.add_argument(option, action="store_true", help=meaning)
     parser.add_argument("--commit", help="with --stamp: by the code of this commit")
-    asked = parser.parse_args()
-    if unknown := [name for name in asked.names if name not in names]:
+    given = parser.parse_args()
+    if unknown := [name for name in given.names if name not in names]:
         parser.error(f"no tables are called {', '.join(unknown)}; there are {', '.join(names)}")
-    if asked.stamp and not asked.names:
+    if given.stamp and not given.names:
         parser.error("--stamp needs names")
-    stamps, console = Stamps(root, measurements), Console(stderr=True)
-    changed = stamps.changed() if asked.stale else {}
-    chosen = [names[name] for name in asked.names or names if not asked.stale or changed[name] != []]
-    if asked.check:
+    stamps = Stamps(root, measurements)
+    if given.check:
         complaints = stamps.complaints()
-        say("\n".join(complaints) or "every table is what was measured, and the page says what has changed since")
+        say("\n".join(complaints) or "every table is as measured, and the page lists what has changed since")
         return int(bool(complaints))
-    if asked.list:
-        say(listed(stamps, chosen))
-    elif asked.dry_run:
-        say("\n".join(f"{command}  # {one.name}" for one in chosen for command in one.commands))
-    elif asked.page or asked.stamp:
-        for one in chosen if asked.stamp else ():
-            if asked.commit:
-                stamps.write_as_of(one, asked.commit)
+    chosen = [names[name] for name in given.names] or [one for one in measurements if one.is_study == given.studies]
+    if not (given.names or given.all):
+        changed = stamps.changed()
+        chosen = [one for one in chosen if changed[one.name] != []]
+    if given.list or given.dry_run:
+        say(listed(stamps, chosen, with_files=given.list))
+    elif given.page or given.stamp:
+        for one in chosen if given.stamp else ():
+            if given.commit:
+                stamps.write_from_commit(one, given.commit)
             else:
                 stamps.write(one, stamps.checkout().files(one.rests_on), None)
         stamps.write_pages()
     else:
-        return rerun(Round(stamps, [*asked.names, *(["--stale"] if asked.stale else [])], console), chosen)
+        return rerun(Round(stamps, sys.argv[1:], Console(stderr=True)), chosen)
     return 0
 
 
 def rerun(work: Round, chosen: list[Measurement]) -> int:
     """Measure, and print what moved; the exit code."""
+    if not chosen:
+        say("no table's code has changed since it was measured; --all measures them all the same")
+        return 0
     for signum in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(signum, interrupted)
     try:
         failed = work.run(chosen)
     except KeyboardInterrupt:
-        say("interrupted: the same command goes on from here")
+        say("interrupted: run the same command again to resume")
         return 130
     say(work.report())
     if failed:

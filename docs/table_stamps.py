@@ -1,8 +1,9 @@
-"""When and at which code the measured tables were measured: docs/measured_at/NAME.json, and what of it pages show."""
+"""When and with which code tables were measured: docs/measured_at/NAME.json, and what pages show of it."""
 
 import hashlib
 import io
 import json
+import math
 import os
 import subprocess
 import tarfile
@@ -13,9 +14,10 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
 
+import yaml
 from code_digests import SOURCES, Checkout
 from measured_tables import MEASUREMENTS, UNWRITTEN, Measurement
-from page_tables import block, digest, link, places, with_block, with_line
+from page_tables import block, digest, filled, link, locked, places, replace, with_line
 
 PAGE = "docs/benchmarks/reproducibility.md"
 COMMAND = "python docs/rerun_tables.py"
@@ -24,20 +26,20 @@ MEASURED, BY_HAND = "measured tables", "tables by hand"
 
 @dataclass(frozen=True, slots=True)
 class Stamp:
-    """When tables were measured, and at which code.
+    """When tables were measured, and with which code.
 
     Attributes
     ----------
     version, commit, date : str
-        Of FogSim: the last with " with changes" if files differed from the commit.
+        Of FogSim; the commit ends in " with changes" if files differed from it.
     machine : str
-        Its processor, where that is known.
+        Its processor, if known.
     minutes : float or None
-        How long it took [min], where that is known.
+        How long it took [min], if known.
     tables : dict
-        Digests of what the tables said, by name.
+        Digests of the tables, by name.
     files : dict
-        Digests of the files that they rest on, by path.
+        Digests of the files that they depend on, by path.
     """
 
     version: str
@@ -49,21 +51,13 @@ class Stamp:
     files: dict[str, str]
 
     @property
-    def told(self) -> str:
+    def label(self) -> str:
         """Version, commit and date in words."""
         return f"{self.version} ({self.commit}, {self.date})"
 
 
 class Stamps:
-    """Stamps of the tables of a checkout.
-
-    Parameters
-    ----------
-    root : Path
-        Of the checkout.
-    measurements : tuple of Measurement, optional
-        The checkout's.
-    """
+    """Stamps of the tables of a checkout."""
 
     def __init__(self, root: Path, measurements: tuple[Measurement, ...] = MEASUREMENTS) -> None:
         self.root, self.measurements = root, measurements
@@ -90,10 +84,15 @@ class Stamps:
         now = datetime.now(UTC).strftime("%Y-%m-%d")
         self._write(one, files, (commit, now, machine()), minutes, (self.root / "pyproject.toml").read_text())
 
-    def write_as_of(self, one: Measurement, commit: str) -> None:
-        """Stamp tables as measured at an earlier commit, by whatever machine."""
-        told = self._git("show", "-s", "--format=%h %cs", "--abbrev=7", commit).decode().split()
-        tops = [*(folder for folder, _ in SOURCES), "scenarios", "pyproject.toml"]
+    def minutes(self, one: Measurement) -> float:
+        """How long a measurement took last time, or about how long it takes [min]."""
+        stamp = self.read(one)
+        return one.minutes if stamp is None or stamp.minutes is None else stamp.minutes
+
+    def write_from_commit(self, one: Measurement, commit: str) -> None:
+        """Stamp tables as measured with the code of an earlier commit, on an unknown machine."""
+        at = self._git("show", "-s", "--format=%h %cs", "--abbrev=7", commit).decode().split()
+        tops = [*(folder for folder, _ in SOURCES), "docs", "scenarios", "pyproject.toml"]
         there = self._git("ls-tree", "--name-only", commit, "--", *tops).decode().split()
         with tempfile.TemporaryDirectory() as folder:
             with tarfile.open(fileobj=io.BytesIO(self._git("archive", commit, "--", *there))) as archive:
@@ -102,7 +101,7 @@ class Stamps:
             self._write(
                 one,
                 Checkout(then).files(one.rests_on),
-                (*told, ""),
+                (*at, ""),
                 None,
                 (then / "pyproject.toml").read_text(encoding="utf-8"),
             )
@@ -111,9 +110,9 @@ class Stamps:
         self, one: Measurement, files: dict[str, str], at: Iterable[str], minutes: float | None, project: str
     ) -> None:
         where = places(self.root)
-        said = {name: digest(block(where[name].read_text(encoding="utf-8"), name)) for name in one.tables}
+        tables = {name: digest(block(where[name].read_text(encoding="utf-8"), name)) for name in one.tables}
         version = tomllib.loads(project)["project"]["version"]
-        kept = asdict(Stamp(version, *at, minutes, said, files))
+        kept = asdict(Stamp(version, *at, minutes, tables, files))
         by_folder: dict[str, list[str]] = {}
         for path, value in files.items():
             by_folder.setdefault(str(PurePosixPath(path).parent), []).append(f"{PurePosixPath(path).name}:{value}")
@@ -128,7 +127,7 @@ class Stamps:
         return subprocess.run(["git", "-C", str(self.root), *arguments], check=True, capture_output=True).stdout  # noqa: S603, S607 - git of the developer's
 
     def changed(self) -> dict[str, list[str] | None]:
-        """Files of each measurement that are others than when it was measured; None if it was not stamped."""
+        """Files of each measurement that have changed since it was measured; None if it has no stamp."""
         checkout, found = self.checkout(), {}
         for one in self.measurements:
             stamp = self.read(one)
@@ -136,57 +135,57 @@ class Stamps:
         return found
 
     def documented(self) -> dict[Path, str]:
-        """Texts of the pages as they should be: with lines below the tables, and the page's own tables."""
+        """Texts of the pages as they should be: with a line below each table, and the overview of all."""
         where, changed = places(self.root), self.changed()
         page = self.root / PAGE
         texts = {path: path.read_text(encoding="utf-8") for path in {*where.values(), page}}
-        rows = ["| tables | command | min | as of FogSim | code changed since |", "| --- | --- | --- | --- | --- |"]
+        rows = ["| tables | command | min | measured with FogSim | changed since |", "| --- | --- | --- | --- | --- |"]
         for one in self.measurements:
             rows.append(self._row(one, where, changed[one.name]))
             stamp = self.read(one)
             for name in one.tables if stamp else ():
                 path = where[name]
                 on = f" on {stamp.machine}" if stamp.machine else ""
-                told = f"FogSim {stamp.told}{on}: [what changed since]({link(path, page)}).*"
-                texts[path] = with_line(texts[path], name, told)
-        texts[page] = with_block(texts[page], MEASURED, "\n" + "\n".join(rows) + "\n\n")
+                line = f"FogSim {stamp.label}{on}: [what changed since]({link(path, page)}).*"
+                texts[path] = with_line(texts[path], name, line)
+        texts[page] = filled(texts[page], MEASURED, rows)
         by_hand = ["| page | table | figures |", "| --- | --- | --- |"]
         for table in UNWRITTEN:
             to = link(page, self.root / table.page)
             by_hand.append(f"| [{Path(table.page).stem}]({to}) | {table.about} | {table.figures} |")
-        texts[page] = with_block(texts[page], BY_HAND, "\n" + "\n".join(by_hand) + "\n\n")
+        texts[page] = filled(texts[page], BY_HAND, by_hand)
         return texts
 
     def _row(self, one: Measurement, where: dict[str, Path], changed: list[str] | None) -> str:
         stamp, page = self.read(one), self.root / PAGE
         named = ", ".join(f"[{name}]({link(page, where[name])})" for name in one.tables)
         named += f" (times: {one.times})" if one.times else ""
-        minutes = stamp.minutes if stamp and stamp.minutes is not None else one.minutes
+        budget = f"{self.minutes(one):.0f}" + (f", {runs(self.root / one.rests_on[0])} runs" if one.is_study else "")
         commands = ", then ".join(f"`{command}`" for command in one.commands)
-        since = "never measured by its command" if changed is None else rooms(changed) or "none"
-        return f"| {named} | {commands} | {minutes:.0f} | {stamp.told if stamp else '–'} | {since} |"
+        since = "never measured by its command" if changed is None else parts(changed) or "nothing"
+        return f"| {named} | {commands} | {budget} | {stamp.label if stamp else '–'} | {since} |"
 
     def complaints(self) -> list[str]:
-        """What of the tables and of the page about them is not so, with the command that mends it."""
-        where, changed, told = places(self.root), self.changed(), []
+        """What tables and pages state wrongly, with the command that mends each."""
+        where, changed, found = places(self.root), self.changed(), []
         page = (self.root / PAGE).read_text(encoding="utf-8")
         for one in self.measurements:
             if missing := [name for name in one.tables if name not in where]:
-                told.append(f"{one.name}: no page has the table {', '.join(missing)}")
+                found.append(f"{one.name}: no page has the table {', '.join(missing)}")
                 continue
-            told += [
+            found += [
                 f"{where[name].name}: the table {name} is not what was measured: {COMMAND} {one.name} measures it; "
-                f"{COMMAND} --stamp {one.name}, if its command wrote it just now"
+                f"{COMMAND} --stamp {one.name} records it, if its command has just written it"
                 for name in self._edited(one, where)
             ]
             if self._row(one, where, changed[one.name]) not in page:
                 files = ", ".join(changed[one.name] or ["no file"])
-                told.append(
-                    f"{PAGE} is not up to date on {one.name}: of what it rests on, there has changed since it was "
-                    f"measured: {files}. {COMMAND} {one.name} measures it anew, {COMMAND} --page lets the page say so"
+                found.append(
+                    f"{PAGE} is not up to date on {one.name}: since it was measured, these have changed: {files}. "
+                    f"{COMMAND} {one.name} measures it again, {COMMAND} --page lists the change in the page"
                 )
-        stale = [] if told else [path for path, text in self.documented().items() if path.read_text("utf-8") != text]
-        return told + [f"{path.name} is not up to date: {COMMAND} --page" for path in stale]
+        stale = [] if found else [path for path, text in self.documented().items() if path.read_text("utf-8") != text]
+        return found + [f"{path.name} is not up to date: {COMMAND} --page" for path in stale]
 
     def _edited(self, one: Measurement, where: dict[str, Path]) -> list[str]:
         stamp = self.read(one)
@@ -194,22 +193,30 @@ class Stamps:
         return [name for name, text in texts.items() if stamp and digest(block(text, name)) != stamp.tables.get(name)]
 
     def write_pages(self) -> None:
-        """Let pages say when their tables were measured, and what has changed since."""
-        for path, text in self.documented().items():
-            if path.read_text(encoding="utf-8") != text:
-                path.write_text(text, encoding="utf-8")
+        """Write into pages when their tables were measured and what has changed since."""
+        with locked(self.root):
+            for path, text in self.documented().items():
+                if path.read_text(encoding="utf-8") != text:
+                    replace(path, text)
 
 
-def rooms(files: Iterable[str]) -> str:
+def runs(study: Path) -> int:
+    """How many runs a study file asks for."""
+    written = yaml.safe_load(study.read_text(encoding="utf-8"))
+    seeds = written["seeds"]
+    return math.prod(map(len, written["factors"].values())) * (seeds if isinstance(seeds, int) else len(seeds))
+
+
+def parts(files: Iterable[str]) -> str:
     """The parts of the repository that files are in, by folders at its top."""
-    parts: dict[str, set[str]] = {}
+    found: dict[str, set[str]] = {}
     for folder, name, *_ in (PurePosixPath(file).parts for file in files):
-        parts.setdefault(folder, set()).add(name)
-    return "; ".join(f"{folder}: {', '.join(sorted(names))}" for folder, names in parts.items())
+        found.setdefault(folder, set()).add(name)
+    return "; ".join(f"{folder}: {', '.join(sorted(names))}" for folder, names in found.items())
 
 
 def machine() -> str:
-    """Cores that this process has, and their name."""
+    """Number and name of this machine's cores."""
     info = Path("/proc/cpuinfo")
     lines = info.read_text(encoding="utf-8").splitlines() if info.exists() else []
     name = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), "a processor")

@@ -266,8 +266,8 @@ class ClosedLoop:
         self._step = None
         self._drivers_fog.restart()
         self._timeline = Timeline(self._scenario)
-        if self._replays and not self._drivers_fog.is_entered:
-            self._enter_planned_fog()
+        if self._replays:
+            self._enter_known_fog(streams.patch_seed)
         self._traffic.start(streams.traffic_seed)
         snapshot = self._observe_ego()
         body = snapshot.state.types[snapshot.ego]
@@ -282,11 +282,13 @@ class ClosedLoop:
         self._step = self._with_unplayed(self._with_ending(self._complete_step(0, snapshot, Command())))
         return self._step
 
-    def _enter_planned_fog(self) -> None:
-        """Have drivers in the fog from the beginning, where the ego's way, along which it lies, is known already."""
-        planned = self._traffic.planned_network()
-        if planned is not None:
+    def _enter_known_fog(self, patch_seed: int) -> None:
+        """Surround drivers with the fog from the beginning if the ego's route, along which it lies, is known."""
+        fog = self._fog
+        if fog is None and (planned := self._traffic.planned_network()) is not None:
             fog = build.fog_field(self._scenario, planned[0].route, planned[0].structures)
+        if fog is not None:
+            fog = build.fog_of_run(self._scenario, fog, patch_seed)
             if not self._drivers_fog.is_about(fog):
                 self._drivers_fog.enter(fog, self._traffic)
 

@@ -19,14 +19,16 @@ class Streams:
     Attributes
     ----------
     traffic_seed : int
-        Seed handed to the traffic simulation, in 0 … 2³¹ − 1.
-    fog, camera, sensors, driver, faults, gps, reports, scatterometer : numpy.random.Generator
-        Generators for fog fields, camera noise, the vehicle's other sensors, drivers, faults of sensors, satellite
-        positioning, what others report of the fog, and the scatterometer on board.
+        Seed of the traffic simulation, in 0 … 2³¹ − 1.
+    patch_seed : int
+        Seed of the patches of fog, unless the scenario has one; the same for every vehicle of a run.
+    camera, sensors, driver, faults, gps, reports, scatterometer : numpy.random.Generator
+        Generators for camera noise, the vehicle's other sensors, drivers, sensor faults, satellite positioning,
+        other vehicles' reports of the fog, and the scatterometer on board.
     """
 
     traffic_seed: int
-    fog: np.random.Generator
+    patch_seed: int
     camera: np.random.Generator
     sensors: np.random.Generator
     driver: np.random.Generator
@@ -52,10 +54,11 @@ def spawn_streams(seed: int, vehicle: str = "") -> Streams:
         If the seed is negative.
     """
     root = np.random.SeedSequence([seed, *vehicle.encode()] if vehicle else seed)
-    traffic, fog, camera, sensors, driver, faults, gps, reports, scatterometer = root.spawn(9)
+    traffic, _, camera, sensors, driver, faults, gps, reports, scatterometer = root.spawn(9)
+    patches = np.random.SeedSequence(seed).spawn(2)[1]
     return Streams(
         traffic_seed=int(traffic.generate_state(1, np.uint32)[0] >> 1),
-        fog=np.random.default_rng(fog),
+        patch_seed=int(patches.generate_state(1, np.uint32)[0]),
         camera=np.random.default_rng(camera),
         sensors=np.random.default_rng(sensors),
         driver=np.random.default_rng(driver),

@@ -14,7 +14,7 @@ from fogsim.errors import InputError, MethodError, RecorderError
 from fogsim.files.output_targets import refuse_unwritable
 from fogsim.interruption import Interruption
 from fogsim.loop import Processes, run, warn_of_unplayed
-from fogsim.metrics import MetricsOfRun, RunMetrics, RunSummary, TrafficRunMetrics
+from fogsim.metrics import MetricsOfRun, RunMetrics, RunSummary, TrafficRunMetrics, metric_topics
 from fogsim.metrics.road_speeds import RoadSpeeds
 from fogsim.parameters import checked_parameters
 from fogsim.randomness import Seed
@@ -33,6 +33,7 @@ from fogsim.recorders import (
 from fogsim.recording_steps import Recording
 from fogsim.registry import Registry
 from fogsim.scenario import Scenario, build, resolved
+from fogsim.scenario.wording.sentences import SENTENCES
 from fogsim.traffic.road.configuration import configured_files
 from fogsim.traffic.road.network import read_net
 from fogsim.traffic.road.signs import geographic_position, sign_map
@@ -221,6 +222,8 @@ def _information(what: _Recorded[AnyStep], scenario: Scenario, seed: int, direct
         summary=lambda: what.metrics.summary().values,
         meanings=what.metrics.summary().meanings,
         along_road=what.along_road,
+        topics=metric_topics(),
+        settings=lambda: {heading: words(scenario) for heading, words in SENTENCES.items()},
     )
 
 

@@ -26,7 +26,7 @@ from fogsim.traffic import NetworkTraffic, libsumo_network_traffic
 from fogsim.traffic.road.configuration import configured_files
 from fogsim.traffic.road.network import read_net, route_axis
 from fogsim.traffic.road.structures import structures
-from fogsim.values import Begun, Command, Ending, NetworkSnapshot, TrafficStep, Truth
+from fogsim.values import Begun, Cohort, Command, Ending, NetworkSnapshot, TrafficStep, Truth
 from fogsim.values.belief import certain_belief
 from fogsim.values.result_checks import checked_advice, checked_command
 
@@ -153,6 +153,7 @@ class TrafficRun:
         self._meters = _places_along(axis) + EYES
         self._section_meters, self._reporters = RoadMeters(scenario, axis, limits), FogReports(scenario, axis)
         self._drivers_fog = DriversFog()
+        self._cohort = _CohortWatch(scenario.traffic.cohort_s)
         self._step: TrafficStep | None = None
 
     @checked_parameters
@@ -175,11 +176,13 @@ class TrafficRun:
             If SUMO cannot start, or runs already in this process.
         """
         self._step = None
+        streams = spawn_streams(seed)
+        self._fog = build.fog_of_run(self._scenario, self._fog, streams.patch_seed)
         self._timeline, self._fog_now = Timeline(self._scenario), self._fog
+        self._cohort = _CohortWatch(self._scenario.traffic.cohort_s)
         self._drivers_fog.restart()
         if not self._drivers_fog.is_about(self._fog):
             self._drivers_fog.enter(self._fog, self._traffic)
-        streams = spawn_streams(seed)
         self._reporters.reset(streams.reports)
         self._section_meters.reset()
         self._traffic.start(streams.traffic_seed)
@@ -226,6 +229,7 @@ class TrafficRun:
 
     def _complete_step(self, index: int, command: Command, begun: tuple[Begun, ...] = ()) -> tuple[TrafficStep, float]:
         snapshot, time = self._traffic.observe_network(), self._periods.time(index)
+        cohort = self._cohort.update(time, snapshot)
         step = TrafficStep(
             index=index,
             time=time,
@@ -233,9 +237,10 @@ class TrafficRun:
             collisions=snapshot.collisions,
             truth=self._truth(snapshot, time),
             command=command,
-            ending=self._ending(index, snapshot),
+            ending=self._ending(index, snapshot, cohort),
             begun=begun,
-            waiting=snapshot.waiting,
+            waiting=len(snapshot.waiting),
+            cohort=cohort,
         )
         ended = self._timeline.ended(step)
         if step.ending is None and ended is not None:
@@ -255,7 +260,9 @@ class TrafficRun:
         sections = self._section_meters.measure(fog)
         return Truth(measured, measured, fog=fog, vehicle_extinctions=seen, sections=sections, route=self._route)
 
-    def _ending(self, index: int, snapshot: NetworkSnapshot) -> Ending | None:
+    def _ending(self, index: int, snapshot: NetworkSnapshot, cohort: Cohort | None) -> Ending | None:
+        if cohort is not None and not cohort.unfinished and self._cohort.is_complete:
+            return Ending.COHORT_LEFT
         if index >= self._periods.frames:
             return Ending.TIME
         return Ending.NOBODY_LEFT if snapshot.is_over else None
@@ -272,6 +279,30 @@ class TrafficRun:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+class _CohortWatch:
+    """Finds the vehicles that are due in the first seconds of a run, if a duration is given, and when they leave."""
+
+    def __init__(self, duration: float | None) -> None:
+        self._duration = duration
+        self._before: frozenset[str] | None = None
+        self._due: frozenset[str] = frozenset()
+        self.is_complete = False
+
+    def update(self, time: float, snapshot: NetworkSnapshot) -> Cohort | None:
+        """The cohort after a step; vehicles that are due at the first step already are not in it."""
+        if self._duration is None:
+            return None
+        here = {*snapshot.state.ids, *snapshot.waiting}
+        if self._before is None:
+            self._before = frozenset(here)
+        if not self.is_complete:
+            new = here - self._before - self._due
+            self._due = self._due | new if new else self._due
+            self.is_complete = time >= self._duration
+        waiting = len(self._due.intersection(snapshot.waiting))
+        return Cohort(self._due, waiting, unfinished=len(self._due & here))
 
 
 def _axis_along(edges: Sequence[str], net: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

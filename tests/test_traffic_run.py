@@ -134,6 +134,7 @@ def test_signs_along_named_edges_go_each_by_its_own_meter() -> None:
             r"traffic.events.0.at_gap_to_ego_m: a gap to the ego needs an ego",
         ),
         (("traffic.along=[bnk]",), r"traffic.along.0: the net has no edge 'bnk'; did you mean 'bank'"),
+        (('traffic.along=["bank","approach"]',), r"along.1: the net has no lane that leads from edge 'bank'"),
         (
             ("traffic.ego=ego", "traffic.warm_up_s=5", "estimators=[negru2013]"),
             r"traffic: warm_up_s: goes with ego: none, and the ego is 'ego'",
@@ -156,3 +157,51 @@ def test_runs_with_and_without_an_ego_name_one_another() -> None:
         next(fogsim.run(alone(EVEN)))
     with pytest.raises(FogSimError, match=r"traffic\.ego is 'ego'; write none, or call fogsim\.run"):
         next(fogsim.run_traffic(load_scenario("motorway_fog_bank")))
+
+
+def demand(folder: Path, vehicles: str) -> Path:
+    """A SUMO configuration with these vehicles on the motorway."""
+    config = empty_simulation(folder)
+    route = '<route id="r" edges="approach bank"/>'
+    (folder / "none.rou.xml").write_text(f"<routes>{route}{vehicles}</routes>")
+    return config
+
+
+def test_a_cohort_is_due_in_its_time_and_the_run_ends_when_it_has_left(tmp_path: Path) -> None:
+    """Three are due at 2 s on one lane, where two wait; the first is there from the beginning, the last comes late."""
+    due = (("first", 0.0), ("a", 2.0), ("b", 2.0), ("c", 2.0), ("late", 9.0))
+    config = demand(
+        tmp_path,
+        "".join(f'<vehicle id="{v}" route="r" depart="{t}" departLane="0" departSpeed="20"/>' for v, t in due),
+    )
+    keys = ("clocks.traffic_step_s=0.5", "clocks.camera_period_s=0.5", "traffic.warm_up_s=1", "traffic.cohort_s=4")
+    steps = list(fogsim.run_traffic(scenario_from_config(config, "none", [EVEN, *keys, "duration_s=400"]), 1))
+    cohorts = [step.cohort for step in steps]
+    assert cohorts[-1] is not None
+    assert cohorts[-1].vehicles == {"a", "b", "c"}
+    assert max(cohort.waiting for cohort in cohorts if cohort is not None) == 2
+    assert (steps[-1].ending, cohorts[-1].unfinished, "late" in steps[-1].traffic.ids) == (Ending.COHORT_LEFT, 0, True)
+    metrics = TrafficRunMetrics()
+    for step in steps:
+        metrics.update(step)
+    values = metrics.summary().values
+    assert (values["traffic_cohort_vehicles"], values["traffic_cohort_unfinished"]) == (3, 0)
+    arrival = {v: max(step.time for step in steps if v in step.traffic.ids) for v in "abc"}
+    # They are due 1 s after the warm-up.
+    expected = sum(time - 1.0 for time in arrival.values()) / 3
+    assert values["traffic_travel_time_s_per_cohort_vehicle"] == pytest.approx(expected)
+
+
+def test_vehicles_of_a_cohort_that_have_not_left_in_time_are_unfinished(tmp_path: Path) -> None:
+    config = demand(tmp_path, '<flow id="f" route="r" begin="0" end="100" period="2" departSpeed="20"/>')
+    keys = ("clocks.traffic_step_s=0.5", "clocks.camera_period_s=0.5", "traffic.cohort_s=6", "duration_s=8")
+    found = measure_run(scenario_from_config(config, "none", [EVEN, *keys]), 1)["metrics"]
+    assert (found["ending"], found["traffic_cohort_vehicles"], found["traffic_cohort_unfinished"]) == ("time", 3, 3)
+
+
+@pytest.mark.parametrize(("written", "differ"), [("", True), (", seed: 4", False)])
+def test_patches_are_drawn_for_each_seed_unless_theirs_is_written(written: str, differ: bool) -> None:
+    with TrafficRun(alone(f"fog={{visibility_m: 60, patches: {{correlation_length_m: 50{written}}}}}")) as run:
+        fogs = [run.start(seed)[0].truth.fog for seed in (1, 2, 1)]
+    assert fogs[0] == fogs[2]
+    assert (fogs[0] != fogs[1]) is differ

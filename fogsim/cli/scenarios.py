@@ -19,7 +19,7 @@ def list_command() -> None:
     from fogsim.lighting import LIGHTING_POLICIES
     from fogsim.render import RENDERERS
     from fogsim.scenario import catalogue, load_scenario
-    from fogsim.study.shipped import shipped_studies
+    from fogsim.study import shipped_studies
 
     table = Table(title="Scenarios", title_justify="left", box=None, pad_edge=False)
     table.add_column("name", style="bold", no_wrap=True)

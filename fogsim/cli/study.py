@@ -1,8 +1,9 @@
 """``fogsim study``: policies compared over seeds."""
 
+from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -10,6 +11,9 @@ from fogsim.cli.printing import FAILED, INTERRUPTED, escape, stderr, stdout
 from fogsim.cli.progress import STARTING, counting_bar, progress_bar
 from fogsim.cli.scenario_options import CodeNotice, MethodTimeout, with_timeout
 from fogsim.errors import InputError
+
+if TYPE_CHECKING:
+    from fogsim.scenario import Scenario
 
 
 class EngineName(StrEnum):
@@ -41,6 +45,7 @@ def study_command(
 ) -> None:
     """Run a grid of policies, fogs, drivers and seeds, and write a table, differences with intervals, and a report."""
     from fogsim.registry.user_code import import_nothing
+    from fogsim.scenario.wording.sentences import empty_start
     from fogsim.study import RayCluster, load_study, run_study
 
     if address is not None and engine is EngineName.POOL:
@@ -51,11 +56,13 @@ def study_command(
     with counting_bar(stderr, "checking the scenario of each cell") as watch:
         loaded = load_study(study, with_timeout(None, method_timeout), may_import, watch)
     shape = " × ".join(f"{len(levels)} {name}" for name, levels in loaded.factors.items())
-    cells = len({tuple(run.levels.values()) for run in loaded.runs})
-    stdout.print(
-        f"{escape(loaded.name)}: {escape(shape)} × {len(loaded.runs) // cells} seeds = {len(loaded.runs)} runs"
-    )
+    seeds = len(loaded.runs) // len(loaded.cells())
+    stdout.print(f"{escape(loaded.name)}: {escape(shape)} × {seeds} seeds = {len(loaded.runs)} runs")
+    cells = loaded.cells()
+    if (warning := next(filter(None, map(empty_start, cells.values())), None)) is not None:
+        stderr.print(f"[yellow]{escape(warning)}[/]")
     if check:
+        _build(loaded.file, cells)
         return
     directory = out or Path("runs", loaded.name)
     failed: list[str] = []
@@ -79,8 +86,19 @@ def study_command(
     for row in missing[:10]:
         stdout.print(f"[yellow]run {row['run']} failed:[/] {escape(str(row['message']))}", soft_wrap=True)
     stdout.print("Results:")
-    for name in ("study.parquet", "study.csv", "comparison.csv", "report.html"):
+    for name in ("study.parquet", "study.csv", "comparison.csv", "methods.md", "report.html"):
         stdout.print(f"  {escape(directory / name)}", soft_wrap=True)
     if missing:
         stdout.print(f"[yellow]{len(missing)} of {len(rows)} runs failed; the same command tries them again.[/]")
         raise typer.Exit(FAILED)
+
+
+def _build(file: Path, cells: "Mapping[str, Scenario]") -> None:
+    """Build each cell's road, fog and meters; InputError names the cell in which they do not fit."""
+    from fogsim.study.execution import build_without_running
+
+    for label, scenario in cells.items():
+        try:
+            build_without_running(scenario)
+        except InputError as error:
+            raise InputError(f"{file}: {label}: {error}") from error

@@ -168,6 +168,7 @@ class EgoEquipment:
         self._daylight = self._light.first
         if self._fog is None:
             self._fog = view.fog
+        self._fog = build.fog_of_run(self._scenario, self._fog, streams.patch_seed)
         self._enter_fog(self._fog)
         return self._fog
 

@@ -1,7 +1,7 @@
-"""Safety, comfort and delay of the ego and of everybody near it, and how right estimators were."""
+"""Safety, comfort and delay of the ego and of all vehicles near it, and the accuracy of estimators."""
 
 from fogsim.kinematics import stopping_sight_distance
-from fogsim.metrics.metric import JsonValue, Metric, Sample
+from fogsim.metrics.metric import Definition, JsonValue, Metric, Sample
 from fogsim.metrics.run_metrics import (
     METRICS,
     MetricFactory,
@@ -9,14 +9,17 @@ from fogsim.metrics.run_metrics import (
     RunMetrics,
     RunSummary,
     TrafficRunMetrics,
-    metric_keys,
+    metric_definitions,
+    metric_topics,
 )
-from fogsim.metrics.step_metrics import DEFAULT_STANDARD, step_metrics
+from fogsim.metrics.safety import DEFAULT_STANDARD, step_metrics
 from fogsim.metrics.surrogate import (
     SafetyStandard,
+    crash_potential,
     deceleration_rate_to_avoid_crash,
     modified_deceleration_rate_to_avoid_crash,
     potential_collision_speed,
+    stopping_distance_difference,
     time_exposed_time_to_collision,
     time_headway,
     time_integrated_time_to_collision,
@@ -26,6 +29,7 @@ from fogsim.metrics.surrogate import (
 __all__ = [
     "DEFAULT_STANDARD",
     "METRICS",
+    "Definition",
     "JsonValue",
     "Metric",
     "MetricFactory",
@@ -35,11 +39,14 @@ __all__ = [
     "SafetyStandard",
     "Sample",
     "TrafficRunMetrics",
+    "crash_potential",
     "deceleration_rate_to_avoid_crash",
-    "metric_keys",
+    "metric_definitions",
+    "metric_topics",
     "modified_deceleration_rate_to_avoid_crash",
     "potential_collision_speed",
     "step_metrics",
+    "stopping_distance_difference",
     "stopping_sight_distance",
     "time_exposed_time_to_collision",
     "time_headway",

@@ -7,15 +7,7 @@ from fogsim.metrics.metric import share
 
 
 class Histogram:
-    """Time by value, in bins of equal width; what lies beyond the ends is in the outermost two.
-
-    Parameters
-    ----------
-    low, high : float
-        Ends of the range.
-    width : float
-        Width of a bin, a whole part of the range; quantiles are as exact as that.
-    """
+    """Time by value, in bins of equal width; what lies beyond the ends is in the outermost two."""
 
     def __init__(self, low: float, high: float, width: float) -> None:
         self._low, self._width = low, width
@@ -23,38 +15,18 @@ class Histogram:
         self._time = np.zeros(self._bins + 2)
 
     def add(self, values: NDArray[np.float64], elapsed: NDArray[np.float64]) -> None:
-        """Add times at values.
-
-        Parameters
-        ----------
-        values : (n,) float64
-            The values; infinity is allowed.
-        elapsed : (n,) float64
-            The times [s].
-        """
+        """Add times [s] at values (n,), which may be infinite."""
         # A value on an edge is above it, whatever the quotient's last bit.
         place = np.clip((values - self._low) / self._width + (1.0 + 1e-9), 0.0, self._bins + 1.0)
         self._time += np.bincount(place.astype(np.intp), elapsed, minlength=self._bins + 2)
 
     def share_below(self, value: float) -> float | None:
-        """Share of the time below a value [-]; None without any.
-
-        Parameters
-        ----------
-        value : float
-            An edge of a bin.
-        """
+        """Share of the time below a value, an edge of a bin [-]; None without any."""
         until = round((value - self._low) / self._width) + 1
         return share(float(self._time[:until].sum()), float(self._time.sum()))
 
     def quantile(self, probability: float) -> float | None:
-        """Value below which a share of the time was spent; None without any, or beyond the range.
-
-        Parameters
-        ----------
-        probability : float
-            The share [-], between 0 and 1.
-        """
+        """Value below which a share of the time was spent; None without any, or beyond the range."""
         total = np.cumsum(self._time)
         wanted = probability * total[-1]
         place = int(np.searchsorted(total, wanted))

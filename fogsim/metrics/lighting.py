@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from fogsim.metrics.metric import JsonValue, Sample, share
+from fogsim.metrics.metric import Definition, JsonValue, Sample, definitions_of, share
 from fogsim.units import clock_time
 from fogsim.values import Lamp
 
@@ -17,16 +17,7 @@ lay over the eye at most, and more than the fog in the own low beams does."""
 class Lighting:
     """Benefit and cost of the ego's lamps, in the time in which it was darker than 1000 lx."""
 
-    meanings: ClassVar[Mapping[str, str]] = {
-        "mean_own_sight_m": "by night, mean distance at which a small object on the road reaches visibility level 7 "
-        "(Adrian) by the ego's own lamps; none by day",
-        "minimum_own_sight_m": "least such distance",
-        "high_beam_time_share": "share of the night's time with high beams; none by day",
-        "glare_dealt_time_share": "share of the night's time in which the ego's lamps lay a veil of 1 cd/m² or more "
-        "over any other driver's eyes; none by day",
-        "glare_dealt_s": "seconds of such glare, added up over the drivers who had it",
-        "max_glare_dealt_cdpm2": "largest veil that the ego's lamps lay over another's eyes; none if nobody was lit",
-    }
+    definitions: ClassVar[Mapping[str, Definition]] = definitions_of("lighting")
     _time: float = 0.0
     _sight_time: float = 0.0
     _least_sight: float | None = None
@@ -36,13 +27,7 @@ class Lighting:
     _most_veil: float | None = None
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
         effects = sample.step.truth.lamp_effects
         if effects is None:
             return

@@ -1,13 +1,16 @@
-"""What a metric is: something that watches the steps of a run and says a few numbers at its end."""
+"""What a metric is: it watches the steps of a run and gives a few numbers at its end, each with a definition."""
 
+import csv
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from importlib.resources import files
+from typing import ClassVar, Literal, Protocol
 
 from fogsim.values import Step
 
 JsonValue = float | int | str | None | Mapping[str, "JsonValue"]
-"""What a metric may say: None where it is undefined, never NaN or infinity."""
+"""Value of a metric: None where it is undefined, never NaN or infinity."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,23 +32,74 @@ class Sample:
     derived: Mapping[str, float | None]
 
 
+@dataclass(frozen=True, slots=True)
+class Definition:
+    """What a key of ``metrics.json`` means, and whether it ranks policies; `definitions.csv` has those of FogSim.
+
+    Attributes
+    ----------
+    meaning : str
+        Complete sentences.
+    numerator, denominator : str
+        What the value is the quotient of; an empty numerator stands for a count, a sum or an extreme of one run.
+    denominator_moves : bool
+        Whether a policy moves the denominator by making traffic slower. Such a metric never ranks policies.
+    better : "lower", "higher" or None
+        Direction in which the metric ranks policies; None where it only describes.
+    label, unit : str
+        Name and unit in reports; an empty label stands for the key itself.
+    scale : float
+        Factor from the unit of the key to `unit`.
+    """
+
+    meaning: str
+    numerator: str = ""
+    denominator: str = "one run"
+    denominator_moves: bool = False
+    better: Literal["lower", "higher"] | None = None
+    label: str = ""
+    unit: str = ""
+    scale: float = 1.0
+
+
+def definitions_of(metric: str) -> dict[str, Definition]:
+    """Definitions of the keys of one of FogSim's metrics, by its name in `METRICS`."""
+    return {
+        row["key"]: Definition(
+            row["meaning"],
+            row["numerator"],
+            row["denominator"],
+            row["denominator_moves"] == "yes",
+            _DIRECTIONS[row["better"]],
+            row["label"],
+            row["unit"],
+            float(row["scale"] or 1.0),
+        )
+        for row in _table()
+        if row["metric"] == metric
+    }
+
+
+_DIRECTIONS: Mapping[str, Literal["lower", "higher"] | None] = {"": None, "lower": "lower", "higher": "higher"}
+
+
+@functools.cache
+def _table() -> list[dict[str, str]]:
+    text = files("fogsim.metrics").joinpath("definitions.csv").read_text(encoding="utf-8")
+    return list(csv.DictReader(text.splitlines()))
+
+
 class Metric(Protocol):
     """A few numbers about a run."""
 
-    meanings: ClassVar[Mapping[str, str]]
-    """One line on each key of the result; a key ends in its unit."""
+    definitions: ClassVar[Mapping[str, Definition]]
+    """Definition of each key of the result; a key ends in its unit."""
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
 
     def result(self) -> Mapping[str, JsonValue]:
-        """Say what the steps so far amount to; the keys are those of `meanings`."""
+        """Values over the steps so far; the keys are those of `definitions`."""
 
 
 def share(part: float, whole: float) -> float | None:

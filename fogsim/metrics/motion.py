@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from fogsim.metrics.metric import JsonValue, Sample, share
+from fogsim.metrics.metric import Definition, JsonValue, Sample, definitions_of, share
 from fogsim.units import clock_time
 
 
@@ -13,13 +13,7 @@ from fogsim.units import clock_time
 class Motion:
     """Duration, distance and speed of the ego."""
 
-    meanings: ClassVar[Mapping[str, str]] = {
-        "duration_s": "simulated time between the first and the last step",
-        "distance_m": "distance that the ego drove in it",
-        "mean_speed_mps": "distance over duration",
-        "max_speed_mps": "highest speed of the ego",
-        "steps": "number of steps",
-    }
+    definitions: ClassVar[Mapping[str, Definition]] = definitions_of("motion")
     _steps: int = 0
     _duration: float = 0.0
     _start: float = 0.0
@@ -27,13 +21,7 @@ class Motion:
     _max_speed: float = 0.0
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
         step = sample.step
         if self._steps == 0:
             self._start = step.route_position
@@ -58,23 +46,14 @@ class Motion:
 class Comfort:
     """Braking and jerk of the ego; the jerk is the change of acceleration between steps."""
 
-    meanings: ClassVar[Mapping[str, str]] = {
-        "max_deceleration_mps2": "hardest braking of the ego",
-        "rms_jerk_mps3": "root mean square of the change of its acceleration in time",
-    }
+    definitions: ClassVar[Mapping[str, Definition]] = definitions_of("comfort")
     _max_deceleration: float | None = None
     _previous: float | None = None
     _squared_jerk_time: float = 0.0
     _time: float = 0.0
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
         acceleration = float(sample.step.traffic.acceleration[sample.step.ego])
         self._max_deceleration = max(self._max_deceleration or 0.0, -acceleration)
         if self._previous is not None and sample.elapsed > 0:
@@ -102,14 +81,7 @@ class Compliance:
     """
 
     tolerance: float
-    meanings: ClassVar[Mapping[str, str]] = {
-        "advised_time_share": "share of the time in which there was a speed advice",
-        "mean_advised_speed_mps": "mean advice over the time in which there was one",
-        "above_advice_time_share": "share of all time in which the ego was faster than advised",
-        "advice_compliance_share": "share of the time with an advice in which the ego drove at it, or slower; 1 km/h "
-        "above it counts",
-        "advice_changes_per_km": "how often the advice appeared, changed by 1 km/h or more, or ended, per kilometre",
-    }
+    definitions: ClassVar[Mapping[str, Definition]] = definitions_of("compliance")
     _time: float = 0.0
     _distance: float = 0.0
     _changes: int = 0
@@ -119,13 +91,7 @@ class Compliance:
     _above_time: float = 0.0
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
         advised = sample.step.command.advice.speed
         self._time += sample.elapsed
         self._distance += float(sample.step.traffic.speed[sample.step.ego]) * sample.elapsed

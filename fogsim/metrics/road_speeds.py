@@ -66,15 +66,7 @@ class RoadSpeeds:
         return np.array(self._path).reshape(-1, 3)
 
     def update(self, step: Step, elapsed: float) -> None:
-        """Take in a step of the ego.
-
-        Parameters
-        ----------
-        step : Step
-            The step, before `add` gets what is in it.
-        elapsed : float
-            Time since the one before [s].
-        """
+        """Add a step of the ego, a time [s] after the one before, before `add` gets its traffic."""
         traffic, place = step.traffic, step.route_position
         if not self._path or place >= self._path[-1][0] + PATH_SPACING:
             x, y, _ = traffic.position[step.ego]
@@ -83,13 +75,7 @@ class RoadSpeeds:
         self._ego[cell] = self._ego.get(cell, np.zeros(3)) + elapsed * np.array([1.0, speed, step.truth.extinction])
 
     def add(self, span: TrafficSpan) -> None:
-        """Take in everybody in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The steps.
-        """
+        """Add all vehicles of some steps."""
         if not self._path and span.route is not None:
             self._path = _points_along(span.route)
         if not self._path:

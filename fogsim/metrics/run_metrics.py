@@ -10,11 +10,11 @@ from fogsim.metrics.cross_sections import TrafficThroughput
 from fogsim.metrics.crossing import TrafficEncroachment
 from fogsim.metrics.estimation import BeliefAheadError, BeliefError, DenseFogKnown, EquippedBelief, EstimatorErrors
 from fogsim.metrics.lighting import Lighting
-from fogsim.metrics.metric import JsonValue, Metric, Sample
+from fogsim.metrics.metric import Definition, JsonValue, Metric, Sample, definitions_of
 from fogsim.metrics.motion import Comfort, Compliance, Motion
-from fogsim.metrics.safety import Collisions, Conflict, Sight
-from fogsim.metrics.step_metrics import DEFAULT_STANDARD, step_metrics
+from fogsim.metrics.safety import DEFAULT_STANDARD, Collisions, Conflict, Sight, step_metrics
 from fogsim.metrics.surrogate import SafetyStandard
+from fogsim.metrics.traffic_cohort import TrafficCohort
 from fogsim.metrics.traffic_collisions import TrafficCollisions
 from fogsim.metrics.traffic_comfort import TrafficComfort
 from fogsim.metrics.traffic_compliance import TrafficCompliance
@@ -47,6 +47,7 @@ METRICS: Registry[MetricFactory] = Registry(
         "dense_fog_known": lambda _: DenseFogKnown(),
         "equipped": lambda _: EquippedBelief(),
         "estimators": lambda _: EstimatorErrors(),
+        "traffic_cohort": lambda _: TrafficCohort(),
         "traffic_collisions": lambda _: TrafficCollisions(),
         "traffic_conflicts": lambda standard: TrafficConflicts(standard.time_to_collision),
         "traffic_headways": lambda _: TrafficHeadways(),
@@ -70,12 +71,17 @@ class RunSummary:
     ----------
     values : mapping from str to JSON value
         Every metric by its key, which ends in the unit; None where it is undefined.
-    meanings : mapping from str to str
-        One line on each key.
+    definitions : mapping from str to Definition
+        What each key means.
     """
 
     values: Mapping[str, JsonValue]
-    meanings: Mapping[str, str]
+    definitions: Mapping[str, Definition]
+
+    @property
+    def meanings(self) -> dict[str, str]:
+        """Meaning of each key."""
+        return {key: one.meaning for key, one in self.definitions.items()}
 
     def to_json(self) -> dict[str, JsonValue]:
         """Give the values as a dict that JSON can hold without NaN or infinity, numbers in the digits that they have.
@@ -165,11 +171,11 @@ class MetricsOfRun(ABC, Generic[AnyStep]):
         self._of_traffic.hand_over()
         ending = None if self._last is None else self._last.ending
         values: dict[str, JsonValue] = {"ending": None if ending is None else ending.value}
-        meanings = {"ending": "why the run was over; none if it was cut short"}
+        definitions = {"ending": Definition("Why the run ended; none if it was interrupted.")}
         for name, metric in self._metrics.items():
             values.update(checked_values(name, metric.result()))
-            meanings.update(metric.meanings)
-        return RunSummary(values, meanings)
+            definitions.update(metric.definitions)
+        return RunSummary(values, definitions)
 
 
 class RunMetrics(MetricsOfRun[Step]):
@@ -262,21 +268,20 @@ class TrafficRunMetrics(MetricsOfRun[TrafficStep]):
         """Say what the steps so far amount to."""
         found = super().summary()
         about: dict[str, JsonValue] = {"duration_s": clock_time(self._duration), "steps": self._steps}
-        meanings = {key: Motion.meanings[key] for key in about}
-        # The way of the run comes first, as in that of an ego.
+        definitions = {key: Motion.definitions[key] for key in about}
+        # The order is that of a run with an ego.
         first = {"ending": found.values["ending"], **about}
-        return RunSummary({**first, **found.values}, {**found.meanings, **meanings})
+        return RunSummary({**first, **found.values}, {**found.definitions, **definitions})
 
 
-def metric_keys() -> tuple[str, ...]:
-    """Keys of ``metrics.json`` that any run may have; `estimators` has a block for each method.
+def metric_definitions() -> Mapping[str, Definition]:
+    """Definitions of all keys of ``metrics.json``; `estimators` has a block for each method."""
+    return RunMetrics().summary().definitions
 
-    Returns
-    -------
-    tuple of str
-        Those of a run about an ego, and those of one without.
-    """
-    return tuple(dict.fromkeys((*RunMetrics().summary().meanings, *TrafficRunMetrics().summary().meanings)))
+
+def metric_topics() -> dict[str, tuple[str, ...]]:
+    """Keys of ``metrics.json`` by topic, the name of their metric in words."""
+    return {name.replace("_", " "): tuple(definitions_of(name)) for name in METRICS}
 
 
 def _elapsed(last: TrafficStep | None, step: TrafficStep) -> float | None:

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import ndtr
 
 from fogsim.kinematics import DECELERATION, REACTION_TIME
 
 QUEUE_SPEED = 5.0
-"""Who is slower stands in a queue, or is about to [m/s]: closing up to it is no conflict, driving into it is another
-one than with a leader that moves."""
+"""Speed below which a vehicle counts as queued [m/s]; slower followers only close up and are in no conflict."""
 
 CRITICAL_DECELERATION = 3.4
 """Deceleration to avoid a crash from which a conflict is serious [m/s²] (threshold of SUMO's SSM device for MDRAC)."""
@@ -22,6 +22,10 @@ ALERT_REACTION_TIME = 1.0
 
 FULL_BRAKING = 6.43
 """Deceleration that the brakes of a passenger car must reach at least [m/s²] (UN R13-H, mean fully developed)."""
+
+AVAILABLE_DECELERATION = (8.45, 1.40, 4.23, 12.68)
+"""Mean, standard deviation, least and highest of the maximum available deceleration rate (MADR) of cars [m/s²], a
+truncated normal distribution (Cunto & Saccomanno 2008)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +151,55 @@ def potential_collision_speed(
     at_once = np.sqrt(closing**2 + np.multiply(2.0 * deceleration, gap))
     impact: NDArray[np.float64] = np.where(hit_growing <= 0.0, at_once, falling)[()]
     return impact
+
+
+def crash_potential(drac: ArrayLike) -> NDArray[np.float64]:
+    """Probability that DRAC exceeds the deceleration that the brakes and the road allow, P(MADR ≤ DRAC).
+
+    Its mean over a vehicle's time is the crash potential index (CPI, Cunto & Saccomanno, Accident Analysis and
+    Prevention 40 (2008), 1171-1179).
+
+    Parameters
+    ----------
+    drac : array_like
+        Deceleration rate to avoid a crash [m/s²]; ``inf`` where no braking is enough.
+
+    Returns
+    -------
+    ndarray
+        Probability [-] by the distribution `AVAILABLE_DECELERATION`, 0 … 1.
+    """
+    mean, deviation, least, highest = AVAILABLE_DECELERATION
+    below, up_to, below_highest = (
+        ndtr((x - mean) / deviation) for x in (least, np.clip(drac, least, highest), highest)
+    )
+    return np.asarray((up_to - below) / (below_highest - below), dtype=np.float64)[()]
+
+
+def stopping_distance_difference(
+    gap: ArrayLike,
+    speed: ArrayLike,
+    leader_speed: ArrayLike,
+    reaction_time: float = ALERT_REACTION_TIME,
+    deceleration: float = FULL_BRAKING,
+) -> NDArray[np.float64]:
+    """Difference of space distance and stopping distance, gap + v_L² / 2b − (v_F t + v_F² / 2b) (DSS).
+
+    Negative where the follower cannot stop behind a leader that brakes fully now (Okamura et al., Advances in
+    Transportation Studies, special issue (2011), 99-112). The time integral of −DSS while it is negative is TIDSS.
+
+    Parameters
+    ----------
+    gap, speed, leader_speed, reaction_time, deceleration
+        See `potential_collision_speed`.
+
+    Returns
+    -------
+    ndarray
+        Difference [m].
+    """
+    braking = (np.square(leader_speed) - np.square(speed)) / (2.0 * deceleration)
+    return np.asarray(np.add(gap, braking) - np.multiply(speed, reaction_time), dtype=np.float64)[()]
 
 
 def time_headway(gap: ArrayLike, speed: ArrayLike) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""How smoothly everybody near the ego drives."""
+"""How smoothly all vehicles near the ego drive."""
 
 import math
 from collections.abc import Mapping
@@ -8,20 +8,16 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.metrics.metric import JsonValue, share
+from fogsim.metrics.metric import Definition, JsonValue, definitions_of, share
 from fogsim.metrics.surrogate import CRITICAL_DECELERATION
 from fogsim.metrics.traffic_span import Exposure, TrafficMetric, TrafficSpan
 
 
 @dataclass(slots=True)
 class TrafficComfort(TrafficMetric):
-    """Jerk, the change of acceleration between two steps, and hard braking of everybody near the ego."""
+    """Jerk, the change of acceleration between two steps, and hard braking of all vehicles near the ego."""
 
-    meanings: ClassVar[Mapping[str, str]] = {
-        "traffic_rms_jerk_mps3": "root mean square over the time of all vehicles read of the change of "
-        "acceleration from step to step, over the time between them",
-        "traffic_hard_braking_time_share": "share of that time in which they brake harder than 3.4 m/s²",
-    }
+    definitions: ClassVar[Mapping[str, Definition]] = definitions_of("traffic_comfort")
     _exposure: Exposure = field(default_factory=Exposure)
     _last: tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64], NDArray[np.float64]] = field(
         default_factory=lambda: (np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros(0), np.zeros(0))
@@ -29,15 +25,10 @@ class TrafficComfort(TrafficMetric):
     _squared_jerk_time: float = 0.0
     _time: float = 0.0
     _braking: float = 0.0
+    _cohort_events: int = 0
 
     def add(self, span: TrafficSpan) -> None:
-        """Take in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The next steps.
-        """
+        """Add some steps."""
         self._exposure.add(span)
         self._braking += float(span.elapsed[span.acceleration < -CRITICAL_DECELERATION].sum())
         # The last step of the span before comes first.
@@ -48,7 +39,14 @@ class TrafficComfort(TrafficMetric):
         # Moments ascend, and stay so within a vehicle.
         order = np.argsort(vehicle, kind="stable")
         before, after = order[:-1], order[1:]
-        follows = (vehicle[before] == vehicle[after]) & (moment[before] + 1 == moment[after]) & (elapsed[after] > 0.0)
+        follows = (vehicle[before] == vehicle[after]) & (moment[before] + 1 == moment[after])
+        if span.in_cohort.any():
+            hard = (acceleration < -CRITICAL_DECELERATION) & span.in_cohort[vehicle]
+            begins = hard[order]
+            begins[1:] &= ~(follows & hard[before])
+            # What began in the last step of the span before is counted already.
+            self._cohort_events += int((begins & (order >= len(self._last[0]))).sum())
+        follows &= elapsed[after] > 0.0
         change = np.diff(acceleration[order])[follows]
         passed = elapsed[after][follows]
         self._squared_jerk_time += float((change**2 / passed).sum())
@@ -62,4 +60,5 @@ class TrafficComfort(TrafficMetric):
         return {
             "traffic_rms_jerk_mps3": None if mean_square is None else math.sqrt(mean_square),
             "traffic_hard_braking_time_share": share(self._braking, self._exposure.time),
+            "traffic_hard_braking_events_per_cohort_vehicle": self._exposure.per_cohort_vehicle(self._cohort_events),
         }

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from fogsim.metrics.metric import JsonValue, share
+from fogsim.metrics.metric import Definition, JsonValue, definitions_of, share
 from fogsim.metrics.traffic_span import Exposure, TrafficMetric, TrafficSpan
 
 
@@ -21,24 +21,13 @@ class TrafficCompliance(TrafficMetric):
     """
 
     tolerance: float
-    meanings: ClassVar[Mapping[str, str]] = {
-        "traffic_advised_time_share": "share of the time of all vehicles read in which their drivers have "
-        "heard an advice in force; the ego hears its own",
-        "traffic_advice_compliance_share": "share of that time in which they drive at it, or slower; 1 km/h above it "
-        "counts",
-    }
+    definitions: ClassVar[Mapping[str, Definition]] = definitions_of("traffic_compliance")
     _exposure: Exposure = field(default_factory=Exposure)
     _advised_time: float = 0.0
     _compliant_time: float = 0.0
 
     def add(self, span: TrafficSpan) -> None:
-        """Take in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The next steps.
-        """
+        """Add some steps."""
         self._exposure.add(span)
         advised = np.isfinite(span.advised_speed)
         if advised.any():

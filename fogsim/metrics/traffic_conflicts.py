@@ -1,4 +1,4 @@
-"""Conflicts of everybody near the ego, the ego among them: how often, how long and how hard."""
+"""Conflicts of all vehicles near the ego, the ego among them: how often, how long and how hard."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -7,13 +7,16 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.metrics.metric import JsonValue, share
+from fogsim.metrics.metric import Definition, JsonValue, definitions_of, share
 from fogsim.metrics.surrogate import (
+    AVAILABLE_DECELERATION,
     CRITICAL_DECELERATION,
     QUEUE_SPEED,
+    crash_potential,
     deceleration_rate_to_avoid_crash,
     modified_deceleration_rate_to_avoid_crash,
     potential_collision_speed,
+    stopping_distance_difference,
     time_to_collision,
 )
 from fogsim.metrics.traffic_span import Exposure, TrafficMetric, TrafficSpan
@@ -25,10 +28,7 @@ _MOMENTS = 1 << 32
 
 @dataclass(slots=True)
 class TrafficConflicts(TrafficMetric):
-    """Conflicts between followers and leaders of one lane.
-
-    Leaders slower than 5 m/s are a queue, and count apart; who is slower than that itself only closes up to one, which
-    counts nowhere.
+    """Conflicts between followers at 5 m/s or more and their leaders, moving or standing, in the same lane.
 
     Attributes
     ----------
@@ -37,94 +37,83 @@ class TrafficConflicts(TrafficMetric):
     """
 
     threshold: float
-    meanings: ClassVar[Mapping[str, str]] = {
-        "traffic_conflicts_per_vehicle_h": "how often a driver came below the time-to-collision threshold behind a "
-        "leader that moved (5 m/s or more), per hour of all vehicles",
-        "traffic_conflicts_per_vehicle_km": "the same per kilometre of all vehicles",
-        "traffic_exposed_time_share": "share of the time of all vehicles below that threshold, likewise (TET)",
-        "traffic_exposed_time_s_per_vehicle_km": "the same time per kilometre of all vehicles",
-        "traffic_integrated_time_to_collision_s2_per_h": "what was missing to that threshold, over time (TIT), per "
-        "hour of all vehicles",
-        "traffic_integrated_time_to_collision_s2_per_vehicle_km": "the same per kilometre of all vehicles",
-        "traffic_minimum_time_to_collision_s": "least time to collision of anybody, likewise",
-        "traffic_max_drac_mps2": "highest deceleration rate to avoid a crash, Δv² / 2 gap, of anybody, likewise",
-        "traffic_serious_conflict_time_share": "share with that deceleration above 3.4 m/s²",
-        "traffic_serious_mdrac_time_share": "share with a deceleration after 1 s of reaction, Δv / 2 (TTC − 1 s), "
-        "above 3.4 m/s² (MDRAC), or none that is enough",
-        "traffic_queue_exposed_time_share": "as traffic_exposed_time_share, for leaders slower than 5 m/s: driving at "
-        "5 m/s or more towards a queue",
-        "traffic_queue_serious_conflict_time_share": "as traffic_serious_conflict_time_share, for those",
-        "traffic_mean_potential_collision_speed_mps": "mean over the time of followers that move of the speed at which "
-        "they would hit their leader, should it brake at 6.43 m/s² and they do so 1 s later; 0 where they would not",
-        "traffic_potential_collision_time_share": "share of that time in which they would hit it",
-        "traffic_mean_approach_mps": "mean speed at which followers would meet their leader if nobody did anything",
-    }
+    definitions: ClassVar[Mapping[str, Definition]] = definitions_of("traffic_conflicts")
     _exposure: Exposure = field(default_factory=Exposure)
-    _times: NDArray[np.float64] = field(default_factory=lambda: np.zeros(10))
-    _episodes: int = 0
+    _times: NDArray[np.float64] = field(default_factory=lambda: np.zeros((11, 2)))
+    _episodes: NDArray[np.intp] = field(default_factory=lambda: np.zeros(2, np.intp))
+    _cohort_episodes: int = 0
     _exposed_before: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))
-    _least: float = np.inf
-    _most: float = 0.0
+    _least: NDArray[np.float64] = field(default_factory=lambda: np.full(2, np.inf))
+    _most: NDArray[np.float64] = field(default_factory=lambda: np.zeros(2))
 
     def add(self, span: TrafficSpan) -> None:
-        """Take in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The next steps.
-        """
+        """Add some steps; arrays of two are about moving and queued leaders."""
         self._exposure.add(span)
         found = span.following
         driving = found.speed >= QUEUE_SPEED
-        row, gap, own, ahead = (part[driving] for part in (found.follower, found.gap, found.speed, found.leader_speed))
-        elapsed, moving = span.elapsed[row], ahead >= QUEUE_SPEED
+        row = found.follower[driving]
+        gap, own, ahead = (part[driving] for part in (found.gap, found.speed, found.leader_speed))
+        elapsed, queued = span.elapsed[row], (ahead < QUEUE_SPEED).astype(np.intp)
         remaining = time_to_collision(gap, own, ahead)
         exposed = remaining <= self.threshold
         drac = deceleration_rate_to_avoid_crash(gap, own, ahead)
-        serious = drac > CRITICAL_DECELERATION
         late = modified_deceleration_rate_to_avoid_crash(gap, own, ahead) > CRITICAL_DECELERATION
         impact = potential_collision_speed(gap, own, ahead)
-        self._least = float(remaining[moving].min(initial=self._least))
-        self._most = float(drac[moving & (gap > 0.0)].max(initial=self._most))
-        begun = row[exposed & moving]
-        self._count_episodes(span.vehicle[begun] * _MOMENTS + span.moment[begun], int(span.moment.max(initial=0)))
-        self._times += [
-            elapsed[exposed & moving].sum(),
-            (elapsed * np.maximum(self.threshold - remaining, 0.0))[moving].sum(),
-            elapsed[serious & moving].sum(),
-            elapsed[late & moving].sum(),
-            elapsed[exposed & ~moving].sum(),
-            elapsed[serious & ~moving].sum(),
-            elapsed.sum(),
-            (elapsed * impact).sum(),
-            elapsed[impact > 0.0].sum(),
-            (elapsed * np.maximum(own - ahead, 0.0)).sum(),
-        ]
+        lacking = np.maximum(-stopping_distance_difference(gap, own, ahead), 0.0)
+        potential = np.zeros(len(drac))
+        hard = np.flatnonzero(drac > AVAILABLE_DECELERATION[2])
+        potential[hard] = crash_potential(drac[hard])
+        np.minimum.at(self._least, queued, remaining)
+        free = np.flatnonzero(gap > 0.0)
+        np.maximum.at(self._most, queued[free], drac[free])
+        self._count_episodes(span, row[exposed], queued[exposed])
+        values = (
+            *(exposed, np.maximum(self.threshold - remaining, 0.0), drac > CRITICAL_DECELERATION, late, potential),
+            *(lacking > 0.0, lacking, np.ones(len(row)), impact, impact > 0.0, np.maximum(own - ahead, 0.0)),
+        )
+        self._times += [np.bincount(queued, elapsed * value, minlength=2) for value in values]
 
-    def _count_episodes(self, exposed: NDArray[np.intp], last: int) -> None:
+    def _count_episodes(self, span: TrafficSpan, row: NDArray[np.intp], queued: NDArray[np.intp]) -> None:
         """Count those who are exposed (vehicle and moment in one number) and were not so a moment before."""
-        self._episodes += int((~np.isin(exposed - 1, np.concatenate((self._exposed_before, exposed)))).sum())
-        self._exposed_before = exposed[exposed % _MOMENTS == last]
+        exposed = span.vehicle[row] * _MOMENTS + span.moment[row]
+        begun = ~np.isin(exposed - 1, np.concatenate((self._exposed_before, exposed)))
+        self._episodes += np.bincount(queued[begun], minlength=2)
+        self._cohort_episodes += int(span.in_cohort[span.vehicle[row[begun]]].sum())
+        self._exposed_before = exposed[exposed % _MOMENTS == int(span.moment.max(initial=0))]
 
     def result(self) -> dict[str, JsonValue]:
-        """Say what everybody's time amounts to."""
+        """Rates, shares and extremes over the steps so far."""
         total, rate = self._exposure.time, self._exposure
-        exposed, missing, serious, late, queue, hard_queue, moving, impact, hits, approach = map(float, self._times)
-        return {
-            "traffic_conflicts_per_vehicle_h": rate.per_hour(self._episodes),
-            "traffic_conflicts_per_vehicle_km": rate.per_kilometre(self._episodes),
+        conflicts = int(self._episodes.sum())
+        exposed, missing, serious, late, potential, negative, lacking, driving, impact, hits, approach = map(
+            float, self._times.sum(axis=1)
+        )
+        followed = self._times[7]
+        found: dict[str, JsonValue] = {
+            "traffic_conflicts_per_cohort_vehicle": rate.per_cohort_vehicle(self._cohort_episodes),
+            "traffic_conflicts_per_vehicle_km": rate.per_kilometre(conflicts),
+            "traffic_conflicts_per_vehicle_h": rate.per_hour(conflicts),
             "traffic_exposed_time_share": share(exposed, total),
             "traffic_exposed_time_s_per_vehicle_km": rate.per_kilometre(exposed),
             "traffic_integrated_time_to_collision_s2_per_h": rate.per_hour(missing),
             "traffic_integrated_time_to_collision_s2_per_vehicle_km": rate.per_kilometre(missing),
-            "traffic_minimum_time_to_collision_s": finite_or_none(self._least),
-            "traffic_max_drac_mps2": self._most if moving else None,
+            "traffic_minimum_time_to_collision_s": finite_or_none(float(self._least.min())),
+            "traffic_max_drac_mps2": float(self._most.max()) if driving else None,
             "traffic_serious_conflict_time_share": share(serious, total),
             "traffic_serious_mdrac_time_share": share(late, total),
-            "traffic_queue_exposed_time_share": share(queue, total),
-            "traffic_queue_serious_conflict_time_share": share(hard_queue, total),
-            "traffic_mean_potential_collision_speed_mps": share(impact, moving),
-            "traffic_potential_collision_time_share": share(hits, moving),
-            "traffic_mean_approach_mps": share(approach, moving),
+            "traffic_crash_potential_index": share(potential, total),
+            "traffic_negative_dss_time_share": share(negative, total),
+            "traffic_time_integrated_dss_m_s_per_vehicle_km": rate.per_kilometre(lacking),
+        }
+        for sort, name in enumerate(("moving", "queue")):
+            found[f"traffic_{name}_conflicts_per_vehicle_km"] = rate.per_kilometre(int(self._episodes[sort]))
+            found[f"traffic_{name}_exposed_time_share"] = share(float(self._times[0, sort]), total)
+            found[f"traffic_{name}_serious_conflict_time_share"] = share(float(self._times[2, sort]), total)
+            found[f"traffic_minimum_{name}_time_to_collision_s"] = finite_or_none(float(self._least[sort]))
+            found[f"traffic_max_{name}_drac_mps2"] = float(self._most[sort]) if followed[sort] else None
+        return {
+            **found,
+            "traffic_mean_potential_collision_speed_mps": share(impact, driving),
+            "traffic_potential_collision_time_share": share(hits, driving),
+            "traffic_mean_approach_mps": share(approach, driving),
         }

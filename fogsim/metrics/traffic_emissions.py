@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.linear_algebra import matrix_product
-from fogsim.metrics.metric import JsonValue
+from fogsim.metrics.metric import Definition, JsonValue, definitions_of
 from fogsim.metrics.traffic_span import Exposure, TrafficMetric, TrafficSpan
 
 _KINDS = ("car", "van", "truck", "bus", "motorcycle")
@@ -56,23 +56,12 @@ class TrafficEmissions(TrafficMetric):
     diesel Euro 6 vans, 7.5 t lorries and 15 to 18 t buses of Euro VI, motorcycles above 250 cm³.
     """
 
-    meanings: ClassVar[Mapping[str, str]] = {
-        "traffic_co2_g_per_vehicle_km": "carbon dioxide of all vehicles read, per kilometre of all, by HBEFA 4 "
-        "with SUMO's usual classes; on the level",
-        "traffic_nox_mg_per_vehicle_km": "nitrogen oxides, likewise",
-        "traffic_fuel_g_per_vehicle_km": "fuel, likewise",
-    }
+    definitions: ClassVar[Mapping[str, Definition]] = definitions_of("traffic_emissions")
     _exposure: Exposure = field(default_factory=Exposure)
     _milligrams: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
 
     def add(self, span: TrafficSpan) -> None:
-        """Take in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The next steps.
-        """
+        """Add some steps."""
         self._exposure.add(span)
         names = np.array([_KINDS.index(name) if name in _KINDS else 0 for name in span.kind_names], dtype=np.intp)
         kind, speed, acceleration = names[span.kind], span.speed, span.acceleration

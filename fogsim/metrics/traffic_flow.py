@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.metrics.metric import JsonValue, share
+from fogsim.metrics.metric import Definition, JsonValue, definitions_of, share
 from fogsim.metrics.traffic_span import HOUR, KILOMETRE, Exposure, TrafficMetric, TrafficSpan
 
 
@@ -20,28 +20,14 @@ class SpeedsByNumber:
         self._way = np.zeros(0)
 
     def add(self, number: NDArray[np.intp], elapsed: NDArray[np.float64], way: NDArray[np.float64]) -> None:
-        """Take in times and ways.
-
-        Parameters
-        ----------
-        number : (n,) intp
-            Vehicles or lanes.
-        elapsed, way : (n,) float64
-            Their times [s] and ways [m].
-        """
+        """Add times [s] and distances [m] by vehicle or lane."""
         size = max(len(self._time), int(number.max(initial=-1)) + 1)
         grown = (0, size - len(self._time))
         self._time = np.pad(self._time, grown) + np.bincount(number, elapsed, minlength=size)
         self._way = np.pad(self._way, grown) + np.bincount(number, way, minlength=size)
 
     def variance_between(self, group: Sequence[int] | None = None) -> float | None:
-        """Variance of the mean speeds about that of their group, by time [m²/s²]; None without time.
-
-        Parameters
-        ----------
-        group : (n,) sequence of int or None
-            Group of each number; None for one of all.
-        """
+        """Variance of the mean speeds about that of their group, by time [m²/s²]; None without time."""
         groups = np.zeros(len(self._time), np.intp) if group is None else np.array(group, dtype=np.intp)
         times, ways = np.bincount(groups, self._time)[groups], np.bincount(groups, self._way)[groups]
         been = self._time > 0.0
@@ -59,21 +45,7 @@ class TrafficFlow(TrafficMetric):
     does: of each second the part 1 − v / v_free, where v_free is what the driver would drive alone in clear air.
     """
 
-    meanings: ClassVar[Mapping[str, str]] = {
-        "traffic_vehicle_time_s": "time of all vehicles read together (traffic.reading_radius_m; all without an ego)",
-        "traffic_vehicle_distance_m": "way of all of them in it",
-        "traffic_mean_vehicles": "mean number of them",
-        "traffic_vehicle_km_per_h": "throughput: their way per hour of simulated time (within that radius)",
-        "traffic_mean_speed_mps": "mean speed over their time: way over time",
-        "traffic_speed_standard_deviation_mps": "standard deviation of speed over their time",
-        "traffic_speed_standard_deviation_within_vehicles_mps": "root of its part within vehicles: each about its own "
-        "mean speed",
-        "traffic_speed_standard_deviation_between_vehicles_mps": "root of the other part: of vehicles' mean speeds",
-        "traffic_speed_standard_deviation_between_lanes_mps": "the same of lanes' mean speeds about that of their edge",
-        "traffic_delay_s_per_vehicle_km": "time lost to driving slower than alone in clear air at the limit times the "
-        "driver's own factor, ∫ 1 − v / v_free dt, per kilometre of all vehicles; none where that speed is not known",
-        "traffic_delay_share": "the same per time of all vehicles",
-    }
+    definitions: ClassVar[Mapping[str, Definition]] = definitions_of("traffic_flow")
     _exposure: Exposure = field(default_factory=Exposure)
     _duration: float = 0.0
     _squares: float = 0.0
@@ -85,13 +57,7 @@ class TrafficFlow(TrafficMetric):
     _lane_names: tuple[str, ...] = ()
 
     def add(self, span: TrafficSpan) -> None:
-        """Take in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The next steps.
-        """
+        """Add some steps."""
         self._exposure.add(span)
         self._duration += span.duration
         way = span.elapsed * span.speed

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from fogsim.metrics.histogram import Histogram
-from fogsim.metrics.metric import JsonValue
+from fogsim.metrics.metric import Definition, JsonValue, definitions_of
 from fogsim.metrics.surrogate import QUEUE_SPEED, time_headway
 from fogsim.metrics.traffic_span import TrafficMetric, TrafficSpan
 
@@ -19,24 +19,11 @@ class TrafficHeadways(TrafficMetric):
     comes there, at the speed that it has.
     """
 
-    meanings: ClassVar[Mapping[str, str]] = {
-        "traffic_headway_below_1_s_share": "share of the time of moving followers (5 m/s or more) at less than 1 s "
-        "from their front bumper to the leader's rear one; it is their post-encroachment time (PET), too",
-        "traffic_headway_below_2_s_share": "the same at less than 2 s",
-        "traffic_headway_below_3_s_share": "the same at less than 3 s",
-        "traffic_headway_p05_s": "time headway that they are below for 5 % of that time; none above 10 s",
-        "traffic_median_headway_s": "and for half of it",
-    }
+    definitions: ClassVar[Mapping[str, Definition]] = definitions_of("traffic_headways")
     _headways: Histogram = field(default_factory=lambda: Histogram(0.0, 10.0, 0.05))
 
     def add(self, span: TrafficSpan) -> None:
-        """Take in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The next steps.
-        """
+        """Add some steps."""
         found = span.following
         moving = found.speed >= QUEUE_SPEED
         headways = time_headway(found.gap[moving], found.speed[moving])

@@ -3,7 +3,7 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar, Protocol
 
@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.metrics.following import Following, pair_in_lanes
-from fogsim.metrics.metric import JsonValue, share
-from fogsim.values import Collision, Step, TrafficState, TrafficStep
+from fogsim.metrics.metric import Definition, JsonValue, share
+from fogsim.values import Cohort, Collision, Step, TrafficState, TrafficStep
 
 MOST_ROWS = 4096
 """Rows that are gathered before the metrics get them."""
@@ -56,6 +56,12 @@ class TrafficSpan:
         Lanes and body kinds so far, by their numbers.
     route : (m, 3) float64 or None
         As of `Truth`.
+    cohort : Cohort or None
+        The cohort at the last step; None without one.
+    in_cohort : (vehicles,) bool
+        Whether each vehicle so far, by its number, is in the cohort.
+    cohort_waiting_time : float
+        Time that the cohort's vehicles have waited to enter the road [s].
     ego : (k,) intp or None
         Rows of the ego, one in each step; None without one.
     reading_radius : float
@@ -82,6 +88,9 @@ class TrafficSpan:
     lane_names: tuple[str, ...]
     kind_names: tuple[str, ...]
     route: NDArray[np.float64] | None = None
+    cohort: Cohort | None = None
+    in_cohort: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
+    cohort_waiting_time: float = 0.0
     ego: NDArray[np.intp] | None = None
     reading_radius: float = math.inf
 
@@ -106,81 +115,49 @@ class SpanWatcher(Protocol):
     """Whoever watches everybody near the ego."""
 
     def add(self, span: TrafficSpan) -> None:
-        """Take in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The next steps.
-        """
+        """Add some steps."""
 
 
 class TrafficMetric(ABC):
     """A few numbers about everybody near the ego."""
 
-    meanings: ClassVar[Mapping[str, str]]
-    """One line on each key of the result; a key ends in its unit."""
+    definitions: ClassVar[Mapping[str, Definition]]
+    """Definition of each key of the result; a key ends in its unit."""
 
     @abstractmethod
     def add(self, span: TrafficSpan) -> None:
-        """Take in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The next steps.
-        """
+        """Add some steps."""
 
     @abstractmethod
     def result(self) -> Mapping[str, JsonValue]:
-        """Say what the steps so far amount to; the keys are those of `meanings`."""
+        """Values over the steps so far; the keys are those of `definitions`."""
 
 
 @dataclass(slots=True)
 class Exposure:
-    """On how much driving rates are based: time and way of all vehicles near the ego together.
-
-    Attributes
-    ----------
-    time : float
-        Vehicle-seconds [s].
-    distance : float
-        Vehicle-metres [m].
-    """
+    """Denominators of rates: time [s] and distance [m] of all vehicles read, and vehicles of the cohort."""
 
     time: float = 0.0
     distance: float = 0.0
+    cohort: int | None = None
 
     def add(self, span: TrafficSpan) -> None:
-        """Take in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The next steps.
-        """
+        """Add some steps."""
         self.time += span.vehicle_time
         self.distance += span.vehicle_distance
+        self.cohort = None if span.cohort is None else len(span.cohort.vehicles)
 
     def per_hour(self, amount: float) -> float | None:
-        """Amount per vehicle-hour; None without time.
-
-        Parameters
-        ----------
-        amount : float
-            Of anything.
-        """
+        """Amount per vehicle-hour; None without time."""
         return share(HOUR * amount, self.time)
 
     def per_kilometre(self, amount: float) -> float | None:
-        """Amount per vehicle-kilometre; None without way.
-
-        Parameters
-        ----------
-        amount : float
-            Of anything.
-        """
+        """Amount per vehicle-kilometre; None without distance."""
         return share(KILOMETRE * amount, self.distance)
+
+    def per_cohort_vehicle(self, amount: float) -> float | None:
+        """Amount per vehicle of the cohort; None without a cohort."""
+        return None if self.cohort is None else share(amount, self.cohort)
 
 
 class TrafficGathering:
@@ -194,6 +171,8 @@ class TrafficGathering:
         self._numbers: list[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]] = []
         self._collisions: list[Collision] = []
         self._route: NDArray[np.float64] | None = None
+        self._cohort: Cohort | None = None
+        self._cohort_waiting_time = 0.0
         self._egos: list[int] = []
         self._reading_radius = math.inf
         self._last_ids: tuple[str, ...] = ()
@@ -208,16 +187,10 @@ class TrafficGathering:
         return self._rows >= MOST_ROWS
 
     def add(self, step: TrafficStep, elapsed: float) -> None:
-        """Take in a step.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            The next step.
-        elapsed : float
-            Time since the one before [s].
-        """
-        traffic, self._route = step.traffic, step.truth.route
+        """Add a step, a time [s] after the one before."""
+        traffic, self._route, self._cohort = step.traffic, step.truth.route, step.cohort
+        if self._cohort is not None:
+            self._cohort_waiting_time += elapsed * self._cohort.waiting
         if step.collisions:
             # The simulation may have removed both; then they were near at the step before.
             near = {*self._last_ids, *traffic.ids}
@@ -268,13 +241,21 @@ class TrafficGathering:
             lane_names=tuple(self._lanes),
             kind_names=tuple(self._kinds),
             route=self._route,
+            cohort=self._cohort,
+            in_cohort=self._in_cohort(),
+            cohort_waiting_time=self._cohort_waiting_time,
             ego=np.array(self._egos, dtype=np.intp) if self._egos else None,
             reading_radius=self._reading_radius,
         )
         self._moments += len(states)
         self._time = float(clock[-1])
         self._rows, self._states, self._numbers, self._collisions, self._egos = 0, [], [], [], []
+        self._cohort_waiting_time = 0.0
         return span
+
+    def _in_cohort(self) -> NDArray[np.bool_]:
+        members = frozenset() if self._cohort is None else self._cohort.vehicles
+        return np.fromiter((name in members for name in self._vehicles), np.bool_, len(self._vehicles))
 
 
 def _known(values: NDArray[np.float64], count: int, unknown: float) -> NDArray[np.float64]:
@@ -283,28 +264,14 @@ def _known(values: NDArray[np.float64], count: int, unknown: float) -> NDArray[n
 
 
 class GatheredMetrics:
-    """Hands whoever watches everybody the steps of a run, some at a time.
-
-    Parameters
-    ----------
-    watchers : sequence of SpanWatcher
-        Metrics of everybody, and others who watch.
-    """
+    """Hands whoever watches everybody the steps of a run, some at a time."""
 
     def __init__(self, watchers: Sequence[SpanWatcher]) -> None:
         self._watchers = watchers
         self._gathering = TrafficGathering()
 
     def add(self, step: TrafficStep, elapsed: float) -> None:
-        """Take in a step.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            The next step.
-        elapsed : float
-            Time since the one before [s].
-        """
+        """Add a step, a time [s] after the one before."""
         if self._watchers:
             self._gathering.add(step, elapsed)
             if self._gathering.is_full:

@@ -1,6 +1,6 @@
 """What a recorder is, and what it is told about the run it records."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol, TypeVar
 
@@ -91,6 +91,10 @@ class RunInformation:
     along_road : callable
         Gives means over everybody on the road of traffic alone when the run is over (n, 4): middle of a stretch [m],
         speed [m/s], extinction [1/m], and time of the vehicles [s]; empty where no road was named.
+    topics : mapping from str to tuple of str
+        Those keys by topic, for the report's folded tables.
+    settings : callable
+        Returns paragraphs on how the run was set up, by their headings.
     """
 
     directory: RunDirectory
@@ -102,3 +106,5 @@ class RunInformation:
     summary: Callable[[], Mapping[str, object]] = _no_summary
     meanings: Mapping[str, str] = field(default_factory=dict)
     along_road: Callable[[], NDArray[np.float64]] = _no_road
+    topics: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    settings: Callable[[], Mapping[str, str]] = dict

@@ -12,7 +12,7 @@ from fogsim.files.atomic import write_text
 from fogsim.recorders.manifest import versions
 from fogsim.recorders.panel.camera_picture import scale_image
 from fogsim.recorders.protocol import AnyStep_contra, Derived, RunInformation
-from fogsim.recorders.report_data import Album, Curves, ReportPicture, SignBook, SignRow
+from fogsim.recorders.report_data import Album, Curves, DecisiveFrames, ReportPicture, SignBook, SignRow
 from fogsim.recorders.report_figures import draw_figures
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Step
@@ -46,6 +46,11 @@ th, td { text-align: left; padding: .3rem .8rem .3rem 0; border-bottom: 1px soli
 th { font-weight: 600; color: #44505c; }
 td.value, th.value { text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }
 td.meaning { color: #5d6975; }
+.numbers { display: grid; grid-template-columns: repeat(3, 1fr); gap: .7rem; margin: 1.2rem 0; }
+.numbers div { background: #f4f6f8; border-radius: .4rem; padding: .7rem .9rem; }
+.numbers b { display: block; font-size: 1.45rem; line-height: 1.25; font-variant-numeric: tabular-nums; }
+.numbers span, .numbers small { font-size: .85rem; font-weight: 400; color: #44505c; }
+details { margin: .6rem 0; } summary { cursor: pointer; font-weight: 600; color: #44505c; }
 figure { margin: 1.2rem 0 0; break-inside: avoid; }
 figure img { width: 100%; height: auto; display: block; }
 figcaption, p.note { font-size: .85rem; color: #5d6975; margin-top: .25rem; }
@@ -75,10 +80,16 @@ class ReportContent:
         Summary of the run; a key ends in its unit, and a mapping under ``estimators`` has one entry per method.
     meanings : mapping from str to str
         One line on each key.
+    topics : mapping from str to sequence of str
+        Keys by topic.
+    settings : mapping from str to str
+        Paragraphs on how the run was set up, by their headings.
     figures : sequence of (str, bytes)
         Caption and PNG of each figure.
+    decisive : sequence of (str, ReportPicture)
+        Captions and camera images of the decisive moments.
     pictures : sequence of ReportPicture
-        Camera images.
+        Camera images, spread evenly over the run.
     signs : sequence of SignRow
         Signs of the map that were ahead.
     footer : mapping from str to str
@@ -92,7 +103,10 @@ class ReportContent:
     not_played: Sequence[str]
     metrics: Mapping[str, object]
     meanings: Mapping[str, str]
+    topics: Mapping[str, Sequence[str]]
+    settings: Mapping[str, str]
     figures: Sequence[tuple[str, bytes]]
+    decisive: Sequence[tuple[str, ReportPicture]]
     pictures: Sequence[ReportPicture]
     signs: Sequence[SignRow]
     footer: Mapping[str, str]
@@ -115,11 +129,14 @@ def render_report(content: ReportContent) -> str:
             f'<h1>{title}</h1>\n<p class="lead">{escape(content.description)}</p>',
             _banner(content.interrupted_at),
             *(f'<p class="note">Not played: {escape(line)}</p>' for line in content.not_played),
-            _summary_table(content.metrics, content.meanings),
-            _methods_table(content.metrics, content.meanings),
+            _key_numbers(content.metrics, content.meanings),
             _figures(content.figures, recorded=content.recorded),
+            _decisive(content.decisive),
+            _methods_table(content.metrics, content.meanings),
             _signs_table(content.signs),
             _pictures(content.pictures),
+            _metrics_by_topic(content.metrics, content.meanings, content.topics),
+            _settings(content.settings),
             _footer(content.footer),
             "</body>\n</html>\n",
         ]
@@ -132,17 +149,73 @@ def _banner(interrupted_at: float | None) -> str:
     return f'<div class="partial">PARTIAL: interrupted at t = {interrupted_at:.1f} s</div>'
 
 
-def _summary_table(metrics: Mapping[str, object], meanings: Mapping[str, str]) -> str:
-    rows = [
-        f'<tr><td>{escape(_label(key))}</td><td class="value">{escape(_value(key, value))}</td>'
-        f'<td class="meaning">{escape(meanings.get(key, ""))}</td></tr>'
-        for key, value in metrics.items()
-        if not isinstance(value, Mapping)
+_KEY_NUMBERS: Sequence[tuple[str, str]] = (
+    ("ego_collisions", "collisions of the ego"),
+    ("minimum_time_to_collision_s", "least time to collision of the ego"),
+    ("overdriven_m_per_km_in_fog", "m per km in fog driven too fast to stop in sight"),
+    ("belief_median_error_percent", "median error of the estimated visibility"),
+    ("belief_coverage_share", "of its 90 % intervals hold the truth"),
+    ("above_advice_time_share", "of the time faster than advised"),
+)
+"""Metrics that answer the question of a run in fog, and what they are; the report opens with them."""
+
+_KEY_NUMBERS_OF_TRAFFIC: Sequence[tuple[str, str]] = (
+    ("traffic_collisions", "collisions"),
+    ("traffic_minimum_time_to_collision_s", "least time to collision"),
+    ("traffic_overdriven_m_per_vehicle_km_in_fog", "m per vehicle-km in fog driven too fast to stop in sight"),
+    ("traffic_sight_margin_by_distance_m", "mean sight margin over the distance in fog"),
+    ("traffic_mean_speed_mps", "mean speed"),
+    ("traffic_delay_s_per_vehicle_km", "s of delay per vehicle-km"),
+)
+
+
+def _key_numbers(metrics: Mapping[str, object], meanings: Mapping[str, str]) -> str:
+    """The first numbers that a reader asks about, large."""
+    wanted = _KEY_NUMBERS if "ego_collisions" in metrics else _KEY_NUMBERS_OF_TRAFFIC
+    shown = [(key, label) for key, label in wanted if key in metrics]
+    tiles = [
+        f'<div title="{escape(meanings.get(key, label))}"><b>{escape(_value(key, metrics[key]))}</b>'
+        f"<span>{escape(label)}</span></div>"
+        for key, label in shown
     ]
-    if not rows:
-        return ""
+    return f'<div class="numbers">{"".join(tiles)}</div>' if tiles else ""
+
+
+def _metrics_by_topic(
+    metrics: Mapping[str, object], meanings: Mapping[str, str], topics: Mapping[str, Sequence[str]]
+) -> str:
+    """All metrics, a folded table for each topic."""
+    topic_of = {key: topic for topic, keys in topics.items() for key in keys}
+    tables: dict[str, list[str]] = {}
+    for key, value in metrics.items():
+        if not isinstance(value, Mapping):
+            tables.setdefault(topic_of.get(key, "run"), []).append(
+                f'<tr><td>{escape(_label(key))}</td><td class="value">{escape(_value(key, value))}</td>'
+                f'<td class="meaning">{escape(meanings.get(key, ""))}</td></tr>'
+            )
     head = '<tr><th>metric</th><th class="value">value</th><th>meaning</th></tr>'
-    return f"<h2>Summary</h2>\n<table>{head}\n" + "\n".join(rows) + "\n</table>"
+    folded = [
+        f"<details><summary>{escape(topic.capitalize())} ({len(rows)})</summary><table>{head}\n"
+        + "\n".join(rows)
+        + "</table></details>"
+        for topic, rows in tables.items()
+    ]
+    return "\n".join(["<h2>All metrics</h2>", *folded]) if folded else ""
+
+
+def _settings(paragraphs: Mapping[str, str]) -> str:
+    """How the run was set up, folded."""
+    if not paragraphs:
+        return ""
+    said = "\n".join(f"<p><b>{escape(name)}.</b> {escape(text)}</p>" for name, text in paragraphs.items())
+    return f"<h2>How it was run</h2>\n<details><summary>Methods</summary>{said}</details>"
+
+
+def _decisive(frames: Sequence[tuple[str, ReportPicture]]) -> str:
+    if not frames:
+        return ""
+    shown = "\n".join(_figure(_png(one), said, f"{said}. {_caption(one)}") for said, one in frames)
+    return f'<h2>Decisive frames</h2>\n<div class="pictures">\n{shown}\n</div>'
 
 
 def _methods_table(metrics: Mapping[str, object], meanings: Mapping[str, str]) -> str:
@@ -171,7 +244,7 @@ def _method_rows(name: str, methods: Mapping[str, Mapping[str, object]], meaning
 def _figures(figures: Sequence[tuple[str, bytes]], *, recorded: bool) -> str:
     if not figures:
         return f"<p>{'Figures are of whole runs; the rows are a table.' if recorded else 'No step was recorded.'}</p>"
-    return "<h2>Figures</h2>\n" + "\n".join(_figure(png, caption, caption) for caption, png in figures)
+    return "<h2>Timeline</h2>\n" + "\n".join(_figure(png, caption, caption) for caption, png in figures)
 
 
 def _signs_table(signs: Sequence[SignRow]) -> str:
@@ -199,7 +272,10 @@ def _pictures(pictures: Sequence[ReportPicture]) -> str:
     if not pictures:
         return ""
     shown = "\n".join(_figure(_png(picture), "camera image", _caption(picture)) for picture in pictures)
-    return f'<h2>What the camera saw</h2>\n<div class="pictures">\n{shown}\n</div>'
+    return (
+        f"<h2>What the camera saw</h2>\n<details><summary>{len(pictures)} frames over the run</summary>"
+        f'<div class="pictures">\n{shown}\n</div></details>'
+    )
 
 
 def _figure(png: bytes, alternative: str, caption: str) -> str:
@@ -288,6 +364,10 @@ class StepReport(ABC, Generic[AnyStep_contra]):
     def _figures(self) -> Sequence[tuple[str, bytes]]:
         """Caption and PNG of each figure, once there was a step."""
 
+    def _decisive(self) -> Sequence[tuple[str, ReportPicture]]:
+        """Captions and camera images of the decisive moments; none where there is no camera."""
+        return ()
+
     def _pictures(self) -> Sequence[ReportPicture]:
         """Camera images; none where there is no camera."""
         return ()
@@ -314,8 +394,11 @@ class StepReport(ABC, Generic[AnyStep_contra]):
             not_played=self._not_played,
             metrics=self._information.summary(),
             meanings=self._information.meanings,
+            topics=self._information.topics,
+            settings=self._information.settings(),
             # Figures take longer than somebody waits who has pressed Ctrl-C.
             figures=self._figures() if self._last is not None and complete else [],
+            decisive=self._decisive(),
             pictures=self._pictures(),
             signs=self._signs(),
             footer=_footnotes(self._information.seed),
@@ -336,15 +419,19 @@ class ReportRecorder(StepReport[Step]):
     def __init__(self, information: RunInformation) -> None:
         super().__init__(information)
         self._curves = Curves(estimates={method: [] for method in information.methods})
-        self._album, self._book = Album(), SignBook()
+        self._album, self._book, self._moments = Album(), SignBook(), DecisiveFrames()
 
     def _remember(self, step: Step, derived: Derived) -> None:
         self._curves.add(step, derived)
         self._album.add(step)
+        self._moments.add(step, derived)
         self._book.add(step)
 
     def _figures(self) -> Sequence[tuple[str, bytes]]:
         return draw_figures(self._curves)
+
+    def _decisive(self) -> Sequence[tuple[str, ReportPicture]]:
+        return self._moments.in_order()
 
     def _pictures(self) -> Sequence[ReportPicture]:
         return self._album.chosen()

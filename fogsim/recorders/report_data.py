@@ -194,6 +194,44 @@ class Album:
         return [pictures[place] for place in places]
 
 
+CLOSE = 200.0
+"""Visibility ahead below which drivers slow down [m] (White & Jeffery 1980)."""
+
+_LEAST_BRAKING = 1.0  # m/s²; anything softer is no braking that a reader asks about
+
+
+class DecisiveFrames:
+    """Frames at the decisive moments of a run: into the fog, hardest braking, least time to collision, collision."""
+
+    def __init__(self) -> None:
+        self._found: dict[str, tuple[float, str, ReportPicture]] = {}
+        self._was_clear = False
+
+    def add(self, step: Step, derived: Derived) -> None:
+        """Keep the frame of a step where it is the most decisive one so far."""
+        row, left = step.ego, derived["time_to_collision_s"]
+        ahead, braking = step.truth.visibility_ahead, -float(step.traffic.acceleration[row])
+        if self._was_clear and ahead < CLOSE:
+            self._keep("fog", 0.0, f"First frame with less than {CLOSE:.0f} m of visibility ahead", step)
+        self._was_clear |= ahead >= CLOSE
+        if braking > _LEAST_BRAKING:
+            self._keep("braking", -braking, f"Hardest braking: {braking:.1f} m/s²", step)
+        if left is not None:
+            gap = "" if step.leader is None else f", {step.leader.gap:.0f} m behind the leader"
+            self._keep("approach", left, f"Least time to collision: {left:.1f} s{gap}", step)
+        hit = next((one for one in step.collisions if step.traffic.ids[row] in (one.collider, one.victim)), None)
+        if hit is not None:
+            self._keep("collision", 0.0, f"Collision of {hit.collider} with {hit.victim}", step)
+
+    def _keep(self, kind: str, value: float, caption: str, step: Step) -> None:
+        if kind not in self._found or value < self._found[kind][0]:
+            self._found[kind] = value, caption, ReportPicture.of_step(step)
+
+    def in_order(self) -> list[tuple[str, ReportPicture]]:
+        """Captions and frames, by time."""
+        return sorted(((said, one) for _, said, one in self._found.values()), key=lambda found: found[1].time)
+
+
 @dataclass(frozen=True, slots=True)
 class SignRow:
     """What became of a sign of the map in a run.

@@ -1,7 +1,7 @@
 """From a scenario to the parts of the loop; here the units of scenario files become SI and radians, once."""
 
 from fogsim.scenario.parts.clocks import Periods, periods
-from fogsim.scenario.parts.fog import fog_field
+from fogsim.scenario.parts.fog import fog_field, fog_of_run
 from fogsim.scenario.parts.methods import (
     adviser,
     check_ego,
@@ -47,6 +47,7 @@ __all__ = [
     "check_frames",
     "estimators",
     "fog_field",
+    "fog_of_run",
     "fusion",
     "gps",
     "lead_sensor",

@@ -67,8 +67,8 @@ class Patches(Section):
     strength: Annotated[Number, Field(ge=0, le=2)] = 0.6
     """Standard deviation of the logarithm of the extinction coefficient; 0.6 is from half to twice as thick."""
 
-    seed: Seed = 0
-    """Seed of the patches, which are the same for every seed of the run."""
+    seed: Seed | None = None
+    """Seed of the patches, which are then the same in every run; by default each seed of the run has its own."""
 
 
 class Wind(Section):
@@ -277,7 +277,7 @@ def _changes(fog: Fog, ground: float) -> tuple[FogChange, ...]:
 
 
 def _patches(patches: Patches) -> FogPatches:
-    return FogPatches(patches.correlation_length_m, patches.correlation_height_m, patches.strength, patches.seed)
+    return FogPatches(patches.correlation_length_m, patches.correlation_height_m, patches.strength, patches.seed or 0)
 
 
 def _velocity(wind: Wind) -> tuple[float, float]:

@@ -1,5 +1,6 @@
 """What SUMO cannot play of a scenario: its traffic step, and vehicles, roads and banks missing from its files."""
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -126,7 +127,7 @@ def _edges(scenario: Scenario, demand: Demand) -> NetEdges | None:
     if not (demand.routes or changes or traffic.along or scenario.timeline or scenario.expect or scenario.end_when):
         return None
     net = configured_files(folder / traffic.config)[0] if traffic.config else traffic_files(scenario).net or Path()
-    return read_net_edges(net, _way(scenario, demand))
+    return read_net_edges(net, _way(scenario, demand), must_follow=bool(traffic.along))
 
 
 def _way(scenario: Scenario, demand: Demand) -> tuple[str, ...]:
@@ -136,11 +137,17 @@ def _way(scenario: Scenario, demand: Demand) -> tuple[str, ...]:
 
 
 def _unknown_edges(scenario: Scenario, edges: NetEdges) -> dict[KeyPath, str]:
-    """Edges of ``traffic.along`` that the network does not have."""
-    return {
+    """Edges of ``traffic.along`` that the network does not have, or that do not follow the one before."""
+    along = scenario.traffic.along
+    unknown: dict[KeyPath, str] = {
         ("traffic", "along", i): f"the net has no edge {shown(edge)}; {_suggested(edge, edges.lanes)}"
-        for i, edge in enumerate(scenario.traffic.along)
+        for i, edge in enumerate(along)
         if edge not in edges.lanes
+    }
+    return unknown or {
+        ("traffic", "along", i): f"the net has no lane that leads from edge {shown(one)} to edge {shown(other)}"
+        for i, (one, other) in enumerate(itertools.pairwise(along), 1)
+        if (one, other) in edges.gaps
     }
 
 

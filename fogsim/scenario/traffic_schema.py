@@ -168,6 +168,10 @@ class Traffic(Section):
     warm_up_s: Time = 0.0
     """With `ego: none`: simulated time before the run begins."""
 
+    cohort_s: Period | None = None
+    """With `ego: none`: vehicles due to depart in this time from the run's start form the cohort of the metrics per
+    cohort vehicle. The run ends when all of them have left, and after `duration_s` at the latest."""
+
     advice_deceleration_mps2: Deceleration = 2.0
     """How hard an advised vehicle slows down to the advice."""
 
@@ -211,7 +215,7 @@ class Traffic(Section):
 
     @model_validator(mode="after")
     def _keys_without_ego(self) -> Self:
-        for key in ("along", "warm_up_s"):
+        for key in ("along", "warm_up_s", "cohort_s"):
             if self.has_ego and getattr(self, key):
                 raise ValueError(f"{key}: goes with ego: none, and the ego is {self.ego!r}")
         for key in ("equipped", "equipped_vehicles"):

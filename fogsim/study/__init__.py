@@ -11,12 +11,11 @@ from fogsim.parameters import Range, checked_parameters
 from fogsim.study.comparison import Difference
 from fogsim.study.directory import StudyDirectory
 from fogsim.study.engine import Engine
-from fogsim.study.plan import Study, StudyRun, load_study
+from fogsim.study.plan import Study, StudyRun, load_study, shipped_studies
 from fogsim.study.pool import ProcessPool
 from fogsim.study.pooled_profiles import pool_profiles
 from fogsim.study.ray_cluster import RayCluster
 from fogsim.study.report import write_report
-from fogsim.study.shipped import shipped_studies
 from fogsim.study.table import Row, check_factors, write_table
 
 __all__ = [

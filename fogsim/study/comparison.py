@@ -5,18 +5,28 @@ have the same traffic and noise, so the difference is taken run by run.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from fogsim.study.main_metrics import metric_words, signed
 from fogsim.study.plan import Study
 from fogsim.study.table import Row
 
 RESAMPLES = 9_999
 """Resamples of bootstraps and permutation tests."""
+
+DENOMINATORS = (
+    *("traffic_vehicle_distance_in_fog_m", "traffic_vehicle_distance_m", "traffic_vehicle_time_s"),
+    *("distance_in_fog_m", "traffic_cohort_vehicles"),
+)
+"""Metrics that others are divided by."""
+
+MOVED_SHARE = 0.05
+"""Change of a denominator, and share of unfinished vehicles of a cohort, from which the report says so [-]."""
 
 SATURATED_SHARE = 0.9
 """Share of runs at a metric's extreme value above which it shows little about the rest [-]."""
@@ -90,26 +100,64 @@ def number_of(value: object) -> float | None:
 
 def compare_to_baseline(study: Study, rows: Sequence[Row], metrics: Sequence[str]) -> list[Difference]:
     """Compare every policy to the baseline, by metric and in grid order, without pairs that share no seed."""
+    pairs = list(_paired_rows(study, rows))
+    found = (
+        _difference(study, metric, levels, _paired_values(both, metric)) for metric in metrics for levels, both in pairs
+    )
+    return [one for one in found if one is not None]
+
+
+def moved_denominators(study: Study, rows: Sequence[Row]) -> list[str]:
+    """Sentences on where a policy moves a denominator by more than 5 %, or leaves as much of a cohort unfinished."""
+    said = []
+    pairs = [(" · ".join(levels.values()), both) for levels, both in _paired_rows(study, rows)]
+    for metric in DENOMINATORS:
+        words = metric_words(metric)
+        for policy, both in pairs:
+            values = words.scale * _paired_values(both, metric)
+            baseline, here = values.mean(axis=0) if len(values) else (0.0, 0.0)
+            change = here / baseline - 1.0 if baseline > 0.0 else 0.0
+            if abs(change) > MOVED_SHARE:
+                said.append(
+                    f"{words.label}: {here:.3g} {words.unit} with {policy}, {baseline:.3g} {words.unit} under the "
+                    f"baseline ({signed(100.0 * change, 2)} %). Metrics divided by it compare different amounts of "
+                    "traffic."
+                )
+    cohorts: dict[str, NDArray[np.float64]] = {}
+    for row in rows:
+        counts = [number_of(row.get(f"traffic_cohort_{key}")) or 0.0 for key in ("unfinished", "vehicles")]
+        cell = " · ".join(str(row[name]) for name in study.factors)
+        cohorts[cell] = cohorts.get(cell, np.zeros(2)) + np.array(counts)
+    said += [
+        f"Cohort: {100.0 * unfinished / vehicles:.0f} % of its vehicles have not left when the run ends with {cell}; "
+        "their later conflicts are not counted. Raise duration_s."
+        for cell, (unfinished, vehicles) in cohorts.items()
+        if unfinished > MOVED_SHARE * vehicles
+    ]
+    return said
+
+
+def _paired_rows(study: Study, rows: Sequence[Row]) -> Iterator[tuple[dict[str, str], list[tuple[Row, Row]]]]:
+    """Levels of each compared policy, and its runs, each after the baseline's run with the same seed."""
     by_cell: dict[tuple[str, ...], dict[int, Row]] = {}
     for row in rows:
         cell = tuple(str(row[name]) for name in study.factors)
         by_cell.setdefault(cell, {})[int(str(row["seed"]))] = row
-    found = []
-    for metric in metrics:
-        for cell, runs in by_cell.items():
-            levels = dict(zip(study.factors, cell, strict=True))
-            of_baseline = tuple({**levels, **study.baseline}.values())
-            if of_baseline != cell and of_baseline in by_cell:
-                difference = _difference(study, metric, levels, runs, by_cell[of_baseline])
-                found += [difference] if difference is not None else []
-    return found
+    for cell, runs in by_cell.items():
+        levels = dict(zip(study.factors, cell, strict=True))
+        of_baseline = tuple({**levels, **study.baseline}.values())
+        if of_baseline != cell and of_baseline in by_cell:
+            baseline = by_cell[of_baseline]
+            yield levels, [(baseline[seed], run) for seed, run in runs.items() if seed in baseline]
 
 
-def _difference(
-    study: Study, metric: str, levels: Mapping[str, str], runs: Mapping[int, Row], baseline: Mapping[int, Row]
-) -> Difference | None:
-    pairs = [(number_of(baseline[s].get(metric)), number_of(runs[s].get(metric))) for s in runs if s in baseline]
-    values = np.array([pair for pair in pairs if None not in pair], dtype=np.float64).reshape(-1, 2)
+def _paired_values(both: Sequence[tuple[Row, Row]], metric: str) -> NDArray[np.float64]:
+    """Values of a metric under the baseline and here (n, 2), where both runs have one."""
+    values = [(number_of(baseline.get(metric)), number_of(run.get(metric))) for baseline, run in both]
+    return np.array([pair for pair in values if None not in pair], dtype=np.float64).reshape(-1, 2)
+
+
+def _difference(study: Study, metric: str, levels: Mapping[str, str], values: NDArray[np.float64]) -> Difference | None:
     if not len(values):
         return None
     differences = values[:, 1] - values[:, 0]

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
+from fogsim.ego.fog_reports import FogReports
+from fogsim.ego.road_meters import RoadMeters
 from fogsim.errors import FogSimError, UnplayedWarning
 from fogsim.files.atomic import write_json
 from fogsim.loop import run
@@ -13,7 +15,8 @@ from fogsim.metrics import MetricsOfRun, RunMetrics, RunSummary, TrafficRunMetri
 from fogsim.scenario import Scenario, build
 from fogsim.study.profiles import RunProfiles
 from fogsim.study.run_file import Value
-from fogsim.traffic_run import run_traffic
+from fogsim.traffic import libsumo_traffic
+from fogsim.traffic_run import TrafficRun, run_traffic
 from fogsim.values import TrafficStep
 
 
@@ -54,6 +57,19 @@ def _flat(values: Mapping[str, object], prefix: str = "") -> list[tuple[str, Val
         elif value is None or isinstance(value, str | int | float):
             rows.append((prefix + key, value))
     return rows
+
+
+def build_without_running(scenario: Scenario) -> None:
+    """Build the road, the fog and the meters of a run, without SUMO and users' code; InputError if they do not fit."""
+    if not scenario.traffic.has_ego:
+        TrafficRun(scenario).close()
+        return
+    planned = libsumo_traffic(build.traffic_setup(scenario)).planned_network()
+    if planned is not None:
+        road, _ = planned
+        build.fog_field(scenario, road.route, road.structures)
+        RoadMeters(scenario, road.route, road.route_limits)
+        FogReports(scenario, road.route)
 
 
 def run_outcome(scenario: Scenario, seed: int, sumo_outputs: Path) -> dict[str, Any]:

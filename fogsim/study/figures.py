@@ -8,7 +8,7 @@ from fogsim.study.comparison import Difference, mean_interval, number_of
 from fogsim.study.drawing import MUTED, Grid, StudyFigure, label_figure, svg_of
 from fogsim.study.main_metrics import metric_words
 from fogsim.study.plan import Study
-from fogsim.study.table import Row
+from fogsim.study.table import Row, rows_of_cells
 
 
 def differences_figure(study: Study, metric: str, differences: Sequence[Difference]) -> StudyFigure:
@@ -55,9 +55,7 @@ def differences_figure(study: Study, metric: str, differences: Sequence[Differen
 def trade_off_figure(study: Study, rows: Sequence[Row], across: str, upwards: str) -> StudyFigure:
     """Means of two metrics of completed runs with their intervals: a point per policy, a panel per fog."""
     grid = Grid(study)
-    by_cell: dict[tuple[str, ...], list[Row]] = {}
-    for row in rows:
-        by_cell.setdefault(tuple(str(row[name]) for name in study.factors), []).append(row)
+    by_cell = rows_of_cells(study.factors, rows)
     figure, panels = grid.figure(2.4, same_axes=False)
     scales = metric_words(across).scale, metric_words(upwards).scale
     table = []

@@ -12,11 +12,11 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
-from fogsim.errors import InputError, shown, suggest
+from fogsim.errors import InputError, UnknownNameError, shown, suggest
 from fogsim.files.readers import open_regular
 from fogsim.parameters import checked_parameters
 from fogsim.registry.user_code import MayImport, import_anything
-from fogsim.scenario import Scenario, build, scenario_from_config
+from fogsim.scenario import Scenario, build, catalogue, scenario_from_config
 from fogsim.scenario.document import Document, read_document
 from fogsim.scenario.expect.conditions import refuse
 from fogsim.scenario.loading import CountWatch, deciding, scenario_reader
@@ -27,7 +27,6 @@ from fogsim.scenario.section import Id, Section, Seed, Share, Text
 from fogsim.scenario.traffic_alone import NO_EGO
 from fogsim.scenario.variation import grid_mistake
 from fogsim.study.main_metrics import unknown_metrics
-from fogsim.study.shipped import study_file
 from fogsim.study.table import column_mistake
 from fogsim.traffic.road.configuration import configured_demand, configured_files
 
@@ -166,16 +165,19 @@ class Study:
     level_settings: Mapping[str, Mapping[str, tuple[str, ...]]] = field(default_factory=dict)
     file: Path = Path("study.yaml")
 
+    def cells(self) -> dict[str, Scenario]:
+        """Scenario of each cell, by the levels of all factors as text."""
+        return {_label(run.levels): run.scenario for run in self.runs}
+
     def description(self) -> dict[str, Any]:
         """Everything that determines its runs, as JSON data: each cell's scenario by its levels, and the seeds."""
-        # Runs of a cell share a scenario, and differ in their seed.
-        of_cells = list({id(run.scenario): run for run in self.runs}.values())
-        cells = {_label(run.levels): deciding(run.scenario) for run in of_cells}
+        of_cells = self.cells()
+        cells = {label: deciding(scenario) for label, scenario in of_cells.items()}
         seeds = list(dict.fromkeys(run.seed for run in self.runs))
         factors = {name: list(levels) for name, levels in self.factors.items()}
-        files = dict(item for run in of_cells for item in file_digests(run.scenario).items())
+        files = dict(item for scenario in of_cells.values() for item in file_digests(scenario).items())
         told = {"factors": factors, "baseline": dict(self.baseline), "seeds": seeds, "files": files, "cells": cells}
-        methods = dict(item for run in of_cells for item in build.own_methods(run.scenario).items())
+        methods = dict(item for scenario in of_cells.values() for item in build.own_methods(scenario).items())
         return {**told, "own_methods": methods} if methods else told
 
 
@@ -204,6 +206,23 @@ def _digest(path: Path, _: int) -> str:
     """Digest of a file's content, computed again after the file has changed."""
     with open_regular(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()[:20]
+
+
+def shipped_studies() -> dict[str, Path]:
+    """Names and files of the shipped studies, which are next to the scenarios."""
+    folders = {file.parents[1] / "studies" for file in catalogue().values()}
+    return {file.stem: file for folder in folders for file in sorted(folder.glob("*.yaml"))}
+
+
+def study_file(name_or_path: str | Path) -> Path:
+    """Path of a study file or of a shipped study's name; a path is not checked."""
+    path = Path(name_or_path)
+    if path.suffix or len(path.parts) != 1 or path.exists():
+        return path
+    known = shipped_studies()
+    if str(name_or_path) not in known:
+        raise UnknownNameError("study", str(name_or_path), known)
+    return known[str(name_or_path)]
 
 
 @checked_parameters

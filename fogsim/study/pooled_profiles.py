@@ -61,11 +61,11 @@ class PooledProfiles:
     def survival(self) -> NDArray[np.float64]:
         """Share of all vehicles' time with a time to collision above the upper end of each class [-].
 
-        Time behind leaders slower than 5 m/s, which is closing up to a queue, counts as above.
+        Followers slower than 5 m/s, which close up to a queue, count as above.
         """
         if self.vehicle_time <= 0.0:
             return np.full(CLASSES, np.nan)
-        return np.asarray(1.0 - np.cumsum(self.moving) / self.vehicle_time)
+        return np.asarray(1.0 - np.cumsum(self.moving + self.queue) / self.vehicle_time)
 
     def speeds(self, *, ego_only: bool = False) -> NDArray[np.float64]:
         """Columns of position along the road [m], mean speed there [m/s] and observed time [s].

@@ -46,8 +46,8 @@ def survival_figure(study: Study, cells: Mapping[Cell, PooledProfiles]) -> Study
     label_figure(figure, "Time to collision (TTC), x [s]", "Vehicle-time with TTC > x [%]")
     caption = (
         "Survival of time to collision: share of the time of all vehicles in which their TTC with the leader is above "
-        "x (1 − TET share; Minderhoud & Bovy 2001). Time without a leader, and behind one slower than 5 m/s, counts as "
-        "above. Curves begin where there was any time below."
+        "x (1 − TET share; Minderhoud & Bovy 2001). Time without a leader, and of followers slower than 5 m/s, counts "
+        "as above. Curves begin where there was any time below."
     )
     columns = [*study.factors, "time_to_collision_s", "share_above", "vehicle_time_s"]
     return StudyFigure("ttc_survival", caption, svg_of(figure, "ttc_survival"), columns, rows)

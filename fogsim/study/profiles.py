@@ -60,7 +60,7 @@ class RunProfiles:
         self._vehicle_time += span.vehicle_time
         found = span.following
         remaining = time_to_collision(found.gap, found.speed, found.leader_speed)
-        short = np.flatnonzero(remaining < CLASS_WIDTH * CLASSES)
+        short = np.flatnonzero((remaining < CLASS_WIDTH * CLASSES) & (found.speed >= QUEUE_SPEED))
         place = (remaining[short] / CLASS_WIDTH).astype(np.intp) + CLASSES * (found.leader_speed[short] < QUEUE_SPEED)
         times = np.bincount(place, span.elapsed[found.follower[short]], minlength=2 * CLASSES)
         self._by_class += times.reshape(2, CLASSES)
@@ -69,7 +69,7 @@ class RunProfiles:
     def to_json(self) -> dict[str, Any]:
         """The profiles as JSON data, once the metrics have handed over everything that they gathered.
 
-        ``vehicle_time_s``; ``time_to_collision``: seconds of all vehicles in each class of `CLASS_WIDTH` seconds,
+        ``vehicle_time_s``; ``time_to_collision``: seconds of vehicles at 5 m/s or more in each class,
         behind a leader that moves and behind one slower than 5 m/s; ``road``: columns ``place_m`` (middle of a stretch
         along the road), time and distance of the ego and of all vehicles there, and the sums of extinction over these
         times; ``path``: the road in plan, columns ``place_m``, ``x_m``, ``y_m``; ``collisions``: columns for the first

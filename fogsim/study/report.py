@@ -7,19 +7,19 @@ from html import escape
 from pathlib import Path
 
 from fogsim.files.atomic import write_text
-from fogsim.recorders.manifest import versions
+from fogsim.metrics import metric_topics
 from fogsim.recorders.report import PAGE_STYLE
-from fogsim.scenario.schema import NO_RENDERER
 from fogsim.study.comparison import Difference, adjust_p_values, compare_to_baseline, numeric_metrics, uninformative
 from fogsim.study.drawing import StudyFigure
 from fogsim.study.figures import differences_figure, trade_off_figure
 from fogsim.study.main_metrics import DELAY_METRICS, SAFETY_METRICS, main_metrics
+from fogsim.study.methods import write_methods
 from fogsim.study.plan import Study
 from fogsim.study.pooled_profiles import Cell, PooledProfiles
 from fogsim.study.profile_figures import collisions_figure, speed_figure, survival_figure
-from fogsim.study.report_tables import comparison_table, main_tables, plain_table
+from fogsim.study.report_tables import comparison_table, events_of_both, main_tables, plain_table
 from fogsim.study.report_words import summary
-from fogsim.study.table import Row, write_csv
+from fogsim.study.table import Row, rows_of_cells, write_csv
 
 _STYLE = """
 body { max-width: 76rem; }
@@ -28,7 +28,7 @@ h3 { font-size: 1rem; margin: 1.2rem 0 .3rem; }
 .scrolls td:first-child { min-width: 11rem; } .scrolls td, .scrolls th { padding-right: .5rem; }
 .scrolls small { color: #5d6975; } .scrolls small b { color: #1c2733; }
 figure { max-width: 52rem; }
-details { margin: .8rem 0; } summary { cursor: pointer; font-weight: 600; color: #44505c; }
+p.warning { background: #fff4d6; border-left: 4px solid #e0a100; margin: .5rem 0; padding: .4rem .8rem; }
 ul { margin: .2rem 0; padding-left: 1.2rem; } code { overflow-wrap: anywhere; }
 """
 
@@ -59,7 +59,7 @@ def write_report(study: Study, rows: Sequence[Row], profiles: Mapping[Cell, Pool
     others = [] if study.metrics else [name for name in known if name not in main]
     remarks = uninformative(done, [*main, *others])
     differences = adjust_p_values(compare_to_baseline(study, done, main)) + compare_to_baseline(study, done, others)
-    _write_comparison(study, differences, remarks, folder)
+    _write_comparison(study, done, differences, remarks, folder)
     telling = [one for one in differences if one.metric in main and one.metric not in remarks]
     figures = [*_figures(study, done, remarks, profiles, telling)]
     (folder / "figures").mkdir(exist_ok=True)
@@ -70,19 +70,26 @@ def write_report(study: Study, rows: Sequence[Row], profiles: Mapping[Cell, Pool
 
 
 def _write_comparison(
-    study: Study, differences: Sequence[Difference], remarks: Mapping[str, str], folder: Path
+    study: Study,
+    rows: Sequence[Row],
+    differences: Sequence[Difference],
+    remarks: Mapping[str, str],
+    folder: Path,
 ) -> None:
     names = ("metric", "baseline_mean", "mean", "difference", "low", "high", "p_value", "p_value_adjusted", "pairs")
+    events = ("baseline_events", "events")
     seeds = f"seeds_for_{100 * study.wanted_interval:g}_percent"
-    rows = [
+    cells = rows_of_cells(study.factors, rows)
+    lines = [
         [
             *(one.levels[name] for name in study.factors),
             *(one.metric, one.baseline_mean, one.mean, one.difference, one.low, one.high),
-            *(one.p_value, one.adjusted_p_value, one.pairs, one.seeds_for_half_width, remarks.get(one.metric)),
+            *(one.p_value, one.adjusted_p_value, one.pairs, one.seeds_for_half_width),
+            *(*events_of_both(study, cells, one), remarks.get(one.metric)),
         ]
         for one in differences
     ]
-    write_csv(folder / "comparison.csv", [*study.factors, *names, seeds, "remark"], rows)
+    write_csv(folder / "comparison.csv", [*study.factors, *names, seeds, *events, "remark"], lines)
 
 
 def _figures(
@@ -126,8 +133,8 @@ def _page(study: Study, rows: Sequence[Row], found: _Findings, folder: Path) -> 
             main_tables(study, done, found.main, found.of_main(), found.remarks),
             "<h2>Figures</h2>" if found.figures else "",
             *(_embedded(figure) for figure in found.figures),
-            *_details(study, found),
-            _how_it_was_run(study, folder),
+            *_details(study, done, found),
+            _methods(study, folder),
             "</body>\n</html>\n",
         ]
     )
@@ -162,13 +169,18 @@ def _failures(study: Study, failed: Sequence[Row]) -> list[str]:
     ]
 
 
-def _details(study: Study, found: _Findings) -> Iterator[str]:
+def _details(study: Study, rows: Sequence[Row], found: _Findings) -> Iterator[str]:
     """Details, folded."""
     yield "<h2>All comparisons</h2>"
-    for title, differences in (("Main metrics", found.of_main()), ("All other metrics", found.of_others())):
+    topics = {name: topic.capitalize() for topic, names in metric_topics().items() for name in names}
+    of_title: dict[str, list[Difference]] = {"Main metrics": found.of_main()}
+    for one in found.of_others():
+        of_title.setdefault(topics.get(one.metric.partition(".")[0], "Other metrics"), []).append(one)
+    for title, differences in of_title.items():
         if differences:
-            table = comparison_table(study, differences, found.remarks)
-            yield f"<details><summary>{title}</summary>{table}</details>"
+            table = comparison_table(study, rows, differences, found.remarks)
+            count = len({one.metric for one in differences})
+            yield f"<details><summary>{title} ({count})</summary>{table}</details>"
     yield (
         '<p class="note">In the metrics\' own units. Differences are of runs with the same seed; intervals by '
         "bootstrap (BCa; Efron 1987; 9999 resamples), p by a paired permutation test, adjusted among the main metrics "
@@ -181,26 +193,9 @@ def _details(study: Study, found: _Findings) -> Iterator[str]:
         yield plain_table(["metric", "why"], told.items()) + "</details>"
 
 
-def _how_it_was_run(study: Study, folder: Path) -> str:
-    settings = [
-        [factor, level, ", ".join(given) or "–"]
-        for factor, levels in study.level_settings.items()
-        for level, given in levels.items()
-    ]
-    of_cells = {" · ".join(run.levels.values()): run.scenario.renderer == NO_RENDERER for run in study.runs}
-    without = [cell for cell, is_blind in of_cells.items() if is_blind]
-    if not without:
-        cameras = "All runs had a camera."
-    else:
-        which = "all" if len(without) == len(of_cells) else "; ".join(without)
-        cameras = f"Run without a camera, which nothing in them goes by: {which}."
+def _methods(study: Study, folder: Path) -> str:
     command = f"fogsim study {study.file} --out {folder}"
-    known = "; ".join(f"{name} {version}" for name, version in versions().items() if version)
-    return "\n".join(
-        [
-            "<h2>How it was run</h2>",
-            plain_table(["factor", "level", "settings"], settings) if settings else "",
-            f"<p>{escape(cameras)}</p>\n<p>Again, or on, if runs are missing: <code>{escape(command)}</code></p>",
-            f"<footer>{escape(known)}</footer>",
-        ]
+    return (
+        f"<h2>Methods</h2>\n{write_methods(study, folder).html()}\n"
+        f"<p>Command, which also resumes the study if runs are missing: <code>{escape(command)}</code></p>"
     )

@@ -1,13 +1,16 @@
 """A study's results in words: significant differences only."""
 
+import math
 from collections.abc import Mapping, Sequence
 from html import escape
 
-from fogsim.study.comparison import Difference
+from fogsim.scenario.wording.sentences import empty_start
+from fogsim.study.comparison import Difference, number_of
 from fogsim.study.drawing import Grid
 from fogsim.study.main_metrics import MetricWords, metric_words, signed
 from fogsim.study.plan import Study
-from fogsim.study.table import Row
+from fogsim.study.report_tables import events_of_both
+from fogsim.study.table import Row, rows_of_cells
 
 
 def summary(study: Study, rows: Sequence[Row], differences: Sequence[Difference], remarks: Mapping[str, str]) -> str:
@@ -17,10 +20,44 @@ def summary(study: Study, rows: Sequence[Row], differences: Sequence[Difference]
         [
             "<h2>Summary</h2>",
             f"<p>{escape(_compared(study, rows))}</p>",
+            *(f'<p class="warning">{escape(line)}</p>' for line in _warnings(study, rows, differences)),
             *_findings(study, telling),
             *_doubts(study, telling),
         ]
     )
+
+
+def _warnings(study: Study, rows: Sequence[Row], differences: Sequence[Difference]) -> list[str]:
+    """Reasons for which the study may show nothing, or something else than it seems."""
+    done = [row for row in rows if row["status"] == "complete"]
+    empty = dict.fromkeys(filter(None, map(empty_start, study.cells().values())))
+    return [*empty, *scarce_events(study, done, differences)]
+
+
+def scarce_events(study: Study, rows: Sequence[Row], differences: Sequence[Difference]) -> list[str]:
+    """A line for metrics without any event, and one for those with too few in every comparison to show a difference.
+
+    With n events, at most n seeds differ, and the paired permutation test cannot give less than 2^(1 − n).
+    """
+    cells, needed = rows_of_cells(study.factors, rows), 1 + math.ceil(-math.log2(1.0 - study.confidence))
+    none, few = [], []
+    for metric in dict.fromkeys(one.metric for one in differences):
+        words = metric_words(metric)
+        both = [events_of_both(study, cells, one) for one in differences if one.metric == metric]
+        counts = [of_baseline + here for of_baseline, here in both if of_baseline is not None and here is not None]
+        if words.better in {"less", "lower"} and not any(number_of(row.get(metric)) for row in rows):
+            none.append(words.label)
+        elif counts and (most := max(counts)) < needed:
+            few.append(f"{words.label} (at most {most})")
+    kilometres = math.fsum(number_of(row.get("traffic_vehicle_distance_m")) or 0.0 for row in rows) / 1000.0
+    advice = "raise the demand, add an incident, or choose another metric."
+    said = f"This scene produces no such event in any of its {len(rows)} runs ({kilometres:.4g} vehicle-km)"
+    rare = f"Fewer than the {needed} events that a difference needs at least, in every comparison"
+    return [
+        f"{text}: {'; '.join(names)}. To compare policies, {advice}"
+        for text, names in ((said, none), (rare, few))
+        if names
+    ]
 
 
 def _compared(study: Study, rows: Sequence[Row]) -> str:
@@ -68,11 +105,11 @@ def _finding(grid: Grid, metric: str, differences: Sequence[Difference]) -> str:
 
 
 def _verdict(one: Difference, words: MetricWords) -> str:
-    """Whether a difference is an improvement, if the metric defines one."""
-    lower = one.difference < 0
-    if words.better == "neither":
-        return "lower" if lower else "higher"
-    return "better" if lower == (words.better == "less") else "worse"
+    """Whether a difference is an improvement, if the metric ranks policies."""
+    direction = "lower" if one.difference < 0 else "higher"
+    if words.better is None:
+        return direction
+    return "better" if direction == words.better else "worse"
 
 
 def _doubts(study: Study, differences: Sequence[Difference]) -> list[str]:

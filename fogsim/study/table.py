@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import pyarrow as pa
@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 
 from fogsim.errors import InputError
 from fogsim.files.atomic import write_bytes, write_text
-from fogsim.metrics import metric_keys
+from fogsim.metrics import metric_definitions
 from fogsim.study.main_metrics import METHODS_KEY
 from fogsim.study.run_file import Value
 
@@ -23,6 +23,15 @@ def columns(rows: Sequence[Row]) -> list[str]:
     return list(dict.fromkeys(key for row in rows for key in row))
 
 
+def rows_of_cells(factors: Iterable[str], rows: Iterable[Row]) -> dict[tuple[str, ...], list[Row]]:
+    """Rows by the levels of all factors."""
+    names = tuple(factors)
+    cells: dict[tuple[str, ...], list[Row]] = {}
+    for row in rows:
+        cells.setdefault(tuple(str(row[name]) for name in names), []).append(row)
+    return cells
+
+
 FIXED_COLUMNS = frozenset({"run", "seed", "status", "message", "sumo_outputs"})
 """Columns of every table, besides factors and metrics."""
 
@@ -31,7 +40,7 @@ def column_mistake(factor: str) -> str | None:
     """Why the table cannot have a column of a factor's name; None if it can."""
     if factor in FIXED_COLUMNS:
         return "the table has a column of that name; choose another"
-    if factor in metric_keys() or factor.startswith(f"{METHODS_KEY}."):
+    if factor in metric_definitions() or factor.startswith(f"{METHODS_KEY}."):
         return "a metric has that name; choose another"
     return None
 

@@ -396,7 +396,7 @@ class SumoTraffic:
             speed_limit=max(limits, default=math.inf),
             collisions=run.collisions.take(),
             is_over=run.api.simulation.getMinExpectedNumber() == 0,
-            waiting=len(run.api.simulation.getPendingVehicles()),
+            waiting=tuple(run.api.simulation.getPendingVehicles()),
         )
 
     def _with_street(self, run: _Run, state: TrafficState, here: NDArray[np.float64] | None) -> TrafficState:

@@ -40,7 +40,7 @@ from fogsim.values.road import (
 )
 from fogsim.values.scene import Batch, Mesh, Pavement, RoadSurface, Scene, Surface
 from fogsim.values.script import Begun
-from fogsim.values.step import Ending, EquippedVehicle, LampEffects, RoadSection, Step, TrafficStep, Truth
+from fogsim.values.step import Cohort, Ending, EquippedVehicle, LampEffects, RoadSection, Step, TrafficStep, Truth
 from fogsim.values.traffic import (
     Collision,
     Leader,
@@ -62,6 +62,7 @@ __all__ = [
     "Belief",
     "Camera",
     "CameraPose",
+    "Cohort",
     "Collision",
     "Command",
     "DenserFog",

@@ -34,6 +34,9 @@ class Ending(StrEnum):
     END_CONDITION = "end condition"
     """The scenario's ``end_when`` holds."""
 
+    COHORT_LEFT = "cohort left"
+    """Without an ego: all vehicles of the cohort (``traffic.cohort_s``) have left."""
+
     NOBODY_LEFT = "nobody left"
     """Without an ego: all vehicles have gone, and no more will come."""
 
@@ -139,6 +142,25 @@ class Truth:
         return visibility_from_extinction(self.extinction_ahead)
 
 
+@dataclass(frozen=True, slots=True)
+class Cohort:
+    """Vehicles that are due to depart in the first ``traffic.cohort_s`` of a run.
+
+    Attributes
+    ----------
+    vehicles : frozenset of str
+        Ids of those that have been due so far.
+    waiting : int
+        How many of them find no room to enter the road yet.
+    unfinished : int
+        How many of them have not left yet: those on the road, and those waiting.
+    """
+
+    vehicles: frozenset[str]
+    waiting: int
+    unfinished: int
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrafficStep:
     """One finished instant of the traffic, whether an ego is in it or not.
@@ -165,6 +187,8 @@ class TrafficStep:
         What of the script began in this period.
     waiting : int
         Without an ego: vehicles that were to come by now and find no room to; 0 with one, where nobody counts them.
+    cohort : Cohort or None
+        The vehicles that metrics of the cohort are about; None where the scenario has no ``traffic.cohort_s``.
     """
 
     index: int
@@ -177,6 +201,7 @@ class TrafficStep:
     unplayed: Unplayed = NOTHING_UNPLAYED
     begun: tuple[Begun, ...] = ()
     waiting: int = 0
+    cohort: Cohort | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,7 +242,7 @@ class Step(TrafficStep):
 
     Attributes
     ----------
-    index, time, traffic, collisions, truth, command, ending, unplayed, begun, waiting
+    index, time, traffic, collisions, truth, command, ending, unplayed, begun, waiting, cohort
         As of `TrafficStep`.
     ego : int
         Row of the ego vehicle in `traffic`.

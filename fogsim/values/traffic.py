@@ -322,12 +322,12 @@ class NetworkSnapshot:
         Collisions since the last snapshot, each pair once.
     is_over : bool
         True if nobody is there, and nobody will come.
-    waiting : int
-        Vehicles that were to come by now and find no room to.
+    waiting : tuple of str
+        Ids of vehicles that are due and find no room to enter the road.
     """
 
     state: TrafficState
     speed_limit: float
     collisions: tuple[Collision, ...]
     is_over: bool
-    waiting: int = 0
+    waiting: tuple[str, ...] = ()

@@ -1,5 +1,6 @@
-"""Measured tables say when they were measured; what changed since is told; all are measured anew by one command."""
+"""Tables state when they were measured and what has changed since; one command measures them again."""
 
+import fcntl
 import json
 import subprocess
 import sys
@@ -53,23 +54,31 @@ def wide() -> float:
     """The width."""
     return WIDTH
 '''
-SCRIPT = """import sys
+SCRIPT = f"""import sys
 from pathlib import Path
-sys.path.insert(0, ".")  # before the FogSim that is installed
+sys.path[:0] = [".", {str(DOCS)!r}]  # before the FogSim that is installed
+import page_tables
 from fogsim import road
 
 name, times = sys.argv[1], float(sys.argv[2])
-page = Path("docs/page.md")
-before, rest = page.read_text().split(f"<!-- table: {name} -->")
-old, after = rest.split("<!-- end", 1)
-value = f"{times * road.wide():.1f}"
-table = f"\\n\\n| road | {'width' if name == 'width' else name} [m] |\\n| --- | --- |\\n| any | {value} |\\n\\n"
-page.write_text(f"{before}<!-- table: {name} -->{table}<!-- end{after}")
+page_tables.ROOT = Path.cwd()
+cells = ("any", f"{{times * road.wide():.1f}}")
+page_tables.write_table("page.md", name, page_tables.lines_of(("road", name + " [m]"), [cells]))
 """
 WIDTH = ("width", "python benchmarks/roads.py width 1")
 TWICE = ("twice", "python benchmarks/roads.py twice 2")
 FAILS = ("twice", "python benchmarks/roads.py twice 9 && exit 3")
-STOPS = ("twice", f"{TWICE[1]} && if test ! -e stopped; then touch stopped; kill $PPID; sleep 60; fi")
+BUSY = ("width", f"{WIDTH[1]} && if test ! -e stopped; then touch busy; sleep 60; fi")
+UNTIL = "for i in $(seq 300); do test -e {0} && break; sleep 0.1; done; test -e {0}"
+STOPS = (
+    "twice",
+    f"{TWICE[1]} && if test ! -e stopped; then {UNTIL.format('busy')}; touch stopped; kill $PPID; sleep 60; fi",
+)
+MEET = tuple(
+    (name, f"{command} && touch {name} && {UNTIL.format(other)}")
+    for (name, command), other in ((WIDTH, "twice"), (TWICE, "width"))
+)
+ALONE = tuple((name, f"mkdir busy && {command} && sleep 0.5 && rmdir busy") for name, command in (WIDTH, TWICE))
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
@@ -98,13 +107,14 @@ def root(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def rerun(root: Path) -> Run:
-    """docs/rerun_tables.py in that checkout, with measurements of its own."""
+    """docs/rerun_tables.py in that checkout, on two cores and with its own measurements."""
 
-    def run(*arguments: str, measured: tuple[tuple[str, str], ...] = (WIDTH, TWICE)) -> Any:
+    def run(*arguments: str, measured: tuple[tuple[str, str], ...] = (WIDTH, TWICE), **fields: object) -> Any:
         code = (
             f"import sys; sys.path.insert(0, {str(DOCS)!r}); from pathlib import Path\n"
-            "from measured_tables import Measurement; import rerun_tables\n"
-            f"made = tuple(Measurement(n, (c,), 1.0, ('benchmarks/roads.py',)) for n, c in {measured!r})\n"
+            "from measured_tables import Measurement; import rerun_tables, table_round; table_round.CORES = 2\n"
+            "made = tuple(Measurement(name, (command,), 1.0, ('benchmarks/roads.py',), "
+            f"**{fields!r}) for name, command in {measured!r})\n"
             f"sys.exit(rerun_tables.main(Path({str(root)!r}), made))"
         )
         command = [sys.executable, "-c", code, *arguments]
@@ -138,19 +148,19 @@ def test_tables_are_measured_and_say_so(root: Path, rerun: Run) -> None:
     assert page(root).count("*Measured with FogSim 1.2.3 (") == 2
     assert "with changes" in page(root)
     assert page(root).endswith("<!-- measured: twice -->\n\nMore.\n")
-    assert overview(root).count("| none |") == 2
+    assert overview(root).count("| nothing |") == 2
     assert rerun("--check").returncode == 0
     cells = json.loads((root / "runs" / "tables" / "moved.json").read_text(encoding="utf-8"))
-    assert [(cell["table"], cell["column"], cell["old"], cell["new"]) for cell in cells] == [
-        ("width", "width [m]", "3.5", "3.7"),
+    assert sorted((cell["table"], cell["column"], cell["old"], cell["new"]) for cell in cells) == [
         ("twice", "twice [m]", "7.0", "7.4"),
+        ("width", "width [m]", "3.5", "3.7"),
     ]
     assert "| width | any | width [m] | 3.5 | 3.7 |" in done.stdout
     assert "| any | 3.7 |" in (rerun("width"), page(root))[1], "the line below survives"
     assert page(root).count("*Measured with") == 2
 
 
-def test_changed_code_is_told_and_changed_prose_is_not(root: Path, rerun: Run) -> None:
+def test_changed_code_is_listed_and_changed_prose_is_not(root: Path, rerun: Run) -> None:
     rerun()
     road = root / "fogsim" / "road.py"
     change(road, '"""The width."""', '"""How wide it is."""  # a comment')
@@ -162,7 +172,7 @@ def test_changed_code_is_told_and_changed_prose_is_not(root: Path, rerun: Run) -
     assert "on width: " in done.stdout
     assert "fogsim/road.py" in done.stdout
     assert "python docs/rerun_tables.py --page" in done.stdout
-    assert "python benchmarks/roads.py twice 2" in rerun("--stale", "--dry-run").stdout
+    assert "python benchmarks/roads.py twice 2" in rerun("--dry-run").stdout
     assert rerun("--page").returncode == 0
     assert overview(root).count("| fogsim: road.py |") == 2
     assert rerun("--check").returncode == 0
@@ -179,7 +189,7 @@ def test_tables_that_were_edited_are_found(root: Path, rerun: Run) -> None:
     assert rerun("--check").returncode == 0
 
 
-def test_a_command_that_fails_changes_nothing_and_stops_nobody(root: Path, rerun: Run) -> None:
+def test_a_command_that_fails_changes_nothing_and_stops_no_other(root: Path, rerun: Run) -> None:
     change(root / "fogsim" / "road.py", "3.5", "3.7")
     done = rerun(measured=(FAILS, WIDTH))
     assert done.returncode == 1
@@ -190,19 +200,65 @@ def test_a_command_that_fails_changes_nothing_and_stops_nobody(root: Path, rerun
     assert "<!-- measured: twice -->" not in page(root)
 
 
-def test_what_was_interrupted_goes_on(root: Path, rerun: Run) -> None:
+def test_tables_that_have_not_changed_are_not_measured(root: Path, rerun: Run) -> None:
+    rerun("width")
+    once = (root / "runs" / "tables" / "width.log").read_text(encoding="utf-8")
+    assert rerun("--dry-run").stdout.splitlines()[-1].startswith("1 to measure")
+    done = rerun()
+    assert "moved in the tables of twice: 0" in done.stdout
+    assert "no table's code has changed" in rerun().stdout
+    assert rerun("--dry-run", "--all").stdout.splitlines()[-1].startswith("2 to measure")
+    assert (root / "runs" / "tables" / "width.log").read_text(encoding="utf-8") == once
+
+
+def test_two_commands_run_at_once(root: Path, rerun: Run) -> None:
     change(root / "fogsim" / "road.py", "3.5", "3.7")
-    done = rerun(measured=(WIDTH, STOPS))
-    assert done.returncode == 130, done.stderr
-    assert "| any | 7.0 |" in page(root), "its table is as it was"
-    log = root / "runs" / "tables" / "width.log"
-    once = log.read_text(encoding="utf-8")
-    done = rerun(measured=(WIDTH, STOPS))
+    done = rerun(measured=MEET)
     assert done.returncode == 0, done.stderr
-    assert log.read_text(encoding="utf-8") == once, "what is finished is not measured again"
+    assert page(root).count("*Measured with FogSim 1.2.3 (") == 2
+    assert "| any | 3.7 |" in page(root)
     assert "| any | 7.4 |" in page(root)
-    assert "moved in the tables of width, twice: 2" in done.stdout
+
+
+@pytest.mark.parametrize("field", [{"times": "all"}, {"cores": 2}], ids=str)
+def test_times_and_two_cores_need_the_whole_machine(root: Path, rerun: Run, field: dict[str, object]) -> None:
+    done = rerun(measured=ALONE, **field)
+    assert done.returncode == 0, done.stderr
+    assert rerun("--all", measured=ALONE, cores=1).returncode == 1, "together they are in each other's way"
+
+
+def test_interrupted_commands_leave_their_tables_and_are_resumed(root: Path, rerun: Run) -> None:
+    change(root / "fogsim" / "road.py", "3.5", "3.7")
+    done = rerun(measured=(BUSY, STOPS))
+    assert done.returncode == 130, done.stderr
+    assert "| any | 3.5 |" in page(root)
+    assert "| any | 7.0 |" in page(root)
+    assert subprocess.run(["pgrep", "-f", str(root)], check=False, capture_output=True).stdout == b""  # noqa: S607
+    kept = root / "runs" / "tables" / "width.kept"
+    kept.touch()
+    done = rerun(measured=(BUSY, STOPS))
+    assert done.returncode == 0, done.stderr
+    assert kept.exists(), "what a command keeps is its own"
+    assert "| any | 3.7 |" in page(root)
+    assert "| any | 7.4 |" in page(root)
     assert not (root / "runs" / "tables" / "progress.json").exists(), "the next one is another round"
+
+
+def test_finished_measurements_are_not_repeated_by_the_same_request(root: Path, rerun: Run) -> None:
+    rerun("--all", measured=(WIDTH, FAILS))
+    once = (root / "runs" / "tables" / "width.log").read_text(encoding="utf-8")
+    assert "1 of 2 to measure" in rerun("--all", measured=(WIDTH, TWICE)).stderr
+    assert (root / "runs" / "tables" / "width.log").read_text(encoding="utf-8") == once
+
+
+def test_what_another_command_measures_is_left_alone(root: Path, rerun: Run) -> None:
+    (root / "runs" / "tables").mkdir(parents=True)
+    with (root / "runs" / "tables" / "width.log").open("wb") as log:
+        fcntl.flock(log, fcntl.LOCK_EX)
+        done = rerun("width")
+    assert done.returncode == 1
+    assert "width is being measured by another command" in done.stderr
+    assert rerun("width").returncode == 0
 
 
 @pytest.fixture
@@ -210,6 +266,18 @@ def docs(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], ModuleType]:
     """Import of a script of docs/."""
     monkeypatch.syspath_prepend(str(DOCS))
     return import_module
+
+
+def test_a_forecast_fills_both_cores(docs: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch) -> None:
+    table_round, measurement = docs("table_round"), docs("measured_tables").Measurement
+    monkeypatch.setattr(table_round, "CORES", 2)
+    one, other, both, timed = (
+        measurement(name, (), 0.0, (), (), times, cores)
+        for name, times, cores in (("a", "", 1), ("b", "", 1), ("c", "", 2), ("d", "ms", 1))
+    )
+    assert table_round.forecast({one: 10.0, other: 20.0}) == 20.0
+    assert table_round.forecast({one: 10.0, other: 20.0, both: 8.0, timed: 2.0}) == 25.0
+    assert table_round.forecast({}) == 0.0
 
 
 def test_last_digits_and_times_of_a_cell(docs: Callable[[str], ModuleType]) -> None:

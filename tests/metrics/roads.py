@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fogsim.metrics.metric import JsonValue
 from fogsim.metrics.traffic_span import TrafficGathering, TrafficMetric
-from fogsim.values import Collision, TrafficState
+from fogsim.values import Cohort, Collision, TrafficState
 from tests.recorders.synthetic import make_step
 
 
@@ -38,13 +38,14 @@ def watched(
     roads: Iterable[tuple[float, TrafficState]],
     extinctions: NDArray[np.float64] | None = None,
     collisions: tuple[Collision, ...] = (),
+    cohort: Cohort | None = None,
 ) -> Mapping[str, JsonValue]:
     """What a metric says of states that each held for a time [s], with collisions in the last; in spans of two."""
     roads, gathering = list(roads), TrafficGathering()
     for number, (elapsed, road) in enumerate(roads):
         step = make_step(number, collisions=collisions if number == len(roads) - 1 else ())
         truth = dataclasses.replace(step.truth, vehicle_extinctions=extinctions)
-        gathering.add(dataclasses.replace(step, traffic=road, truth=truth), elapsed)
+        gathering.add(dataclasses.replace(step, traffic=road, truth=truth, cohort=cohort), elapsed)
         if number % 2 or number == len(roads) - 1:
             span = gathering.take()
             assert span is not None

@@ -39,5 +39,5 @@ def test_seconds_of_glare_add_up_over_drivers_and_shares_over_the_night() -> Non
 def test_by_day_there_is_nothing_to_tell() -> None:
     lighting = Lighting()
     lighting.update(sample(1.0, None))
-    assert set(lighting.result()) == set(Lighting.meanings)
+    assert set(lighting.result()) == set(Lighting.definitions)
     assert all(value is None for value in lighting.result().values())

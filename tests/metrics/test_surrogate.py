@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from fogsim.metrics import (
+    crash_potential,
     deceleration_rate_to_avoid_crash,
     modified_deceleration_rate_to_avoid_crash,
     potential_collision_speed,
+    stopping_distance_difference,
     time_exposed_time_to_collision,
     time_headway,
     time_integrated_time_to_collision,
@@ -106,3 +109,21 @@ def test_potential_collision_speed_is_that_of_a_simulation(gap: float, speed: fl
 def test_an_obstacle_within_the_reaction_distance_is_hit_at_full_speed_and_one_without_end_never() -> None:
     found = potential_collision_speed(np.array([19.0, np.inf]), np.array([20.0, 20.0]), np.zeros(2))
     assert found.tolist() == [20.0, 0.0]
+
+
+def test_crash_potential_is_the_truncated_normal_distribution_of_available_deceleration() -> None:
+    """Half at the mean of 8.45 m/s², in the middle of 4.23 … 12.68; elsewhere scipy's distribution."""
+    assert float(crash_potential(0.5 * (4.23 + 12.68))) == pytest.approx(0.5, abs=2e-3)
+    ends = (4.23 - 8.45) / 1.40, (12.68 - 8.45) / 1.40
+    wanted = np.linspace(3.0, 14.0, 45)
+    np.testing.assert_allclose(crash_potential(wanted), stats.truncnorm.cdf(wanted, *ends, 8.45, 1.40), atol=1e-12)
+    assert crash_potential(np.array([0.0, 4.23, 12.68, np.inf])).tolist() == [0.0, 0.0, 1.0, 1.0]
+
+
+def test_stopping_distance_difference_by_hand_and_where_it_is_zero() -> None:
+    """25 m behind 15 m/s at 20 m/s, 1 s and 5 m/s²: 25 + 22.5 − (20 + 40); 0 where both stop at the same place."""
+    assert float(stopping_distance_difference(25.0, 20.0, 15.0, 1.0, 5.0)) == pytest.approx(-12.5)
+    gap = 20.0 * 1.0 + (400.0 - 225.0) / 12.86
+    assert float(stopping_distance_difference(gap, 20.0, 15.0)) == pytest.approx(0.0, abs=1e-12)
+    assert float(potential_collision_speed(gap + 0.01, 20.0, 15.0)) == 0.0
+    assert float(potential_collision_speed(gap - 0.01, 20.0, 15.0)) > 0.0

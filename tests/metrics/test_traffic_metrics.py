@@ -9,6 +9,8 @@ import pytest
 from fogsim.metrics.cross_sections import TrafficThroughput
 from fogsim.metrics.crossing import TrafficEncroachment
 from fogsim.metrics.histogram import Histogram
+from fogsim.metrics.surrogate import crash_potential
+from fogsim.metrics.traffic_cohort import TrafficCohort
 from fogsim.metrics.traffic_collisions import TrafficCollisions
 from fogsim.metrics.traffic_comfort import TrafficComfort
 from fogsim.metrics.traffic_compliance import TrafficCompliance
@@ -19,30 +21,41 @@ from fogsim.metrics.traffic_headways import TrafficHeadways
 from fogsim.metrics.traffic_sight import TrafficSight
 from fogsim.metrics.traffic_span import TrafficMetric
 from fogsim.units import extinction_from_visibility
-from fogsim.values import Collision
+from fogsim.values import Cohort, Collision
 from tests.metrics.roads import lanes, watched
 
 ROAD = lanes(("a_0", 0, 30), ("a_0", 25, 20), ("b_0", 0, 20), ("b_0", 44, 0), ("c_0", 0, 20), ("c_0", 20, 20))
 """v0 is 2 s from a moving leader, v2 from a standing one; v4 follows at 0.75 s and comes no nearer."""
 
 
-def test_conflicts_are_told_from_closing_up_to_a_queue() -> None:
+def test_conflicts_include_standing_leaders_and_are_split_by_leader() -> None:
     found = watched(TrafficConflicts(threshold=3.0), [(0.0, ROAD), (0.5, ROAD), (1.5, ROAD)])
     hours, kilometres = 12.0 / 3600.0, 0.220
-    assert found["traffic_exposed_time_share"] == pytest.approx(1 / 6)
-    assert found["traffic_exposed_time_s_per_vehicle_km"] == pytest.approx(2.0 / kilometres)
-    assert found["traffic_integrated_time_to_collision_s2_per_h"] == pytest.approx(2.0 * (3.0 - 2.0) / hours)
-    assert found["traffic_integrated_time_to_collision_s2_per_vehicle_km"] == pytest.approx(2.0 / kilometres)
-    assert found["traffic_queue_exposed_time_share"] == pytest.approx(1 / 6)
-    assert found["traffic_minimum_time_to_collision_s"] == pytest.approx(2.0)
+    # TTC of v0 is 20 / 10 = 2 s, of v2 39 / 20 = 1.95 s, each for 2 s of 12 s of all vehicles.
+    missing = 2.0 * (3.0 - 2.0) + 2.0 * (3.0 - 1.95)
+    assert found["traffic_exposed_time_share"] == pytest.approx(2 / 6)
+    assert found["traffic_exposed_time_s_per_vehicle_km"] == pytest.approx(4.0 / kilometres)
+    assert found["traffic_integrated_time_to_collision_s2_per_h"] == pytest.approx(missing / hours)
+    assert found["traffic_integrated_time_to_collision_s2_per_vehicle_km"] == pytest.approx(missing / kilometres)
+    assert found["traffic_minimum_time_to_collision_s"] == pytest.approx(1.95)
     # DRAC of v0 is 10² / 2 · 20, MDRAC 10 / 2 (2 − 1); of v2 20² / 2 · 39 = 5.1.
-    assert found["traffic_max_drac_mps2"] == pytest.approx(2.5)
-    assert found["traffic_serious_conflict_time_share"] == 0.0
-    assert found["traffic_serious_mdrac_time_share"] == pytest.approx(1 / 6)
-    assert found["traffic_queue_serious_conflict_time_share"] == pytest.approx(1 / 6)
+    assert found["traffic_max_drac_mps2"] == pytest.approx(400.0 / 78.0)
+    assert found["traffic_serious_conflict_time_share"] == pytest.approx(1 / 6)
+    assert found["traffic_serious_mdrac_time_share"] == pytest.approx(2 / 6)
     assert found["traffic_mean_approach_mps"] == pytest.approx((10 + 20 + 0) / 3)
-    assert found["traffic_conflicts_per_vehicle_h"] == pytest.approx(1 / hours)
-    assert found["traffic_conflicts_per_vehicle_km"] == pytest.approx(1 / kilometres)
+    assert found["traffic_conflicts_per_vehicle_h"] == pytest.approx(2 / hours)
+    assert found["traffic_conflicts_per_vehicle_km"] == pytest.approx(2 / kilometres)
+    assert found["traffic_crash_potential_index"] == pytest.approx(float(crash_potential(400.0 / 78.0)) / 6)
+    for name, ttc, drac in (("moving", 2.0, 2.5), ("queue", 1.95, 400.0 / 78.0)):
+        assert found[f"traffic_{name}_conflicts_per_vehicle_km"] == pytest.approx(1 / kilometres)
+        assert found[f"traffic_{name}_exposed_time_share"] == pytest.approx(1 / 6)
+        assert found[f"traffic_{name}_serious_conflict_time_share"] == pytest.approx((drac > 3.4) / 6)
+        assert found[f"traffic_minimum_{name}_time_to_collision_s"] == pytest.approx(ttc)
+        assert found[f"traffic_max_{name}_drac_mps2"] == pytest.approx(drac)
+    # DSS by hand: 20 + (20² − 30²) / 12.86 − 30, 39 − 20² / 12.86 − 20, 15 − 20.
+    lacking = (10.0 + 500.0 / 12.86, 400.0 / 12.86 - 19.0, 5.0)
+    assert found["traffic_negative_dss_time_share"] == pytest.approx(3 / 6)
+    assert found["traffic_time_integrated_dss_m_s_per_vehicle_km"] == pytest.approx(2.0 * sum(lacking) / kilometres)
     # v0 would hit at 10 + 6.43 after 1 s, when 20 m less 13.2 are left, and after 0.4 s more; v2 with 19 m left, and
     # v4 at 6.43 since its gap of 15 m is used up while both brake.
     impacts = (16.43, math.sqrt(20.0**2 - 2 * 6.43 * 19.0), 6.43)
@@ -52,7 +65,7 @@ def test_conflicts_are_told_from_closing_up_to_a_queue() -> None:
 
 def test_who_closes_up_slowly_to_a_queue_is_in_no_conflict() -> None:
     found = watched(TrafficConflicts(threshold=3.0), [(1.0, lanes(("a", 0, 4), ("a", 8, 0)))])
-    assert found["traffic_queue_exposed_time_share"] == found["traffic_exposed_time_share"] == 0.0
+    assert found["traffic_exposed_time_share"] == 0.0
     assert found["traffic_minimum_time_to_collision_s"] is None
 
 
@@ -114,6 +127,9 @@ def test_overdriving_the_visibility_and_the_margin() -> None:
     assert found["traffic_overdriving_time_share"] == pytest.approx(2 / 5)
     stopping = 50.0 + 400.0 / 6.8
     assert found["traffic_mean_sight_margin_m"] == pytest.approx(105.0 - stopping)
+    assert found["traffic_overdriven_m_per_vehicle_km_in_fog"] == pytest.approx(2000 / 3)
+    assert found["traffic_sight_margin_by_distance_m"] == pytest.approx(105.0 - stopping)
+    assert found["traffic_vehicle_distance_in_fog_m"] == pytest.approx(120.0)
     assert found["traffic_sight_margin_p05_m"] == pytest.approx(15.0 - stopping, abs=0.5)
     # From 100 m and 200 m it stops, after 20 m of reaction and 31.1 m of braking; 15 m are over before it reacts.
     assert found["traffic_mean_obstacle_impact_speed_mps"] == pytest.approx(20.0 / 3)
@@ -166,13 +182,39 @@ def test_collisions_by_what_was_driven() -> None:
     [
         *(TrafficConflicts(3.0), TrafficHeadways(), TrafficFlow(), TrafficSight(2.5, 3.4), TrafficComfort()),
         *(TrafficCollisions(), TrafficEmissions(), TrafficCompliance(1.0), TrafficEncroachment()),
-        TrafficThroughput(),
+        *(TrafficThroughput(), TrafficCohort()),
     ],
     ids=lambda metric: type(metric).__name__,
 )
 def test_without_anybody_nothing_is_said(metric: TrafficMetric) -> None:
     assert {*metric.result().values()} <= {None, 0}
     assert {*watched(metric, [(1.0, lanes()), (1.0, lanes())], np.zeros(0)).values()} <= {None, 0}
+
+
+def test_events_and_times_of_the_cohort() -> None:
+    """Of v0 and v2, in three steps of 1 s while a third one waits; v1 and v3 came before the cohort."""
+    roads = [
+        dataclasses.replace(
+            lanes(("a", 0, 30), ("a", 25, 20), ("b", 0, 20), ("b", 44, 0)),
+            acceleration=np.array([0.0, 0.0, braking, braking]),
+            free_speed=np.array([40.0, 40.0, 40.0, 40.0]),
+        )
+        for braking in (-5.0, -5.0, 0.0, -4.0)
+    ]
+    cohort = Cohort(frozenset({"v0", "v2", "later"}), waiting=1, unfinished=3)
+    steps = [(float(number > 0), road) for number, road in enumerate(roads)]
+    hits = (Collision(0.0, "v3", "v2", 12.0), Collision(0.0, "v3", "v1", 4.0))
+    conflicts = watched(TrafficConflicts(3.0), steps, cohort=cohort)
+    assert conflicts["traffic_conflicts_per_cohort_vehicle"] == pytest.approx(2 / 3)
+    assert watched(TrafficComfort(), steps, cohort=cohort)[
+        "traffic_hard_braking_events_per_cohort_vehicle"
+    ] == pytest.approx(2 / 3)
+    found = watched(TrafficCollisions(), steps, collisions=hits, cohort=cohort)
+    assert (found["traffic_collisions"], found["traffic_collisions_per_cohort_vehicle"]) == (2, pytest.approx(1 / 3))
+    times = watched(TrafficCohort(), steps, cohort=cohort)
+    assert (times["traffic_cohort_vehicles"], times["traffic_cohort_unfinished"]) == (3, 3)
+    assert times["traffic_travel_time_s_per_cohort_vehicle"] == pytest.approx(3.0 * 3 / 3)
+    assert times["traffic_delay_s_per_cohort_vehicle"] == pytest.approx(3.0 * (0.25 + 0.5 + 1.0) / 3)
 
 
 def test_histogram_of_what_lies_within_and_beyond() -> None:

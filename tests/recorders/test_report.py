@@ -11,7 +11,8 @@ from PIL import Image
 
 from fogsim.metrics import RunMetrics, step_metrics
 from fogsim.recorders import ReportRecorder, RunDirectory, RunInformation, versions
-from fogsim.recorders.report_data import MOST_PICTURES, Album
+from fogsim.recorders.report import _key_numbers
+from fogsim.recorders.report_data import MOST_PICTURES, Album, DecisiveFrames
 from fogsim.values import Step
 from tests.recorders.synthetic import METHODS, drive, make_step
 
@@ -73,7 +74,11 @@ def test_a_report_is_whole_and_loads_nothing(tmp_path: Path) -> None:
     assert "link" not in page.tags
     assert page.links == []
     assert re.search(r"https?://|url\(|@import", text) is None
-    assert len(page.images) == 4 + MOST_PICTURES
+    places = [text.index(part) for part in ('class="numbers"', "Timeline", "Decisive frames", "All metrics")]
+    assert places == sorted(places)
+    decisive = text[places[2] : text.index("What the camera saw")].count("<figure")
+    assert decisive >= 1
+    assert len(page.images) == 4 + decisive + MOST_PICTURES
     for source in page.images:
         kind, data = source.split(",", 1)
         assert kind == "data:image/png;base64"
@@ -88,6 +93,32 @@ def test_it_shows_metrics_with_units_methods_seed_and_versions(tmp_path: Path) -
         assert method in text
     assert "seed 11" in text
     assert f"numpy {versions()['numpy']}" in text
+
+
+def test_it_opens_with_the_numbers_that_answer_a_run_in_fog() -> None:
+    metrics = {"ego_collisions": 0, "minimum_time_to_collision_s": 2.5, "minimum_moving_time_to_collision_s": 42.2}
+    page = Page(_key_numbers({**metrics, "traffic_minimum_time_to_collision_s": 1.0, "belief_coverage_share": 0.9}, {}))
+    for number in ("0collisions of the ego", "2.5 sleast time to collision", "90 %of its 90 % intervals"):
+        assert number in page.text
+    assert "1 s" not in page.text
+
+
+def test_decisive_frames_are_those_of_the_extremes_in_order_of_time() -> None:
+    steps = [
+        make_step(0, time=0.0, visibility_ahead=900.0),
+        make_step(1, time=1.0, visibility_ahead=150.0),
+        make_step(2, time=2.0, visibility_ahead=100.0, acceleration=-4.0),
+        make_step(3, time=3.0, visibility_ahead=90.0, acceleration=-2.0),
+    ]
+    frames = DecisiveFrames()
+    for step, left in zip(steps, (9.0, 5.0, None, 3.0), strict=True):
+        frames.add(step, {"time_to_collision_s": left})
+    said = [(caption.partition(":")[0], one.time) for caption, one in frames.in_order()]
+    assert said == [
+        ("First frame with less than 200 m of visibility ahead", 1.0),
+        ("Hardest braking", 2.0),
+        ("Least time to collision", 3.0),
+    ]
 
 
 def test_pictures_say_where_and_what_was_true_and_believed(tmp_path: Path) -> None:

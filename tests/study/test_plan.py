@@ -13,7 +13,7 @@ from fogsim.scenario.loading import catalogue
 from fogsim.scenario.variation import grid_mistake
 from fogsim.study import load_study
 from fogsim.study.execution import flat_metrics
-from fogsim.study.shipped import shipped_studies, study_file
+from fogsim.study.plan import shipped_studies, study_file
 from fogsim.study.table import FIXED_COLUMNS, check_factors, column_mistake
 
 STUDY = """

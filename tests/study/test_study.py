@@ -57,7 +57,7 @@ def test_a_study_is_run_continued_and_reported(tmp_path: Path) -> None:
     table = pq.read_table(out / "study.parquet").to_pylist()
     assert [row["mean_speed_mps"] for row in table[:4]] == [row["mean_speed_mps"] for row in rows[:4]]
     assert {path.name for path in out.iterdir()} == {
-        *("study.json", "study.parquet", "study.csv", "comparison.csv", "report.html", "figures", "runs")
+        *("study.json", "study.parquet", "study.csv", "comparison.csv", "methods.md", "report.html", "figures", "runs")
     }
     figures = {path.name for path in (out / "figures").iterdir()}
     assert {"mean_speed_mps.svg", "ttc_survival.csv", "speed_over_road.svg"} <= figures

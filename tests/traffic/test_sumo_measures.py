@@ -208,15 +208,17 @@ def test_conflicts_are_those_of_the_ssm_device(run: Run, told: dict[tuple[float,
                 rows.append((*told[key], state.speed[leader]))
     ttc, drac, mdrac, ahead = np.array(rows).T
     moving, vehicle_time = ahead >= QUEUE_SPEED, len(SPEEDS) * (STEPS - 1) * STEP
-    assert found["traffic_exposed_time_share"] == pytest.approx((ttc[moving] <= 3.0).sum() * STEP / vehicle_time)
-    assert found["traffic_minimum_time_to_collision_s"] == pytest.approx(ttc[moving].min(), rel=1e-6)
-    assert found["traffic_max_drac_mps2"] == pytest.approx(drac[moving].max(), rel=1e-6)
-    serious = (drac[moving] > CRITICAL_DECELERATION).sum() * STEP / vehicle_time
+    for name, chosen in (("", ttc >= 0.0), ("moving_", moving), ("queue_", ~moving)):
+        exposed = (ttc[chosen] <= 3.0).sum() * STEP / vehicle_time
+        assert found[f"traffic_{name}exposed_time_share"] == pytest.approx(exposed)
+    assert found["traffic_minimum_time_to_collision_s"] == pytest.approx(ttc.min(), rel=1e-6)
+    assert found["traffic_max_drac_mps2"] == pytest.approx(drac.max(), rel=1e-6)
+    serious = (drac > CRITICAL_DECELERATION).sum() * STEP / vehicle_time
     assert found["traffic_serious_conflict_time_share"] == pytest.approx(serious)
     # The device leaves MDRAC out once the reaction takes all the time to collision; FogSim says that nothing is enough.
-    late = ((mdrac > CRITICAL_DECELERATION) | (ttc <= 1.0))[moving].sum() * STEP / vehicle_time
+    late = ((mdrac > CRITICAL_DECELERATION) | (ttc <= 1.0)).sum() * STEP / vehicle_time
     assert found["traffic_serious_mdrac_time_share"] == pytest.approx(late)
-    assert (ttc[moving] <= 3.0).sum() > 10
+    assert (ttc <= 3.0).sum() > 10
     assert serious > 0.0
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.metrics.cross_sections.passage_kernels import NOT_YET, count_passages
-from fogsim.metrics.metric import JsonValue, share
+from fogsim.metrics.metric import Definition, JsonValue, definitions_of, share
 from fogsim.metrics.road_speeds import ROAD_HALF_WIDTH
 from fogsim.metrics.traffic_span import HOUR, TrafficMetric, TrafficSpan
 
@@ -31,23 +31,14 @@ class TrafficThroughput(TrafficMetric):
     The ego, whose coming decides when is counted, is not counted itself.
     """
 
-    meanings: ClassVar[Mapping[str, str]] = {
-        "traffic_flow_vehicles_per_h": "vehicles that pass cross sections of the ego's route, or of traffic.along, "
-        "every 250 m, over the time in which these are read: mean over sections by that time; the ego is not counted",
-    }
+    definitions: ClassVar[Mapping[str, Definition]] = definitions_of("traffic_throughput")
     _sections: NDArray[np.float64] | None = None
     _last: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 4)))
     _passed: int = 0
     _time: float = 0.0
 
     def add(self, span: TrafficSpan) -> None:
-        """Take in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The next steps.
-        """
+        """Add some steps."""
         if span.route is None:
             return
         if self._sections is None:

@@ -51,13 +51,7 @@ class Fronts(NamedTuple):
 
     @classmethod
     def of(cls, span: TrafficSpan) -> "Fronts":
-        """Those of some steps, of short ones but the first and one in each `INTERVAL`.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The steps.
-        """
+        """Those of some steps, of short ones but the first and one in each `INTERVAL`."""
         time, elapsed = span.time, span.elapsed
         x, y = span.position[:, 0], span.position[:, 1]
         fronts = cls(span.vehicle, span.lane, time, elapsed, x, y, span.speed, span.length, span.width)
@@ -66,25 +60,13 @@ class Fronts(NamedTuple):
 
     @classmethod
     def joined(cls, parts: Sequence["Fronts"]) -> "Fronts":
-        """All rows of several, one after the other.
-
-        Parameters
-        ----------
-        parts : sequence of Fronts
-            At least one.
-        """
+        """All rows of several, one after the other."""
         return parts[0]._replace(
             **{name: np.concatenate([getattr(part, name) for part in parts]) for name in cls._fields}
         )
 
     def chosen(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> "Fronts":
-        """Some of the rows.
-
-        Parameters
-        ----------
-        rows : (m,) intp, or (n,) bool
-            Which.
-        """
+        """Some of the rows."""
         return self._replace(**{name: getattr(self, name)[rows] for name in self._fields})
 
 
@@ -102,13 +84,7 @@ class Junctions:
         self._known: dict[str, int] = {}
 
     def learn(self, lane_names: Sequence[str]) -> bool:
-        """Take in the lanes so far; True if any of them lies in a junction.
-
-        Parameters
-        ----------
-        lane_names : sequence of str
-            As of `TrafficSpan`.
-        """
+        """Take in the lanes so far; True if any of them lies in a junction."""
         new = lane_names[len(self.of_lane) :]
         if new:
             found = [self._number(name) for name in new]
@@ -153,15 +129,7 @@ class Tracks(NamedTuple):
     target: Numbers
 
     def time_at(self, row: Numbers, travelled: Floats) -> Floats:
-        """Time at which a front is at a place of its way (k,) [s]; that of the way's nearer end beyond it.
-
-        Parameters
-        ----------
-        row : (k,) intp
-            Any row of the way.
-        travelled : (k,) float64
-            The place [m]; where a vehicle stands there, the time at which it drives on.
-        """
+        """Time at which a front is at a place of its way (k,) [s]; that of the way's nearer end beyond it."""
         if not row.size:
             return travelled
         track = self.track[row]
@@ -170,15 +138,7 @@ class Tracks(NamedTuple):
 
 
 def tracks_through(fronts: Fronts, junctions: Junctions) -> Tracks:
-    """Ways of vehicles through junctions.
-
-    Parameters
-    ----------
-    fronts : Fronts
-        Rows of which each vehicle's are in the order of time.
-    junctions : Junctions
-        Which lanes are in which.
-    """
+    """Ways of vehicles through junctions."""
     source = _rows_at_junctions(fronts, junctions.of_lane[fronts.lane] >= 0)
     fronts = fronts.chosen(source)
     way = np.hypot(*_steps(fronts.x, fronts.y))

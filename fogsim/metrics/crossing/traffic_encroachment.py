@@ -8,7 +8,7 @@ import numpy as np
 
 from fogsim.metrics.crossing.encroachment import find_encroachments
 from fogsim.metrics.crossing.tracks import Fronts, Junctions, tracks_through
-from fogsim.metrics.metric import JsonValue
+from fogsim.metrics.metric import Definition, JsonValue, definitions_of
 from fogsim.metrics.traffic_span import Exposure, TrafficMetric, TrafficSpan
 
 MEMORY = 10.0
@@ -28,14 +28,7 @@ class TrafficEncroachment(TrafficMetric):
     A junction is where SUMO's lanes have names that begin with a colon; the formula is `find_encroachments`'.
     """
 
-    meanings: ClassVar[Mapping[str, str]] = {
-        "traffic_minimum_post_encroachment_time_s": "least time from when a vehicle has left a place where its way "
-        "and another one's cross in a junction until that one comes there (PET); 0 if both were there at once, none "
-        "above 10 s",
-        "traffic_post_encroachments_below_5_s_per_vehicle_km": "pairs of vehicles with such a time of 5 s or less, per "
-        "kilometre of all vehicles",
-        "traffic_post_encroachments_below_1_s_per_vehicle_km": "the same with 1 s or less",
-    }
+    definitions: ClassVar[Mapping[str, Definition]] = definitions_of("traffic_encroachment")
     _exposure: Exposure = field(default_factory=Exposure)
     _junctions: Junctions = field(default_factory=Junctions)
     _spans: list[TrafficSpan] = field(default_factory=list)
@@ -44,13 +37,7 @@ class TrafficEncroachment(TrafficMetric):
     _least: dict[tuple[int, int, int], float] = field(default_factory=dict)
 
     def add(self, span: TrafficSpan) -> None:
-        """Take in some steps.
-
-        Parameters
-        ----------
-        span : TrafficSpan
-            The next steps.
-        """
+        """Add some steps."""
         self._exposure.add(span)
         if not len(span.time):
             return

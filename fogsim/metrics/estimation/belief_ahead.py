@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from fogsim.metrics.estimation.errors import FOG_LIMIT, quantile, relative_error
-from fogsim.metrics.metric import JsonValue, Sample, share
+from fogsim.metrics.metric import Definition, JsonValue, Sample, definitions_of, share
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import Step
 
@@ -31,26 +31,12 @@ INTO_FOG = 300.0
 class BeliefAheadError:
     """Error of what is believed of places ahead, where the fog there is below 1000 m."""
 
-    meanings: ClassVar[Mapping[str, str]] = {
-        f"belief_{distance}_m_ahead_{key}": f"{meaning} at the place {distance} m ahead along the route, where it is "
-        "below 1000 m; none by a fusion that does not tell of places"
-        for distance in PLACES
-        for key, meaning in (
-            ("median_error_percent", "median error of the believed visibility"),
-            ("coverage_share", "share of steps in which the 90 % interval held the true visibility"),
-        )
-    }
+    definitions: ClassVar[Mapping[str, Definition]] = definitions_of("belief_ahead")
     _errors: dict[int, list[float]] = field(default_factory=lambda: {distance: [] for distance in PLACES})
     _held: dict[int, int] = field(default_factory=lambda: dict.fromkeys(PLACES, 0))
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
         believed, true = sample.step.belief.profile, sample.step.truth.profile
         if believed is None or true is None or not true.distance.size:
             return
@@ -76,23 +62,13 @@ class BeliefAheadError:
 class DenseFogKnown:
     """How far before dense fog it was known, and known from then on."""
 
-    meanings: ClassVar[Mapping[str, str]] = {
-        "dense_fog_known_before_m": "way before fog of less than 150 m from which on the belief about the place 50 m "
-        "behind its beginning was below 300 m in the median; negative if it was known only behind that beginning; "
-        "median over such fogs, and none if the run has none or ends 300 m behind it or earlier",
-    }
+    definitions: ClassVar[Mapping[str, Definition]] = definitions_of("dense_fog_known")
     _begins: float | None = None
     _known: float | None = None
     _found: list[float] = field(default_factory=list)
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
         step = sample.step
         if self._begins is None:
             self._begins, self._known = _dense_fog_ahead(step), None

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from fogsim.metrics.estimation.errors import FOG_LIMIT, quantile, relative_error
-from fogsim.metrics.metric import JsonValue, Sample, share
+from fogsim.metrics.metric import Definition, JsonValue, Sample, definitions_of, share
 from fogsim.units import visibility_from_extinction
 
 
@@ -13,25 +13,14 @@ from fogsim.units import visibility_from_extinction
 class EquippedBelief:
     """How right the beliefs of all other equipped vehicles were, where the fog ahead of them is below 1000 m."""
 
-    meanings: ClassVar[Mapping[str, str]] = {
-        "equipped_vehicles_mean": "equipped vehicles beside the ego that were read and on its way, mean over steps",
-        "equipped_belief_median_error_percent": "median error of the visibility that they believed, where it is below "
-        "1000 m ahead of them",
-        "equipped_belief_coverage_share": "share of those beliefs whose 90 % interval held the true visibility",
-    }
+    definitions: ClassVar[Mapping[str, Definition]] = definitions_of("equipped")
     _steps: int = 0
     _vehicles: int = 0
     _held: int = 0
     _errors: list[float] = field(default_factory=list)
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
         self._steps += 1
         self._vehicles += len(sample.step.equipped)
         for one in sample.step.equipped:

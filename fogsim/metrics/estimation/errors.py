@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from fogsim.metrics.metric import JsonValue, Sample, share
+from fogsim.metrics.metric import Definition, JsonValue, Sample, definitions_of, share
 from fogsim.units import finite_or_none
 from fogsim.values import Belief
 
@@ -16,13 +16,7 @@ FOG_LIMIT = 1000.0
 
 
 def relative_error(visibility: float, truth: float) -> float:
-    """|V − V_true| / V_true in percent; ``inf`` for a visibility without limit.
-
-    Parameters
-    ----------
-    visibility, truth : float
-        Visibilities [m].
-    """
+    """|V − V_true| / V_true in percent; ``inf`` for a visibility without limit."""
     return abs(visibility - truth) / truth * 100.0
 
 
@@ -53,33 +47,13 @@ class Errors:
     _truths: list[tuple[float, float]] = field(default_factory=list)
 
     def follow(self, time: float, truth: float, said: float | None) -> None:
-        """Take in how the fog is, and what was said of it, if anything.
-
-        Parameters
-        ----------
-        time : float
-            Simulated time [s].
-        truth : float
-            Visibility ahead [m].
-        said : float or None
-            What was said of it [m].
-        """
+        """Add the visibility ahead [m] at a time [s], and the reported one, if any."""
         self._truths.append((time, math.log(min(truth, FOG_LIMIT))))
         if said is not None:
             self._said.append((time, math.log(min(said, FOG_LIMIT))))
 
     def judge(self, truth: float, said: float, low: float, high: float) -> None:
-        """Take in one visibility that was said in fog.
-
-        Parameters
-        ----------
-        truth : float
-            Visibility ahead [m].
-        said : float
-            What was said of it [m]; ``inf`` for clear air.
-        low, high : float
-            Ends of the interval that was to hold the truth in 90 % of all cases [m].
-        """
+        """Add a visibility reported in fog, ``inf`` for clear air, and its 90 % interval [m]."""
         self.percent.append(relative_error(said, truth))
         self._ratios.append(math.log(said / truth))
         self.covered += low <= truth <= high
@@ -122,15 +96,7 @@ class Errors:
 
 
 def quantile(values: Sequence[float], probability: float) -> float | None:
-    """Quantile without interpolation, so that an infinite value never makes a NaN of its neighbour.
-
-    Parameters
-    ----------
-    values : (n,) sequence of float
-        The values.
-    probability : float
-        Which quantile [-].
-    """
+    """Quantile without interpolation, so that an infinite value never makes a NaN of its neighbour."""
     if not values:
         return None
     return finite_or_none(float(np.quantile(values, probability, method="inverted_cdf")))
@@ -140,22 +106,11 @@ def quantile(values: Sequence[float], probability: float) -> float | None:
 class EstimatorErrors:
     """Error of every method in fog, frame by frame."""
 
-    meanings: ClassVar[Mapping[str, str]] = {
-        "estimators": "error |V − V_true| / V_true of each method against the true visibility ahead, in fog "
-        "(below 1000 m): frames, share with a valid estimate, share of those that said clear air, quantiles; bias "
-        "(median of V / V_true − 1); share of valid estimates whose 90 % interval (± 1.645 deviations of k) held the "
-        "truth; latency (lag up to 30 s at which they match the fog best; none where it hardly changes)",
-    }
+    definitions: ClassVar[Mapping[str, Definition]] = definitions_of("estimators")
     _methods: dict[str, Errors] = field(default_factory=dict)
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
         truth = sample.step.truth.visibility_ahead
         for estimate in sample.step.estimates:
             errors = self._methods.setdefault(estimate.method, Errors())
@@ -175,25 +130,12 @@ class EstimatorErrors:
 class BeliefError:
     """Error of the median belief in fog, and how often its 90 % interval held the truth."""
 
-    meanings: ClassVar[Mapping[str, str]] = {
-        "belief_count": "number of steps in fog (true visibility ahead below 1000 m)",
-        "belief_median_error_percent": "median over those steps of the error of the median belief",
-        "belief_p95_error_percent": "95th percentile of the same",
-        "belief_bias_percent": "median over those steps of V / V_true − 1",
-        "belief_latency_s": "lag up to 30 s at which the belief matches the fog best; none where it hardly changes",
-        "belief_coverage_share": "share of those steps in which the 90 % interval held the truth",
-    }
+    definitions: ClassVar[Mapping[str, Definition]] = definitions_of("belief")
     _errors: Errors = field(default_factory=Errors)
     _waiting: list[tuple[float, float, Belief]] = field(default_factory=list)
 
     def update(self, sample: Sample) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        sample : Sample
-            The step, and what is derived from it.
-        """
+        """Add one step."""
         self._waiting.append((sample.step.time, sample.step.truth.visibility_ahead, sample.step.belief))
         if len(self._waiting) >= _MOST_WAITING:
             self._judge_waiting()

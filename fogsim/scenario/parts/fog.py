@@ -1,6 +1,7 @@
 """From a scenario to its fog along the ego's way."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from fogsim.values import FogField, Structure
 
 
 def fog_field(scenario: Scenario, route: NDArray[np.float64], structures: Sequence[Structure] = ()) -> FogField:
-    """Fog of a scenario, laid along the ego's route.
+    """Fog of a scenario, laid along the ego's route; `fog_of_run` draws its patches.
 
     Parameters
     ----------
@@ -37,6 +38,24 @@ def fog_field(scenario: Scenario, route: NDArray[np.float64], structures: Sequen
     if fog.ground_albedo is not None:
         _check_layer(fog, float(route[:, 2].max()) + (scenario.camera.mount_height_m or 0.0))
     return fog
+
+
+def fog_of_run(scenario: Scenario, fog: FogField, patch_seed: int) -> FogField:
+    """Fog of a scenario with the patches of one run, unless the scenario gives their seed.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    fog : FogField
+        From `fog_field`.
+    patch_seed : int
+        From `Streams`.
+    """
+    written = scenario.fog.patches
+    if fog.patches is None or written is None or written.seed is not None:
+        return fog
+    return replace(fog, patches=replace(fog.patches, seed=patch_seed))
 
 
 def _check_layer(fog: FogField, eye: float) -> None:

@@ -17,11 +17,15 @@ Point = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True)
 class NetEdges:
-    """Edges for vehicles: number of lanes, middle lanes [m] of the requested ones, and ids of traffic lights."""
+    """Edges for vehicles: number of lanes, middle lanes [m] of the wanted ones, and ids of traffic lights.
+
+    `gaps` are pairs of wanted edges that were to follow one another and have no lane from one to the next.
+    """
 
     lanes: Mapping[str, int]
     axes: Mapping[str, Sequence[Point]]
     signals: tuple[str, ...] = ()
+    gaps: Collection[tuple[str, str]] = ()
 
     def route_length(self, route: Sequence[str]) -> float:
         """Length of the axis that fog is laid along [m]: middle lanes of a route's edges, end to end."""
@@ -29,24 +33,27 @@ class NetEdges:
         return sum(math.dist(one, other) for one, other in itertools.pairwise(points))
 
 
-def read_net_edges(net: Path, wanted: Collection[str], most_bytes: int = MOST_BYTES) -> NetEdges | None:
-    """Edges of a network, with axes of the wanted ones; None if it is too large or not a network."""
-    reader = _EdgeReader(wanted)
+def read_net_edges(
+    net: Path, wanted: Sequence[str], most_bytes: int = MOST_BYTES, *, must_follow: bool = False
+) -> NetEdges | None:
+    """Edges of a network, with axes of the wanted ones and gaps between them; None if too large or not a network."""
+    reader = _EdgeReader(wanted, set(itertools.pairwise(wanted)) if must_follow else set())
     try:
         size = read_elements(net, reader, most_bytes)
     except InputError:
         return None
-    if not reader.lanes or (size == most_bytes and not reader.is_done):
+    if not reader.lanes or (size == most_bytes and not reader.has_edges):
         return None
     axes = {edge: shapes[len(shapes) // 2] for edge, shapes in reader.shapes.items() if shapes}
-    return NetEdges(reader.lanes, axes, tuple(reader.signals))
+    return NetEdges(reader.lanes, axes, tuple(reader.signals), reader.unlinked if size < most_bytes else ())
 
 
 class _EdgeReader:
-    """Counts lanes of edges."""
+    """Counts lanes of edges, and finds which of the pairs `unlinked` no connection links."""
 
-    def __init__(self, wanted: Collection[str]) -> None:
-        self.is_done = False
+    def __init__(self, wanted: Collection[str], unlinked: set[tuple[str, str]]) -> None:
+        self.is_done = self.has_edges = False
+        self.unlinked = unlinked
         self.lanes: dict[str, int] = {}
         self.shapes: dict[str, list[list[Point]]] = {edge: [] for edge in wanted}
         self.signals: dict[str, None] = {}
@@ -64,7 +71,9 @@ class _EdgeReader:
             self.signals[attributes.get("id", "")] = None
         elif tag == "connection":
             # All edges and programs of traffic lights come before the connections.
-            self.is_done = True
+            self.has_edges = True
+            self.unlinked.discard((attributes.get("from", ""), attributes.get("to", "")))
+            self.is_done = not self.unlinked
 
     def end(self, tag: str) -> None:
         pass

@@ -18,7 +18,7 @@ LAMPS = ((80.0, 60.0, 4.0, 300.0), (220.0, 70.0, 6.0, 300.0))
 LIT = Lamp.POSITION | Lamp.LOW_BEAM
 
 
-def seen(lamps: tuple[tuple[float, float, float, float], ...] = (), glow: float = 0.0) -> Observation:
+def seen(lamps=(), glow=0.0):
     """A road that own lamps light, under a dark sky."""
     level = picture(lamps, glow=glow)
     level[140:] = np.maximum(level[140:], 60)

@@ -177,7 +177,7 @@ MEASUREMENTS = (
     study("which_sensor", 8),  # 112 runs of 8.6 s
     study("who_tells_of_the_bank", 11),  # 56 runs of 24 s
     study("lighting_policies", 12),  # 108 runs of 13 s
-    study("estimators_in_the_loop", 40),
+    study("estimators_in_the_loop", 12),
     environment(
         "advisory",
         5,

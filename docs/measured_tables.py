@@ -177,7 +177,7 @@ MEASUREMENTS = (
     study("which_sensor", 9),  # 140 runs of 4 to 12 s
     study("who_tells_of_the_bank", 7),  # 70 runs of 6 to 27 s
     study("lighting_policies", 4),  # 360 runs of 1 s
-    study("estimators_in_the_loop", 40),
+    study("estimators_in_the_loop", 12),
     environment(
         "advisory",
         5,

@@ -36,7 +36,7 @@ class PaperCell:
     absolute : bool
         Whether the tolerance is in the figure's own unit, as for shares in percent.
     truth : float or None
-        What was estimated, if it is known: a result no farther from it than the published one is reached, too.
+        What was estimated, if known: a corrected result no farther from it than the published one is reached, too.
     """
 
     place: str
@@ -50,24 +50,29 @@ class PaperCell:
     absolute: bool = False
     truth: float | None = None
 
-    def reached(self, ours: float | None) -> bool:
-        """Whether a result agrees with the published figure."""
+    def agrees(self, ours: float | None) -> bool:
+        """Whether a result agrees with the published figure, as the method as published should."""
         if ours is None:
             return False
         if self.claim != "equal":
             return ours <= self.paper if self.claim == "at_most" else ours >= self.paper
-        if self.truth is not None and abs(ours - self.truth) <= abs(self.paper - self.truth):
-            return True
         if math.inf in (self.paper, ours):
             return ours == self.paper
         return abs(ours - self.paper) <= (self.tolerance if self.absolute else self.tolerance * abs(self.paper))
 
+    @property
+    def reached(self) -> tuple[bool, bool]:
+        """Whether the figure is reached: as published by agreement, corrected also by an error that is no larger."""
+        ours, truth = self.corrected, self.truth
+        nearer = ours is not None and truth is not None and abs(ours - truth) <= abs(self.paper - truth)
+        return self.agrees(self.as_published), nearer or self.agrees(ours)
+
     def shown(self, miss: str = "**{}**") -> tuple[str, ...]:
         """Row of a table, ours to as many decimals as the paper prints and those that are not reached as `miss`."""
         cells = [_SIGNS[self.claim] + _figure(self.paper)]
-        for ours in (self.as_published, self.corrected):
+        for ours, reached in zip((self.as_published, self.corrected), self.reached, strict=True):
             figure = "—" if ours is None else _figure(ours, like=self.paper)
-            cells.append(figure if self.reached(ours) else miss.format(figure))
+            cells.append(figure if reached else miss.format(figure))
         return (self.place, self.row, self.column, *cells)
 
     def record(self) -> dict[str, str | float | bool | None]:
@@ -79,8 +84,8 @@ class PaperCell:
             "column": self.column,
             "claim": self.claim,
             **{name: "inf" if figure == math.inf else figure for name, figure in figures.items()},
-            "as_published_reached": self.reached(self.as_published),
-            "corrected_reached": self.reached(self.corrected),
+            "as_published_reached": self.reached[0],
+            "corrected_reached": self.reached[1],
         }
 
 
@@ -93,7 +98,7 @@ def _figure(value: float, like: float | None = None) -> str:
 
 def reached_counts(cells: Sequence[PaperCell]) -> tuple[int, int]:
     """How many of a paper's figures are reached as published and corrected."""
-    return sum(cell.reached(cell.as_published) for cell in cells), sum(cell.reached(cell.corrected) for cell in cells)
+    return sum(cell.reached[0] for cell in cells), sum(cell.reached[1] for cell in cells)
 
 
 def chosen_tables(known: Sequence[str], table: str | None) -> tuple[str, ...]:

@@ -172,11 +172,11 @@ MEASUREMENTS = (
         (PHOTONS, "docs/make_airlight_tables.py"),
     ),
     study("message_sign", 2),  # 80 runs of 2.5 s on one core
-    study("motorway_policies", 8),  # 360 runs of 2.5 s
-    study("field_sizes", 10),  # 160 runs of 7.3 s
-    study("which_sensor", 8),  # 112 runs of 8.6 s
-    study("who_tells_of_the_bank", 11),  # 56 runs of 24 s
-    study("lighting_policies", 12),  # 108 runs of 13 s
+    study("motorway_policies", 15),  # 600 runs of 3 s
+    study("field_sizes", 10),  # 160 runs of 7 s
+    study("which_sensor", 9),  # 140 runs of 4 to 12 s
+    study("who_tells_of_the_bank", 7),  # 70 runs of 6 to 27 s
+    study("lighting_policies", 4),  # 360 runs of 1 s
     study("estimators_in_the_loop", 12),
     environment(
         "advisory",

@@ -109,7 +109,10 @@ def run_command(
         loaded, of_file = chosen_case(scenario, sumocfg, ego, visibility, settings, case, seed)
         compile_for(loaded)
         from fogsim.recording import record_run, record_traffic
+        from fogsim.scenario.wording.sentences import empty_start
 
+        if warning := empty_start(loaded):
+            stderr.print(f"[yellow]{escape(warning)}[/]", soft_wrap=True)
         chosen = {
             "table": True,
             "video": _filmed(loaded, video),

@@ -60,7 +60,7 @@ def study_command(
     stdout.print(f"{escape(loaded.name)}: {escape(shape)} × {seeds} seeds = {len(loaded.runs)} runs")
     cells = loaded.cells()
     if (warning := next(filter(None, map(empty_start, cells.values())), None)) is not None:
-        stderr.print(f"[yellow]{escape(warning)}[/]")
+        stderr.print(f"[yellow]{escape(warning)}[/]", soft_wrap=True)
     if check:
         _build(loaded.file, cells)
         return

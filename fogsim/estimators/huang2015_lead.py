@@ -40,9 +40,6 @@ LEAST_CHANGE = 10.0
 WORST = 1.0
 """Relative standard deviation of k beyond which it is as good as unknown [-]."""
 
-LARGEST_SCALE_DEVIATION = 0.3
-"""Relative standard deviation of all ranges together beyond which ranges from the camera say nothing [-]."""
-
 CURVE_STEP, CURVE_END = 5.0, 200.0
 """Ranges of the confidence curve in the diagnostics [m]."""
 
@@ -162,7 +159,9 @@ class Huang2015Lead:
         image = self._check.kernel_image(observation)
         try:
             lead, deviation = self._range(image, observation.lead)
-            if not self._track.follows(lead.distance):
+            # Ranges from the camera are of one vehicle until it is forgotten.
+            is_known = self._camera_range is not None and self._track.reference is not None
+            if not (is_known or self._track.follows(lead.distance)):
                 self._track = self._new_track()
                 self._tracks += 1
             self._track.see(image, lead, observation.time, deviation)
@@ -171,8 +170,8 @@ class Huang2015Lead:
             return Estimate.invalid(self.method, str(reason))
         return self._estimate()
 
-    def _range(self, image: Pixels, lead: LeadMeasurement | None) -> tuple[LeadMeasurement, float]:
-        """Range of the vehicle ahead and its standard deviation [m]."""
+    def _range(self, image: Pixels, lead: LeadMeasurement | None) -> tuple[LeadMeasurement, float | None]:
+        """Range of the vehicle ahead, and its standard deviation if it is from the camera [m]."""
         if self._camera_range is not None:
             distance, deviation = self._camera_range.measure(partial(crop_vehicle, image, self._camera))
             return LeadMeasurement(distance, math.nan), deviation
@@ -180,7 +179,7 @@ class Huang2015Lead:
             raise CannotTellError("no vehicle is tracked ahead")
         if math.isnan(lead.distance):
             raise InputError("the distance of a lead measurement must be a number, got NaN")
-        return lead, RANGE_DEVIATION
+        return lead, None
 
     def _miss(self) -> None:
         if self._track.miss():
@@ -198,8 +197,6 @@ class Huang2015Lead:
             "window": None if window is None else (window.column, window.foot, window.width),
             "range_change": change,
         }
-        if self._camera_range is not None and self._camera_range.scale_deviation > LARGEST_SCALE_DEVIATION:
-            return Estimate.invalid(self.method, "where the vehicle stands is too uncertain", **diagnostics)
         if change < LEAST_CHANGE or distances.size < (2 if self._as_published else 3):
             return Estimate.invalid(self.method, "the vehicle's range has not changed enough", **diagnostics)
         measured = self._published() if self._as_published else self._corrected()

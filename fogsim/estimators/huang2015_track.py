@@ -98,7 +98,7 @@ class LeadTrack(TrackedVehicle[Comparison]):
         """
         return self.reference is not None and abs(distance + self._setback - self._last_distance) <= MOST_JUMP
 
-    def see(self, image: Pixels, measured: LeadMeasurement, time: float, deviation: float = RANGE_DEVIATION) -> None:
+    def see(self, image: Pixels, measured: LeadMeasurement, time: float, deviation: float | None = None) -> None:
         """Look for the vehicle in the next frame.
 
         Parameters
@@ -109,8 +109,8 @@ class LeadTrack(TrackedVehicle[Comparison]):
             Range and relative speed by the radar.
         time : float
             [s].
-        deviation : float
-            Standard deviation of the range [m]; where it is larger than a radar's, registration measures it again.
+        deviation : float, optional
+            Standard deviation of a range from the camera [m], which registration then refines; a radar's otherwise.
 
         Raises
         ------
@@ -138,16 +138,16 @@ class LeadTrack(TrackedVehicle[Comparison]):
         self.reference, self.detections = comparison, [comparison]
         self._remember(window.column, window.foot, crop.depth)
 
-    def _follow(self, crop: VehicleCrop, number: int, reference: RearPatch, deviation: float) -> None:
+    def _follow(self, crop: VehicleCrop, number: int, reference: RearPatch, deviation: float | None) -> None:
         distance = crop.depth
         expected = self._expected(distance, reference)
         full = cut_patch(crop, expected, number, self._blur)
         picture, most = shrink_broad(full), self._most_contrast(distance)
-        prior = expected_placement(reference, picture, deviation)
+        prior = expected_placement(reference, picture, deviation or RANGE_DEVIATION)
         comparison = compare(reference, picture, prior, most)
         if comparison is None or _exceeds(comparison, most):
             raise CannotTellError("the vehicle ahead was lost")
-        if deviation != RANGE_DEVIATION:
+        if deviation is not None:
             distance *= prior.placement.scale / comparison.regression.placement.scale
             picture = replace(picture, distance=distance)
             comparison = replace(comparison, picture=picture, distance=distance)

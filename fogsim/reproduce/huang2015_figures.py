@@ -153,8 +153,8 @@ def cells(wanted: Sequence[Figure], results: Results, rough: Rough) -> list[Pape
     found = []
     for figure in wanted:
         published, corrected = (_ours(figure, name, _estimate(figure, name, results, rough)) for name in VARIANTS)
-        place = f"table {figure.table}"
-        found.append(PaperCell(place, figure.row, figure.column, figure.paper, published, corrected))
+        names = (f"table {figure.table}", figure.row, figure.column)
+        found.append(PaperCell(*names, figure.paper, published, corrected, truth=_truth(figure)))
     return found
 
 

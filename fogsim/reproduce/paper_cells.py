@@ -56,10 +56,10 @@ class PaperCell:
             return False
         if self.claim != "equal":
             return ours <= self.paper if self.claim == "at_most" else ours >= self.paper
-        if self.paper == float("inf") or ours == float("inf"):
-            return ours == self.paper
         if self.truth is not None and abs(ours - self.truth) <= abs(self.paper - self.truth):
             return True
+        if math.inf in (self.paper, ours):
+            return ours == self.paper
         return abs(ours - self.paper) <= (self.tolerance if self.absolute else self.tolerance * abs(self.paper))
 
     def shown(self, miss: str = "**{}**") -> tuple[str, ...]:

@@ -86,14 +86,14 @@ def _common(scenarios: Sequence[Scenario]) -> dict[str, Setting]:
 
 def _by_level(study: Study, words: Callable[[Scenario], str]) -> str:
     """Words on the scenarios of all cells: once if they agree, else by the levels of the factor that they depend on."""
-    told = [(run.levels, words(run.scenario)) for run in {id(run.scenario): run for run in study.runs}.values()]
+    texts = [(run.levels, words(run.scenario)) for run in {id(run.scenario): run for run in study.runs}.values()]
     cells_of: dict[str, list[Mapping[str, str]]] = {}
-    for levels, text in told:
+    for levels, text in texts:
         cells_of.setdefault(text, []).append(levels)
     if len(cells_of) == 1:
-        return told[0][1]
+        return texts[0][1]
     if len(cells_of) > _MOST_VARIANTS:
-        return f"{told[0][1]} (The first cell, {_levels(told[0][0])}; the table of factors has what varies.)"
+        return f"{texts[0][1]} (The first cell, {_levels(texts[0][0])}; the table of factors has what varies.)"
     for factor in study.factors:
         of_text = {text: list(dict.fromkeys(at[factor] for at in cells)) for text, cells in cells_of.items()}
         if sum(map(len, of_text.values())) == len(study.factors[factor]):

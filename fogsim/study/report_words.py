@@ -45,7 +45,7 @@ def scarce_events(study: Study, rows: Sequence[Row], differences: Sequence[Diffe
         words = metric_words(metric)
         both = [events_of_both(study, cells, one) for one in differences if one.metric == metric]
         counts = [of_baseline + here for of_baseline, here in both if of_baseline is not None and here is not None]
-        if words.better in {"less", "lower"} and not any(number_of(row.get(metric)) for row in rows):
+        if words.better == "lower" and not any(number_of(row.get(metric)) for row in rows):
             none.append(words.label)
         elif counts and (most := max(counts)) < needed:
             few.append(f"{words.label} (at most {most})")

@@ -219,7 +219,7 @@ def test_the_window_on_the_way_back_is_that_of_the_way_away(visibility):
 
 
 @pytest.mark.parametrize("visibility", [80.0, 150.0, 300.0])
-@pytest.mark.parametrize(("width", "bound"), [(None, 0.08), (1.8, 0.06)])
+@pytest.mark.parametrize(("width", "bound"), [(None, 0.1), (1.8, 0.06)])
 def test_without_a_radar_the_camera_gives_the_range(visibility, width, bound):
     estimator = make("huang2015_lead", Chase().camera, range_from="camera", vehicle_width=width)
     for seen in chased(Chase(visibility=visibility), 1, AWAY[:10]):
@@ -230,23 +230,16 @@ def test_without_a_radar_the_camera_gives_the_range(visibility, width, bound):
     assert found.visibility == pytest.approx(visibility, rel=bound)
 
 
-def test_pitch_that_may_be_off_widens_the_interval_by_ranges_of_the_camera():
+def test_what_the_camera_does_not_know_of_ranges_widens_the_interval():
     seen = [replace(one, lead=None) for one in chased(Chase(visibility=150.0), 1, AWAY[:10])]
     spread = []
-    for pitch in (0.05, 0.4):
-        estimator = make("huang2015_lead", Chase().camera, range_from="camera", pitch_deviation=np.radians(pitch))
+    for options in ({"vehicle_width": 1.8}, {}, {"pitch_deviation": np.radians(2.0)}):
+        estimator = make("huang2015_lead", Chase().camera, range_from="camera", **options)
         found = [estimator.update(one) for one in seen][-1]
         spread.append(found.standard_deviation / found.extinction)
-    # Alone, 0.4° is 13 % of the range at 25 m.
-    assert spread[1] == pytest.approx(np.radians(0.4) * 25.0 / 1.3, rel=0.15)
-    assert spread[0] < 0.4 * spread[1]
-
-
-def test_a_pitch_that_is_hardly_known_leaves_ranges_of_the_camera_unknown():
-    estimator = make("huang2015_lead", Chase().camera, range_from="camera", pitch_deviation=np.radians(2.0))
-    found = [estimator.update(replace(one, lead=None)) for one in chased(Chase(visibility=150.0), 1, AWAY[:10])][-1]
-    assert not found.valid
-    assert "too uncertain" in found.diagnostics["reason"]
+    # The last pitch says nothing of ranges: the spread of vehicles' widths, 15 %, is left.
+    assert spread[0] < 0.5 * spread[1] < 0.5 * spread[2]
+    assert spread[2] == pytest.approx(0.15, rel=0.1)
 
 
 @pytest.mark.parametrize(("distance", "bound"), [(90.0, 0.2), (60.0, 0.15), (30.0, 0.07)])

@@ -121,3 +121,9 @@ def test_unknown_papers_answer_with_the_nearest(command) -> None:
     code, _, err = command("negru2031")
     assert code == 2
     assert "did you mean 'negru2013'" in err
+
+
+def test_a_table_is_one_papers(command) -> None:
+    code, _, err = command("all", "--table", "2")
+    assert code == 2
+    assert "--table 2 needs one paper, not all" in err

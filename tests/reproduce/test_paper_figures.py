@@ -248,6 +248,7 @@ def test_gallen2014_is_run_with_the_figures_of_its_paper() -> None:
         (math.inf, {}, False),
         (107.0, {"truth": 100.0}, True),
         (129.0, {"truth": 100.0}, False),
+        (math.inf, {"truth": 100.0}, False),
         (72.1, {"claim": "at_most"}, False),
         (71.0, {"claim": "at_most"}, True),
         (71.0, {"claim": "at_least"}, False),

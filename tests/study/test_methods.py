@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 from fogsim.cli.app import app
 from fogsim.scenario import load_scenario
 from fogsim.scenario.wording.non_defaults import non_default_settings
-from fogsim.scenario.wording.sentences import empty_start
+from fogsim.scenario.wording.sentences import SENTENCES, empty_start
 from fogsim.study import load_study
 from fogsim.study.comparison import compare_to_baseline
 from fogsim.study.methods import study_methods
@@ -40,8 +40,8 @@ def test_a_stranger_finds_the_methods_in_the_text(study: Study) -> None:
     text = study_methods(study).markdown("Methods")
     for needed in (
         *("(policy: none, a16)", "2 seeds (0 to 1), 4 runs", "baseline is policy none"),
-        *("at most 20 s", "warm-up of 0 s", "motorway.net.xml", "5.5 km long, with 3 lanes", "110 to 130 km/h"),
-        *("2880 vehicles/h in 2 flows", "car 68 %", "60 m from 1300 to 2500 m (edges of 300 m)"),
+        *("at most 20 s", "warm-up of 0 s", "motorway.net.xml", "5.5 km, lanes 3, limit 110 to 130 km/h"),
+        *("Flows: 2", "together 2880 vehicles/h", "car 68 %", "60 m from 1300 to 2500 m (edges of 300 m)"),
         *("policy none: No speed is advised.", "netherlands_a16 (Hogema & van der Horst 1997)", "every 500 m"),
         *("Speed choice: observed (White & Jeffery 1980", "in_sight 50 %", "rate 0.6", "Efron 1987", "SUMO (libsumo)"),
         *("| drivers.compliance.rate | 0.6 | 1 |", "| policy | a16 | advice=netherlands_a16, drivers.advised=signs |"),
@@ -106,3 +106,9 @@ def test_check_builds_the_fog_along_the_road(tmp_path: Path) -> None:
     path.write_text(ALONE.replace("none: [advice=none]", f"none: [advice=none, '{photons}']"), encoding="utf-8")
     outcome = CliRunner().invoke(app, ["study", str(path), "--check"])
     assert "policy=none: fog.airlight: photons is known for eyes within the layer" in str(outcome.exception)
+
+
+@pytest.mark.parametrize("name", ["patchy_fog", "city_fog", "highway_99_corridor", "rural_night_oncoming"])
+def test_shipped_scenarios_can_be_put_in_words(name: str) -> None:
+    said = {heading: words(load_scenario(name)) for heading, words in SENTENCES.items()}
+    assert all(text.endswith(".") and "None" not in text for text in said.values())

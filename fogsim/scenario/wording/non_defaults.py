@@ -50,8 +50,8 @@ def _of_value(value: object, default: object, path: tuple[str, ...], meaning: st
         for name, one in value.items():
             yield from _of_value(one, None, (*path, name), meaning)
     else:
-        told = "" if default is None and isinstance(value, BaseModel) else shown_value(default)
-        yield ".".join(path), Setting(shown_value(value), told, " ".join(meaning.split()))
+        usual = "" if default is None and isinstance(value, BaseModel) else shown_value(default)
+        yield ".".join(path), Setting(shown_value(value), usual, " ".join(meaning.split()))
 
 
 def shown_value(value: Any) -> str:

@@ -78,20 +78,18 @@ def _road_words(scenario: Scenario) -> str:
     limits = _span(KMH_PER_MPS * roads.speed_limit(edge) for edge in way)
     whose = "ego's route" if scenario.traffic.has_ego else "road along which positions count"
     length = float(stations(axis)[-1]) / 1000.0
-    return (
-        f"SUMO network: {source}. The {whose} is {length:.3g} km long, with {lanes} lanes and a limit of {limits} km/h."
-    )
+    return f"SUMO network: {source}. The {whose}: {length:.3g} km, lanes {lanes}, limit {limits} km/h."
 
 
 def _span(values: Iterator[float]) -> str:
-    known = sorted(set(values))
-    return f"{known[0]:.4g}" if len(known) == 1 else f"{known[0]:.4g} to {known[-1]:.4g}"
+    known = sorted({round(value) for value in values})
+    return f"{known[0]}" if len(known) == 1 else f"{known[0]} to {known[-1]}"
 
 
 def _demand_words(scenario: Scenario) -> str:
     if scenario.road is not None:
-        told = scenario.demand
-        rates = {} if told is None else {key: value for key, value in told if key.endswith("_vph") and value}
+        demand = scenario.demand
+        rates = {} if demand is None else {key: value for key, value in demand if key.endswith("_vph") and value}
         flows = ", ".join(f"{key.removesuffix('_vph').replace('_', ' ')} {value:g}" for key, value in rates.items())
         mix = {name: share for name, share in usual_mix(scenario.road.template) if share}
         return (f"Vehicles per hour: {flows} ({_shares(mix)})." if flows else "No traffic flows.") + _actors(scenario)
@@ -99,10 +97,10 @@ def _demand_words(scenario: Scenario) -> str:
     of_config = () if config is None else configured_demand(scenario.directory / config).files
     found = read_flows((*of_config, *files.additional, *files.routes))
     total = math.fsum(found.rates.values())
-    text = f"{total:.0f} vehicles/h in {found.flows} flows of all directions while all of them last"
-    text = f"{text} ({_shares(found.rates)})" if total else "No flows with a rate"
-    single = sum(found.single.values())
-    text += f"; {single:.0f} vehicles that depart one by one ({_shares(found.single)})" if single else ""
+    text = f"Flows: {found.flows}, of all directions"
+    text += f", together {total:.0f} vehicles/h while all of them last ({_shares(found.rates)})" if total else ""
+    single = ", ".join(f"{name} {number:.3g}" for name, number in found.single.items())
+    text += f"; vehicles that depart one by one, by type: {single}" if single else ""
     return text + ("." if found.is_whole else "; not all demand files could be read.") + _actors(scenario)
 
 
@@ -128,7 +126,7 @@ def _fog_words(scenario: Scenario) -> str:
             for one in fog.banks
         )
         text = f"Meteorological visibility {outside:g} m outside banks, and {banks or 'no banks'}"
-    return f"{text}{_layers(fog)}; daylight {scenario.light.illuminance_lx:g} lx."
+    return f"{text}{_layers(fog)}; illuminance by the sky {scenario.light.illuminance_lx:g} lx."
 
 
 def _layers(fog: Fog) -> str:

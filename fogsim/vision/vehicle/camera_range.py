@@ -17,8 +17,11 @@ NEAREST, STEP = 8.0, 1.1
 LEAST_WIDTH = 8.0
 """Narrowest vehicle that is searched [px]."""
 
-USUAL_WIDTH, WIDTH_SPREAD = 1.8, 0.15
-"""Median width of vehicles [m], and its relative standard deviation: cars 1.6 to 1.95 m, lorries 2.55 m [-]."""
+USUAL_WIDTH, WIDTH_SPREAD, UNUSUAL = 1.8, 0.15, 0.4
+"""Median width of vehicles [m], the standard deviation of its logarithm, and how far that may be from it [-]."""
+
+FOOT = 0.15
+"""Standard deviation of the height of what is taken for the foot [m]: in fog a bumper's lower edge is clearer."""
 
 KNOWN_WIDTH = 0.02
 """Relative standard deviation of a width that is given: edges are rounded [-]."""
@@ -26,7 +29,7 @@ KNOWN_WIDTH = 0.02
 CONSISTENT = 0.1
 """Largest relative difference of a range by the contact with the road from the range that is tried [-]."""
 
-EDGE, REGISTERED = 0.3, 0.1
+EDGE, REGISTERED = 0.3, 0.2
 """Standard deviation of the width between two edges, and of one by registration [px]."""
 
 MOST_JUMP = 12.0
@@ -41,8 +44,9 @@ def registered_deviation(camera: Camera, distance: NDArray[np.float64]) -> NDArr
 class CameraRange:
     """Ranges to a vehicle by the width of its picture, d = f W / w.
 
-    Its width W is known, or follows from the row at which it stands on the road, d = λ / (v − v_h): weighted over its
-    pictures, for the nearest show it best. An error of W is common to all ranges, and so goes into k as a factor.
+    Its width W is known, or follows from the row at which it stands on the road, d = λ / (v − v_h), weighted over its
+    pictures, for the nearest show it best, and from the usual width of vehicles. An error of W is common to all ranges,
+    and so goes into k as a factor.
 
     Parameters
     ----------
@@ -65,8 +69,12 @@ class CameraRange:
 
     @property
     def scale(self) -> float:
-        """What true ranges are over the measured ones, by all pictures so far [-]."""
-        return 1.0 if self._known else math.exp(self._weighted / self._weight) / self._first_width
+        """What true ranges are over the measured ones, by all pictures and the usual width of vehicles [-]."""
+        if self._known:
+            return 1.0
+        share = (self.scale_deviation / WIDTH_SPREAD) ** 2
+        width = (1.0 - share) * self._weighted / self._weight + share * math.log(USUAL_WIDTH)
+        return math.exp(width) / self._first_width
 
     @property
     def scale_deviation(self) -> float:
@@ -74,7 +82,8 @@ class CameraRange:
         if self._known:
             return KNOWN_WIDTH
         # The pitch may be off by as much in every picture; the nearest shows that least.
-        return self._pitch_deviation * self._nearest / self._camera.mount_height
+        by_contact = math.hypot(self._pitch_deviation * self._nearest, FOOT) / self._camera.mount_height
+        return 1.0 / math.hypot(1.0 / by_contact, 1.0 / WIDTH_SPREAD)
 
     def measure(self, crop_at: Callable[[float], VehicleCrop]) -> tuple[float, float]:
         """Range from the camera, and its standard deviation that is not common to all [m].
@@ -112,26 +121,20 @@ class CameraRange:
     def _search(self, crop_at: Callable[[float], VehicleCrop]) -> RearBox:
         farthest = WIDTHS[1] * self._camera.focal_length / LEAST_WIDTH
         count = max(math.ceil(math.log(max(farthest, NEAREST) / NEAREST) / math.log(STEP)), 1)
-        found: list[tuple[float, RearBox]] = []
-        reason = "no vehicle stands out ahead"
         for tried in np.geomspace(NEAREST, NEAREST * STEP**count, count + 1):
             try:
                 box = _localised(crop_at(float(tried)), float(tried))
-            except CannotTellError as why:
-                reason = str(why)
+            except CannotTellError:
                 continue
             contact = None if box is None else self._contact(box)
             if box is None or contact is None or abs(math.log(contact / tried)) > CONSISTENT:
                 continue
-            width, spread = self._known or USUAL_WIDTH, KNOWN_WIDTH + CONSISTENT if self._known else WIDTH_SPREAD
-            unusual = math.log(box.width * contact / self._camera.focal_length / width) / spread
-            found.append((box.evidence - 0.5 * unusual**2, box))
-        if not found:
-            raise CannotTellError(reason)
-        best = max(found, key=lambda one: one[0])[1]
-        contact = self._contact(best)
-        self._first_width = best.width * (contact or 0.0) / self._camera.focal_length
-        return best
+            width = box.width * contact / self._camera.focal_length
+            if abs(math.log(width / (self._known or USUAL_WIDTH))) < UNUSUAL:
+                # Farther ones are parts of it: in the image they lie above its foot.
+                self._first_width = width
+                return box
+        raise CannotTellError("no vehicle stands out ahead whose range the image shows")
 
     def _follow(self, crop_at: Callable[[float], VehicleCrop], distance: float) -> RearBox:
         box = _localised(crop_at(distance), distance)

@@ -27,15 +27,7 @@ _Values = tuple[float, float]  # mean Br50 and largest sharpness of a picture
 
 
 def random_scene(rng: np.random.Generator, strengths: tuple[float, float] = STRENGTHS) -> NightScene:
-    """A road by night with at least one lamp that is seen.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        Draws it: street lamps on every second road, a vehicle ahead on more than half, up to two oncoming ones.
-    strengths : tuple of float
-        Range of the lamps' intensity over the usual one [-].
-    """
+    """A night road on which at least one lamp is seen; `strengths` is the range of factors on intensities [-]."""
     vehicles = []
     if rng.random() < 0.6:
         lamps = _LIT | Lamp.STOP if rng.random() < 0.3 else _LIT
@@ -94,13 +86,7 @@ def measure_halo_threshold(
 
 
 def parting(clear: Sequence[float], fog: Sequence[float]) -> tuple[float, float, float]:
-    """Value below which the fewest of one kind and above which the fewest of the other lie, and both shares.
-
-    Parameters
-    ----------
-    clear, fog : sequence of float
-        Values on clear nights, which are large, and in fog, which are small.
-    """
+    """Value that best separates small values (fog) from large ones (clear nights), and the shares on the wrong side."""
     high, low = np.sort(clear), np.sort(fog)
     candidates = np.unique(np.concatenate((high, low)))
     candidates = np.concatenate((candidates, 0.5 * (candidates[1:] + candidates[:-1])))

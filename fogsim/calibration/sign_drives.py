@@ -82,17 +82,7 @@ class SignDrive:
 def observed(
     drive: SignDrive, visibilities: Sequence[float], rng: np.random.Generator
 ) -> Iterator[dict[float, Observation]]:
-    """Observations of a drive, frame by frame, in homogeneous fog of each visibility.
-
-    Parameters
-    ----------
-    drive : SignDrive
-        The drive.
-    visibilities : sequence of float
-        Meteorological visibilities [m].
-    rng : numpy.random.Generator
-        Errors of map, pose and pixels, and where trees stand.
-    """
+    """Observations of a drive, frame by frame, in homogeneous fog of each visibility [m]."""
     noise, told = drive.noise, drive.camera
     known = SignMap(drive.known or tuple(_misplaced(sign, noise.position, rng) for sign in drive.signs))
     length = max(drive.places) + 2.0 * drive.reach
@@ -119,19 +109,7 @@ def observed(
 
 
 def sign_beside(name: str, kind: str, place: float, diameter: float, rng: np.random.Generator) -> Sign:
-    """A sign on the right of the road, somewhere where signs stand.
-
-    Parameters
-    ----------
-    name, kind : str
-        Its id and kind.
-    place : float
-        Where along the road [m].
-    diameter : float
-        Size of its face [m].
-    rng : numpy.random.Generator
-        Chooses its offset, its height and, of a limit, its number.
-    """
+    """A sign of a diameter [m] on the right of the road at `place` [m], its offset and height drawn at random."""
     position = (place, -float(rng.uniform(4.0, 6.5)), float(rng.uniform(1.9, 2.5)))
     return Sign(name, kind, float(rng.choice((50, 70, 80, 100))) / 3.6, position, 0.0, diameter)
 

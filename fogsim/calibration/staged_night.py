@@ -141,15 +141,7 @@ class NightRoad:
         return self._drawn[lit]
 
     def radiances(self, scene: NightScene, visibilities: Sequence[float]) -> list[NDArray[np.float32]]:
-        """What the camera gets of a scene in homogeneous fog of each visibility (rows, cols, 3) [cd/m²].
-
-        Parameters
-        ----------
-        scene : NightScene
-            What there is.
-        visibilities : sequence of float
-            Meteorological visibilities [m]; ``inf`` for a clear night.
-        """
+        """Radiance at the camera in fog of each visibility [m], ``inf`` for clear air: (rows, cols, 3) [cd/m²]."""
         camera, lit = self.camera, scene.street_lamps
         renderer, heads = self._scene(lit)
         pose = CameraPose((scene.place, 0.0, camera.mount_height), heading=0.0)
@@ -169,17 +161,7 @@ class NightRoad:
         return out
 
     def photograph(self, radiance: NDArray[np.float32], exposure: float, rng: np.random.Generator) -> Pixels:
-        """Take a picture at an exposure relative to the automatic one.
-
-        Parameters
-        ----------
-        radiance : (rows, cols, 3) float32
-            From `radiances` [cd/m²].
-        exposure : float
-            Light that is gathered, over what automatic exposure gathers [-].
-        rng : numpy.random.Generator
-            Of the noise.
-        """
+        """Take a picture of a radiance [cd/m²] at an exposure relative to the automatic one [-]."""
         saturation = saturation_for(metered_luminance(radiance, AUTOMATIC.metering), AUTOMATIC) / exposure
         sensor = Sensor(saturation, bits=self.camera.bits, black_level=self.camera.black_level)
         sensor = sensor_at(sensor, saturation, AUTOMATIC)

@@ -38,13 +38,7 @@ _LENGTH, _WIDTH = 1500.0, 3.5  # of the lanes [m]
 
 
 def straight_road(length: float = _LENGTH) -> RoadNetwork:
-    """Two lanes of opposite directions, straight along x; too slow for guard rails, too fast for a town.
-
-    Parameters
-    ----------
-    length : float
-        How far it goes [m].
-    """
+    """Two lanes of opposite directions along x, `length` [m] long; too slow for guard rails, too fast for a town."""
 
     def lane(name: str, left: float, ways: int) -> Lane:
         line = np.array([[-50.0, left, 0.0], [length, left, 0.0]])[::ways]
@@ -83,13 +77,7 @@ class StagedVehicle:
 
 @contextmanager
 def road_renderer(*, trees: bool = True) -> Iterator[Renderer]:
-    """Renderer of the straight road.
-
-    Parameters
-    ----------
-    trees : bool
-        Whether what stands beside the road is drawn.
-    """
+    """Renderer of the straight road, with or without trees next to it."""
     scene = build_scene(straight_road(), SignMap(()), np.random.default_rng(0))
     renderer = make_renderer("auto", scene if trees else replace(scene, scenery=()), illuminance=ILLUMINANCE)
     try:
@@ -100,43 +88,19 @@ def road_renderer(*, trees: bool = True) -> Iterator[Renderer]:
 
 @contextmanager
 def views(camera: Camera, cars: Sequence[tuple[float, float]], *, trees: bool) -> Iterator[tuple[View, CameraPose]]:
-    """Draw the road without air.
-
-    Parameters
-    ----------
-    camera : Camera
-        The true calibration.
-    cars : sequence of (float, float)
-        How far the near end of each car is ahead of the camera, and how far left its middle is [m].
-    trees : bool
-        Whether what stands beside the road is drawn.
-    """
+    """Draw the road without air; `cars` are distances of near ends ahead and of middles to the left [m]."""
     pose = CameraPose((0.0, 0.0, camera.mount_height), heading=0.0)
     with road_renderer(trees=trees) as renderer:
         yield renderer.render(vehicle_batches(standing_cars(cars), None), camera, pose), pose
 
 
 def standing_cars(cars: Sequence[tuple[float, float]]) -> TrafficState:
-    """Cars along the road.
-
-    Parameters
-    ----------
-    cars : sequence of (float, float)
-        How far along the road the near end of each is, and how far left its middle is [m].
-    """
+    """Cars along the road; `cars` are places of near ends along it and of middles to the left [m]."""
     return staged_traffic([(rear, StagedVehicle(left=left, name=f"car {i}")) for i, (rear, left) in enumerate(cars)])
 
 
 def staged_traffic(vehicles: Sequence[tuple[float, StagedVehicle]], speed: float = 0.0) -> TrafficState:
-    """Vehicles along the road.
-
-    Parameters
-    ----------
-    vehicles : sequence of (float, StagedVehicle)
-        How far along the road the near end of each is [m], and what it is.
-    speed : float
-        Of each [m/s].
-    """
+    """Vehicles along the road, each with the place of its near end [m]; all drive at `speed` [m/s]."""
     n, kinds = len(vehicles), [vehicle for _, vehicle in vehicles]
     return TrafficState(
         time=0.0,
@@ -163,28 +127,7 @@ def foggy_radiance(
     albedo: float | None = None,
     droplets: Droplets = Droplets.MODERATE_RADIATION,
 ) -> NDArray[np.float32]:
-    """What a camera gets of a view in homogeneous fog.
-
-    Parameters
-    ----------
-    view : View
-        What there is.
-    pose : CameraPose
-        Where it is seen from.
-    camera : Camera
-        The true calibration.
-    extinction : float
-        Extinction coefficient k [1/m].
-    albedo : float or None
-        Albedo of the land for the airlight of photons, in a layer of `LAYER`; None for Koschmieder's.
-    droplets : Droplets
-        Their sizes, which matter to the former.
-
-    Returns
-    -------
-    (rows, cols, 3) float32
-        Linear radiance [cd/m²].
-    """
+    """Radiance at the camera in homogeneous fog (rows, cols, 3) [cd/m²]; Koschmieder's airlight without `albedo`."""
     if albedo is None:
         fog = FogField(extinction, (AIRLIGHT,) * 3)
     else:
@@ -194,12 +137,6 @@ def foggy_radiance(
 
 
 def foggy_image(view: View, pose: CameraPose, camera: Camera, extinction: float) -> NDArray[np.uint8]:
-    """Image of a view in homogeneous fog, the airlight at pixel value 255, without noise.
-
-    Parameters
-    ----------
-    view, pose, camera, extinction
-        As of `foggy_radiance`.
-    """
+    """Image of a view in homogeneous fog, the airlight at pixel value 255, without noise."""
     radiance = foggy_radiance(view, pose, camera, extinction)
     return expose(radiance, NOISELESS, camera.response, np.random.default_rng(0)).astype(np.uint8)

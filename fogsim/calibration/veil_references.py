@@ -57,23 +57,7 @@ def compute_references(
     mount: LampMount | None = None,
     droplets: Sequence[Droplets] = DROPLETS,
 ) -> tuple[VeilReferences, ...]:
-    """Draw references by the night model, for each kind of droplets.
-
-    Parameters
-    ----------
-    camera : Camera
-        The camera that the vehicle assumes.
-    lamps : Lamp
-        Own lamps that are lit.
-    setback : float
-        Distance of the camera behind the front bumper [m].
-    visibilities : sequence of float
-        Meteorological visibilities, rising [m].
-    mount : LampMount or None
-        Where the lamps are and how they shine; None for a car's.
-    droplets : sequence of Droplets
-        Sizes of the fog's droplets.
-    """
+    """Draw references by the night model for each droplet type; visibilities rise [m], without `mount` it is a car's."""
     cells = camera_of_cells(camera)
     lit = own_head_lamps(lamps, camera.mount_height, setback, mount)
     extinctions = [extinction_from_visibility(visibility) for visibility in visibilities]
@@ -135,15 +119,7 @@ def _means(luminance: NDArray[Any], samples: int) -> NDArray[np.float64]:
 
 
 def flat_road(camera: Camera, pose: CameraPose, response: float) -> View:
-    """The view of an endless, flat road without light of its own.
-
-    Parameters
-    ----------
-    camera, pose : Camera, CameraPose
-        Who looks.
-    response : float
-        Luminance that it returns of own lamps' illuminance [cd/m² per lx].
-    """
+    """View of an endless, flat road that returns a luminance per illuminance of own lamps [cd/m² per lx]."""
     u, v = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
     rays = matrix_product(np.stack((u, v, np.ones_like(u)), axis=-1).astype(np.float64), ray_from_pixel(camera, pose).T)
     slope = -rays[..., 2] / np.sqrt((rays**2).sum(axis=-1))
@@ -155,33 +131,12 @@ def flat_road(camera: Camera, pose: CameraPose, response: float) -> View:
 
 @lru_cache(maxsize=12)
 def usual_references(camera: Camera, lamps: Lamp, setback: float) -> tuple[VeilReferences, ...]:
-    """References of a car's usual lamps, computed once a process.
-
-    Parameters
-    ----------
-    camera : Camera
-        The camera that the vehicle assumes.
-    lamps : Lamp
-        Own lamps that are lit.
-    setback : float
-        Distance of the camera behind the front bumper [m].
-    """
+    """References of a car's usual lamps, computed once per process; `setback` from the front bumper [m]."""
     return compute_references(camera, lamps, setback)
 
 
 def lamps_named(text: str) -> Lamp:
-    """Head lamps by their names, such as "low_beam+front_fog".
-
-    Parameters
-    ----------
-    text : str
-        Names, joined by "+".
-
-    Raises
-    ------
-    UnknownNameError
-        If one is none of low_beam, high_beam and front_fog.
-    """
+    """Head lamps by their names, such as "low_beam+front_fog"; UnknownNameError for another name."""
     known = {str(lamp.name).lower(): lamp for lamp in (Lamp.LOW_BEAM, Lamp.HIGH_BEAM, Lamp.FRONT_FOG)}
     found = Lamp.NONE
     for name in text.split("+"):

@@ -32,13 +32,7 @@ class Following(NamedTuple):
 
 
 def find_following(traffic: TrafficState) -> Following:
-    """Pair each vehicle with the nearest one ahead of it in its lane; see `pair_in_lanes`.
-
-    Parameters
-    ----------
-    traffic : TrafficState
-        Every vehicle.
-    """
+    """Pair each vehicle with the nearest one ahead of it in its lane; see `pair_in_lanes`."""
     known: dict[str, int] = {}
     lane = np.array([known.setdefault(lane, len(known)) for lane in traffic.lane], dtype=np.intp)
     return pair_in_lanes(traffic.position, traffic.heading, traffic.length, traffic.speed, lane)

@@ -94,25 +94,7 @@ def reproduce(
     table: str | None = None,
     watch: Watch = unwatched,
 ) -> Reproduction:
-    """Run the evaluation again.
-
-    Parameters
-    ----------
-    images : int
-        How many images there are in each fog.
-    setups : sequence of Setup
-        The cameras.
-    approaches : int, optional
-        Drives of each calibration.
-    fogs : sequence of float
-        Visibilities of the calibration [m].
-    quick : bool
-        A third of the calibration's drives by default.
-    table : str, optional
-        The paper has one figure of results, "figure 4".
-    watch : Watch
-        Called after every tenth image.
-    """
+    """Drive past signs in each fog; an image is a step, `approaches` and `fogs` [m] are the calibration's."""
     chosen_tables(TABLES, table)
     approaches = approaches or (QUICK_APPROACHES if quick else APPROACHES)
     share, records, ranges = approaches + images // 10 + 1, list[dict[str, Cell]](), list[OperatingRange]()

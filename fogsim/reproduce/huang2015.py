@@ -62,22 +62,7 @@ NOTES = (
 
 
 def reproduce(*, quick: bool = False, table: str | None = None, watch: Watch = unwatched) -> Reproduction:
-    """Run the evaluation again.
-
-    Parameters
-    ----------
-    quick : bool
-        One drive of each setting of the sweeps, and no chase beyond the thesis'.
-    table : str, optional
-        Run this table of the thesis alone, such as "5.1".
-    watch : Watch
-        Called after every frame of every case.
-
-    Returns
-    -------
-    Reproduction
-        A cell for each figure of the thesis; a record for each of them and each variant.
-    """
+    """Follow vehicles through fog; `quick` ends the chase where the thesis' ends and runs each sweep once."""
     wanted = figures(chosen_tables(TABLES, table))
     more = [Case(v, back=back, noisy=not back) for v in TABLE_4_1 for back in (True, False)]
     if quick or table is not None:

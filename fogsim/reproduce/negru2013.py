@@ -67,24 +67,7 @@ NOTES = (
 def reproduce(
     drives: int | None = None, *, quick: bool = False, table: str | None = None, watch: Watch = unwatched
 ) -> Reproduction:
-    """Run the evaluation again, and sweep what the paper leaves open.
-
-    Parameters
-    ----------
-    drives : int, optional
-        Drives of each setting of the sweeps.
-    quick : bool
-        One drive of each setting by default.
-    table : str, optional
-        Run this part of the paper's evaluation alone, without sweeps.
-    watch : Watch
-        Called after every image.
-
-    Returns
-    -------
-    Reproduction
-        A record for each scene and extinction: true and estimated visibilities [m] and categories of each variant.
-    """
+    """Estimate on each scene at each extinction, and sweep what the paper leaves open over some drives."""
     chosen_tables(TABLES, table)
     drives = drives or (1 if quick else DRIVES)
     records: list[Mapping[str, Cell]] = []

@@ -106,30 +106,7 @@ QUICK = Size(4, 2, 4, 1)
 def reproduce(
     size: Size | None = None, *, quick: bool = False, table: str | None = None, watch: Watch = unwatched
 ) -> Reproduction:
-    """Run the evaluation again.
-
-    Parameters
-    ----------
-    size : Size, optional
-        How much is run.
-    quick : bool
-        Run `QUICK` by default.
-    table : str, optional
-        Run this part of the paper's evaluation alone, without sweeps.
-    watch : Watch
-        Called after every fog of every drive.
-
-    Returns
-    -------
-    Reproduction
-        A record for each frame from the third on: true and estimated visibilities [m] (None: clear air, or no estimate)
-        and states of each variant.
-
-    Raises
-    ------
-    InputError
-        If there are too few of anything.
-    """
+    """Drive along a country road in each weather; records begin with the third frame of a drive."""
     chosen = chosen_tables(TABLES, table)
     size = size or (QUICK if quick else Size())
     drives, visibilities, frames, sweeps = size.drives, size.visibilities, size.frames, size.sweeps

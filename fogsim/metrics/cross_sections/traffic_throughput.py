@@ -60,13 +60,7 @@ class TrafficThroughput(TrafficMetric):
 
 
 def sections_along(road: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Middles of cross sections [m], and the unit vector along the road there (s, 4).
-
-    Parameters
-    ----------
-    road : (m, 3) float64
-        Polyline along it [m].
-    """
+    """Middles [m] and unit vectors along the road (s, 4) of cross sections of a polyline (m, 3) [m]."""
     x, y = road[:, 0], road[:, 1]
     place = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))))
     middle = np.arange(0.5 * SPACING, place[-1], SPACING)

@@ -84,25 +84,7 @@ class Plan:
 def reproduce(
     plan: Plan | None = None, *, quick: bool = False, table: str | None = None, watch: Watch = unwatched
 ) -> Reproduction:
-    """Let every daytime method read frames of both fogs.
-
-    Parameters
-    ----------
-    plan : Plan, optional
-        A part of it; all by default.
-    quick : bool
-        One drive for each camera.
-    table : str, optional
-        Refused, for the evaluation follows no paper's tables.
-    watch : Watch
-        Told of every drive.
-
-    Returns
-    -------
-    Reproduction
-        A record for each height, albedo, visibility and method: share of drives with an estimate of fog, the median of
-        what they read, and how often the 90 % interval holds the truth.
-    """
+    """Let every daytime method read frames of both fogs; there are no tables to choose from."""
     chosen_tables((), table)
     plan = plan or (Plan(drives=1) if quick else Plan())
     steps = Steps(len(plan.heights) * 2 * plan.drives, watch)

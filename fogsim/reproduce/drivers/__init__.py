@@ -28,24 +28,7 @@ NOTES = (
 def reproduce(
     plan: Plan | None = None, *, quick: bool = False, table: str | None = None, watch: Watch = unwatched
 ) -> Reproduction:
-    """Let traffic drive by demand and visibility, and set it beside what is published.
-
-    Parameters
-    ----------
-    plan : Plan, optional
-        A part of it; all by default.
-    quick : bool
-        Run two seeds of the default plan.
-    table : str, optional
-        Refused, for the evaluation follows no one paper's tables.
-    watch : Watch
-        Told of every run that is done.
-
-    Returns
-    -------
-    Reproduction
-        A record for each measure of each case, and one for each published finding.
-    """
+    """Run traffic by demand and visibility next to published findings; there are no tables to choose from."""
     chosen_tables((), table)
     plan = plan or (Plan(seeds=REPORT_SEEDS[:2]) if quick else Plan())
     cases: tuple[Case | Pair, ...] = (*plan.cases, *plan.pairs)

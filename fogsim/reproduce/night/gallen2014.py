@@ -93,21 +93,7 @@ def reproduce(
     table: str | None = None,
     watch: Watch = unwatched,
 ) -> Reproduction:
-    """Run the evaluation again.
-
-    Parameters
-    ----------
-    camera : Camera
-        The camera.
-    size : Size, optional
-        How much is run; the paper's number of frames by default.
-    quick : bool
-        A ninth of the drives' frames.
-    table : str, optional
-        One of `TABLES`, all by default.
-    watch : Watch
-        Called with every step.
-    """
+    """Take pictures of lamps and of the own beams' veil by night; `quick` takes a ninth of the drives' frames."""
     wanted = chosen_tables(TABLES, table)
     size = size or (_QUICK if quick else Size())
     has_drives, has_fogs = "figure 8" in wanted, bool({"I", "figure 11", "figure 14"}.intersection(wanted))

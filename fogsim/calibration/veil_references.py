@@ -57,7 +57,7 @@ def compute_references(
     mount: LampMount | None = None,
     droplets: Sequence[Droplets] = DROPLETS,
 ) -> tuple[VeilReferences, ...]:
-    """Draw references by the night model for each droplet type; visibilities rise [m], without `mount` it is a car's."""
+    """Draw references by the night model for each droplet type; visibilities rise [m], a car's without `mount`."""
     cells = camera_of_cells(camera)
     lit = own_head_lamps(lamps, camera.mount_height, setback, mount)
     extinctions = [extinction_from_visibility(visibility) for visibility in visibilities]

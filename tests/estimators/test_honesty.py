@@ -173,9 +173,9 @@ class Wall:
         return None
 
 sys.meta_path.insert(0, Wall())
-from fogsim.estimators import ESTIMATORS, make
+from fogsim.estimators import ESTIMATORS
 camera, observations = pickle.loads(Path(sys.argv[1]).read_bytes())
-estimators = [make(name, camera) for name in sorted(ESTIMATORS)]
+estimators = [ESTIMATORS[name](camera) for name in sorted(ESTIMATORS)]
 found = [[(e.method, e.extinction, e.standard_deviation, e.valid) for e in (m.update(o) for m in estimators)]
          for o in observations]
 Path(sys.argv[2]).write_bytes(pickle.dumps(found))

@@ -215,7 +215,8 @@ def test_the_window_on_the_way_back_is_that_of_the_way_away(visibility):
     away, back = (
         followed(chase, 1, ranges, as_published=True).diagnostics["variances"] for ranges in (AWAY, AWAY[::-1])
     )
-    assert back[:5] == pytest.approx(away[:5], rel=0.05)
+    # Single variances scatter with the noise; a strip of sky would make all of them larger.
+    assert np.mean(np.divide(back[:5], away[:5])) == pytest.approx(1.0, abs=0.05)
 
 
 @pytest.mark.parametrize("visibility", [80.0, 150.0, 300.0])

@@ -52,6 +52,6 @@ def test_its_stream_moves_no_other() -> None:
     """The first numbers of the other streams with seed 1, as they were before there was one."""
     children = np.random.SeedSequence(1).spawn(8)
     streams = spawn_streams(1)
-    names = ("fog", "camera", "sensors", "driver", "faults", "gps", "reports")
-    for name, child in zip(names, children[1:], strict=True):
+    names = ("camera", "sensors", "driver", "faults", "gps", "reports")
+    for name, child in zip(names, children[2:], strict=True):
         assert getattr(streams, name).random() == np.random.default_rng(child).random()

@@ -23,7 +23,7 @@ from fogsim.values.camera import Camera, Response
 from fogsim.values.estimate import Estimate
 from fogsim.values.light import Lamp
 from fogsim.values.observation import Observation
-from fogsim.vision.light.daylight import lit_by_lamps
+from fogsim.vision.light.daylight import darkens_ahead, lit_by_lamps
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.lines.horizon import levelled
 
@@ -50,6 +50,9 @@ LEAST_BRIGHT = 8.0
 """Pixel value that something must have."""
 
 NORMAL_95_PERCENT = 1.645
+
+ROAD_NOT_LIT = "no veil of the own lamps, nor a road that darkens ahead as they light it"
+"""Why a night cannot be called clear."""
 
 
 @checked_parameters
@@ -147,7 +150,8 @@ class Gallen2014Veil:
         if templates is None:
             return Estimate.invalid(self.method, "it has no references; fogsim calibrate veil makes them")
         self._earlier.append(means)
-        return self._estimate(templates.scores(self._composed()))
+        is_lit = bool(lit & Lamp.HIGH_BEAM) or darkens_ahead(levelled(image, self._camera), self._camera)
+        return self._estimate(templates.scores(self._composed()), is_lit=is_lit)
 
     def _unfit(self, image: NDArray[np.uint8] | NDArray[np.uint16], means: CellMeans) -> str:
         row = self._camera.horizon_row
@@ -177,10 +181,12 @@ class Gallen2014Veil:
         composed: NDArray[np.float64] = np.median(frames, axis=0) if self._median else frames.mean(axis=0)
         return composed
 
-    def _estimate(self, scores: VeilScores) -> Estimate:
+    def _estimate(self, scores: VeilScores, *, is_lit: bool) -> Estimate:
         best = float(np.nanmax(np.nan_to_num(scores.score, nan=-1.0)))
         found: dict[str, object] = {"score": best, "scores": tuple(scores.score.tolist())}
         found["detected"] = best >= self._threshold and not scores.clear >= best
+        if not found["detected"] and not is_lit:
+            return Estimate.invalid(self.method, ROAD_NOT_LIT, **found)
         if not found["detected"]:
             least = extinction_from_visibility(LIGHT_FOG)
             return Estimate(self.method, 0.0, least / NORMAL_95_PERCENT, diagnostics=found)

@@ -20,9 +20,10 @@ from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate, ExtinctionBounds
 from fogsim.values.light import Lamp
 from fogsim.values.observation import Observation
+from fogsim.vision.light.daylight import darkens_ahead
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.pixel_kernels import Pixels
-from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation
+from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation, levelled
 
 NEAREST, FARTHEST, HALF_LANE = 5.0, 80.0, 1.4
 """The road is looked at between these distances, and so far to the left and right of the own middle [m]."""
@@ -38,6 +39,9 @@ LEAST_PEAK = 8.0
 
 LEAST_EXPLAINED = 0.93
 """Share of the cells' variance that veil, road and even light must explain, or other light lights them [-]."""
+
+NOT_BY_OWN_LAMPS = "other light than that of the own head lamps"
+"""Why an image is refused."""
 
 MOST_EVEN = 0.5
 """Share of the brightest cells that light may have that is the same everywhere: by day it is most of the light [-]."""
@@ -195,7 +199,11 @@ class NightRoad:
         if not references:
             return Estimate.invalid(self.method, "it has no references; fogsim calibrate veil makes them")
         floor = max(1.0, float(np.quantile(means.luminance, 0.05)))
-        return self._estimate(_Seen(means.luminance[used], used, floor), references)
+        found = self._estimate(_Seen(means.luminance[used], used, floor), references)
+        high = bool(lit & Lamp.HIGH_BEAM)
+        if found.valid and not high and not darkens_ahead(levelled(image, self._camera), self._camera):
+            return Estimate.invalid(self.method, NOT_BY_OWN_LAMPS, **found.diagnostics)
+        return found
 
     def _hidden(self, observation: Observation) -> NDArray[np.bool_]:
         """Cells that the vehicle ahead may cover."""
@@ -222,7 +230,7 @@ class NightRoad:
         found: dict[str, object] = {"veil": veil, "road": road, "even": even, "explained": fit.explained}
         found["droplets"] = references[kind].droplets
         if fit.explained < LEAST_EXPLAINED or even > MOST_EVEN * float(seen.luminance.max()):
-            return Estimate.invalid(self.method, "other light than that of the own head lamps", **found)
+            return Estimate.invalid(self.method, NOT_BY_OWN_LAMPS, **found)
         outshone = 1.0 - float(fit.weight.mean())
         if outshone > 1.0 - LEAST_WEIGHT:
             return Estimate.invalid(self.method, "lamps of others outshine what the own ones light", **found)

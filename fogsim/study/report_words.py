@@ -65,8 +65,8 @@ def _compared(study: Study, rows: Sequence[Row]) -> str:
     seeds = len({run.seed for run in study.runs})
     done = sum(row["status"] == "complete" for row in rows)
     return (
-        f"{shape} × {seeds} seeds = {len(rows)} runs, of which {'all' if done == len(rows) else done} are complete. "
-        f"Everything is compared to {' · '.join(study.baseline.values())}, run by run with the same seed."
+        f"{shape} × {seeds} seeds = {len(rows)} runs, {'all' if done == len(rows) else done} complete. "
+        f"Policies are compared to {' · '.join(study.baseline.values())} with the same seed."
     )
 
 
@@ -82,7 +82,7 @@ def _findings(study: Study, differences: Sequence[Difference]) -> list[str]:
         items = [_finding(grid, metric, by_metric[metric]) for metric in by_metric if metric in shown]
         nothing = [metric_words(metric).label for metric in by_metric if metric not in shown]
         if nothing:
-            items.append(f"No difference of any could be shown in: {', '.join(nothing)}.")
+            items.append(f"No difference could be shown in: {', '.join(nothing)}.")
         heading = f"<h3>{escape(title)}</h3>" if title else ""
         lines += [heading, "<ul>", *(f"<li>{escape(item)}</li>" for item in items), "</ul>"] if items else []
     return lines

@@ -199,7 +199,7 @@ def test_without_any_finished_run_there_is_a_report_too(study: Study, tmp_path: 
     ]
     write_report(study, rows, {}, tmp_path)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "of which 0 are complete" in page
+    assert "runs, 0 complete" in page
     assert "PARTIAL: 32 of 32 runs" in page
     assert list((tmp_path / "figures").iterdir()) == []
 

@@ -5,7 +5,7 @@ in ln V and a fifth in clear air, at exposures of 0.6 to 1.6 of the automatic on
 is not as the methods take it to be: the pavement returns half as much again, the droplets are others, the pitch is off
 by 0.1° (one standard deviation). Errors are |V_est − V| / V of valid estimates of fog; `bands` is the share within the
 errors that gallen2014 reports (10 m below 50 m, 20 below 100, 40 below 200, 100 above), `coverage` that of 90 %
-intervals that hold the truth, `clear` that of clear nights that are told to be clear, or to have more than 300 m.
+intervals that hold the truth, `clear` that of clear nights that are estimated as clear, or with more than 300 m.
 Constants were chosen on `--pool 0`; what is reported is of `--pool 1`.
 
     python benchmarks/night_estimators.py [--json] [--docs] [--pool 1] [--pictures 40]
@@ -58,24 +58,24 @@ VARIANTS = {
 
 
 def looks(variant: Variant, pool: int, count: int) -> Iterator[tuple[float, Camera, Observation]]:
-    """True visibility, told camera and what is seen."""
+    """True visibility, assumed camera and observation."""
     rng = np.random.default_rng((pool, 19))
-    told = replace(TOLD, black_level=variant.black_level)
+    assumed = replace(TOLD, black_level=variant.black_level)
     for _ in range(count):
         visibility = float(np.exp(rng.uniform(np.log(15.0), np.log(500.0))))
         clear, place, exposure = rng.random() < CLEAR_SHARE, rng.uniform(0.0, 400.0), np.exp(rng.uniform(-0.5, 0.5))
         visibility = np.inf if clear else visibility
-        camera = replace(told, pitch=told.pitch + variant.pitch * rng.standard_normal())
+        camera = replace(assumed, pitch=assumed.pitch + variant.pitch * rng.standard_normal())
         with NightRoad(camera, variant.droplets, seed=int(rng.integers(1000))) as road:
             (radiance,) = road.radiances(NightScene(place, pavement=variant.pavement), [visibility])
             picture = road.photograph(radiance, float(exposure), rng)
-        yield visibility, told, Observation(picture, lamps=Lamp.LOW_BEAM, camera_setback=SETBACK)
+        yield visibility, assumed, Observation(picture, lamps=Lamp.LOW_BEAM, camera_setback=SETBACK)
 
 
-def estimates(name: str, told: Camera, seen: Observation) -> Estimate:
+def estimates(name: str, assumed: Camera, seen: Observation) -> Estimate:
     """What a method says of one picture alone."""
     method, options = METHODS[name]
-    return make(method, told, **options).update(seen)
+    return make(method, assumed, **options).update(seen)
 
 
 def record(name: str, variant: str, found: list[tuple[float, Estimate]]) -> dict[str, Any]:
@@ -134,7 +134,7 @@ def main() -> None:
     for label, variant in VARIANTS.items():
         seen = list(looks(variant, asked.pool, asked.pictures))
         for name in METHODS:
-            records.append(record(name, label, [(v, estimates(name, told, one)) for v, told, one in seen]))
+            records.append(record(name, label, [(v, estimates(name, assumed, one)) for v, assumed, one in seen]))
             if not asked.json:
                 print(*records[-1].values(), flush=True)
     times = milliseconds()

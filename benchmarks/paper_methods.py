@@ -1,7 +1,7 @@
 """Every method of the published papers in the shipped scenario that has what it needs, as a user runs it.
 
 Nothing is prepared: calibrations of the camera are made on the first run. Errors are |V_est − V| / V of valid
-estimates, V the visibility ahead; `coverage` is the share of them whose 90 % interval holds V. `gallen2014_halo` tells
+estimates, V the visibility ahead; `coverage` is the share of them whose 90 % interval holds V. `gallen2014_halo` shows
 whether there is fog and gives a bound, not a visibility: `bounds` is the share of frames with a bound and no estimate,
 `bounds_hold` the share of those that hold V, 10 % aside.
 

@@ -40,7 +40,7 @@ _RESTS_ON = (
     "values",
     "vision",
 )
-"""Packages whose code decides what is drawn and detected: a change in one of them makes calibrations anew."""
+"""Packages whose code decides what is drawn and detected: after a change in one of them calibrations are made again."""
 
 _MOST_KEPT = 200
 _NEWS_PERIOD = 10.0  # between two lines about the progress [s]

@@ -27,8 +27,8 @@ HALF_WIDTH, MIDDLE, HALF_HEIGHT = 0.42, 0.42, 0.32
 its height [-]. It ends below the roof of the flattest car and above the shadow under it."""
 
 BODY_HALF_WIDTH, BODY_HEIGHTS = 0.34, (0.15, 0.7)
-"""The part whose variance is taken, in widths of the vehicle [-]. It lies on the body of every vehicle: beside a narrow
-roof there is sky, and under the bumper road, whose share of a larger window would change with its place."""
+"""The part whose variance is taken, in widths of the vehicle [-]. It lies on the body of every vehicle: next to a
+narrow roof there is sky, and under the bumper road, whose share of a larger window would change with its place."""
 
 MARGIN, MARGIN_PIXELS = 0.12, 8
 """What a stored picture holds around that part: widths of the vehicle [-] and pixels."""

@@ -22,7 +22,7 @@ from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
 from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation, calibrated_horizon
-from fogsim.vision.region.curve_checks import check_law, detection_limit, is_clear, seen_up_to, told
+from fogsim.vision.region.curve_checks import check_law, detection_limit, fog_or_clear, is_clear, seen_up_to
 from fogsim.vision.region.law import extinction_deviation
 from fogsim.vision.region.profile import RoadCurve
 from fogsim.vision.region.road_image import CannotTellError, road_image
@@ -132,7 +132,7 @@ class Huang2015Rough:
         airlight, dark = check_law(curve, extinction, road)
         deviation = extinction_deviation(curve, extinction, self._extinctions, apart)
         found = {"first_extinction": first, "airlight": airlight, "road": dark}
-        return self._estimate(*told(extinction, deviation), medians, **found)
+        return self._estimate(*fog_or_clear(extinction, deviation), medians, **found)
 
     def _extinctions(self, curve: RoadCurve, luminance: NDArray[np.float64]) -> NDArray[np.float64]:
         first = first_extinctions(curve, luminance, self._repairs)

@@ -25,7 +25,7 @@ from fogsim.vision.lines.gradient_lines import consensus_vanishing_point
 from fogsim.vision.lines.horizon import PITCH_DEVIATION, Horizon, PitchDeviation, calibrated_horizon, weighted_mean
 from fogsim.vision.lines.road_lines import road_vanishing_point
 from fogsim.vision.lines.vanishing_point import VanishingPoint
-from fogsim.vision.region.curve_checks import SURE_OF_FOG, check_law, detection_limit, seen_up_to, told
+from fogsim.vision.region.curve_checks import SURE_OF_FOG, check_law, detection_limit, fog_or_clear, seen_up_to
 from fogsim.vision.region.inflection import (
     FogModel,
     Parameters,
@@ -313,7 +313,7 @@ class Negru2013:
         beside = min(max(2.0 * paved / (extinction * curve.row_distance) - 1.0, 0.0), 1.0)
         deviation = math.hypot(deviation, OTHER_GROUND * beside * extinction)
         if self._refuses and extinction < SURE_OF_FOG * deviation:
-            told(extinction, deviation)
+            fog_or_clear(extinction, deviation)
             return None
         try:
             airlight, dark = self._checked_law(curve, extinction, seen.road)

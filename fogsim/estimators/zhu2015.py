@@ -76,7 +76,7 @@ class Zhu2015:
     after three equal ones.
 
     As published the region grows between the two lines (section 4), and where its columns end is the inflection, which
-    cannot work: the columns beside the lane's middle end at the lines far below the inflection, so that with any G_max
+    cannot work: the columns next to the lane's middle end at the lines far below the inflection, so that with any G_max
     all air is thick fog. A region over the whole image grows beyond the horizon in dense fog ("no fog"), for the road
     fades into the sky without an edge, and stops too low in thin fog, which is steeper from row to row (`fogsim
     reproduce zhu2015`). What the corrected form (the default) does instead is listed in `Zhu2015Repair`, and can be

@@ -24,7 +24,7 @@ from fogsim.vision.lines.lane_lines import (
     refined_lines,
 )
 from fogsim.vision.region.corridor import corridor_curve, hide_vehicle
-from fogsim.vision.region.curve_checks import check_law, detection_limit, is_clear, seen_up_to, told
+from fogsim.vision.region.curve_checks import check_law, detection_limit, fog_or_clear, is_clear, seen_up_to
 from fogsim.vision.region.law import extinction_deviation
 from fogsim.vision.region.profile import RoadCurve
 from fogsim.vision.region.region_kernels import GrowthLimits, region_tops
@@ -294,7 +294,7 @@ def steepest_fog(road: SeenRoad, camera: Camera, repairs: AbstractSet[Zhu2015Rep
     if extinction > 0.0 and steepest_rows(curve, curve.luminance[:, None], REACH)[0] >= resolved:
         airlight, dark = check_law(curve, extinction, road.image)
         deviation = extinction_deviation(curve, extinction, _read, apart)
-        return Inflection(*told(extinction, deviation), airlight, dark)
+        return Inflection(*fog_or_clear(extinction, deviation), airlight, dark)
     if Zhu2015Repair.LAST_ROW not in repairs:
         seen_up_to(curve)
         raise CannotTellError("the inflection lies above the last row of the road that is seen")
@@ -327,7 +327,7 @@ def _of_last_row(curve: RoadCurve, road: SeenRoad) -> Inflection:
     optical = max(math.log(bottom / dark), 0.0) / span
     noise = road.image.contrast * ALBEDO / dark
     deviation = math.hypot(math.hypot(ALBEDO, noise) / span, optical * apart / below)
-    return Inflection(*told(optical / curve.row_distance, deviation / curve.row_distance))
+    return Inflection(*fog_or_clear(optical / curve.row_distance, deviation / curve.row_distance))
 
 
 def _read(curve: RoadCurve, luminance: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -52,7 +52,7 @@ NOTES = (
     "As published, the optimisation takes the bottom row's luminance for the road's own. It is fogged: with this lens"
     " that row is 19 m away and has 141 levels where the road has 19 (V_met = 50 m), so V_met is too large.",
     "As published, variances are taken on the vehicle's body, 0.68 × 0.55 of its width. A noisy range changes how much"
-    " sky beside its roof a larger window holds, and by that the ratio of two variances by up to 25 %.",
+    " sky next to its roof a larger window holds, and by that the ratio of two variances by up to 25 %.",
     "As published, noise adds to every variance; without noise, 8 bits leave steps of flat paint that nothing dithers.",
     "25 to 90 m every 5 m are 14 pictures over 65 m, not 13 over 75 m. Table 5.1 has tracks of up to 250 m: that"
     " vehicle is followed to 275 m.",

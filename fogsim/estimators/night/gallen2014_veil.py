@@ -150,8 +150,11 @@ class Gallen2014Veil:
         if templates is None:
             return Estimate.invalid(self.method, "it has no references; fogsim calibrate veil makes them")
         self._earlier.append(means)
-        is_lit = bool(lit & Lamp.HIGH_BEAM) or darkens_ahead(levelled(image, self._camera), self._camera)
-        return self._estimate(templates.scores(self._composed()), is_lit=is_lit)
+        found = self._estimate(templates.scores(self._composed()))
+        clear, high = found.valid and found.extinction == 0.0, bool(lit & Lamp.HIGH_BEAM)
+        if clear and not high and not darkens_ahead(levelled(image, self._camera), self._camera):
+            return Estimate.invalid(self.method, ROAD_NOT_LIT, **found.diagnostics)
+        return found
 
     def _unfit(self, image: NDArray[np.uint8] | NDArray[np.uint16], means: CellMeans) -> str:
         row = self._camera.horizon_row
@@ -181,12 +184,10 @@ class Gallen2014Veil:
         composed: NDArray[np.float64] = np.median(frames, axis=0) if self._median else frames.mean(axis=0)
         return composed
 
-    def _estimate(self, scores: VeilScores, *, is_lit: bool) -> Estimate:
+    def _estimate(self, scores: VeilScores) -> Estimate:
         best = float(np.nanmax(np.nan_to_num(scores.score, nan=-1.0)))
         found: dict[str, object] = {"score": best, "scores": tuple(scores.score.tolist())}
         found["detected"] = best >= self._threshold and not scores.clear >= best
-        if not found["detected"] and not is_lit:
-            return Estimate.invalid(self.method, ROAD_NOT_LIT, **found)
         if not found["detected"]:
             least = extinction_from_visibility(LIGHT_FOG)
             return Estimate(self.method, 0.0, least / NORMAL_95_PERCENT, diagnostics=found)

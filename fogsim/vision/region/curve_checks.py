@@ -112,19 +112,8 @@ def check_law(curve: RoadCurve, extinction: float, road: RoadImage) -> tuple[flo
     return fit.airlight, fit.road
 
 
-def told(extinction: float, deviation: float) -> tuple[float, float]:
-    """Extinction and standard deviation as they are told: what may as well be no fog is none.
-
-    Parameters
-    ----------
-    extinction, deviation : float
-        What was read [1/m].
-
-    Raises
-    ------
-    CannotTellError
-        If it may be clear air as well as fog that matters.
-    """
+def fog_or_clear(extinction: float, deviation: float) -> tuple[float, float]:
+    """Extinction and its standard deviation [1/m], 0 where it may be clear air; CannotTellError if it may also be fog."""
     if extinction >= SURE_OF_FOG * deviation:
         return extinction, deviation
     if extinction + SURE_OF_FOG * deviation > CLEAR:

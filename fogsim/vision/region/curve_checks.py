@@ -113,7 +113,7 @@ def check_law(curve: RoadCurve, extinction: float, road: RoadImage) -> tuple[flo
 
 
 def fog_or_clear(extinction: float, deviation: float) -> tuple[float, float]:
-    """Extinction and its standard deviation [1/m], 0 where it may be clear air; CannotTellError if it may also be fog."""
+    """Extinction and standard deviation [1/m], 0 where it may be clear air; CannotTellError if that may also be fog."""
     if extinction >= SURE_OF_FOG * deviation:
         return extinction, deviation
     if extinction + SURE_OF_FOG * deviation > CLEAR:

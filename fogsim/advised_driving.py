@@ -1,10 +1,11 @@
-"""A scenario's own policy: from what is believed of the fog to advice and lamps."""
+"""A scenario's own policy: from what is believed of the fog to advice, lamps and warning."""
 
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
 
 from fogsim.advice import Adviser, VehicleAdviser
+from fogsim.advice.warning import weigh
 from fogsim.lighting import LightingPolicy, VehicleLightingPolicy
 from fogsim.road_advice import RoadAdvice, stretch_advices
 from fogsim.scenario import Scenario, build
@@ -17,7 +18,7 @@ from fogsim.values.result_checks import checked_advice, checked_lamp_choice, che
 
 
 class AdvisedDriving:
-    """The scenario's own policy: its adviser and its lighting rules, asked once a decision period.
+    """The scenario's own policy: adviser, lighting rules and the driver's warning, asked once a decision period.
 
     Parameters
     ----------
@@ -47,12 +48,31 @@ class AdvisedDriving:
             return previous
         lit = known_fog(step, self._scenario.lighting)
         chosen = self._ask_lighting(step, lit, LampChoice(previous.lamps, previous.lamp_wish))
+        command = warned(Command(lamps=chosen.lamps, lamp_wish=chosen.wish), step, previous)
         if self._road is not None:
             advice, stretches = self._road.advise(step)
-            return Command(advice=advice, lamps=chosen.lamps, lamp_wish=chosen.wish, stretches=stretches)
+            return dataclasses.replace(command, advice=advice, stretches=stretches)
         known = known_fog(step, self._scenario.advice)
         advice = checked_advice(self._scenario.advice.method, self._ask_adviser(step, known, previous.advice))
-        return spread_advice(Command(advice=advice, lamps=chosen.lamps, lamp_wish=chosen.wish), self._scenario)
+        return spread_advice(dataclasses.replace(command, advice=advice), self._scenario)
+
+
+def warned(command: Command, step: Step, previous: Command) -> Command:
+    """Add the warning of the ego's driver to a command, by what the vehicle itself knows; none without estimators.
+
+    Parameters
+    ----------
+    command : Command
+        Any command.
+    step : Step
+        What was finished last.
+    previous : Command
+        The command that was in force, with what was remembered of warnings.
+    """
+    if not step.estimates:
+        return command
+    warning, evidence = weigh(step.belief, step.observation, step.time, previous)
+    return dataclasses.replace(command, warning=warning, warning_evidence=evidence)
 
 
 def _questions_to(adviser: Adviser | VehicleAdviser) -> Callable[[Step, Belief, SpeedAdvice], SpeedAdvice]:

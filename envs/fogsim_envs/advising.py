@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from fogsim.advised_driving import spread_advice
+from fogsim.advised_driving import spread_advice, warned
 from fogsim.errors import InputError
 from fogsim.parameters import checked_parameters
 from fogsim.randomness import Seed
@@ -143,7 +143,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         name = type(self).__name__ if self.spec is None else self.spec.id
         chosen = command_of(checked_action(action, self.action_space, name), self._continuous)
         before = self._step
-        command = spread_advice(chosen, self._active, before.truth.sections)
+        command = warned(spread_advice(chosen, self._active, before.truth.sections), before, before.command)
         for _ in range(self._frames):
             self._step = self._simulation.advance(command)
             if self._step.ending is not None:
@@ -180,6 +180,7 @@ def _info(step: Step) -> dict[str, Any]:
         "route_position_m": step.route_position,
         "speed_mps": float(step.traffic.speed[step.ego]),
         "collisions": len(step.collisions),
+        "warning": None if step.command.warning is None else step.command.warning.value,
         "ending": None if step.ending is None else step.ending.value,
         "unplayed": step.unplayed.lines,
         "truth": {

@@ -12,7 +12,7 @@ from fogsim.kinematics import DECELERATION, REACTION_TIME, stopping_sight_distan
 from fogsim.registry import Registry
 from fogsim.units import KMH_PER_MPS
 from fogsim.units.quantities import parse_quantity
-from fogsim.values import Ending, Estimate, FogBank, Lamp, Leader, SignalAhead, SignalColour, Step
+from fogsim.values import DriverWarning, Ending, Estimate, FogBank, Lamp, Leader, SignalAhead, SignalColour, Step
 
 FASTEST = 500.0 / KMH_PER_MPS
 """No vehicle drives faster [m/s]."""
@@ -25,6 +25,9 @@ NO_LEADER = "none"
 
 LAMP_WORDS = tuple(str(lamp.name).lower() for lamp in Lamp if lamp)
 """Lamps by their words."""
+
+NO_WARNING = "none"
+"""Value of ``warning`` while the driver is warned of nothing."""
 
 ENDING_WORDS = tuple(ending.name.lower() for ending in Ending)
 """Endings of a run by their words."""
@@ -365,6 +368,13 @@ _OF_EGO = {
     "limit": _speed("speed limit where the ego is", _of_step(lambda s: s.speed_limit), needs=_EGO),
     "lamps": Signal(
         "lamps of the ego that are lit", lambda m: _lamps(m, "ego"), Kind.WORDS, words=LAMP_WORDS, needs=_EGO
+    ),
+    "warning": Signal(
+        "what the ego's driver is warned of; `none` for nothing",
+        _of_step(lambda s: NO_WARNING if s.command.warning is None else s.command.warning.value),
+        Kind.WORD,
+        words=(NO_WARNING, *(one.value for one in DriverWarning)),
+        needs=_FRAMES,
     ),
 }
 

@@ -12,7 +12,7 @@ from fogsim.camera import Delivered, FaultyLens, FrameDelivery, Pixels, knocked,
 from fogsim.ego.daylight import Ramp, in_daylight
 from fogsim.ego.fog_reports import FogReports
 from fogsim.ego.fog_truth import KnownWay, carriageways, fog_truth
-from fogsim.ego.frame_watch import FrameWatch, LeadHistory
+from fogsim.ego.frame_watch import FrameWatch, LeadHistory, why_useless
 from fogsim.ego.light_sensing import LightSensing, lamp_effects
 from fogsim.ego.measurements import EgoSensors
 from fogsim.ego.road_meters import RoadMeters
@@ -315,9 +315,11 @@ class EgoEquipment:
             pose,
         )
         frame, right = self._frame(radiance, second, camera, faults, parts.streams, time)
+        speed = float(state.speed[ego])
+        old = self._watch.why_no_news(frame, speed) if self._estimators else ""
         observation = Observation(
             frame=frame,
-            speed=float(state.speed[ego]),
+            speed=speed,
             lead=self._sensors.lead(snapshot, faults, parts.streams),
             signs=self._sensors.signs(snapshot, parts.signs, faults, parts.streams),
             camera_setback=self._setback,
@@ -326,8 +328,9 @@ class EgoEquipment:
             reports=reports,
             right=right,
             scattering=self._sensors.scattering(snapshot, fog, time, faults),
+            camera_trouble=old or (why_useless(frame, time) if self._estimators else ""),
         )
-        estimates = self._estimate(frame, observation, time)
+        estimates = self._estimate(frame, observation, time, old)
         return Step(
             index=index,
             time=time,
@@ -424,13 +427,13 @@ class EgoEquipment:
         heading, grade = float(state.heading[ego]), float(state.grade[ego])
         return mounted_pose(self._camera, state.position[ego], heading, self._setback, grade, body_pitch)
 
-    def _estimate(self, frame: Frame, observation: Observation, time: float) -> tuple[Estimate, ...]:
-        """What each estimator says; none is asked about a frame that tells nothing new."""
+    def _estimate(self, frame: Frame, observation: Observation, time: float, old: str) -> tuple[Estimate, ...]:
+        """What each estimator says; none is asked about a frame that tells nothing new, for a reason."""
         if not self._estimators:
             return ()
         self._leads.add(time, observation.lead)
-        if why := self._watch.why_no_news(frame, observation.speed):
-            return tuple(Estimate.invalid(estimator.method, why) for estimator in self._estimators)
+        if old:
+            return tuple(Estimate.invalid(estimator.method, old) for estimator in self._estimators)
         # A late frame belongs with what the radar measured when it was taken.
         observation = replace(observation, lead=self._leads.at(frame.time))
         return tuple(

@@ -3,11 +3,20 @@
 import math
 from collections import deque
 
+import numpy as np
+
 from fogsim.camera import Pixels
 from fogsim.values import Frame, LeadMeasurement
 
 MOVING = 1.0
 """Speed from which on the picture of the road must change from frame to frame [m/s]."""
+
+LATEST = 0.5
+"""How late a frame may be [s]: 18 m at 130 km/h."""
+
+LEAST_CONTRAST = 0.01
+"""Span of the grey levels of a frame below which it shows nothing, as a share of full scale [-]: in fog of 10 m by day
+the road before the bonnet still differs by more from the airlight."""
 
 _APART = 16
 """Rows and columns between the pixels that are compared first."""
@@ -45,6 +54,25 @@ class FrameWatch:
         if speed > MOVING and before is not None and _are_same(before, frame.image):
             return "the picture stands still while the vehicle moves"
         return ""
+
+
+def why_useless(frame: Frame, time: float) -> str:
+    """Say why a frame, news or not, does not show the road of now; empty if it may.
+
+    Parameters
+    ----------
+    frame : Frame
+        What the camera hands out.
+    time : float
+        Now [s].
+    """
+    if time - frame.time > LATEST:
+        return f"the frame is {time - frame.time:.2f} s late"
+    sample = frame.image[::_APART, ::_APART]
+    dark, bright = np.quantile(sample, (0.01, 0.99))
+    if bright - dark < LEAST_CONTRAST * (2**frame.camera.bits - 1):
+        return f"the picture shows nothing: {dark:.0f} … {bright:.0f} grey levels"
+    return ""
 
 
 class LeadHistory:

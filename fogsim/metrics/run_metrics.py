@@ -9,6 +9,7 @@ from fogsim.errors import SimulationError
 from fogsim.metrics.cross_sections import TrafficThroughput
 from fogsim.metrics.crossing import TrafficEncroachment
 from fogsim.metrics.estimation import BeliefAheadError, BeliefError, DenseFogKnown, EquippedBelief, EstimatorErrors
+from fogsim.metrics.estimation.warnings import FogWarnings
 from fogsim.metrics.lighting import Lighting
 from fogsim.metrics.metric import Definition, JsonValue, Metric, Sample, definitions_of
 from fogsim.metrics.motion import Comfort, Compliance, Motion
@@ -45,6 +46,7 @@ METRICS: Registry[MetricFactory] = Registry(
         "belief": lambda _: BeliefError(),
         "belief_ahead": lambda _: BeliefAheadError(),
         "dense_fog_known": lambda _: DenseFogKnown(),
+        "fog_warnings": lambda _: FogWarnings(),
         "equipped": lambda _: EquippedBelief(),
         "estimators": lambda _: EstimatorErrors(),
         "traffic_cohort": lambda _: TrafficCohort(),

@@ -1,4 +1,4 @@
-"""What happens in a run, one row each: the script's doings, collisions, faults of sensors, traffic lights, the end."""
+"""What happens in a run, one row each: what the script does, collisions, faults, warnings, traffic lights, the end."""
 
 import json
 import math
@@ -12,13 +12,17 @@ from fogsim.files.row_log import RowLog, row_batches, row_schema
 from fogsim.recorders.protocol import Derived
 from fogsim.recorders.run_directory import EVENT_LOG
 from fogsim.recorders.table import write_table
-from fogsim.values import SignalColour, Step, TrafficStep
+from fogsim.values import DriverWarning, SignalColour, Step, TrafficStep
 
 EVENT_COLUMNS: Mapping[str, tuple[Any, str]] = {
     "index": (pa.int64(), "number of the camera period, as in steps.parquet"),
     "time_s": (pa.float64(), "time since the run began"),
-    "event": (pa.string(), "script_begins, script_ends, collision, fault_begins, fault_ends, signal_shows or run_ends"),
-    "name": (pa.string(), "entry of the timeline, sensor and fault, traffic light, or why the run ended"),
+    "event": (
+        pa.string(),
+        "script_begins, script_ends, collision, fault_begins, fault_ends, warning_begins, warning_ends, signal_shows "
+        "or run_ends",
+    ),
+    "name": (pa.string(), "entry of the timeline, sensor and fault, warning, traffic light, or why the run ended"),
     "what": (pa.string(), "what is done; of a collision the speed of the impact [m/s]; lane and colour"),
     "who": (pa.string(), "vehicles, with commas between"),
     "x_m": (pa.float64(), "where the first of them is, the signal head, or else the ego: east; null if none is there"),
@@ -60,6 +64,7 @@ class EventRecorder:
         )
         self._log: RowLog | None = None
         self._faults: frozenset[str] = frozenset()
+        self._warning: DriverWarning | None = None
         self._last = -math.inf
         self._shown: dict[tuple[str, str], SignalColour] = {}
         self._open = True
@@ -75,6 +80,7 @@ class EventRecorder:
             Not needed.
         """
         rows = [self._row(step, event) for event in self._events(step)]
+        self._warning = step.command.warning
         self._faults, self._last = frozenset(fault.name for fault in step.truth.faults), step.traffic.time
         if self._log is None:
             self._log = RowLog(self._path.with_name(EVENT_LOG), self._schema)
@@ -93,6 +99,9 @@ class EventRecorder:
         now = frozenset(fault.name for fault in step.truth.faults)
         for how, faults in (("fault_begins", now - self._faults), ("fault_ends", self._faults - now)):
             yield from (_Event(step.time, how, fault) for fault in sorted(faults))
+        if step.command.warning is not self._warning:
+            changes = ("warning_ends", self._warning), ("warning_begins", step.command.warning)
+            yield from (_Event(step.time, how, warning) for how, warning in changes if warning is not None)
         yield from self._signals(step)
         if step.ending is not None:
             yield _Event(step.time, "run_ends", step.ending.value)

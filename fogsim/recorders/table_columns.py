@@ -209,6 +209,12 @@ _EGO_COLUMNS: tuple[Column[Step], ...] = (
         "lit lamps of the ego, bits of Lamp",
         lambda step, _: int(step.traffic.lamps[step.ego]),
     ),
+    Column(
+        "warning",
+        pa.string(),
+        "what the driver is warned of: camera_degraded, fog_ahead or cannot_see; null for nothing",
+        lambda step, _: step.command.warning,
+    ),
 )
 _NEAR_COLUMNS: tuple[Column[Step], ...] = (
     Column("n_vehicles", pa.int32(), "vehicles near the ego, itself included", lambda step, _: len(step.traffic.ids)),

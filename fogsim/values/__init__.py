@@ -12,6 +12,7 @@ from fogsim.values.command import (
     SpeedAdvice,
     Stretch,
     StretchAdvice,
+    WarningEvidence,
 )
 from fogsim.values.estimate import DenserFog, Estimate, FogCategory, OpticalDepths, SignLook, fog_category
 from fogsim.values.fault import Fault, RunningFault
@@ -137,5 +138,6 @@ __all__ = [
     "Unplayed",
     "UnplayedEvent",
     "View",
+    "WarningEvidence",
     "fog_category",
 ]

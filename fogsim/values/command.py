@@ -1,5 +1,6 @@
 """What goes back into the traffic."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -67,6 +68,22 @@ class DriverWarning(StrEnum):
     """The system knows too little about the fog: it decides nothing by it."""
     CAMERA_DEGRADED = "camera_degraded"
     """The camera is dirty, blinded, frozen or dark."""
+
+
+@dataclass(frozen=True, slots=True)
+class WarningEvidence:
+    """What speaks for a warning, as the warning policy remembers it.
+
+    Attributes
+    ----------
+    since : float or None
+        Instant [s] since which there has been reason for it without a break; None while there is none.
+    until : float
+        Instant [s] up to which it is in force; -``inf`` if it has not been.
+    """
+
+    since: float | None = None
+    until: float = -math.inf
 
 
 class Display(StrEnum):
@@ -159,7 +176,9 @@ class Command:
     lamp_wish : LampWish or None
         What the lighting policy remembers with the lamps.
     warning : DriverWarning or None
-        What the ego's driver is warned of; None for nothing.
+        What the ego's driver is warned of; None for nothing. Simulated drivers do not react to it.
+    warning_evidence : mapping from DriverWarning to WarningEvidence
+        What the warning policy remembers with it.
     """
 
     advice: SpeedAdvice = field(default_factory=SpeedAdvice)
@@ -171,6 +190,7 @@ class Command:
     control: EgoControl | None = None
     lamp_wish: LampWish | None = None
     warning: DriverWarning | None = None
+    warning_evidence: Mapping[DriverWarning, WarningEvidence] = field(default_factory=dict)
 
     @property
     def is_for_others(self) -> bool:

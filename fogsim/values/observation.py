@@ -173,6 +173,8 @@ class Observation:
         What the second camera of a stereo rig shows; None without one.
     scattering : float or None
         What a forward-scatter sensor on board tells of the extinction coefficient at its place [1/m]; None without one.
+    camera_trouble : str
+        Why the frame does not show the road of now, as far as the vehicle itself can tell; empty if it seems to.
     """
 
     frame: Frame | NDArray[np.uint8] | NDArray[np.uint16]
@@ -185,6 +187,7 @@ class Observation:
     reports: tuple[FogReport, ...] = ()
     right: SecondView | None = None
     scattering: Measured | None = None
+    camera_trouble: str = ""
 
     def __post_init__(self) -> None:
         """Keep a read-only view of a bare array."""

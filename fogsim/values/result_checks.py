@@ -14,6 +14,7 @@ from fogsim.values import (
     Belief,
     Command,
     Display,
+    DriverWarning,
     EgoControl,
     Estimate,
     Lamp,
@@ -135,6 +136,8 @@ def checked_command(value: object) -> Command:
         if not (_is_number(control.acceleration) and math.isfinite(control.acceleration)):
             raise InputError(f"the command: control.acceleration must be finite, got {shown(control.acceleration)}")
         _check_kind("the command", "control.lanes", control.lanes, int, "a whole number of lanes to the left")
+    if command.warning is not None:
+        _of_type("the command's warning", command.warning, DriverWarning)
     _check_kind("the command", "stretches", command.stretches, tuple, "a tuple of StretchAdvice")
     for place, advice in enumerate(command.stretches):
         _check_stretch_advice(f"the command's stretches[{place}]", advice)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import gymnasium
@@ -224,7 +225,8 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         if self._simulation is None or self._step is None or self._step.ending is not None:
             raise gymnasium.error.ResetNeeded("the episode is over or none has begun: call reset() before step()")
         name = type(self).__name__ if self.spec is None else self.spec.id
-        self._own = self._commanded(checked_action(action, self.action_space, name))
+        chosen = self._commanded(checked_action(action, self.action_space, name))
+        self._own = replace(chosen, warning=self._built_in.warning)
         before = self._step
         self._step = self._drive(before)
         self._show()
@@ -283,6 +285,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
             "ending": None if step.ending is None else step.ending.value,
             "built_in_advice_mps": self._built_in.advice.speed,
             "built_in_lamps": int(self._built_in.lamps),
+            "warning": None if self._built_in.warning is None else self._built_in.warning.value,
             "belief": {
                 "visibility_m": median,
                 "visibility_low_m": low,

@@ -30,7 +30,7 @@ from fogsim.recorders.style import (
     method_colours,
 )
 from fogsim.units import KMH_PER_MPS, visibility_from_extinction
-from fogsim.values import Collision, Estimate, FogReport, Lamp, Step
+from fogsim.values import Collision, DriverWarning, Estimate, FogReport, Lamp, Step
 
 PANEL_WIDTH = 384
 FRAME_WIDTH = camera_picture.WIDTH + PANEL_WIDTH
@@ -148,10 +148,19 @@ class FramePanel:
             own = step.traffic.ids[step.ego] in {hit.collider, hit.victim}
             text = f"COLLISION   {hit.collider} → {hit.victim}   {_kmh(hit.impact_speed):.0f} km/h"
             _draw_banner(draw, 0, text, ALARM if own else AMBER)
+        elif step.command.warning is not None:
+            _draw_banner(draw, 0, _warning_text(step, step.command.warning), AMBER)
         elif step.belief.denser is not None:
-            _draw_banner(draw, 0, f"denser fog ahead: {step.belief.denser.distance:.0f} m", AMBER)
+            _draw_banner(draw, 0, f"denser fog ahead: {step.belief.denser.distance:.0f} m", WELL)
         if step.ending is not None:
             _draw_banner(draw, FRAME_HEIGHT - 34, f"end of the run: {step.ending.value}", WELL)
+
+
+def _warning_text(step: Step, warning: DriverWarning) -> str:
+    text = f"WARNING   {warning.replace('_', ' ')}"
+    if warning is DriverWarning.FOG_AHEAD and step.belief.denser is not None:
+        return f"{text}: {step.belief.denser.distance:.0f} m"
+    return text
 
 
 def _kmh(speed: float) -> float:

@@ -1,0 +1,116 @@
+"""What the driver is warned of: fog ahead, too little known, or a camera that does not show the road."""
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+from fogsim.kinematics import DECELERATION, REACTION_TIME, stopping_sight_distance
+from fogsim.units import visibility_from_extinction
+from fogsim.values import Belief, Command, DriverWarning, Observation, WarningEvidence
+from fogsim.values.belief import OLDEST
+
+
+class Delay(NamedTuple):
+    """How long there must be reason for a warning before it is given, and how long it stays without [s]."""
+
+    onset: float
+    hold: float
+
+
+DELAYS: Mapping[DriverWarning, Delay] = {
+    DriverWarning.CAMERA_DEGRADED: Delay(onset=0.8, hold=2.0),
+    DriverWarning.FOG_AHEAD: Delay(onset=0.0, hold=5.0),
+    DriverWarning.CANNOT_SEE: Delay(onset=3.0, hold=2.0),
+}
+"""Warnings in order of precedence. A frame or two may be lost, and a belief begins with nothing; denser fog is only
+announced by several estimates. A camera that fails leaves nothing else to rely on; that fog is ahead says more than
+that little is known of it, and at the edge of a bank both hold."""
+
+TAKE_OVER_TIME = 10.0
+"""Time before a place at which its fog is warned of [s]: about what drivers need to take over from a system."""
+
+LIKELY = 0.5
+"""Quantile of the believed visibility that must suffice to stop [-]. Advice is careful with a lower one; drivers do not
+heed warnings that are often wrong."""
+
+EDGE = 3.0
+"""Visibility of announced denser fog below which it is warned of, over the distance to stop [-]: what is seen of a bank
+is its thin edge. Chosen on seeds 101 … 105 of `motorway_fog_bank` with 20 km of visibility outside the bank."""
+
+
+def weigh(
+    belief: Belief, observation: Observation, time: float, previous: Command
+) -> tuple[DriverWarning | None, dict[DriverWarning, WarningEvidence]]:
+    """Choose the warning to give.
+
+    Parameters
+    ----------
+    belief : Belief
+        What is believed about the fog.
+    observation : Observation
+        Its speed and what is wrong with its camera are used.
+    time : float
+        Instant [s].
+    previous : Command
+        The command in force, with its warning and what was remembered of warnings.
+
+    Returns
+    -------
+    DriverWarning or None, and mapping from DriverWarning to WarningEvidence
+        The warning, and what to remember.
+    """
+    reasons = {
+        DriverWarning.CAMERA_DEGRADED: bool(observation.camera_trouble),
+        DriverWarning.FOG_AHEAD: is_fog_in_the_way(belief, observation.speed),
+        DriverWarning.CANNOT_SEE: not belief.is_informed(),
+    }
+    before, none = previous.warning_evidence, WarningEvidence()
+    evidence = {
+        warning: _weighed(before.get(warning, none), reasons[warning], time, delay) for warning, delay in DELAYS.items()
+    }
+    # What a graver warning covered is over with its reason.
+    given = (
+        warning
+        for warning, found in evidence.items()
+        if found.until > time and (reasons[warning] or warning is previous.warning)
+    )
+    return next(given, None), evidence
+
+
+def _weighed(before: WarningEvidence, is_reason: bool, time: float, delay: Delay) -> WarningEvidence:
+    if not is_reason:
+        return WarningEvidence(None, before.until)
+    since = time if before.since is None else before.since
+    # Clocks round: 0.8 s may be a hair less.
+    return WarningEvidence(since, time + delay.hold if time - since >= delay.onset - 1e-9 else before.until)
+
+
+def is_fog_in_the_way(belief: Belief, speed: float) -> bool:
+    """Whether denser fog is announced, or a driver will likely see less far than it takes to stop.
+
+    The fog counts that is seen, and that at all places which the vehicle reaches within `TAKE_OVER_TIME`, as far as the
+    belief knows of them. Where one sees less far than it takes to stop, the confidence of an image of an obstacle at
+    that distance, e^(−2kd) of huang2015 (section 4.3.2), is below e^(−2 ln 20) = 1/400: no detector finds it, and the
+    driver has to take over (section 1.2).
+
+    Parameters
+    ----------
+    belief : Belief
+        What is believed about the fog.
+    speed : float
+        Speed of the vehicle [m/s].
+    """
+    needed = stopping_sight_distance(speed, REACTION_TIME, DECELERATION)
+    if belief.denser is not None and visibility_from_extinction(belief.denser.extinction) < EDGE * needed:
+        return True
+    return any(seen < needed for seen in _likely_visibilities(belief, speed * TAKE_OVER_TIME))
+
+
+def _likely_visibilities(belief: Belief, reach: float) -> Iterator[float]:
+    """Visibilities to act on [m]: of the fog that is seen, and at the places up to a distance ahead [m]."""
+    if (seen := belief.known_visibility(LIKELY)) is not None:
+        yield seen
+    if belief.profile is None or belief.age > OLDEST:
+        return
+    for distance in belief.profile.distance.tolist():
+        if 0.0 <= distance <= reach and (there := belief.profile.known_visibility(distance, LIKELY)) is not None:
+            yield there

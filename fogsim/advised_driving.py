@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from fogsim.advice import Adviser, VehicleAdviser
-from fogsim.advice.warning import weigh
+from fogsim.advice.warning import choose_warning
 from fogsim.lighting import LightingPolicy, VehicleLightingPolicy
 from fogsim.road_advice import RoadAdvice, stretch_advices
 from fogsim.scenario import Scenario, build
@@ -71,8 +71,8 @@ def warned(command: Command, step: Step, previous: Command) -> Command:
     """
     if not step.estimates:
         return command
-    warning, evidence = weigh(step.belief, step.observation, step.time, previous)
-    return dataclasses.replace(command, warning=warning, warning_evidence=evidence)
+    warning, memory = choose_warning(step.belief, step.observation, step.time, previous)
+    return dataclasses.replace(command, warning=warning, warning_memory=memory)
 
 
 def _questions_to(adviser: Adviser | VehicleAdviser) -> Callable[[Step, Belief, SpeedAdvice], SpeedAdvice]:

@@ -1,12 +1,13 @@
 """What the driver is warned of: fog ahead, too little known, or a camera that does not show the road."""
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from fogsim.kinematics import DECELERATION, REACTION_TIME, stopping_sight_distance
 from fogsim.units import visibility_from_extinction
-from fogsim.values import Belief, Command, DriverWarning, Observation, WarningEvidence
-from fogsim.values.belief import OLDEST
+from fogsim.values import Belief, Command, DriverWarning, Observation, WarningMemory
+from fogsim.values.belief import NO_FOG, OLDEST
 
 
 class Delay(NamedTuple):
@@ -28,18 +29,26 @@ that little is known of it, and at the edge of a bank both hold."""
 TAKE_OVER_TIME = 10.0
 """Time before a place at which its fog is warned of [s]: about what drivers need to take over from a system."""
 
-LIKELY = 0.5
-"""Quantile of the believed visibility that must suffice to stop [-]. Advice is careful with a lower one; drivers do not
-heed warnings that are often wrong."""
+LIKELY, CAUTIOUS = 0.5, 0.25
+"""Quantile of the believed visibility that must suffice to stop, and of the one that is watched for a fall [-]. Advice
+is careful with the lower one; drivers do not heed warnings that are often wrong."""
 
 EDGE = 3.0
 """Visibility of announced denser fog below which it is warned of, over the distance to stop [-]: what is seen of a bank
-is its thin edge. Chosen on seeds 101 … 105 of `motorway_fog_bank` with 20 km of visibility outside the bank."""
+is its thin edge. This and the next three were chosen by drives of `motorway_fog_bank` with seeds 101 … 106 and 20 km of
+visibility outside the bank, and 80 min in even fog."""
+
+FALL, LITTLE = 0.5, 2.0
+"""Part of its value of late to which the cautious visibility falls where fog begins, if it is also less than so many
+times the distance to stop [-]."""
+
+FADING = 10.0
+"""Time constant with which the visibility of late falls [s]."""
 
 
-def weigh(
+def choose_warning(
     belief: Belief, observation: Observation, time: float, previous: Command
-) -> tuple[DriverWarning | None, dict[DriverWarning, WarningEvidence]]:
+) -> tuple[DriverWarning | None, WarningMemory]:
     """Choose the warning to give.
 
     Parameters
@@ -55,33 +64,26 @@ def weigh(
 
     Returns
     -------
-    DriverWarning or None, and mapping from DriverWarning to WarningEvidence
+    DriverWarning or None, and WarningMemory
         The warning, and what to remember.
     """
+    before = previous.warning_memory
+    cautious = belief.known_visibility(CAUTIOUS)
+    late = before.visibility * math.exp(-max(time - before.time, 0.0) / FADING)
+    needed = stopping_sight_distance(observation.speed, REACTION_TIME, DECELERATION)
     reasons = {
         DriverWarning.CAMERA_DEGRADED: bool(observation.camera_trouble),
-        DriverWarning.FOG_AHEAD: is_fog_in_the_way(belief, observation.speed),
-        DriverWarning.CANNOT_SEE: not belief.is_informed(),
+        DriverWarning.FOG_AHEAD: is_fog_in_the_way(belief, observation.speed)
+        or (cautious is not None and cautious < min(FALL * late, LITTLE * needed)),
+        DriverWarning.CANNOT_SEE: cautious is None,
     }
-    before, none = previous.warning_evidence, WarningEvidence()
-    evidence = {
-        warning: _weighed(before.get(warning, none), reasons[warning], time, delay) for warning, delay in DELAYS.items()
-    }
-    # What a graver warning covered is over with its reason.
-    given = (
-        warning
-        for warning, found in evidence.items()
-        if found.until > time and (reasons[warning] or warning is previous.warning)
-    )
-    return next(given, None), evidence
-
-
-def _weighed(before: WarningEvidence, is_reason: bool, time: float, delay: Delay) -> WarningEvidence:
-    if not is_reason:
-        return WarningEvidence(None, before.until)
-    since = time if before.since is None else before.since
+    since = {one: before.since.get(one, time) for one, is_reason in reasons.items() if is_reason}
     # Clocks round: 0.8 s may be a hair less.
-    return WarningEvidence(since, time + delay.hold if time - since >= delay.onset - 1e-9 else before.until)
+    lasting = {one: time + DELAYS[one].hold for one in since if time - since[one] >= DELAYS[one].onset - 1e-9}
+    until = {**before.until, **lasting}
+    # What a graver warning covered is over with its reason.
+    given = (one for one in DELAYS if until.get(one, time) > time and (one in since or one is previous.warning))
+    return next(given, None), WarningMemory(time, since, until, max(late, min(cautious or 0.0, NO_FOG)))
 
 
 def is_fog_in_the_way(belief: Belief, speed: float) -> bool:

@@ -30,7 +30,8 @@ _UNIT = re.compile(rf"\s*(%|°|{_UNIT_PART}(?:\s*[/*·]\s*{_UNIT_PART})*)")
 _NAME = re.compile(r"[^\W\d][\w:#@.\-]*")
 _QUOTED = re.compile(r"\"([^\"]+)\"|'([^']+)'")
 _ARGUMENT = re.compile(r"[^\s,()\"'][^,()\"']*")
-_OPERATOR = re.compile(r"<=|>=|==|!=|<|>")
+_OPERATOR = re.compile(r"<=|>=|==|!=|<|>|is\s+not\b|is\b")
+_SPELLED = {"is": "==", "is not": "!="}
 _HOW = re.compile(r"(falls\s+below|rises\s+above|becomes|changes|includes?)\b")
 _AGAIN = re.compile(r"(and|or|not|for)\b")
 
@@ -161,6 +162,7 @@ class _Text:
         kind = SIGNALS[left.signal].kind
         operator, how = self._take(_OPERATOR), self._take(_HOW)
         relation = " ".join((operator or how).split())
+        relation = _SPELLED.get(relation, relation)
         if relation == "changes":
             return Edge(left, relation)
         if not relation:

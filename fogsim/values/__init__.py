@@ -12,7 +12,7 @@ from fogsim.values.command import (
     SpeedAdvice,
     Stretch,
     StretchAdvice,
-    WarningEvidence,
+    WarningMemory,
 )
 from fogsim.values.estimate import DenserFog, Estimate, FogCategory, OpticalDepths, SignLook, fog_category
 from fogsim.values.fault import Fault, RunningFault
@@ -138,6 +138,6 @@ __all__ = [
     "Unplayed",
     "UnplayedEvent",
     "View",
-    "WarningEvidence",
+    "WarningMemory",
     "fog_category",
 ]

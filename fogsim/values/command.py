@@ -1,6 +1,5 @@
 """What goes back into the traffic."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -71,19 +70,25 @@ class DriverWarning(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class WarningEvidence:
-    """What speaks for a warning, as the warning policy remembers it.
+class WarningMemory:
+    """What the warning policy remembers of its last decision.
 
     Attributes
     ----------
-    since : float or None
-        Instant [s] since which there has been reason for it without a break; None while there is none.
-    until : float
-        Instant [s] up to which it is in force; -``inf`` if it has not been.
+    time : float
+        Its instant [s].
+    since : mapping from DriverWarning to float
+        Instants [s] since which there has been reason for a warning without a break.
+    until : mapping from DriverWarning to float
+        Instants [s] up to which warnings are in force.
+    visibility : float
+        Cautious visibility of late [m]: it follows a rise at once, and a fall slowly.
     """
 
-    since: float | None = None
-    until: float = -math.inf
+    time: float = 0.0
+    since: Mapping[DriverWarning, float] = field(default_factory=dict)
+    until: Mapping[DriverWarning, float] = field(default_factory=dict)
+    visibility: float = 0.0
 
 
 class Display(StrEnum):
@@ -177,7 +182,7 @@ class Command:
         What the lighting policy remembers with the lamps.
     warning : DriverWarning or None
         What the ego's driver is warned of; None for nothing. Simulated drivers do not react to it.
-    warning_evidence : mapping from DriverWarning to WarningEvidence
+    warning_memory : WarningMemory
         What the warning policy remembers with it.
     """
 
@@ -190,7 +195,7 @@ class Command:
     control: EgoControl | None = None
     lamp_wish: LampWish | None = None
     warning: DriverWarning | None = None
-    warning_evidence: Mapping[DriverWarning, WarningEvidence] = field(default_factory=dict)
+    warning_memory: WarningMemory = field(default_factory=WarningMemory)
 
     @property
     def is_for_others(self) -> bool:

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.advice.warning import is_fog_in_the_way, weigh
+from fogsim.advice.warning import choose_warning, is_fog_in_the_way
 from fogsim.kinematics import stopping_sight_distance
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Belief, Command, DenserFog, DriverWarning, FogProfile, Observation
@@ -40,8 +40,8 @@ def warnings(*seen: tuple[Belief, str], speed: float = SPEED) -> list[DriverWarn
     image = np.zeros((4, 4), np.uint8)
     for number, (belief, trouble) in enumerate(seen):
         observation = Observation(image, speed, camera_trouble=trouble)
-        warning, evidence = weigh(belief, observation, number * PERIOD, command)
-        command = Command(warning=warning, warning_evidence=evidence)
+        warning, memory = choose_warning(belief, observation, number * PERIOD, command)
+        command = Command(warning=warning, warning_memory=memory)
         given.append(warning)
     return given
 
@@ -74,6 +74,20 @@ def test_slow_enough_nobody_is_warned():
 def test_fog_is_warned_of_at_once_and_for_five_seconds_more():
     given = warnings((CLEAR, ""), (fog(60.0), ""), *[(CLEAR, "")] * 11)
     assert given == [None, *[FOG] * 10, None, None]
+
+
+def test_a_visibility_that_halves_is_warned_of_where_it_is_little():
+    def falls(first: float, last: float, seconds: float) -> bool:
+        fading = first * (last / first) ** np.linspace(0.0, 1.0, round(seconds / PERIOD) + 1)
+        return FOG in warnings(*((fog(visibility), "") for visibility in fading))
+
+    assert falls(1000.0, 1.9 * NEEDED, 2.0)
+    assert not falls(1000.0, 2.1 * NEEDED, 2.0)
+    assert not falls(3.0 * NEEDED, 1.9 * NEEDED, 2.0)
+    # Over half a minute the driver sees it come.
+    assert not falls(1000.0, 1.9 * NEEDED, 30.0)
+    # Air that is clear at any rate does not halve.
+    assert not falls(10_000.0, 1000.0, 1.0)
 
 
 def test_a_belief_that_knows_nothing_is_warned_of_after_three_seconds():

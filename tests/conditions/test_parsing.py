@@ -21,6 +21,8 @@ EGO_SPEED = Reference("X.speed", ("ego",))
             "flow.0.acceleration < -3 m/s²",
             Comparison(Reference("X.acceleration", ("flow.0",)), "<", Quantity(-3.0, "-3", "m/s²")),
         ),
+        ("warning is fog_ahead", Comparison(Reference("warning"), "==", Word("fog_ahead"))),
+        ("warning is  not none", Comparison(Reference("warning"), "!=", Word("none"))),
         ('"0".lane == right', Comparison(Reference("X.lane", ("0",)), "==", Word("right"))),
         ("distance(0, '1 2') > 5 m", Comparison(Reference("distance(X, Y)", ("0", "1 2")), ">", Quantity(5, "5", "m"))),
         (

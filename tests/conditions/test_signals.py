@@ -14,6 +14,7 @@ from fogsim.values import (
     Begun,
     Collision,
     Command,
+    DriverWarning,
     Estimate,
     FogBank,
     FogField,
@@ -181,6 +182,15 @@ def test_lamps() -> None:
     watch = Watch(parse_condition("lamps include rear_fog and not lamps include stop"))
     assert watch.update(step) is True
     assert watch.told() == "lamps = low_beam rear_fog"
+
+
+def test_warning() -> None:
+    step = make_step()
+    assert read("warning", step) == "none"
+    warned = replace(step, command=replace(step.command, warning=DriverWarning.FOG_AHEAD))
+    watch = Watch(parse_condition("warning is fog_ahead and warning is not cannot_see"))
+    assert watch.update(warned) is True
+    assert watch.told() == "warning = fog_ahead"
 
 
 def test_advice() -> None:

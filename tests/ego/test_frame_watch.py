@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fogsim.ego.frame_watch import FrameWatch, LeadHistory
+from fogsim.ego.frame_watch import FrameWatch, LeadHistory, why_useless
 from fogsim.values import Camera, Frame, LeadMeasurement
 
 CAMERA = Camera(40, 30, 50.0, (20.0, 15.0), 1.4)
@@ -47,3 +47,13 @@ def test_a_late_frame_belongs_with_what_was_measured_when_it_was_taken() -> None
         LeadMeasurement(3.0, 0.0),
         LeadMeasurement(5.0, 0.0),
     ]
+
+
+def test_a_frame_that_is_late_or_shows_nothing_is_useless():
+    assert why_useless(frame(3.0, 1), 3.5) == ""
+    assert why_useless(frame(3.0, 1), 3.6) == "the frame is 0.60 s late"
+    dark = Frame(3.0, np.random.default_rng(0).integers(0, 3, (30, 40, 3)).astype(np.uint8), CAMERA)
+    assert why_useless(dark, 3.0) == "the picture shows nothing: 0 … 2 grey levels"
+    assert why_useless(Frame(3.0, np.full((30, 40, 3), 255, np.uint8), CAMERA), 3.0).startswith("the picture shows")
+    # In the densest fog the road before the bonnet still differs from the airlight.
+    assert why_useless(Frame(3.0, np.repeat([200, 203], 600).reshape(30, 40).astype(np.uint8), CAMERA), 3.0) == ""

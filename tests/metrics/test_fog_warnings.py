@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from fogsim.metrics.estimation.warnings import FogWarnings
+from fogsim.metrics.estimation.fog_warnings import FogWarnings
 from fogsim.metrics.metric import JsonValue
 from fogsim.units import extinction_from_visibility
 from fogsim.values import DriverWarning, FogBank, FogField, FogProfile, Step
@@ -35,7 +35,6 @@ def at(
     extinctions = np.where(in_bank, thin + (0.0 if bank is None else bank.extra_extinction), thin)
     logarithms = np.log(np.maximum(extinctions, THINNEST))
     step = make_step(index, time=10.0 * index, route_position=place, visibility=3.0 / thin, speed=speed)
-    traffic = dataclasses.replace(step.traffic, position=step.traffic.position + [place, 0.0, 0.0])
     here = float(extinctions[np.searchsorted(PLACES, 0.0)])
     truth = dataclasses.replace(
         step.truth,
@@ -45,7 +44,7 @@ def at(
         profile=FogProfile(PLACES, logarithms, np.zeros(PLACES.size)),
     )
     command = dataclasses.replace(step.command, warning=warning)
-    return dataclasses.replace(step, traffic=traffic, truth=truth, command=command, speed_limit=36.0)
+    return dataclasses.replace(step, truth=truth, command=command, speed_limit=36.0)
 
 
 def found(*steps: Step) -> dict[str, JsonValue]:

@@ -9,7 +9,18 @@ import pytest
 
 from fogsim.recorders.events import EVENT_COLUMNS, EventRecorder
 from fogsim.recorders.recovery import _make_readable
-from fogsim.values import Collision, Command, Ending, Fault, SignalColour, SignalState, TrafficState, TrafficStep, Truth
+from fogsim.values import (
+    Collision,
+    Command,
+    DriverWarning,
+    Ending,
+    Fault,
+    SignalColour,
+    SignalState,
+    TrafficState,
+    TrafficStep,
+    Truth,
+)
 from fogsim.values.fault import Blackout
 from fogsim.values.script import Begun
 
@@ -48,6 +59,24 @@ def rows(file: Path) -> list[tuple[object, ...]]:
     table = pq.read_table(file)
     assert table.schema.names == list(EVENT_COLUMNS)
     return [tuple(row.values()) for row in table.to_pylist()]
+
+
+def warned(index: int, warning: DriverWarning | None) -> TrafficStep:
+    return step(index, command=Command(warning=warning))
+
+
+def test_warnings_begin_and_end(tmp_path: Path) -> None:
+    recorder = EventRecorder(tmp_path / "events.parquet")
+    given = (DriverWarning.CANNOT_SEE, DriverWarning.CANNOT_SEE, DriverWarning.FOG_AHEAD, None)
+    for number, warning in enumerate(given):
+        recorder.record(warned(2 + number, warning))
+    recorder.close(complete=True)
+    assert [row[2:4] for row in rows(tmp_path / "events.parquet")] == [
+        ("warning_begins", "cannot_see"),
+        ("warning_ends", "cannot_see"),
+        ("warning_begins", "fog_ahead"),
+        ("warning_ends", "fog_ahead"),
+    ]
 
 
 @pytest.mark.parametrize("complete", [True, False])

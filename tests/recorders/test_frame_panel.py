@@ -1,4 +1,5 @@
 import dataclasses
+import itertools
 import math
 
 import numpy as np
@@ -10,7 +11,7 @@ from fogsim.recorders import FramePanel
 from fogsim.recorders.panel.camera_picture import draw_camera_picture, scale_image
 from fogsim.recorders.panel.strip_chart import Axis, Curve, StripChart
 from fogsim.recorders.style import ALARM, AMBER, BELIEF, TRUTH
-from fogsim.values import Collision, Ending, FogProfile, Frame, Lamp, Leader, Step
+from fogsim.values import Collision, Command, DenserFog, DriverWarning, Ending, FogProfile, Frame, Lamp, Leader, Step
 from tests.recorders.synthetic import drive, estimate, make_step
 
 
@@ -72,6 +73,18 @@ def test_a_collision_of_the_ego_stays_in_red_for_three_seconds() -> None:
     assert tuple(draw(hit, soon, late)[4, 10]) != ALARM
     others = dataclasses.replace(hit, collisions=(Collision(1.0, "a", "b", 9.0),))
     assert tuple(draw(others)[4, 10]) == AMBER
+
+
+def test_a_warning_has_a_banner_which_a_collision_covers() -> None:
+    warned = dataclasses.replace(make_step(), command=Command(warning=DriverWarning.CANNOT_SEE))
+    frame = draw(warned)
+    assert tuple(frame[4, 10]) == AMBER
+    hit = dataclasses.replace(warned, collisions=(Collision(0.0, "ego", "other", 9.0),))
+    assert tuple(draw(hit)[4, 10]) == ALARM
+    fog = dataclasses.replace(warned, command=Command(warning=DriverWarning.FOG_AHEAD))
+    bank = dataclasses.replace(fog, belief=dataclasses.replace(fog.belief, denser=DenserFog(200.0, 10.0, 0.03)))
+    frames = [draw(one) for one in (warned, fog, bank)]
+    assert all(differs(one, other, slice(0, 34), slice(0, 640)) for one, other in itertools.pairwise(frames))
 
 
 def test_the_ending_is_named() -> None:

@@ -15,7 +15,7 @@ from fogsim.files.row_log import read_rows
 from fogsim.metrics import step_metrics
 from fogsim.recorders import TableRecorder
 from fogsim.recorders.table import ROWS_PER_GROUP
-from fogsim.values import Collision, Ending, Estimate, FogProfile, Lamp, Leader, LeadMeasurement, Step
+from fogsim.values import Collision, DriverWarning, Ending, Estimate, FogProfile, Lamp, Leader, LeadMeasurement, Step
 from tests.recorders.synthetic import METHODS, drive, estimate, make_step
 
 
@@ -50,6 +50,7 @@ def test_a_step_becomes_a_row(tmp_path: Path) -> None:
         lamps=Lamp.LOW_BEAM | Lamp.REAR_FOG,
         ending=Ending.TIME,
     )
+    step = dataclasses.replace(step, command=dataclasses.replace(step.command, warning=DriverWarning.FOG_AHEAD))
     row = only_row(write(tmp_path / "steps.parquet", [step]))
     expected = {
         "index": 7,
@@ -81,6 +82,7 @@ def test_a_step_becomes_a_row(tmp_path: Path) -> None:
         "collisions": 1,
         "ending": "time",
         "sensor_faults": None,
+        "warning": "fog_ahead",
         "joint_road_valid": True,
         "joint_road_visibility_m": pytest.approx(110.0),
         "joint_road_extinction_per_m": pytest.approx(math.log(20) / 110),

@@ -98,6 +98,7 @@ SIMULATIONS = dict.fromkeys(("field_sizes", "message_sign", "motorway_policies")
 """Folders of studies that run no scenario of the catalogue."""
 
 ACCURACY_KEPT = " --keep runs/tables/estimator_accuracy.kept"
+WARNINGS_KEPT = " --keep runs/tables/driver_warnings.kept"
 TARGETS_KEPT = " --keep runs/tables/estimator_targets.kept"
 
 NIGHT = ("directions", "veils", "gallen2014", "lobes", "lamps", "glows", "limits")
@@ -130,6 +131,7 @@ MEASUREMENTS = (
     benchmark("sign_estimators", 6, ("sign estimators",), " --drives 12"),
     benchmark("sensor_faults", 6, ("sensor faults",)),
     benchmark("broken_devices", 15, ("broken devices",), " -j 2", cores=2),
+    benchmark("driver_warnings", 30, ("warnings",), WARNINGS_KEPT),
     benchmark("grades", 6),
     benchmark("uneven_fog", 30, ("uneven fog",)),
     benchmark("lead_accuracy", 4, ("lead accuracy",), times="ms"),

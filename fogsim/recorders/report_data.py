@@ -10,7 +10,7 @@ from fogsim.recorders.panel.camera_picture import shown_image
 from fogsim.recorders.protocol import Derived
 from fogsim.recorders.sign_marks import sign_looks
 from fogsim.units import finite_or_none
-from fogsim.values import Step
+from fogsim.values import DriverWarning, Step
 
 MOST_PICTURES = 8
 """Pictures in a report."""
@@ -65,6 +65,8 @@ class Curves:
         By method, (time [s], visibility [m]) of each valid estimate of fog.
     collisions : list of float
         Instants of collisions [s].
+    warning : list of DriverWarning or None
+        What the driver was warned of, one entry a step.
     ahead : AheadCurves
         What was believed of a place ahead.
     """
@@ -82,6 +84,7 @@ class Curves:
     high: list[float] = field(default_factory=list)
     estimates: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
     collisions: list[float] = field(default_factory=list)
+    warning: list[DriverWarning | None] = field(default_factory=list)
     ahead: AheadCurves = field(default_factory=AheadCurves)
 
     def add(self, step: Step, derived: Derived) -> None:
@@ -105,6 +108,7 @@ class Curves:
         for quantiles, share in ((self.low, 0.05), (self.belief, 0.5), (self.high, 0.95)):
             quantiles.append(step.belief.visibility_quantile(share))
         self.collisions.extend(hit.time for hit in step.collisions)
+        self.warning.append(step.command.warning)
         self.ahead.add(step)
         self._add_estimates(step)
 

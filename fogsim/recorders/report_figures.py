@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fogsim.recorders.report_data import AHEAD, AheadCurves, Curves
 from fogsim.recorders.style import ON_LIGHT, method_colours
 from fogsim.units import KMH_PER_MPS
+from fogsim.values import DriverWarning
 
 TRUTH, BELIEF, ADVICE, ALARM, SPEED = "#c28a00", "#1f6fd0", "#1f9d61", "#cf3a34", "#1c2733"
 MUTED = "#7b8794"
@@ -21,6 +22,9 @@ MUTED = "#7b8794"
 _VISIBILITY_TICKS = (20, 50, 100, 200, 500, 1000, 2000)
 _MOST_MARGIN = 300.0
 """Safety margins beyond this are drawn at it, so that the dangerous part can be read [m]."""
+
+
+_WARNINGS = {DriverWarning.FOG_AHEAD: "#e39a1f", DriverWarning.CANNOT_SEE: MUTED, DriverWarning.CAMERA_DEGRADED: ALARM}
 
 
 def draw_figures(curves: Curves, time_to_collision_threshold: float = 3.0) -> list[tuple[str, bytes]]:
@@ -54,7 +58,7 @@ def draw_figures(curves: Curves, time_to_collision_threshold: float = 3.0) -> li
         ),
         *ahead,
         (
-            "Speed of the ego, the advice in force and the speed limit.",
+            "Speed of the ego, the advice in force and the speed limit; along the top, what the driver was warned of.",
             figure((2.5,), lambda axes: _draw_speed(axes[0], curves)),
         ),
         (
@@ -211,6 +215,12 @@ def _draw_speed(axis: Axes, curves: Curves) -> None:
     axis.plot(curves.time, plottable(curves.speed) * KMH_PER_MPS, color=SPEED, linewidth=1.6, label="speed")
     axis.set_ylim(bottom=0)
     axis.set_ylabel("speed [km/h]", fontsize=9)
+    for warning, colour in _WARNINGS.items():
+        given = np.array([one is warning for one in curves.warning])
+        if given.any():
+            across = axis.get_xaxis_transform()
+            label = warning.value.replace("_", " ")
+            axis.fill_between(curves.time, 0.95, 1.0, where=given, transform=across, color=colour, lw=0, label=label)
 
 
 def _draw_conflict(axes: Sequence[Axes], curves: Curves, threshold: float) -> None:

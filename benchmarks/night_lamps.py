@@ -36,7 +36,7 @@ OPTIONAL_LAMPS = Lamp.HIGH_BEAM | Lamp.FRONT_FOG | Lamp.REAR_FOG
 
 def settings(scenario: str, visibility: str) -> Iterator[str]:
     """Overrides of a scenario: its fog, a fixed speed, and nothing that the lamps do not need."""
-    yield from ("expect={}", "end_on_collision=false")
+    yield from ("expect={}", "vary={}", "end_on_collision=false")
     yield f"advice={{method: fixed_speed, parameters: {{speed: {SPEED}}}}}"
     if scenario == "rural_night_fog":
         yield from (f"fog.visibility_m={visibility.removesuffix(' m')}", "timeline=[]", "duration_s=30")

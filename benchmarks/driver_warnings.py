@@ -40,10 +40,11 @@ actors:
   ego: {position: 200 m, speed: 110 km/h}
 fog: {visibility: 20 km}
 camera: {width: 320, height: 240, field_of_view: 58 deg, pitch: 2 deg}
+estimators: [joint_road, lead_contrast]
 fusion: field_filter
 advice: {method: stopping_sight_distance, parameters: {reaction_time: 2.0, deceleration: 3.4}}
 """
-"""The camera, fusion and advice are those of the demo."""
+"""Camera, estimators, fusion and advice are those of the demo."""
 
 Row = dict[str, Any]
 

@@ -213,7 +213,7 @@ def _draw_speed(axis: Axes, curves: Curves) -> None:
     advice = plottable(curves.advice) * KMH_PER_MPS
     axis.plot(curves.time, advice, color=ADVICE, linewidth=1.6, drawstyle="steps-post", label="advice")
     axis.plot(curves.time, plottable(curves.speed) * KMH_PER_MPS, color=SPEED, linewidth=1.6, label="speed")
-    axis.set_ylim(bottom=0)
+    axis.set_ylim(0.0, 1.06 * axis.get_ylim()[1])
     axis.set_ylabel("speed [km/h]", fontsize=9)
     for warning, colour in _WARNINGS.items():
         given = np.array([one is warning for one in curves.warning])

@@ -102,6 +102,12 @@ def test_two_environments_in_one_process_do_not_disturb_each_other() -> None:
         assert all(np.array_equal(a[k], b[k]) and np.array_equal(a[k], c[k]) for k in a)
 
 
+def test_the_driver_is_warned_of_fog_whatever_the_agent_advises(env: gymnasium.Env[Any, Any]) -> None:
+    info = env.reset(seed=1, options={"overrides": ["fog.visibility_m=40"]})[1]
+    given = [info["warning"], *(env.step(np.array([len(ADVISED_SPEEDS), 0]))[-1]["warning"] for _ in range(3))]
+    assert given == [None, "fog_ahead", "fog_ahead", "fog_ahead"]
+
+
 def test_overrides_for_one_episode(env: gymnasium.Env[Any, Any]) -> None:
     info = env.reset(seed=1, options={"overrides": ["fog.visibility_m=80"]})[1]
     assert info["truth"]["visibility_m"] == pytest.approx(80.0)

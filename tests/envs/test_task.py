@@ -71,6 +71,8 @@ def test_a_frame_is_observed_and_an_unknown_mode_refused() -> None:
     assert info["cost"] >= 0.0
     picture: Any = env.render()
     assert picture.ndim == 3
+    # So few pixels tell the estimators nothing.
+    assert [env.step(NO_ADVICE)[-1]["warning"] for _ in range(6)] == [*[None] * 4, *["cannot_see"] * 2]
     env.close()
     with pytest.raises(InputError, match=r"did you mean 'state'\?"):
         gymnasium.make("fogsim/FogAdvisory-v1", observation="states")

@@ -40,6 +40,7 @@ SHOWN = {
     "max_deceleration_mps2": ("hardest braking", "m/s²"),
     "minimum_visibility_m": ("least true visibility ahead", "m"),
     "overdriven_m_per_km_in_fog": ("driven too fast to stop in sight", "m per km in fog"),
+    "fog_warning_lead_m": ("warned of fog banks before half their density", "m"),
     "advised_time_share": ("time with a speed advice", "%"),
     "belief_median_error_percent": ("median error of the believed visibility", "%"),
     "belief_coverage_share": ("time in which its 90 % interval held the true one ahead", "%"),

@@ -98,6 +98,14 @@ def test_false_warnings_are_those_without_reason(place: float, outside: float, s
     assert values["false_fog_warnings_per_h"] == pytest.approx(120.0 * false)
 
 
+def test_a_warning_for_which_there_was_reason_when_it_was_decided_is_not_false():
+    """Who brakes at once is slow enough in sight when it is in force."""
+    faster, slower = at(0, 3000.0, outside=200.0, speed=30.0), at(1, 3300.0, FOG, outside=200.0, speed=25.0)
+    assert found(faster, slower)["false_fog_warnings"] == 0
+    again = at(2, 3600.0, outside=200.0, speed=25.0), at(3, 3800.0, FOG, outside=200.0, speed=25.0)
+    assert found(faster, slower, *again)["false_fog_warnings"] == 1
+
+
 def test_shares_of_the_time_under_the_other_warnings():
     values = found(*(at(i, 0.0, warning) for i, warning in enumerate((None, SEE, SEE, CAMERA, None))))
     assert values["cannot_see_time_share"] == pytest.approx(0.5)

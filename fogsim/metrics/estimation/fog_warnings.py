@@ -31,6 +31,7 @@ class FogWarnings:
     _time: float = 0.0
     _times: dict[DriverWarning, float] = field(default_factory=lambda: dict.fromkeys(DriverWarning, 0.0))
     _before: DriverWarning | None = None
+    _had_reason: bool = False
     _false: int = 0
     _warned: deque[float] = field(default_factory=deque)
     _ahead: dict[int, bool] = field(default_factory=dict)
@@ -43,9 +44,11 @@ class FogWarnings:
         if warning is not None:
             self._times[warning] += sample.elapsed
         is_fog = warning is DriverWarning.FOG_AHEAD
-        if is_fog and self._before is not warning and not has_reason(step):
+        # A warning is decided after the step before.
+        is_reason = has_reason(step)
+        if is_fog and self._before is not warning and not (is_reason or self._had_reason):
             self._false += 1
-        self._before = warning
+        self._before, self._had_reason = warning, is_reason
         self._enter_banks(step)
         if is_fog and not any(_is_inside(step, bank) for bank in _banks(step)):
             self._warned.append(step.route_position)

@@ -161,4 +161,4 @@ def as_log_normal(estimate: Estimate) -> tuple[float, float]:
     hazard = math.exp(-0.5 * ratio**2) / math.sqrt(2.0 * math.pi) / (0.5 * math.erfc(-ratio / math.sqrt(2.0)))
     mean, variance = ratio + hazard, 1.0 - hazard * (ratio + hazard)
     spread = math.log1p(variance / mean**2)
-    return deviation * mean * math.exp(-0.5 * spread), math.sqrt(spread)
+    return float(deviation * mean * math.exp(-0.5 * spread)), math.sqrt(spread)

@@ -55,8 +55,8 @@ def sensor_places(sensors: RoadsideReports, length: float) -> Floats:
 
 
 def place_seen(place: float, estimate: Estimate) -> float:
-    """Middle of the road that a camera at a place along a route has seen [m]."""
-    return place + 0.5 * min(estimate.reach, REACH)
+    """Middle of the road of which the estimate of a camera at a place along a route is the mean [m]."""
+    return place + 0.5 * min(estimate.reach, estimate.visibility, REACH)
 
 
 class Beats:

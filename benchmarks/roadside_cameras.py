@@ -3,7 +3,7 @@
 Cameras stand every 60 m along the routes of three shipped scenarios, and each takes one image per seed: with other
 traffic, trees and noise. For each road and fog: images, share of them that are reported, median and 95th percentile of
 the error of V_met [%], and how often its 90 % interval held the truth, which is the mean extinction of the stretch from
-the camera on in whose middle a report is. The last rows are of the bank of highway_99_corridor itself: 60 m between 500
+the camera on in whose middle a report is. Then come dusk, and the bank of highway_99_corridor itself: 60 m between 500
 and 1700 m, 1 km elsewhere. The time is that of drawing, taking and reading an image by day [ms].
 
 Mount, view and position of the cameras were chosen on ``motorway_fog_bank``, which is not among the roads.
@@ -30,6 +30,9 @@ from fogsim.values.estimate import NORMAL_90_PERCENT
 
 ROADS = ("highway_99_corridor", "a16_netherlands", "graded_motorway")
 VISIBILITIES = (60.0, 100.0, 200.0, 400.0, 1000.0)
+LIGHT, DUSK = 10_000.0, (10.0, 3.0, 1.0, 0.1)
+"""Illuminance by day, and in dusk [lx]."""
+
 SPACING, LEFT_OUT = 60.0, 300.0
 """Distance between cameras, and from the last one to the end of the road [m]."""
 
@@ -44,10 +47,10 @@ Found = tuple[float, FogReport]
 """True mean extinction of the stretch that a report is of [1/m], and the report."""
 
 
-def reports(road: str, fog: str, seed: int) -> tuple[int, list[Found]]:
-    """How many cameras there are, and what they report of a fog at the beginning of a run."""
+def reports(road: str, seed: int, *more: str) -> tuple[int, list[Found]]:
+    """How many cameras there are, and what they report at the beginning of a run with more settings."""
     cameras = f"sensors.reports.roadside={{camera: {{}}, every_m: {SPACING}, period_s: 1000, delay_s: 0}}"
-    settings = [*QUIET, *SMALL, cameras, f"scenery_seed={seed}", *([f"fog={fog}"] if fog else [])]
+    settings = [*QUIET, *SMALL, cameras, f"scenery_seed={seed}", *more]
     with ClosedLoop(fogsim.load_scenario(road, settings)) as loop:
         step = loop.start(seed)
     route, fog_now = step.truth.route, step.truth.fog
@@ -72,6 +75,8 @@ def place_of(report: FogReport) -> float:
 
 def row(road: str, fog: str, images: int, found: Sequence[Found]) -> list[str]:
     """One row of the table."""
+    if not found:
+        return [road, fog, str(images), "0", "–", "–", "–"]
     errors = np.array([100.0 * abs(true / one.extinction - 1.0) for true, one in found])
     held = [abs(math.log(one.extinction / true)) <= NORMAL_90_PERCENT * one.relative_deviation for true, one in found]
     reported = f"{100 * len(found) / images:.0f}" if images else "–"
@@ -81,12 +86,13 @@ def row(road: str, fog: str, images: int, found: Sequence[Found]) -> list[str]:
 
 def rows(seeds: int) -> Iterator[list[str]]:
     """Rows of the table."""
-    for road in ROADS:
-        for visibility in VISIBILITIES:
-            asked = [reports(road, f"{{visibility_m: {visibility}}}", seed) for seed in range(1, seeds + 1)]
-            found = [one for _, heard in asked for one in heard]
-            yield row(road, f"{visibility:.0f} m", sum(images for images, _ in asked), found)
-    bank = [one for seed in range(1, seeds + 1) for one in reports(ROADS[0], "", seed)[1]]
+    airs = [(road, f"{visibility:.0f} m", visibility, LIGHT) for road in ROADS for visibility in VISIBILITIES]
+    airs += [(ROADS[0], f"100 m at {light:g} lx", 100.0, light) for light in DUSK]
+    for road, told, visibility, light in airs:
+        more = f"fog={{visibility_m: {visibility}}}", f"light.illuminance_lx={light}"
+        asked = [reports(road, seed, *more) for seed in range(1, seeds + 1)]
+        yield row(road, told, sum(images for images, _ in asked), [one for _, heard in asked for one in heard])
+    bank = [one for seed in range(1, seeds + 1) for one in reports(ROADS[0], seed)[1]]
     inside = [one for one in bank if math.log(20.0) / one[0] <= IN_BANK]
     outside = [one for one in bank if math.log(20.0) / one[0] >= OUT_OF_BANK]
     yield row(ROADS[0], "in its bank", 0, inside)

@@ -53,7 +53,7 @@ class RoadsideCamera(Section):
     """
 
     estimator: Annotated[Method, method_of(ESTIMATORS)] = Method(method="joint_road")
-    """Estimator that reads its images; it is given the assumed calibration and the light, and silent at night."""
+    """Estimator that reads its images; one for the day, since a mast has no head lamps."""
 
     width: Whole = Field(default=320, ge=16, le=8192)
     """Columns of the image."""

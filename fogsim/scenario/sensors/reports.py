@@ -55,10 +55,10 @@ class RoadsideCamera(Section):
     estimator: Annotated[Method, method_of(ESTIMATORS)] = Method(method="joint_road")
     """Estimator that reads its images; one for the day, since a mast has no head lamps."""
 
-    width: Whole = Field(default=320, ge=16, le=8192)
+    width: Whole = Field(default=320, ge=16, le=4096)
     """Columns of the image."""
 
-    height: Whole = Field(default=240, ge=16, le=8192)
+    height: Whole = Field(default=240, ge=16, le=4096)
     """Rows of the image."""
 
     field_of_view_deg: Number = Field(default=58.0, ge=1, le=170)

@@ -349,20 +349,7 @@ class EgoEquipment:
         )
 
     def look_from_roadside(self, time: float, state: TrafficState) -> tuple[tuple[str, FogReport], ...]:
-        """See by cameras beside the road, before `complete_step`: what all who are `sent` it may hear.
-
-        Parameters
-        ----------
-        time : float
-            Simulated time since the run began [s].
-        state : TrafficState
-            Every vehicle.
-
-        Raises
-        ------
-        SimulationError
-            If `start_run` has not been called, or it is closed.
-        """
+        """See by cameras beside the road at a time [s]: part of what is `sent` to all in `complete_step`."""
         sensors = self._scenario.sensors.reports.roadside
         if sensors is None or sensors.camera is None:
             return ()

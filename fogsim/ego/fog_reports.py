@@ -60,13 +60,7 @@ def place_seen(place: float, estimate: Estimate) -> float:
 
 
 class Beats:
-    """When senders report: all at the beginning of a run, then each in its own beat.
-
-    Parameters
-    ----------
-    draw : int
-        Settles the beats.
-    """
+    """When senders report: all at the beginning of a run, then each in its own beat, which a draw settles."""
 
     def __init__(self, draw: int) -> None:
         self._draw = draw

@@ -27,21 +27,7 @@ Draw = Callable[[CameraPose, Camera], NDArray[np.float32] | None]
 
 
 class RoadsideCameras:
-    """The cameras of one run. What they report comes from their images alone.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    sensors : RoadsideReports
-        Where they stand and when they report.
-    section : RoadsideCamera
-        What they are.
-    route : (n, 3) float64
-        Polyline along the ego's route [m].
-    rng : numpy.random.Generator
-        Settles their beats and noise.
-    """
+    """The cameras of one run along a route (n, 3) [m]. What they report comes from their images alone."""
 
     def __init__(
         self,
@@ -62,22 +48,7 @@ class RoadsideCameras:
         self._has_begun = False
 
     def look(self, time: float, illuminance: float, draw: Draw) -> tuple[FogReport, ...]:
-        """Take and read the images that are due.
-
-        Parameters
-        ----------
-        time : float
-            Simulated time [s].
-        illuminance : float
-            Horizontal illuminance of the sky, as their light sensors measure it [lx].
-        draw : callable
-            Draws for a camera.
-
-        Returns
-        -------
-        tuple of FogReport
-            Of those whose estimate is valid, at the time of the image.
-        """
+        """Take and read the images that are due at a time [s], by a measured illuminance [lx]; report what is valid."""
         due = [
             (f"{SENSOR} {i}", place)
             for i, place in enumerate(self._places)
@@ -126,17 +97,9 @@ class RoadsideCameras:
 def over_road(image: Pixels, camera: Camera, aside: float) -> Pixels:
     """Shift the rows of an image so that the road lies as a camera above it would see it.
 
-    A point of the road at v rows below the horizon shows its lateral offset x at α x / ζ = x cos θ v / H columns from
-    the axis (negru2013 eq. 11), so each row is shifted by one number; what lies beside the image repeats its border.
-
-    Parameters
-    ----------
-    image : (rows, cols, 3) uint8 or uint16
-        What the camera shows.
-    camera : Camera
-        The assumed calibration.
-    aside : float
-        How far to the right of the road the camera is [m].
+    The camera stands to the right of it [m]. A point of the road v rows below the horizon shows its lateral offset x at
+    α x / ζ = x cos θ v / H columns from the axis (negru2013 eq. 11), so each row is shifted by one number. What lies
+    beside the image repeats its border, which is as far away as the row.
     """
     rows, columns = np.arange(camera.height), np.arange(camera.width)
     below = np.maximum(rows - camera.horizon_row, 0.0)
@@ -150,11 +113,6 @@ def as_log_normal(estimate: Estimate) -> tuple[float, float]:
 
     It has the mean and the variance of the estimate's normal distribution where that is positive. In clear air, where
     the extinction is 0 with some deviation, that still limits it from above.
-
-    Parameters
-    ----------
-    estimate : Estimate
-        With a positive deviation.
     """
     deviation = max(estimate.standard_deviation, LEAST_DEVIATION * estimate.extinction)
     ratio = estimate.extinction / deviation

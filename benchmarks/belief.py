@@ -31,8 +31,7 @@ from rich.console import Console
 from rich.progress import track
 
 import fogsim
-from fogsim.fusion import fuse, make
-from fogsim.fusion.field_filter import FieldFilter
+from fogsim.fusion import DatedFusion, make
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import Belief, Estimate, FogProfile, FogReport
 from fogsim.values.estimate import NORMAL_90_PERCENT
@@ -149,14 +148,12 @@ def judge(seen: Seen, belief: Belief, found: Found) -> None:
 def follow(name: str, seen: list[Seen], found: Found, seed: int) -> None:
     """Let a fusion take in a drive."""
     rng = np.random.default_rng(seed)
-    fusion = make("field_filter" if name == "reported" else name)
+    fusion = DatedFusion(make("field_filter" if name == "reported" else name))
     inside: float | None = None
     for number, one in enumerate(seen):
         started = time.perf_counter()
-        if name == "reported" and isinstance(fusion, FieldFilter):
-            belief = fusion.update_at(one.estimates, one.time, one.place, reports(seen, number, rng))
-        else:
-            belief = fuse(fusion, one.estimates, one.time, one.place)
+        heard = reports(seen, number, rng) if name == "reported" else ()
+        belief = fusion.update_at(one.estimates, one.time, one.place, heard)
         found.spent.append(1e3 * (time.perf_counter() - started))
         judge(one, belief, found)
         if one.place >= BANK_START + ENTERED and one.ahead > FOG:

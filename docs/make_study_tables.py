@@ -49,6 +49,15 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
         OVERDRIVEN,
         ("collisions", "collisions a run", 1.0, 2),
     ),
+    "night_estimators_in_the_loop": (
+        ("belief_median_error_percent", "error of the belief [%]", 1.0, 1),
+        ("mean_advised_speed_mps", "speed advised [km/h]", 3.6, 1),
+        ("advised_time_share", "advised [% of time]", 100.0, 0),
+        ("high_beam_time_share", "high beams [% of time]", 100.0, 0),
+        EGO,
+        OVERDRIVEN,
+        ("collisions", "collisions a run", 1.0, 2),
+    ),
     "who_tells_of_the_bank": (
         ("equipped_vehicles_mean", "other cameras near", 1.0, 1),
         ("dense_fog_known_before_m", "bank known before it [m]", 1.0, 0),

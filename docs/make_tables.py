@@ -73,7 +73,7 @@ def scenario_keys(model: type[BaseModel] = Scenario, prefix: str = "") -> list[t
 
 
 def _default(field: FieldInfo) -> str:
-    value = field.get_default(call_default_factory=True)
+    value = field.get_default(call_default_factory=True, validated_data={})
     if value is PydanticUndefined:
         return "required"
     if value is None or value == "":

@@ -117,6 +117,7 @@ MEASUREMENTS = (
     benchmark("stereo", 1, times="ms"),
     benchmark("belief", 2),
     benchmark("disappearing_vehicles", 2, ("disappearing vehicles",), times="ms"),
+    benchmark("night_lamps", 3, ("night lamps",)),
     benchmark("night_estimators", 5, ("night-estimators",), times="ms"),
     Measurement(
         "restoration",
@@ -177,8 +178,9 @@ MEASUREMENTS = (
     study("field_sizes", 10),  # 160 runs of 7 s
     study("which_sensor", 9),  # 140 runs of 4 to 12 s
     study("who_tells_of_the_bank", 7),  # 70 runs of 6 to 27 s
-    study("lighting_policies", 4),  # 360 runs of 1 s
+    study("lighting_policies", 14),  # 420 runs of 4 s
     study("estimators_in_the_loop", 12),
+    study("night_estimators_in_the_loop", 4),
     environment(
         "advisory",
         5,

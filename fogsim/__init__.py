@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from fogsim.values import Camera as Camera
     from fogsim.values import Command as Command
     from fogsim.values import Display as Display
+    from fogsim.values import DriverWarning as DriverWarning
     from fogsim.values import Estimate as Estimate
     from fogsim.values import Frame as Frame
     from fogsim.values import LampChoice as LampChoice
@@ -48,6 +49,7 @@ _VALUES = (
     "Camera",
     "Command",
     "Display",
+    "DriverWarning",
     "Estimate",
     "Frame",
     "LampChoice",
@@ -87,6 +89,7 @@ __all__ = [
     "ClosedLoop",
     "Command",
     "Display",
+    "DriverWarning",
     "Estimate",
     "FogSimError",
     "Frame",

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from fogsim.parameters import Range
 from fogsim.values import Belief, FogProfile, SpeedAdvice
+from fogsim.values.belief import OLDEST, WIDEST
 
 _EXACT = 1e-9
 """A hair of tolerance keeps exact multiples from being rounded a whole step [-]."""
@@ -23,8 +24,10 @@ class PresentedAdviser(ABC):
     quantile : float
         Which quantile of the believed visibility counts, 0 … 1; 0.5 is the median, less is careful.
     widest_belief : float
-        Standard deviation of ln k above which a belief says too little to change the advice [-]: at the start, or
-        while nothing but the rear of a truck is to be seen.
+        Standard deviation of ln k above which a belief says too little to act on [-], visibilities above 1 km taken as
+        1 km: at the start, or while nothing but the rear of a truck is to be seen.
+    fallback : float or None
+        Speed advised while the belief says too little [m/s]; None keeps the advice in force.
     smoothing : float
         Time constant with which the logarithm of the visibility is smoothed exponentially [s]; 0 for none.
     hysteresis : float
@@ -45,7 +48,8 @@ class PresentedAdviser(ABC):
     """
 
     quantile: Annotated[float, Range(0.0, 1.0)] = 0.5
-    widest_belief: Annotated[float, Range(0.01, 10.0)] = 0.7
+    widest_belief: Annotated[float, Range(0.01, 10.0)] = WIDEST
+    fallback: Annotated[float, Range(0.0, 140.0, "m/s")] | None = None
     smoothing: Annotated[float, Range(0.0, 3600.0, "s")] = 0.0
     hysteresis: Annotated[float, Range(0.0, 10.0)] = 0.0
     rounding: Annotated[float, Range(0.0, 50.0, "m/s")] = 0.0
@@ -75,7 +79,7 @@ class PresentedAdviser(ABC):
         """
         here = self._here(belief)
         if here is None:
-            return SpeedAdvice(previous.speed)
+            return SpeedAdvice(previous.speed if self.fallback is None else self._presented(self.fallback, speed_limit))
         smoothed = self._smoothed(here, time, previous)
         target = self._speed_for(math.exp(smoothed), belief.profile, speed_limit)
         if target > previous.speed and self.hysteresis > 0.0:
@@ -86,19 +90,19 @@ class PresentedAdviser(ABC):
 
     def _here(self, belief: Belief) -> float | None:
         """Visibility that counts where the vehicle is [m]; None where the belief says too little."""
-        if belief.profile is None:
-            known = belief.log_standard_deviation <= self.widest_belief
-            return belief.visibility_quantile(self.quantile) if known else None
-        known = belief.profile.at(0.0)[1] <= self.widest_belief
-        return belief.profile.visibility_quantile(0.0, self.quantile) if known else None
+        if belief.profile is None or belief.age > OLDEST:
+            return belief.known_visibility(self.quantile, self.widest_belief)
+        return belief.profile.known_visibility(0.0, self.quantile, self.widest_belief)
 
     def _speed_for(self, visibility: float, profile: FogProfile | None, limit: float) -> float:
         """Speed that a visibility here asks for, and denser fog ahead [m/s]."""
         speed = self.speed_at(visibility)
         if profile is not None:
-            ahead = (profile.distance > 0.0) & (profile.standard_deviation <= self.widest_belief)
-            for distance in profile.distance[ahead].tolist():
-                there = self.speed_at(profile.visibility_quantile(distance, self.quantile))
+            for distance in profile.distance[profile.distance > 0.0].tolist():
+                visibility_there = profile.known_visibility(distance, self.quantile, self.widest_belief)
+                if visibility_there is None:
+                    continue
+                there = self.speed_at(visibility_there)
                 # v² = v_there² + 2 a (d − v T)
                 lost = self.slowing * self.lead_time
                 speed = min(speed, math.sqrt(lost**2 + there**2 + 2.0 * self.slowing * distance) - lost)

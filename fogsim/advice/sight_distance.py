@@ -29,7 +29,7 @@ class StoppingSightDistance(PresentedAdviser):
     sight_share : float
         Share of the visibility that may be needed to stop [-]; 1 for an obstacle ahead, 0.5 for narrow roads
         where others come the other way (German StVO § 3).
-    quantile, widest_belief, smoothing, hysteresis, rounding, rounded, minimum, hold
+    quantile, widest_belief, fallback, smoothing, hysteresis, rounding, rounded, minimum, hold
         See `PresentedAdviser`.
 
     Raises

@@ -33,7 +33,7 @@ class StepTable(PresentedAdviser):
         Ends of the steps, ascending [m]: a speed holds below its end; by default those of the A16.
     speeds : sequence of float
         Advised speed of each step, ascending too [m/s].
-    quantile, widest_belief, smoothing, hysteresis, rounding, rounded, minimum, hold
+    quantile, widest_belief, fallback, smoothing, hysteresis, rounding, rounded, minimum, hold
         See `PresentedAdviser`.
 
     Raises
@@ -123,7 +123,7 @@ class VirginiaI77(PresentedAdviser):
 
     Attributes
     ----------
-    quantile, widest_belief, smoothing, hysteresis, rounding, rounded, minimum, hold
+    quantile, widest_belief, fallback, smoothing, hysteresis, rounding, rounded, minimum, hold
         See `PresentedAdviser`.
 
     Raises

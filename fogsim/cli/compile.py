@@ -145,11 +145,11 @@ def read_foggy_road(method: str, parameters: Mapping[str, Any], size: Sequence[i
 
 def fuse_estimates(fusion: str, parameters: Mapping[str, Any], estimates: "Sequence[Sequence[Estimate]]") -> None:
     """Pass each method's estimates to a fusion, image by image."""
-    from fogsim.fusion import fuse, make
+    from fogsim.fusion import DatedFusion, make
 
-    chosen = make(fusion, **parameters)
+    chosen = DatedFusion(make(fusion, **parameters))
     for number, instant in enumerate(zip(*estimates, strict=True)):
-        fuse(chosen, instant, 0.1 * number, 10.0 * number)
+        chosen.update_at(instant, 0.1 * number, 10.0 * number)
 
 
 def _restore_contrast() -> None:

@@ -22,7 +22,7 @@ from fogsim.ego.sensor_faults import FaultSchedule
 from fogsim.ego.shutter import Shutter, exposed
 from fogsim.ego.view_rendering import EgoView, NoView, Surrounding, ViewRenderer
 from fogsim.errors import SimulationError
-from fogsim.fusion import fuse
+from fogsim.fusion import DatedFusion
 from fogsim.randomness import Streams
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.schema import NO_RENDERER
@@ -51,7 +51,7 @@ from fogsim.values import (
 )
 from fogsim.values.fault import FaultKind, Where
 from fogsim.values.light import ALL_LAMPS
-from fogsim.values.result_checks import checked_belief, checked_estimate
+from fogsim.values.result_checks import checked_estimate
 from fogsim.values.script import Actions
 
 
@@ -92,7 +92,7 @@ class EgoEquipment:
         self._fog_now: FogField | None = None
         self._glass, self._delivery = FaultyLens(), FrameDelivery()
         self._watch, self._leads = FrameWatch(), LeadHistory()
-        self._fusion = build.fusion(scenario)
+        self._fusion = DatedFusion(build.fusion(scenario), scenario.fusion.method)
         self._view_renderer: EgoView | None = None
         self._streams: Streams | None = None
         self._meters: RoadMeters | None = None
@@ -381,8 +381,7 @@ class EgoEquipment:
 
     def _believe(self, estimates: tuple[Estimate, ...], observation: Observation, time: float, place: float) -> Belief:
         """What is believed after this step."""
-        believed = fuse(self._fusion, estimates, time, place, observation.reports)
-        return checked_belief(self._scenario.fusion.method, believed)
+        return self._fusion.update_at(estimates, time, place, observation.reports)
 
     def _second_image(
         self, renderer: EgoView, snapshot: TrafficSnapshot, pose: CameraPose, time: float, light: float

@@ -16,7 +16,7 @@ from fogsim.obstruction import tunnels_of
 from fogsim.render import LIMITED, Renderer, RenderError, make_renderer
 from fogsim.render.bonnet import Bonnet, with_bonnet
 from fogsim.scenario import Scenario, build
-from fogsim.scenario.timeline import darkest_light
+from fogsim.scenario.timeline import light_range
 from fogsim.scene import (
     Corridor,
     ScenePlan,
@@ -233,7 +233,7 @@ class ViewRenderer:
         self._scenario, self._network = scenario, network
         self._daylight = scenario.light.illuminance_lx
         # Lamps that were lit in the picture only from a moment on would be a jump in it.
-        self._by_lamplight = darkest_light(scenario.timeline, self._daylight) < DAY_ILLUMINANCE
+        self._by_lamplight = light_range(scenario.timeline, self._daylight)[0] < DAY_ILLUMINANCE
         self._mount = LampMount()
         self._tunnels = tunnels_of(network.structures)
         self._air = Air(self.fog, scenario.fog.droplets)

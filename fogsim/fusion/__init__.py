@@ -7,7 +7,7 @@ from fogsim.fusion.field_filter import FieldFilter
 from fogsim.fusion.grid_filter import GridFilter
 from fogsim.fusion.mixture_filter import MixtureFilter
 from fogsim.fusion.no_fusion import NoFusion
-from fogsim.fusion.protocol import Fusion, LocatedFusion, fuse
+from fogsim.fusion.protocol import DatedFusion, Fusion, LocatedFusion
 from fogsim.parameters import checked_parameters
 from fogsim.registry import Registry
 
@@ -41,4 +41,4 @@ def make(name: str, **options: object) -> Fusion | LocatedFusion:
     return registry.make(FUSIONS, name, **options)
 
 
-__all__ = ["FUSIONS", "Fusion", "LocatedFusion", "fuse", "make"]
+__all__ = ["FUSIONS", "DatedFusion", "Fusion", "LocatedFusion", "make"]

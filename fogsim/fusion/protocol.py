@@ -1,12 +1,15 @@
 """What every fusion is to the loop."""
 
 import functools
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Protocol, cast, runtime_checkable
 
 from fogsim.values.belief import Belief
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import FogReport
+from fogsim.values.result_checks import checked_belief
 
 
 class Fusion(Protocol):
@@ -66,25 +69,48 @@ class LocatedFusion(Protocol):
         ...
 
 
-def fuse(
-    fusion: Fusion | LocatedFusion,
-    estimates: Sequence[Estimate],
-    time: float,
-    place: float,
-    reports: Sequence[FogReport] = (),
-) -> Belief:
-    """Ask a fusion of either kind.
+class DatedFusion:
+    """A fusion of either kind whose beliefs are checked, and know how old the last evidence is.
 
     Parameters
     ----------
     fusion : Fusion or LocatedFusion
         The fusion.
-    estimates, time, place, reports
-        As of `LocatedFusion.update_at`.
+    name : str
+        What error messages call it.
     """
-    if _knows_places(type(fusion)):
-        return cast("LocatedFusion", fusion).update_at(estimates, time, place, reports)
-    return cast("Fusion", fusion).update(estimates, time)
+
+    def __init__(self, fusion: Fusion | LocatedFusion, name: str = "") -> None:
+        self._fusion, self._name = fusion, name
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._fusion.reset()
+        self._last = -math.inf
+
+    def update_at(
+        self, estimates: Sequence[Estimate], time: float, place: float, reports: Sequence[FogReport] = ()
+    ) -> Belief:
+        """Take in the estimates and reports of one instant; see `LocatedFusion.update_at`.
+
+        Parameters
+        ----------
+        estimates, time, place, reports
+            As of `LocatedFusion.update_at`.
+
+        Raises
+        ------
+        InputError
+            If what the fusion returns is no belief.
+        """
+        if reports or any(one.valid or one.bounds is not None for one in estimates):
+            self._last = time
+        if _knows_places(type(self._fusion)):
+            belief = cast("LocatedFusion", self._fusion).update_at(estimates, time, place, reports)
+        else:
+            belief = cast("Fusion", self._fusion).update(estimates, time)
+        return replace(checked_belief(self._name, belief), age=time - self._last)
 
 
 @functools.cache

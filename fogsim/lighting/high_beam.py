@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from fogsim.lighting.rules import FogLampRules
+from fogsim.lighting.rules import BY_DAY, CAREFUL, FogLampRules, Quantile
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim.values import Belief, Lamp, LampChoice, LampWish, Observation
@@ -84,6 +84,8 @@ class Gallen2014:
         How long other lamps must have been wanted before they are lit [s]; high beams are left at once.
     rear_fog_below, front_fog_below : float
         Visibility below which fog lamps are lit [m]; see `FogLampRules`.
+    quantile : float
+        High beams are lit only if visibility is above the threshold with probability 1 - `quantile` [-].
 
     Raises
     ------
@@ -97,19 +99,23 @@ class Gallen2014:
     dwell: Seconds = 2.0
     rear_fog_below: Metres = 50.0
     front_fog_below: Metres = 100.0
+    quantile: Quantile = CAREFUL
 
     def choose_lamps(self, belief: Belief, observation: Observation, time: float, previous: LampChoice) -> LampChoice:
-        """Choose the lamps to light; see `VehicleLightingPolicy.choose_lamps`.
+        """Choose the lamps to light, low beams while uninformed; see `VehicleLightingPolicy.choose_lamps`.
 
         Parameters
         ----------
         belief, observation, time, previous
             What is believed and measured, the instant, and lamps lit now.
         """
+        visibility = belief.known_visibility(self.quantile)
+        if visibility is None:
+            return LampChoice(BY_DAY)
         has_high = Lamp.HIGH_BEAM in previous.lamps
         enough = self.low_beam_below * (1.0 if has_high else 1.0 + self.hysteresis)
-        high = is_dark(observation) and belief.visibility >= enough and not would_dazzle(observation, self.near_lead)
-        rules = FogLampRules(self.rear_fog_below, self.front_fog_below, self.hysteresis)
+        high = is_dark(observation) and visibility >= enough and not would_dazzle(observation, self.near_lead)
+        rules = FogLampRules(self.rear_fog_below, self.front_fog_below, self.hysteresis, self.quantile)
         low = rules.lamps(belief, previous.lamps)
         return settled(HIGH_BEAMS | low & Lamp.REAR_FOG if high else low, time, previous, self.dwell)
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from fogsim.lighting.high_beam import HIGH_BEAMS, Metres, Seconds, is_dark, settled, would_dazzle
-from fogsim.lighting.rules import BY_DAY, FogLampRules
+from fogsim.lighting.rules import BY_DAY, CAREFUL, FogLampRules, Quantile
 from fogsim.parameters import Range, checked_parameters
 from fogsim.values import Belief, Lamp, LampChoice, Observation
 
@@ -108,6 +108,8 @@ class LegalRules:
         Lamps change back when visibility exceeds the threshold by this share [-].
     dwell : float
         How long other lamps must have been wanted before they are lit [s]; high beams are left at once.
+    quantile : float
+        A rule about the visibility counts as met only with probability 1 - `quantile` [-].
 
     Raises
     ------
@@ -118,6 +120,7 @@ class LegalRules:
     country: Country = "unece"
     hysteresis: Annotated[float, Range(0.0, 10.0)] = 0.2
     dwell: Seconds = 2.0
+    quantile: Quantile = CAREFUL
 
     @property
     def near_lead(self) -> Metres:
@@ -125,18 +128,21 @@ class LegalRules:
         return LAWS[self.country].near_lead
 
     def choose_lamps(self, belief: Belief, observation: Observation, time: float, previous: LampChoice) -> LampChoice:
-        """Choose the lamps to light; see `VehicleLightingPolicy.choose_lamps`.
+        """Choose the lamps to light, low beams while uninformed; see `VehicleLightingPolicy.choose_lamps`.
 
         Parameters
         ----------
         belief, observation, time, previous
             What is believed and measured, the instant, and lamps lit now.
         """
+        visibility = belief.known_visibility(self.quantile)
+        if visibility is None:
+            return LampChoice(BY_DAY)
         law = LAWS[self.country]
-        rules = FogLampRules(law.rear_fog_below, law.front_fog_below, self.hysteresis)
+        rules = FogLampRules(law.rear_fog_below, law.front_fog_below, self.hysteresis, self.quantile)
         fog_lamps = rules.lamps(belief, previous.lamps) & ~BY_DAY
         margin = 1.0 if Lamp.HIGH_BEAM in previous.lamps else 1.0 + self.hysteresis
-        may_shine = belief.visibility >= law.high_beam_from * margin and not would_dazzle(observation, law.near_lead)
+        may_shine = visibility >= law.high_beam_from * margin and not would_dazzle(observation, law.near_lead)
         if is_dark(observation) and may_shine:
             return settled(HIGH_BEAMS | fog_lamps & Lamp.REAR_FOG, time, previous, self.dwell)
         return settled(BY_DAY | fog_lamps, time, previous, self.dwell)

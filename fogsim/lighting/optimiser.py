@@ -6,7 +6,7 @@ from typing import Annotated
 
 from fogsim.lighting.high_beam import HIGH_BEAMS, Seconds, is_dark, settled
 from fogsim.lighting.own_sight import own_sight_distance
-from fogsim.lighting.rules import FogLampRules
+from fogsim.lighting.rules import BY_DAY, CAREFUL, FogLampRules, Quantile
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Belief, Lamp, LampChoice, Observation
@@ -41,6 +41,8 @@ class SightOptimiser:
         By how much other beams must be better before they are wanted [m].
     dwell : float
         How long they must have been wanted before they are lit [s]; high beams are left at once.
+    quantile : float
+        Quantile of the visibility that high beams are chosen by [-].
 
     Raises
     ------
@@ -51,21 +53,25 @@ class SightOptimiser:
     price: Annotated[float, Range(0.0, 1e6, "m per cd/m²")] = 20.0
     advantage: Annotated[float, Range(0.0, 1e4, "m")] = 2.0
     dwell: Seconds = 2.0
+    quantile: Quantile = CAREFUL
 
     def choose_lamps(self, belief: Belief, observation: Observation, time: float, previous: LampChoice) -> LampChoice:
-        """Choose the lamps to light; see `VehicleLightingPolicy.choose_lamps`.
+        """Choose the lamps to light, low beams while uninformed; see `VehicleLightingPolicy.choose_lamps`.
 
         Parameters
         ----------
         belief, observation, time, previous
             What is believed and measured, the instant, and lamps lit now.
         """
-        rules = FogLampRules()
+        known = belief.known_visibility(self.quantile)
+        if known is None:
+            return LampChoice(BY_DAY)
+        rules = FogLampRules(quantile=self.quantile)
         low = rules.lamps(belief, previous.lamps)
         if not is_dark(observation):
             return settled(low, time, previous, self.dwell)
         # Belief moves a little in every frame; the sight that it allows need not be reckoned anew for that.
-        visibility = math.exp(round(math.log(belief.visibility), 2))
+        visibility = math.exp(round(math.log(known), 2))
         worth = {beam: self._worth(beam, visibility, observation) for beam in _TOWARD}
         lead = worth[Lamp.HIGH_BEAM] - worth[Lamp.LOW_BEAM]
         high = lead > (-self.advantage if Lamp.HIGH_BEAM in previous.lamps else self.advantage)

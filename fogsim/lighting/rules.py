@@ -8,6 +8,10 @@ from fogsim.values import Belief, Lamp
 
 BY_DAY = Lamp.POSITION | Lamp.LOW_BEAM
 
+Quantile = Annotated[float, Range(0.0, 0.5)]
+CAREFUL = 0.25
+"""Quantile of the visibility that must allow high beams; fog lamps need the opposite one, 0.75, to be below theirs."""
+
 
 @checked_parameters
 @dataclass(frozen=True, slots=True)
@@ -23,6 +27,8 @@ class FogLampRules:
         Visibility below which the lamps go on [m].
     hysteresis : float
         They go off when visibility exceeds the threshold by this share [-].
+    quantile : float
+        They are lit only if visibility is below the threshold with probability 1 - `quantile` [-].
 
     Raises
     ------
@@ -33,16 +39,19 @@ class FogLampRules:
     rear_fog_below: Annotated[float, Range(0.0, 1e6, "m")] = 50.0
     front_fog_below: Annotated[float, Range(0.0, 1e6, "m")] = 100.0
     hysteresis: Annotated[float, Range(0.0, 10.0)] = 0.2
+    quantile: Quantile = CAREFUL
 
     def lamps(self, belief: Belief, previous: Lamp) -> Lamp:
-        """Choose the lamps to light; see `LightingPolicy.lamps`.
+        """Choose the lamps to light, without fog lamps while the belief is uninformed; see `LightingPolicy.lamps`.
 
         Parameters
         ----------
         belief, previous
             What is believed about the fog, and lamps lit now.
         """
-        lit, visibility = BY_DAY, belief.visibility
+        lit, visibility = BY_DAY, belief.known_visibility(1.0 - self.quantile)
+        if visibility is None:
+            return lit
         for lamp, threshold in ((Lamp.REAR_FOG, self.rear_fog_below), (Lamp.FRONT_FOG, self.front_fog_below)):
             margin = 1.0 + self.hysteresis if lamp in previous else 1.0
             if visibility < threshold * margin:

@@ -69,7 +69,7 @@ def mistakes_in(schema: object, error: ValidationError, data: object, beside: Se
     A list with wrong entries is not too short, a misspelt key is not missing, and a value that fits none of several
     types is one mistake. `beside` are top-level keys outside the schema.
     """
-    details = error.errors(include_url=False)
+    details = [one for one in error.errors(include_url=False) if one["type"] != "default_factory_not_called"]
     blocks = {detail["loc"][:length] for detail in details for length in range(len(detail["loc"]))}
     found = [_found(schema, detail, data) for detail in details if detail["loc"] not in blocks]
     inside = {one.path[:length] for one in found for length in range(len(one.path))}

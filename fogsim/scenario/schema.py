@@ -4,8 +4,9 @@ Everything inside FogSim is SI and radians; `fogsim.scenario.parts` converts, on
 """
 
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
@@ -24,7 +25,7 @@ from fogsim.scenario.fog import Fog
 from fogsim.scenario.roads.schema import Actors, DemandSection, Road, check_roads
 from fogsim.scenario.section import Flag, Method, Number, Period, Section, Seed, Text, method_of
 from fogsim.scenario.sensors.schema import Sensors
-from fogsim.scenario.timeline import Timeline, check_timeline
+from fogsim.scenario.timeline import Timeline, check_timeline, light_range
 from fogsim.scenario.timeline.checks import PHOTONS_BY_DAY
 from fogsim.scenario.traffic_alone import without_ego
 from fogsim.scenario.traffic_schema import DriversSection, Traffic
@@ -74,6 +75,19 @@ class Light(Section):
     illuminance_lx: Annotated[Number, Field(ge=0, le=200_000)] = 10_000.0
     """Horizontal illuminance of the overcast sky: 10 000 by day, 1 … 100 in twilight, 0.01 … 0.1 at night. Below 1000
     lamps light the road and the fog."""
+
+
+DUSK, NIGHT = 100.0, 0.1
+"""Horizontal illuminance below which methods for the night are of use, and those for the day are not [lx]."""
+
+
+def estimators_by_light(read: Mapping[str, Any]) -> tuple[Method, ...]:
+    """Estimators for the light that there may be in a run, by what was read of a scenario."""
+    light, timeline = read.get("light", Light()), read.get("timeline", ())
+    darkest, brightest = light_range(timeline, light.illuminance_lx)
+    by_day = ("joint_road", "lead_contrast") if brightest >= NIGHT else ()
+    by_night = ("night_road",) if darkest < DUSK else ()
+    return tuple(Method(method=name) for name in (*by_day, *by_night))
 
 
 class PavementSection(Section):
@@ -154,9 +168,11 @@ class Scenario(Section):
     """The other sensors, and the faults of all."""
 
     estimators: tuple[Annotated[Method, method_of(ESTIMATORS)], ...] = Field(
-        default=(Method(method="joint_road"), Method(method="lead_contrast")), validate_default=True
+        default_factory=estimators_by_light, validate_default=True
     )
-    """Estimators that read every frame; the agent sees the first one's estimate. None, `[]`, with `renderer: none`."""
+    """Estimators that read every frame; the agent sees the first one's estimate. None, `[]`, with `renderer: none`. By
+    default those for the light: by night, below 0.1 lx in the whole run, `[night_road]`; where dusk may fall, below 100
+    lx, `[joint_road, lead_contrast, night_road]`."""
 
     fusion: Annotated[Method, method_of(FUSIONS)] = Method(method="grid_filter")
     """How estimates become a belief."""

@@ -5,6 +5,7 @@ from fogsim.values.camera import Camera, CameraPose, Response
 from fogsim.values.command import (
     Command,
     Display,
+    DriverWarning,
     EgoControl,
     LampChoice,
     LampWish,
@@ -67,6 +68,7 @@ __all__ = [
     "Command",
     "DenserFog",
     "Display",
+    "DriverWarning",
     "EgoControl",
     "Ending",
     "EquippedVehicle",

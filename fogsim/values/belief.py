@@ -9,8 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
-from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
+from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY, extinction_from_visibility
 from fogsim.values.estimate import DenserFog
+
+WIDEST = 0.7
+"""Standard deviation of ln k above which a belief says too little to act on [-]."""
+
+OLDEST = 60.0
+"""Age of the last evidence beyond which a belief says too little to act on [s]: nearly 2 km on a motorway."""
+
+NO_FOG = 1000.0
+"""Visibility from which on there is no fog (WMO) [m]; how clear the air is beyond that changes no decision."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +67,21 @@ class FogProfile:
         mean, deviation = self.at(distance)
         return OPTICAL_DEPTH_AT_VISIBILITY * math.exp(NormalDist().inv_cdf(share) * deviation - mean)
 
+    def known_visibility(self, distance: float, share: float, widest: float = WIDEST) -> float | None:
+        """Quantile of the visibility at a place to act on [m]; None where the profile says too little.
+
+        Parameters
+        ----------
+        distance, share : float
+            As of `visibility_quantile`.
+        widest : float
+            Largest standard deviation of ln k to act on [-].
+        """
+        mean, deviation = self.at(distance)
+        if deviation > widest:
+            return None
+        return OPTICAL_DEPTH_AT_VISIBILITY * math.exp(NormalDist().inv_cdf(share) * deviation - mean)
+
 
 @dataclass(frozen=True, slots=True)
 class Belief:
@@ -73,12 +97,40 @@ class Belief:
         Denser fog ahead that several estimates have told of.
     profile : FogProfile or None
         What is believed of places along the way, by a fusion that tells.
+    age : float
+        Time since an estimate or a report last said anything about the fog [s]; ``inf`` if none has.
     """
 
     log_extinction: NDArray[np.float64]
     probability: NDArray[np.float64]
     denser: DenserFog | None = None
     profile: FogProfile | None = None
+    age: float = 0.0
+
+    def is_informed(self, widest: float = WIDEST) -> bool:
+        """Whether the belief says enough to act on: recent evidence has narrowed it down.
+
+        "At least 400 m" is enough: visibilities above 1 km count as 1 km.
+
+        Parameters
+        ----------
+        widest : float
+            Largest standard deviation of ln k to act on [-].
+        """
+        if self.age > OLDEST:
+            return False
+        in_fog = np.maximum(np.array(self.log_extinction, float), math.log(extinction_from_visibility(NO_FOG)))
+        return _moments(in_fog, np.array(self.probability, float))[1] <= widest
+
+    def known_visibility(self, share: float, widest: float = WIDEST) -> float | None:
+        """Quantile of the visibility to act on [m]; None if the belief says too little: every decision asks here.
+
+        Parameters
+        ----------
+        share, widest : float
+            As of `visibility_quantile` and `is_informed`.
+        """
+        return self.visibility_quantile(share) if self.is_informed(widest) else None
 
     def visibility_quantile(self, share: float) -> float:
         """Visibility below which the truth lies with a given probability [m].

@@ -58,6 +58,17 @@ class LampChoice:
     wish: LampWish | None = None
 
 
+class DriverWarning(StrEnum):
+    """What the ego's driver is warned of, and asked to take over for."""
+
+    FOG_AHEAD = "fog_ahead"
+    """Denser fog ahead, or fog in which the speed is too high for what will be seen."""
+    CANNOT_SEE = "cannot_see"
+    """The system knows too little about the fog: it decides nothing by it."""
+    CAMERA_DEGRADED = "camera_degraded"
+    """The camera is dirty, blinded, frozen or dark."""
+
+
 class Display(StrEnum):
     """Where a driver hears advice to all on a stretch of road."""
 
@@ -147,6 +158,8 @@ class Command:
         The ego driven by hand, in place of its driver and of the advice; None for the driver. SUMO's traffic alone.
     lamp_wish : LampWish or None
         What the lighting policy remembers with the lamps.
+    warning : DriverWarning or None
+        What the ego's driver is warned of; None for nothing.
     """
 
     advice: SpeedAdvice = field(default_factory=SpeedAdvice)
@@ -157,6 +170,7 @@ class Command:
     stretches: tuple[StretchAdvice, ...] = ()
     control: EgoControl | None = None
     lamp_wish: LampWish | None = None
+    warning: DriverWarning | None = None
 
     @property
     def is_for_others(self) -> bool:

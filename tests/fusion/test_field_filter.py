@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fogsim.errors import InputError
-from fogsim.fusion import LocatedFusion, fuse, make
+from fogsim.fusion import DatedFusion, LocatedFusion, make
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import DenserFog, Estimate, FogReport, OpticalDepths
 from fogsim.values.estimate import ExtinctionBounds
@@ -216,8 +216,8 @@ def test_reset_forgets_and_places_must_be_numbers():
 def test_either_kind_of_fusion_can_be_asked():
     assert isinstance(make("field_filter"), LocatedFusion)
     assert not isinstance(make("grid_filter"), LocatedFusion)
-    assert fuse(make("grid_filter"), [seen(100.0)], 0.0, 10.0).profile is None
-    assert fuse(make("field_filter"), [seen(100.0)], 0.0, 10.0).profile is not None
+    assert DatedFusion(make("grid_filter")).update_at([seen(100.0)], 0.0, 10.0).profile is None
+    assert DatedFusion(make("field_filter")).update_at([seen(100.0)], 0.0, 10.0).profile is not None
 
 
 def test_who_drives_on_blindly_knows_less_and_less_of_the_road_ahead():

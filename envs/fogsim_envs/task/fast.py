@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import extinction
-from fogsim.fusion import fuse
+from fogsim.fusion import DatedFusion
 from fogsim.parameters import checked_parameters
 from fogsim.recorders import FramePanel, draw_view_from_above
 from fogsim.scenario import Scenario, build
@@ -96,14 +96,14 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
         """Any scenario will do: nothing is drawn."""
 
     def _begin(self, scenario: Scenario, seed: int) -> Step:
-        self._fusion, self._illuminance = build.fusion(scenario), scenario.light.illuminance_lx
+        self._fusion, self._illuminance = DatedFusion(build.fusion(scenario)), scenario.light.illuminance_lx
         self._surrogate.reset(np.random.default_rng((2, seed)))
         # The belief is made here, of estimates that the loop knows nothing of.
         return super()._begin(scenario.model_copy(update={"fusion": Method(method="none")}), seed)
 
     def _completed(self, step: Step) -> Step:
         estimates = (self._surrogate.estimate(step.truth.extinction_ahead, self._illuminance),)
-        belief = fuse(self._fusion, estimates, step.time, step.route_position, step.observation.reports)
+        belief = self._fusion.update_at(estimates, step.time, step.route_position, step.observation.reports)
         return dataclasses.replace(step, estimates=estimates, belief=belief)
 
 

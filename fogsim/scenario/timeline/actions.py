@@ -296,8 +296,8 @@ def fog_reference(entries: Sequence[TimelineEntry], extinction: float) -> float:
     return extinction if extinction > 0.0 else max(wanted, default=0.0)
 
 
-def darkest_light(entries: Sequence[TimelineEntry], illuminance: float) -> float:
-    """Lowest horizontal illuminance that there may be in a run [lx].
+def light_range(entries: Sequence[TimelineEntry], illuminance: float) -> tuple[float, float]:
+    """Lowest and highest horizontal illuminance that there may be in a run [lx].
 
     Parameters
     ----------
@@ -307,7 +307,8 @@ def darkest_light(entries: Sequence[TimelineEntry], illuminance: float) -> float
         Illuminance with which it begins [lx].
     """
     doings = [doing for entry in entries for _, doing in doings_of(entry)]
-    return min([illuminance, *(doing.illuminance_lx for doing in doings if isinstance(doing, LightActions))])
+    levels = [illuminance, *(doing.illuminance_lx for doing in doings if isinstance(doing, LightActions))]
+    return min(levels), max(levels)
 
 
 def scripted_fog(entries: Sequence[TimelineEntry], fog: FogField) -> FogField:

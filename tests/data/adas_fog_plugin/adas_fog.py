@@ -20,10 +20,12 @@ class Cautious:
         observation: Observation,
         speed_limit: float,
         time: float,  # noqa: ARG002 - the protocol's parameters
-        previous: SpeedAdvice,  # noqa: ARG002 - the protocol's parameters
+        previous: SpeedAdvice,
     ) -> SpeedAdvice:
         """Advise a speed [m/s]."""
-        reach = belief.visibility_quantile(0.25)
+        reach = belief.known_visibility(0.25)
+        if reach is None:  # The belief says too little to act on.
+            return previous
         if observation.lead is not None:
             reach = min(reach, observation.lead.distance)
         return SpeedAdvice(min(speed_limit, reach / self.headway))

@@ -130,6 +130,7 @@ MEASUREMENTS = (
     benchmark("photograph_roads", 1, ("photographs",)),
     benchmark("sign_estimators", 6, ("sign estimators",), " --drives 12"),
     benchmark("sensor_faults", 6, ("sensor faults",)),
+    benchmark("roadside_cameras", 3, ("roadside cameras",)),
     benchmark("broken_devices", 15, ("broken devices",), " -j 2", cores=2),
     benchmark("grades", 6),
     benchmark("uneven_fog", 30, ("uneven fog",)),

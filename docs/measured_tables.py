@@ -131,6 +131,7 @@ MEASUREMENTS = (
     benchmark("photograph_roads", 1, ("photographs",)),
     benchmark("sign_estimators", 6, ("sign estimators",), " --drives 12"),
     benchmark("sensor_faults", 6, ("sensor faults",)),
+    benchmark("roadside_cameras", 3, ("roadside cameras",)),
     benchmark("broken_devices", 15, ("broken devices",), " -j 2", cores=2),
     benchmark("driver_warnings", 30, ("warnings",), WARNINGS_KEPT),
     benchmark("grades", 6),

@@ -217,7 +217,8 @@ class AttachedSession:
                 self._drivers_fog.enter(fog, self._traffic)
         time = self._elapsed(snapshot.state.time)
         self._drivers_fog.set_time(time)
-        step = self._equipment.complete_step(self._index, time, snapshot, self._command, None)
+        sent = self._equipment.look_from_roadside(time, snapshot.state)
+        step = self._equipment.complete_step(self._index, time, snapshot, self._command, None, sent)
         step, self._begun = dataclasses.replace(step, begun=self._begun), ()
         self._index += 1
         return step

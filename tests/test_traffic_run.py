@@ -119,6 +119,7 @@ def test_signs_along_named_edges_go_each_by_its_own_meter() -> None:
     [
         (("estimators=[negru2013]",), r"estimators: reading frames needs an ego, and traffic.ego is none"),
         (("sensors.faults=[{fault: dropout}]",), r"sensors\.faults: a fault of a sensor needs an ego"),
+        (("sensors.reports.roadside={camera: {}}",), r"roadside\.camera: drawing images needs an ego"),
         (("renderer=cpu",), r"renderer: drawing frames needs an ego"),
         (("advice.informed_by=belief",), r"advice.informed_by: belief needs an ego"),
         (("lighting=fog_lamp_rules",), r"lighting: choosing lamps needs an ego"),

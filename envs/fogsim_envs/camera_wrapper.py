@@ -166,7 +166,8 @@ class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordC
         snapshot = read_snapshot(self._fleet, self._progress, (), reach)
         if snapshot is not None:
             index = 0 if self._step is None else self._step.index + 1
-            self._step = self._equipment.complete_step(index, self._fleet.time, snapshot, _COMMAND, None)
+            sent = self._equipment.look_from_roadside(self._fleet.time, snapshot.state)
+            self._step = self._equipment.complete_step(index, self._fleet.time, snapshot, _COMMAND, None, sent)
         if self._step is None:
             raise gymnasium.error.ResetNeeded("the controlled vehicle is not on the road: call reset()")
         own = observe(self._step)

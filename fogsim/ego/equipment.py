@@ -16,6 +16,7 @@ from fogsim.ego.frame_watch import FrameWatch, LeadHistory, why_useless
 from fogsim.ego.light_sensing import LightSensing, lamp_effects
 from fogsim.ego.measurements import EgoSensors
 from fogsim.ego.road_meters import RoadMeters
+from fogsim.ego.roadside_cameras import RoadsideCameras
 from fogsim.ego.second_camera import SecondCamera
 from fogsim.ego.sensor_faults import FaultSchedule
 from fogsim.ego.shutter import Shutter, exposed
@@ -55,12 +56,13 @@ from fogsim.values.script import Actions
 
 
 class _RunParts(NamedTuple):
-    """What lives as long as one run: random numbers, faults, meters, what others tell, and signs."""
+    """What lives as long as one run: random numbers, faults, meters, what others tell, roads and signs."""
 
     streams: Streams
     schedule: FaultSchedule
     meters: RoadMeters
     reporters: FogReports
+    road: RoadNetwork
     signs: SignMap
 
 
@@ -95,6 +97,7 @@ class EgoEquipment:
         self._streams: Streams | None = None
         self._meters: RoadMeters | None = None
         self._reporters: FogReports | None = None
+        self._roadside_cameras: RoadsideCameras | None = None
         self._way = KnownWay()
         self._network: tuple[RoadNetwork, SignMap] | None = None
         self._sign_faults: tuple[FaultKind, ...] = ()
@@ -159,7 +162,7 @@ class EgoEquipment:
         self._delivery.reset()
         self._watch.reset()
         self._leads.reset()
-        self._streams = streams
+        self._streams, self._roadside_cameras = streams, None
         if self._reporters is not None:
             self._reporters.reset(streams.reports)
         if self._meters is not None:
@@ -276,7 +279,7 @@ class EgoEquipment:
         ending : Ending or None
             Why the run is over.
         sent : sequence of (str, FogReport)
-            Ids of equipped vehicles, and what they have seen in their last pictures.
+            Ids of equipped vehicles, and what they have seen in their last pictures; `look_from_roadside`.
 
         Raises
         ------
@@ -285,11 +288,8 @@ class EgoEquipment:
         """
         parts = self._run_parts()
         faults = parts.schedule.at(time)
-        renderer, state, ego = self._view_of_world(faults), snapshot.state, snapshot.ego
-        camera, light = knocked(self._camera, [one.kind for one in faults]), self._light.at(time)
-        if light != self._daylight:
-            self._daylight = light
-            self._enter_fog(in_daylight(renderer.fog, light))
+        renderer, light = self._lit_world(faults, time)
+        state, ego, camera = snapshot.state, snapshot.ego, knocked(self._camera, [one.kind for one in faults])
         pose, fog = self._pose(state, ego), field_at(renderer.fog, time)
         reports = parts.reporters.heard(time, state, ego, fog, sent)
         parts.meters.hear(reports)
@@ -351,13 +351,36 @@ class EgoEquipment:
             reading_radius=self._scenario.traffic.reading_radius_m,
         )
 
+    def look_from_roadside(self, time: float, state: TrafficState) -> tuple[tuple[str, FogReport], ...]:
+        """See by cameras beside the road at a time [s]: part of what is `sent` to all in `complete_step`."""
+        sensors = self._scenario.sensors.reports.roadside
+        if sensors is None or sensors.camera is None:
+            return ()
+        parts = self._run_parts()
+        if self._roadside_cameras is None:
+            rng = parts.streams.reports.spawn(1)[0]
+            self._roadside_cameras = RoadsideCameras(self._scenario, sensors, sensors.camera, parts.road.route, rng)
+        renderer, light = self._lit_world(parts.schedule.at(time), time)
+        reports = self._roadside_cameras.look(
+            time, light, lambda pose, camera: renderer.render(state, None, pose, time, camera, light)[1]
+        )
+        return tuple((report.source, report) for report in reports)
+
+    def _lit_world(self, faults: Sequence[RunningFault], time: float) -> tuple[EgoView, float]:
+        """What draws the world in the daylight of now, and its illuminance [lx]."""
+        renderer, light = self._view_of_world(faults), self._light.at(time)
+        if light != self._daylight:
+            self._daylight = light
+            self._enter_fog(in_daylight(renderer.fog, light))
+        return renderer, light
+
     def _run_parts(self) -> "_RunParts":
         """What lives as long as one run."""
         found = self._streams, self._schedule, self._meters, self._reporters, self._network
         streams, schedule, meters, reporters, network = found
         if streams is None or schedule is None or meters is None or reporters is None or network is None:
             raise SimulationError("the run has not been started, or is closed")
-        return _RunParts(streams, schedule, meters, reporters, network[1])
+        return _RunParts(streams, schedule, meters, reporters, *network)
 
     def _believe(self, estimates: tuple[Estimate, ...], observation: Observation, time: float, place: float) -> Belief:
         """What is believed after this step."""

@@ -20,7 +20,7 @@ from fogsim.scenario.sensors.reports import (
     VehicleReports,
 )
 from fogsim.units import extinction_from_visibility
-from fogsim.values import FogField, FogReport, TrafficState
+from fogsim.values import Estimate, FogField, FogReport, TrafficState
 
 Floats = NDArray[np.float64]
 
@@ -34,6 +34,9 @@ WRONG = extinction_from_visibility(20.0), extinction_from_visibility(5000.0)
 SENSOR = "sensor"
 """What names of sensors beside the road begin with."""
 
+REACH = 300.0
+"""Most of the way ahead in whose middle what a camera has seen counts [m]."""
+
 
 def is_of_sensor(report: FogReport) -> bool:
     """Whether a report is of a sensor beside the road.
@@ -44,6 +47,37 @@ def is_of_sensor(report: FogReport) -> bool:
         The report.
     """
     return report.source.startswith(SENSOR + " ")
+
+
+def sensor_places(sensors: RoadsideReports, length: float) -> Floats:
+    """Places of sensors beside a route of a length [m] along it [m]."""
+    return np.arange(sensors.first_m, length, sensors.every_m)
+
+
+def place_seen(place: float, estimate: Estimate) -> float:
+    """Middle of the road of which the estimate of a camera at a place along a route is the mean [m]."""
+    return place + 0.5 * min(estimate.reach, estimate.visibility, REACH)
+
+
+class Beats:
+    """When senders report: all at the beginning of a run, then each in its own beat, which a draw settles."""
+
+    def __init__(self, draw: int) -> None:
+        self._draw = draw
+        self._numbers: dict[str, int] = {}
+
+    def is_due(self, name: str, period: float, time: float) -> bool:
+        """Whether a sender is to report again; its report is then the next one."""
+        phase = zlib.crc32(f"{name} {self._draw}".encode()) / 2**32
+        number = math.floor(time / period + phase)
+        if self._numbers.get(name) == number:
+            return False
+        self._numbers[name] = number
+        return True
+
+    def number(self, name: str) -> int:
+        """Number of a sender's last report."""
+        return self._numbers[name]
 
 
 class FogReports:
@@ -75,7 +109,7 @@ class FogReports:
         self._rng = rng
         self._draw = int(rng.integers(2**32))
         self._under_way: list[tuple[float, FogReport]] = []
-        self._told: dict[str, int] = {}
+        self._beats = Beats(self._draw)
         self._has_begun = False
 
     def heard(
@@ -94,10 +128,13 @@ class FogReports:
         fog : FogField
             The fog now.
         sent : iterable of (str, FogReport)
-            Ids of equipped vehicles, and what they have seen in their last pictures.
+            Ids of equipped vehicles and names of sensors beside the road, and what their last pictures show.
         """
+        sent = tuple(sent)
         if self._cameras is not None:
             self._take_from_cameras(self._cameras, sent, state, ego)
+        if self._roadside is not None:
+            self._take_from_sensors(self._roadside, sent)
         if self._vehicles is not None:
             self._measure_vehicles(self._vehicles, time, state, ego, fog)
         return self.heard_from_roadside(time, fog)
@@ -110,15 +147,15 @@ class FogReports:
         time, fog
             See `heard`.
         """
-        if self._roadside is not None:
+        if self._roadside is not None and self._roadside.camera is None:
             self._measure_roadside(self._roadside, time, fog)
         arrived = tuple(report for due, report in self._under_way if due <= time + 1e-9)
         self._under_way = [(due, report) for due, report in self._under_way if due > time + 1e-9]
         return arrived
 
     def _measure_roadside(self, sensors: RoadsideReports, time: float, fog: FogField) -> None:
-        places = np.arange(sensors.first_m, self._places.stations[-1], sensors.every_m)
-        due = [i for i in range(len(places)) if self._is_due(f"{SENSOR} {i}", sensors.period_s, time)]
+        places = sensor_places(sensors, self._places.stations[-1])
+        due = [i for i in range(len(places)) if self._beats.is_due(f"{SENSOR} {i}", sensors.period_s, time)]
         if not due:
             return
         # A run begins with what sensors have told before of the fog as it is then.
@@ -134,7 +171,7 @@ class FogReports:
     ) -> None:
         for row, place in self._senders(radio, state, ego):
             name = state.ids[row]
-            if self._is_due(name, radio.period_s, time):
+            if self._beats.is_due(name, radio.period_s, time):
                 eyes = state.position[row] + np.array([0.0, 0.0, METER_HEIGHT])
                 self._send(name, place, float(extinction(fog, eyes)), radio, time)
 
@@ -152,22 +189,23 @@ class FogReports:
         apart = dict(zip(state.ids, _apart(state, ego).tolist(), strict=True))
         for vehicle, report in sent:
             in_range = vehicle != state.ids[ego] and apart.get(vehicle, math.inf) <= radio.range_m
-            if in_range and self._is_due(report.source, radio.period_s, report.time):
-                ahead = self._clock_error(report.source, radio.clock_deviation_s)
-                self._let_travel(replace(report, time=report.time + ahead), report.time, radio)
+            if in_range and self._beats.is_due(report.source, radio.period_s, report.time):
+                self._forward(report, radio)
+
+    def _take_from_sensors(self, sensors: RoadsideReports, sent: Iterable[tuple[str, FogReport]]) -> None:
+        """Let what cameras beside the road have seen be on its way to the ego."""
+        for _, report in sent:
+            if is_of_sensor(report):
+                self._forward(report, sensors)
+
+    def _forward(self, report: FogReport, sender: ReportsFrom) -> None:
+        """Let a report with the time of its picture be on its way, with that of the sender's clock in it."""
+        ahead = self._clock_error(report.source, sender.clock_deviation_s)
+        self._let_travel(replace(report, time=report.time + ahead), report.time, sender)
 
     def _is_equipped(self, name: str, share: float) -> bool:
         """Whether a vehicle is, which in one run it is always or never."""
         return zlib.crc32(f"{self._draw} {name}".encode()) < share * 2**32
-
-    def _is_due(self, name: str, period: float, time: float) -> bool:
-        """Whether a sender is to tell again; each has its own beat."""
-        phase = zlib.crc32(f"{name} {self._draw}".encode()) / 2**32
-        number = math.floor(time / period + phase)
-        if self._told.get(name) == number:
-            return False
-        self._told[name] = number
-        return True
 
     def _send(self, name: str, place: float, k: float, sender: MeasuredReports, time: float) -> None:
         wrong, noise, any_k = self._rng.random(), self._rng.standard_normal(), self._rng.random()
@@ -175,7 +213,8 @@ class FogReports:
         if wrong < sender.wrong:
             told = WRONG[0] * (WRONG[1] / WRONG[0]) ** any_k
         told_time = time + self._clock_error(name, sender.clock_deviation_s)
-        self._let_travel(FogReport(name, self._told[name], place, told_time, told, sender.deviation), time, sender)
+        number = self._beats.number(name)
+        self._let_travel(FogReport(name, number, place, told_time, told, sender.deviation), time, sender)
 
     def _clock_error(self, name: str, deviation: float) -> float:
         """How far a sender's clock is ahead [s]; in one run always the same."""

@@ -31,7 +31,7 @@ class RoadMeters:
         self._places = meter_places(scenario, self._stretches, route)
         self._limits = section_limits(self._stretches, route, limits)
         self._along = [stretch.start for stretch in self._stretches]
-        self._reported: dict[float, float] = {}
+        self._reported: dict[str, tuple[float, float]] = {}
 
     def reset(self) -> None:
         """Begin a run, in which no sensor has reported anything."""
@@ -46,7 +46,7 @@ class RoadMeters:
             What has come in, from others too.
         """
         # Later ones come later: all are on their way for the same time.
-        self._reported.update((one.place, one.extinction) for one in reports if is_of_sensor(one))
+        self._reported.update((one.source, (one.place, one.extinction)) for one in reports if is_of_sensor(one))
 
     def measure(self, fog: FogField) -> tuple[RoadSection, ...]:
         """What they measure, in the direction of travel.
@@ -63,7 +63,7 @@ class RoadMeters:
         return tuple(itertools.starmap(RoadSection, sections))
 
     def _nearest(self, place: float) -> float | None:
-        """What the sensor nearest to a place along the route has reported last [1/m]."""
+        """What has been reported last by the sensor whose report is of the place nearest to one on the route [1/m]."""
         if not self._reported:
             return None
-        return self._reported[min(self._reported, key=lambda at: abs(at - place))]
+        return min(self._reported.values(), key=lambda one: abs(one[0] - place))[1]

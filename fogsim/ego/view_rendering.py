@@ -109,7 +109,7 @@ class EgoView(Protocol):
     def render(
         self,
         state: TrafficState,
-        ego: int,
+        ego: int | None,
         pose: CameraPose,
         time: float,
         camera: Camera | None = None,
@@ -306,7 +306,7 @@ class ViewRenderer:
     def render(
         self,
         state: TrafficState,
-        ego: int,
+        ego: int | None,
         pose: CameraPose,
         time: float,
         camera: Camera | None = None,
@@ -318,14 +318,14 @@ class ViewRenderer:
         ----------
         state : TrafficState
             Every vehicle.
-        ego : int
-            Row of the one that carries the camera.
+        ego : int or None
+            Row of the one that carries the camera; None for a camera beside the road.
         pose : CameraPose
             Where the camera is.
         time : float
             Time since the run began [s].
         camera : Camera or None
-            Its true calibration now, if it is another than at the beginning.
+            Its true calibration now, if it is another than the ego's at the beginning.
         illuminance : float or None
             Horizontal illuminance of the daylight now [lx]; None for the scenario's. The fog's airlight is that of the
             fog that was entered.
@@ -338,19 +338,19 @@ class ViewRenderer:
             Linear radiance at the camera [cd/m²], the mean of a pixel's samples.
         """
         self._set_daylight(self._scenario.light.illuminance_lx if illuminance is None else illuminance)
-        self._go_to(state.position[ego])
+        self._go_to(np.array(pose.position) if ego is None else state.position[ego])
         drawn = self._drawn_camera
         if camera is not None and camera != self._camera:
             drawn = supersampled(camera, self._samples)
         lights = self._lights(state, ego, pose)
         near, viewpoint = self._from_origin(state, pose)
-        renderer = self._renderer_for(viewpoint)
+        renderer = self._renderer_for(drawn, viewpoint)
         vehicles = traffic_batches(near, ego)
         view = renderer.render(vehicles, drawn, viewpoint, lamplight=bool(lights.own))
         if self._tunnel_light.is_seen_by(pose):
             own = self._unlit().render(vehicles, drawn, viewpoint).radiance
             view = self._tunnel_light.on(view, own, drawn, pose)
-        if self._bonnet is not None:
+        if self._bonnet is not None and ego is not None:
             view = with_bonnet(view, drawn, self._bonnet, Instance.FIRST_VEHICLE + ego, self._sky)
         radiance = self._air.radiance(view, drawn, pose, lights, time)
         return middle_samples(view, self._samples), averaged(radiance, self._samples)
@@ -380,9 +380,9 @@ class ViewRenderer:
         if self._known is not None and not self._known.contains(place[None, :])[0]:
             self._plan_scene_along(place[None, :])
 
-    def _renderer_for(self, viewpoint: CameraPose) -> Renderer:
-        """The renderer of a scene that has what is seen from a viewpoint."""
-        has_grown = self._near_scene.reach(self._drawn_camera, viewpoint)
+    def _renderer_for(self, camera: Camera, viewpoint: CameraPose) -> Renderer:
+        """The renderer of a scene that has what a camera sees from a viewpoint."""
+        has_grown = self._near_scene.reach(camera, viewpoint)
         return self._make_renderer() if has_grown or self._renderer is None else self._renderer
 
     def _unlit(self) -> Renderer:
@@ -405,11 +405,11 @@ class ViewRenderer:
         )
         return moved, replace(pose, position=(x, y, z))
 
-    def _lights(self, state: TrafficState, ego: int, pose: CameraPose) -> Lights:
+    def _lights(self, state: TrafficState, ego: int | None, pose: CameraPose) -> Lights:
         if not self._by_lamplight:
             return _UNLIT
         return Lights(
-            own=self._own_lamps(Lamp(int(state.lamps[ego]))),
+            own=() if ego is None else self._own_lamps(Lamp(int(state.lamps[ego]))),
             others=light_sources(state, ego, pose.position, self._mount.beams, self._street_lamps),
             streets=self._streets,
             beams=road_beams(state, ego, pose.position, self._mount.beams, self._sky),

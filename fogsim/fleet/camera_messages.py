@@ -1,12 +1,10 @@
 """What vehicles with cameras tell others of the fog."""
 
+from fogsim.ego.fog_reports import place_seen
 from fogsim.values import Estimate, FogReport, Step
 
 SURE = 0.5
 """Relative deviation beyond which an extinction is not told [-]."""
-
-REACH = 300.0
-"""Most of the way ahead in whose middle what a camera has seen counts [m]."""
 
 
 def camera_messages(step: Step) -> tuple[tuple[str, FogReport], ...]:
@@ -31,6 +29,6 @@ def _report(vehicle: str, place: float, estimates: tuple[Estimate, ...], step: S
     if not valid:
         return None
     surest = min(valid, key=lambda one: one.standard_deviation / one.extinction)
-    ahead = 0.5 * min(surest.reach, REACH)
     deviation = surest.standard_deviation / surest.extinction
-    return FogReport(f"camera of {vehicle}", step.index, place + ahead, step.time, surest.extinction, deviation)
+    seen = place_seen(place, surest)
+    return FogReport(f"camera of {vehicle}", step.index, seen, step.time, surest.extinction, deviation)

@@ -59,7 +59,7 @@ class Instant:
     route_length : float
         Of the ego's route [m].
     sent : tuple of (str, FogReport)
-        Ids of vehicles, and what their cameras saw in their last pictures.
+        Ids of vehicles and names of sensors beside the road, and what their cameras saw in their last pictures.
     """
 
     index: int

@@ -162,15 +162,16 @@ class FieldFilter:
         if estimate.optical_depths is None:
             end = min(estimate.reach, self._sight(k))
             for start in (0.0, 0.5 * end):
-                self._learn(start, start + 0.5 * end, math.log(k), math.sqrt(2.0) * relative)
+                self._learn(start, start + 0.5 * end, math.log(k), math.sqrt(2.0) * relative, estimate.common_deviation)
             return
         for start, end, value, deviation in curve_stretches(estimate.optical_depths, FARTHEST).tolist():
-            self._learn(start, end, value, max(deviation, 0.5 * relative))
+            self._learn(start, end, value, max(deviation, 0.5 * relative), estimate.common_deviation)
 
-    def _learn(self, start: float, end: float, value: float, deviation: float) -> None:
+    def _learn(self, start: float, end: float, value: float, deviation: float, common: float) -> None:
         # The errors of pictures that follow one another are alike: each counts for the share of time that is new.
-        widened = max(deviation, self._floor) / math.sqrt(self._share)
-        self._field.learn(start, end, value, widened, self._outlier_share, self._floor)
+        floor = max(self._floor, common)
+        widened = max(deviation, floor) / math.sqrt(self._share)
+        self._field.learn(start, end, value, widened, self._outlier_share, floor)
 
     def _hear(self, report: FogReport, time: float, place: float) -> None:
         """Learn what somebody else has measured."""

@@ -24,6 +24,9 @@ LOG_LOW, LOG_HIGH = (math.log(extinction_from_visibility(v)) for v in (FARTHEST,
 LOG_RANGE = LOG_HIGH - LOG_LOW
 _MOST_STEPS = 64
 
+MOST_COMMON = 3.0
+"""Largest common deviation that counts [-]: a wider one leaves nothing known either."""
+
 LEAST_UNBOUND = 0.2
 """Least share of bounds that are taken for wrong [-]: signs that bound the fog may be missing or hidden."""
 
@@ -36,7 +39,8 @@ class GridFilter:
     second. An estimate k̂ ± σ has the likelihood N(k̂; k, σ) in k, so that "no fog seen", k̂ = 0, pushes toward thin
     fog without claiming any particular visibility; a share of estimates is taken for outliers that could be anything.
     Neighbouring frames share their errors (road texture, pitch), so an estimate counts only for the share of
-    `correlation_time` that has passed since the one before: the likelihood is raised to that power. Invalid estimates
+    `correlation_time` that has passed since the one before: the likelihood is raised to that power. What all images
+    share (`Estimate.common_deviation`) widens the belief, whatever their number. Invalid estimates
     change nothing but by their bounds, beyond which k is as unlikely as bounds are wrong; time alone widens the belief.
     Before the first estimate every ln k on the grid is equally likely.
 
@@ -101,6 +105,7 @@ class GridFilter:
         self._announcements.reset()
         self._time: float | None = None
         self._weight = 1.0
+        self._common = 0.0
 
     def update(self, estimates: Sequence[Estimate], time: float) -> Belief:
         """Take in the estimates of one instant.
@@ -126,18 +131,26 @@ class GridFilter:
         self._advance(time)
         denser = self._announcements.update(estimates, time)
         farthest = 0.0 if denser is None else denser.distance
-        log_likelihood = np.zeros(CELLS)
+        log_likelihood, common = np.zeros(CELLS), math.inf
         for estimate in estimates:
             if estimate.reach < farthest:
                 continue
             if estimate.valid and math.isfinite(estimate.extinction) and math.isfinite(estimate.standard_deviation):
                 log_likelihood += self._weight * self._log_likelihood(estimate)
+                common = min(common, estimate.common_deviation)
             elif estimate.bounds is not None:
                 log_likelihood += self._weight * self._log_likelihood_within(estimate.bounds)
         # The largest exponent is zero: no product of densities can overflow, and the sum cannot vanish.
         posterior = self._probability * np.exp(log_likelihood - log_likelihood.max())
         self._probability = posterior / posterior.sum()
-        return Belief(self._log_extinction, self._probability.copy(), denser)
+        self._common = self._common if common == math.inf else min(common, MOST_COMMON)
+        return Belief(self._log_extinction, self._with_common_errors(), denser)
+
+    def _with_common_errors(self) -> Floats:
+        """The probability, spread by what all images of the best method in use have wrong in common."""
+        if self._common == 0.0:
+            return self._probability.copy()
+        return _folded(convolution(self._probability, self._walk(self._common)))
 
     def _advance(self, time: float) -> None:
         if not math.isfinite(time):

@@ -26,6 +26,7 @@ from fogsim.scenario.parts.sensors import (
     camera_sensor,
     gps,
     lead_sensor,
+    roadside_scenario,
     scatterometer,
     sensor,
 )
@@ -56,6 +57,7 @@ __all__ = [
     "pavement",
     "periods",
     "road_adviser",
+    "roadside_scenario",
     "safety_standard",
     "scatterometer",
     "sensor",

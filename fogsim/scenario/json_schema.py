@@ -42,6 +42,8 @@ def scenario_json_schema() -> dict[str, Any]:
     schema["$defs"].update(beside["$defs"])
     for key, registry in _METHODS.items():
         written[key] = _methods(written[key], registry)
+    beside_road = schema["$defs"]["RoadsideCamera"]["properties"]
+    beside_road["estimator"] = _methods(beside_road["estimator"], ESTIMATORS)
     written[BLOCK] = {
         "type": "object",
         "description": "What is under test: keys that may stand by themselves too.",

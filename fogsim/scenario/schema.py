@@ -249,8 +249,13 @@ class Scenario(Section):
 
     @field_validator("sensors")
     @classmethod
-    def _frames_for_faults(cls, value: Sensors, info: ValidationInfo) -> Sensors:
+    def _frames_for_cameras(cls, value: Sensors, info: ValidationInfo) -> Sensors:
         if info.data.get("renderer") == NO_RENDERER:
+            roadside = value.reports.roadside
+            if roadside is not None and roadside.camera is not None:
+                raise ValueError(
+                    "reports.roadside.camera takes images, and renderer: none draws none; leave it out, or choose auto"
+                )
             for place, fault in enumerate(value.faults):
                 if fault.sensor == "camera":
                     raise ValueError(f"faults.{place} is of the camera, and renderer: none draws no frames")

@@ -60,6 +60,12 @@ def _of_camera(written: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
     if isinstance(sensors, dict) and sensors.get("faults"):
         yield ("sensors", "faults"), f"a fault of a sensor {_NEEDS}; leave it out"
     reports = sensors.get("reports") if isinstance(sensors, dict) else None
+    roadside = reports.get("roadside") if isinstance(reports, dict) else None
+    if isinstance(roadside, dict) and roadside.get("camera") is not None:
+        yield (
+            ("sensors", "reports", "roadside", "camera"),
+            f"drawing images {_NEEDS}; leave it out: sensors then measure with noise (deviation, wrong)",
+        )
     for key in ("vehicles", "cameras"):
         if isinstance(reports, dict) and reports.get(key):
             yield ("sensors", "reports", key), f"who hears other vehicles {_NEEDS}; leave it out, or write roadside"

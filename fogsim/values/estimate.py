@@ -165,6 +165,9 @@ class Estimate:
         How the fog varies along the road, of a method that tells.
     denser : DenserFog or None
         Denser fog ahead, of a method that tells.
+    common_deviation : float
+        Part of the relative standard deviation that all images of a drive share, as by the droplets or the pattern of
+        the own beam [-]: averaging over images does not reduce it.
     """
 
     method: str
@@ -176,6 +179,7 @@ class Estimate:
     reach: float = math.inf
     optical_depths: OpticalDepths | None = None
     denser: DenserFog | None = None
+    common_deviation: float = 0.0
 
     @classmethod
     def invalid(cls, method: str, reason: str, **diagnostics: object) -> "Estimate":

@@ -42,6 +42,17 @@ def seen(view_renderer: ViewRenderer, scenario: fogsim.Scenario, state: TrafficS
     return view.instance.copy(), radiance.copy()
 
 
+def test_a_camera_beside_the_road_sees_every_vehicle(scenario: fogsim.Scenario) -> None:
+    lane, state = road((0.0, 0.0), 900.0, "a"), two_cars(100.0, 0.0)
+    view_renderer = ViewRenderer(scenario, RoadNetwork((lane,), lane.centreline), SignMap())
+    pose = mounted_pose(build.camera(scenario), np.array([60.0, 0.0, 0.0]), 0.0, 0.0)
+    seen_by = {ego: set(view_renderer.render(state, ego, pose, 0.0)[0].instance.ravel()) for ego in (None, 0)}
+    # One hides the other.
+    assert 16 in seen_by[None]
+    assert 16 not in seen_by[0] >= {17}
+    view_renderer.close()
+
+
 @pytest.fixture(scope="module")
 def scenario() -> fogsim.Scenario:
     return fogsim.load_scenario("motorway_fog_bank", list(SETTINGS))

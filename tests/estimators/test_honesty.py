@@ -20,6 +20,7 @@ from fogsim.values import (
     CameraPose,
     Estimate,
     FogField,
+    FogReport,
     Frame,
     LeadMeasurement,
     LightMeasurement,
@@ -48,8 +49,8 @@ def drive() -> list[Step]:
     """A few frames in traffic with every method that is registered."""
     methods = ", ".join(f"{{method: {name}}}" for name in METHODS)
     size = (EARLY, "camera.width=320", "camera.height=240", "duration_s=2", "fog.visibility_m=80")
-    sensors = "sensors.scatterometer={}"
-    scenario = fogsim.load_scenario("motorway_fog_bank", [*size, sensors, f"estimators=[{methods}]"])
+    sensors = "sensors.scatterometer={}", "sensors.reports.roadside={camera: {}, every_m: 500, period_s: 1, delay_s: 0}"
+    scenario = fogsim.load_scenario("motorway_fog_bank", [*size, *sensors, f"estimators=[{methods}]"])
     return list(fogsim.run(scenario, seed=1))
 
 
@@ -68,6 +69,7 @@ def essence(estimate: Estimate) -> tuple[object, ...]:
 def check_same(honest: list[Step], misled: list[Step]) -> None:
     for a, b in zip(honest, misled, strict=True):
         assert np.array_equal(a.observation.image, b.observation.image)
+        assert a.observation.reports == b.observation.reports
         for one, other in zip(a.estimates, b.estimates, strict=True):
             assert essence(one) == essence(other), f"{one.method}, frame {a.index}"
         assert np.array_equal(a.belief.probability, b.belief.probability)
@@ -80,6 +82,7 @@ def test_the_drive_tells_each_method_apart(as_it_is: list[Step]) -> None:
     assert [estimate.method for estimate in as_it_is[0].estimates] == METHODS
     assert telling >= {"negru2013", "zhu2015", "huang2015", "huang2015_rough", "joint_road", "scatterometer"}
     assert as_it_is[-1].observation.lead is not None
+    assert len({report.source for step in as_it_is for report in step.observation.reports}) >= 5
 
 
 def test_deleting_the_truth_changes_nothing(as_it_is: list[Step], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -90,12 +93,16 @@ def test_deleting_the_truth_changes_nothing(as_it_is: list[Step], monkeypatch: p
 
 
 def test_a_false_truth_changes_nothing(as_it_is: list[Step], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Another fog, visibility, calibration, place, distances, instances and leader than what was drawn and measured."""
+    """Another fog, visibility, calibration, place, distances, instances and leader than what was drawn and measured.
+
+    Reports of cameras beside the road stay the same too.
+    """
+    from fogsim.ego.fog_reports import FogReports
     from fogsim.ego.view_rendering import ViewRenderer
     from fogsim.sensors import measure_lead
 
     rng = np.random.default_rng(4)
-    render = ViewRenderer.render
+    render, heard = ViewRenderer.render, FogReports.heard
 
     def false_truth(
         fog: FogField, pose: CameraPose, camera: Camera, signs: SignMap, traffic: TrafficState, *_: object
@@ -116,7 +123,12 @@ def test_a_false_truth_changes_nothing(as_it_is: list[Step], monkeypatch: pytest
     def measure_another(leader, *arguments):
         return measure_lead(leader and dataclasses.replace(leader, vehicle_id=f"v{rng.integers(99)}"), *arguments)
 
+    def hear_in_another_fog(self, time, state, ego, fog, sent):
+        there = dataclasses.replace(state, position=state.position + rng.normal(0.0, 100.0, state.position.shape))
+        return heard(self, time, there, ego, dataclasses.replace(fog, extinction=float(rng.uniform(0.0, 0.2))), sent)
+
     monkeypatch.setattr("fogsim.ego.equipment.fog_truth", false_truth)
+    monkeypatch.setattr(FogReports, "heard", hear_in_another_fog)
     monkeypatch.setattr("fogsim.ego.measurements.measure_lead", measure_another)
     monkeypatch.setattr(ViewRenderer, "render", render_falsely)
     misled = drive()
@@ -132,6 +144,7 @@ ALLOWED = (
     LeadMeasurement,
     LightMeasurement,
     SignSighting,
+    FogReport,
     float,
     int,
     str,

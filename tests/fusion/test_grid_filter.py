@@ -100,6 +100,15 @@ def test_no_fog_seen_excludes_dense_fog_only():
     assert belief.visibility_quantile(0.95) > 5000.0
 
 
+def test_what_all_images_have_wrong_in_common_stays_in_the_belief():
+    alike = [dataclasses.replace(measured(100.0), common_deviation=0.2)] * 200
+    fusion = make("grid_filter")
+    assert feed(fusion, alike).log_standard_deviation == pytest.approx(0.2, abs=0.05)
+    # A method without such errors, once it speaks, counts as it did.
+    assert feed(fusion, [measured(100.0)] * 50, start=20.0).log_standard_deviation < 0.15
+    assert feed(fusion, [Estimate.invalid("test", "nothing seen")], start=25.0).log_standard_deviation < 0.2
+
+
 def test_agreeing_methods_narrow_the_belief():
     one = make("grid_filter").update([measured(100.0)], 0.0)
     two = make("grid_filter").update([measured(100.0), measured(100.0)], 0.0)

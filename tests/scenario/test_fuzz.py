@@ -53,7 +53,13 @@ EXAMPLES: dict[str, Any] = {
 }
 """Blocks that have required keys, and are there only where one of their keys is tried."""
 
-METHODS = {"estimators": ESTIMATORS, "fusion": FUSIONS, "advice": ADVISERS, "lighting": LIGHTING_POLICIES}
+METHODS = {
+    "estimators": ESTIMATORS,
+    "estimator": ESTIMATORS,
+    "fusion": FUSIONS,
+    "advice": ADVISERS,
+    "lighting": LIGHTING_POLICIES,
+}
 
 MISSING = object()
 WRONG: list[Any] = [
@@ -135,7 +141,8 @@ def written(key: Key, value: Any, data: dict[str, Any]) -> None:
     put_examples(key.path, data)
     if key.method:
         block = {"method": key.method, "parameters": {key.path[-1]: value} if value is not MISSING else {}}
-        data[key.path[0]] = [block] if key.path[0] == "estimators" else block
+        *place, _, _ = key.path
+        put(data, tuple(place) if key.path[0] != "estimators" else ("estimators",), [block] if 0 in place else block)
     else:
         put(data, key.path, value)
 

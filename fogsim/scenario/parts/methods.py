@@ -128,9 +128,10 @@ def own_methods(scenario: Scenario) -> dict[str, str]:
     scenario : Scenario
         The scenario.
     """
-    folder = scenario.directory
+    folder, roadside = scenario.directory, scenario.sensors.reports.roadside
+    beside_road = () if roadside is None or roadside.camera is None else (roadside.camera.estimator,)
     found = {
-        **{one.method: ESTIMATORS.version(one.method, folder) for one in scenario.estimators},
+        **{one.method: ESTIMATORS.version(one.method, folder) for one in (*scenario.estimators, *beside_road)},
         scenario.fusion.method: FUSIONS.version(scenario.fusion.method, folder),
         scenario.advice.method: ADVISERS.version(scenario.advice.method, folder),
         scenario.lighting.method: LIGHTING_POLICIES.version(scenario.lighting.method, folder),

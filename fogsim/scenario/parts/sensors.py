@@ -5,7 +5,9 @@ import math
 
 from fogsim.atmosphere import airlight_from_illuminance
 from fogsim.camera import USUAL_MOUNTS, AutoExposure, BodyPitch, CameraMount, CameraSensor, Metering, Sensor, Suspension
+from fogsim.scenario.camera_schema import CameraSection
 from fogsim.scenario.schema import Scenario
+from fogsim.scenario.sensors.reports import RoadsideCamera
 from fogsim.sensors import Gps, LeadSensor, Scatterometer
 from fogsim.values import Camera
 
@@ -147,6 +149,16 @@ def body_pitch(scenario: Scenario) -> BodyPitch:
     body = scenario.camera.body
     suspension = Suspension(math.radians(body.pitch_deg_per_mps2), body.time_constant_s)
     return BodyPitch(suspension, scenario.clocks.camera_period_s)
+
+
+def roadside_scenario(scenario: Scenario, section: RoadsideCamera) -> Scenario:
+    """The scenario with a camera beside the road in place of the ego's, and the estimator that reads it."""
+    place = {
+        name: getattr(section, name) for name in type(section).model_fields.keys() & CameraSection.model_fields.keys()
+    }
+    alone = {"focal_length_px": None, "principal_point_px": None, "roll_deg": 0.0}
+    camera = scenario.camera.model_copy(update={**place, **alone})
+    return scenario.model_copy(update={"camera": camera, "estimators": (section.estimator,)})
 
 
 def lead_sensor(scenario: Scenario) -> LeadSensor:

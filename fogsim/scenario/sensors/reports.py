@@ -1,10 +1,24 @@
 """The keys of a scenario file about what others tell of the fog: sensors beside the road, and other vehicles."""
 
-from typing import Annotated
+from typing import Annotated, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from fogsim.scenario.section import Distance, Length, Number, Period, Section, Share, Time
+from fogsim.estimators import ESTIMATORS
+from fogsim.scenario.camera_schema import CalibrationErrors
+from fogsim.scenario.section import (
+    Distance,
+    Length,
+    Method,
+    Number,
+    Period,
+    Place,
+    Section,
+    Share,
+    Time,
+    Whole,
+    method_of,
+)
 
 HALF_A_MILE = 804.672
 
@@ -32,6 +46,37 @@ class MeasuredReports(ReportsFrom):
     """Share of measurements that are of any visibility between 20 m and 5 km: droplets on the lens, spray, insects."""
 
 
+class RoadsideCamera(Section):
+    """A camera on a mast beside the road, looking along it in the direction of travel.
+
+    Its lens, image sensor and exposure are those that `camera` describes for the ego.
+    """
+
+    estimator: Annotated[Method, method_of(ESTIMATORS)] = Method(method="joint_road")
+    """Estimator that reads its images; one for the day, since a mast has no head lamps."""
+
+    width: Whole = Field(default=320, ge=16, le=4096)
+    """Columns of the image."""
+
+    height: Whole = Field(default=240, ge=16, le=4096)
+    """Rows of the image."""
+
+    field_of_view_deg: Number = Field(default=58.0, ge=1, le=170)
+    """Horizontal field of view."""
+
+    mount_height_m: Annotated[Number, Field(ge=0.05, le=100)] = 6.0
+    """Height of the camera above the road."""
+
+    right_of_route_m: Annotated[Place, Field(ge=-100, le=100)] = 8.0
+    """Distance of the mast to the right of the ego's route; negative for the left."""
+
+    pitch_deg: Number = Field(default=2.0, ge=-45, le=45)
+    """Pitch; positive looks down."""
+
+    told: CalibrationErrors = CalibrationErrors()
+    """Errors of the calibration that the estimator assumes."""
+
+
 class RoadsideReports(MeasuredReports):
     """Visibility sensors beside the ego's route, as on California's Highway 99."""
 
@@ -46,6 +91,19 @@ class RoadsideReports(MeasuredReports):
 
     delay_s: Time = 5.0
     """Time from a measurement to its arrival; an operator who must confirm it takes minutes."""
+
+    camera: RoadsideCamera | None = None
+    """A camera whose images are read, in place of a measurement with noise (`deviation`, `wrong`); `{}` will do."""
+
+    @model_validator(mode="after")
+    def _measured_or_seen(self) -> Self:
+        written = [key for key in ("deviation", "wrong") if key in self.model_fields_set]
+        if self.camera is not None and written:
+            raise ValueError(
+                f"{' and '.join(written)} is of sensors that measure with noise, and camera replaces them: its errors "
+                f"are those of an estimator; leave out {' and '.join(written)} or camera"
+            )
+        return self
 
 
 class VehicleReports(MeasuredReports):

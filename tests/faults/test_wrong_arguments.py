@@ -284,7 +284,7 @@ def test_what_scenarios_and_runs_are_named_by() -> None:
     assert not Path("nowhere").exists()
 
 
-@pytest.mark.parametrize("field", ["lamps_of", "advised_speeds", "stretches", "advice", "lamps", "control"])
+@pytest.mark.parametrize("field", ["lamps_of", "advised_speeds", "stretches", "advice", "lamps", "control", "warning"])
 def test_commands(field: str) -> None:
     for value in WRONG:
         assert field in refusal(checked_command, fogsim.Command(**{field: value})) or value == {"a": "b"}

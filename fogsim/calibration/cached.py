@@ -14,10 +14,12 @@ from pathlib import Path
 from typing import TypeVar
 
 from fogsim.calibration.halo_calibration import Watch, measure_halo_threshold
+from fogsim.calibration.lit_fog import lit_fog
 from fogsim.calibration.sign_calibration import measure_operating_range
 from fogsim.calibration.veil_references import usual_references
 from fogsim.estimators import Estimator
 from fogsim.estimators.night.halos import HaloThreshold
+from fogsim.estimators.night.own_light import OwnLight
 from fogsim.estimators.night.references import VeilReferences
 from fogsim.estimators.protocol import TakesCalibrations
 from fogsim.estimators.signs.operating_range import OperatingRange
@@ -53,6 +55,10 @@ class CachedCalibrations:
         """References for a car's head lamps, computed once in each process."""
         return usual_references(camera, lamps, setback)
 
+    def own_light(self, camera: Camera, lamps: Lamp, setback: float, head_lamps: str) -> OwnLight:
+        """What a camera sees of its own head lamps, a car's, of an unknown pattern, or of a file."""
+        return _usual_light(camera, lamps, setback, head_lamps)
+
     def halo_threshold(self, camera: Camera) -> HaloThreshold:
         """Sharpness of halos below which there is fog; InputError if the camera shows none."""
         return _cached(HaloThreshold, "halos", camera, lambda watch: measure_halo_threshold(camera, watch=watch))
@@ -63,6 +69,11 @@ class CachedCalibrations:
         return _cached(
             OperatingRange, name, camera, lambda watch: measure_operating_range(camera, diameter, watch=watch)
         )
+
+
+@functools.lru_cache(maxsize=12)
+def _usual_light(camera: Camera, lamps: Lamp, setback: float, head_lamps: str) -> OwnLight:
+    return lit_fog(camera, lamps, setback, known=head_lamps != "unknown")
 
 
 def supply(estimator: Estimator) -> None:

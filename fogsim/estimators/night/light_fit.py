@@ -1,0 +1,285 @@
+"""Posterior of the visibility: veil, lit road, daylight and pedestal fitted to cells for each draw of the nuisances."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+
+Floats = NDArray[np.float64]
+Templates = NDArray[np.float32]
+
+RATIOS = np.linspace(-1.8, 1.8, 9)
+"""ln of the veil over the road, relative to what is drawn: pavement and droplets [-]."""
+
+RATIO_DEVIATION = 0.7
+"""Standard deviation of that [-]."""
+
+SOFTNESS = 0.25
+"""Mean square of the deviations below which a fit is not better [-]."""
+
+PEDESTAL = 6e-4
+"""Standard deviation of the sensor's dark offset and of light that the lens scatters evenly, of full scale [-]."""
+
+SOFT, HARD = 2.5, 3.5
+"""Deviations from which on a cell that is too bright or too dark counts less: others' lamps, things on the road [-]."""
+
+TERMS = 5
+"""Lamplight, pedestal, airlight, the road by day, and how the sky brightens upward."""
+
+
+class Measured(NamedTuple):
+    """What an image shows.
+
+    Attributes
+    ----------
+    seen : (cells,) float64
+        Luminance of the cells, full scale being 1.
+    variance : (cells,) float64
+        Of what the model says of each.
+    depth : (cells,) float64
+        Distance to the road, inf in the sky [m].
+    up : (cells,) float64
+        Elevation of sky cells over the highest [-], 0 on the road.
+    sky_scale, lamp_scale : float
+        Standard size of the airlight: of full scale, and relative to the lamplight's amplitude; 0 where unused.
+    independent : float
+        How many of the cells err independently of one another.
+    """
+
+    seen: Floats
+    variance: Floats
+    depth: Floats
+    up: Floats
+    sky_scale: float
+    lamp_scale: float
+    independent: float
+
+
+@kernel
+def log_likelihoods(
+    measured: Measured, extinction: Floats, veil: Templates, road: Templates, weight: Floats, best: Floats
+) -> Floats:
+    """ln of the likelihood (draws, extinctions), maximal over amplitudes and summed over ratios of veil and road.
+
+    Parameters
+    ----------
+    measured : Measured
+        The image.
+    extinction : (n,) float64
+        Extinction coefficients [1/m].
+    veil, road : (draws, n, cells) float32
+        What lamps light.
+    weight : (cells,) float64
+        How much each cell counts.
+    best : (cells + 1,) float64
+        Written to: luminance of the cells by the likeliest fit, and its mean squared deviation.
+    """
+    seen, variance, depth, up, sky_scale, lamp_scale, independent = measured
+    draws, count, cells = veil.shape
+    found = np.empty((draws, count))
+    precision, total = weight / variance, weight.sum()
+    even = np.empty((3, cells))
+    gram, side = np.zeros((TERMS + 1, TERMS + 1)), np.zeros(TERMS + 1)
+    used, matrix, right = np.zeros(TERMS), np.zeros((TERMS, TERMS + 1)), np.zeros(TERMS)
+    highest, power = -np.inf, 0.0
+    kept = np.zeros(TERMS + 3)
+    is_day = sky_scale > 0.0 or lamp_scale > 0.0
+    terms = TERMS if is_day else 2
+    for cell in range(cells):
+        power += precision[cell] * seen[cell] ** 2
+    for place in range(count):
+        for cell in range(cells):
+            clear = math.exp(-extinction[place] * depth[cell])
+            even[0, cell] = 1.0 - clear
+            even[1, cell] = clear if np.isfinite(depth[cell]) else 0.0
+            even[2, cell] = 4.0 * up[cell]
+        # Rows and columns: veil, road, pedestal, airlight, road by day, slope of the sky.
+        _sums_of_light(even, seen, precision, gram, side)
+        for draw in range(draws):
+            _sums_of_lamps(veil[draw, place], road[draw, place], even, seen, precision, terms, gram, side)
+            total_likelihood = 0.0
+            reference = -np.inf
+            for number in range(len(RATIOS)):
+                factor = math.exp(RATIOS[number])
+                _combine(gram, side, factor, terms, matrix, right)
+                rest = power + _solve(matrix, right, terms, sky_scale, lamp_scale, used)
+                square = max(rest, 0.0) / total
+                value = -0.5 * independent * math.log(SOFTNESS + square) - 0.5 * (RATIOS[number] / RATIO_DEVIATION) ** 2
+                if value > reference:
+                    total_likelihood = total_likelihood * math.exp(reference - value) + 1.0
+                    reference = value
+                else:
+                    total_likelihood += math.exp(value - reference)
+                if value > highest:
+                    highest = value
+                    kept[:TERMS] = used
+                    kept[TERMS], kept[TERMS + 1], kept[TERMS + 2] = draw, place, factor
+                    best[cells] = square
+            found[draw, place] = reference + math.log(total_likelihood)
+    draw, place, factor = int(kept[TERMS]), int(kept[TERMS + 1]), kept[TERMS + 2]
+    for cell in range(cells):
+        clear = math.exp(-extinction[place] * depth[cell])
+        lit = kept[0] * (factor * veil[draw, place, cell] + road[draw, place, cell]) + kept[1]
+        by_day = kept[2] * (1.0 - clear) + kept[4] * 4.0 * up[cell]
+        best[cell] = lit + by_day + (kept[3] * clear if np.isfinite(depth[cell]) else 0.0)
+    return found
+
+
+@kernel
+def _sums_of_light(even: Floats, seen: Floats, precision: Floats, gram: Floats, side: Floats) -> None:
+    """Normal equations of what does not depend on the lamps."""
+    for i in range(4):
+        for j in range(i, 4):
+            total = 0.0
+            for cell in range(len(seen)):
+                a = 1.0 if i == 0 else even[i - 1, cell]
+                b = 1.0 if j == 0 else even[j - 1, cell]
+                total += precision[cell] * a * b
+            gram[2 + i, 2 + j] = total
+        total = 0.0
+        for cell in range(len(seen)):
+            total += precision[cell] * (1.0 if i == 0 else even[i - 1, cell]) * seen[cell]
+        side[2 + i] = total
+
+
+@kernel
+def _sums_of_lamps(
+    veil: NDArray[np.float32],
+    road: NDArray[np.float32],
+    even: Floats,
+    seen: Floats,
+    precision: Floats,
+    terms: int,
+    gram: Floats,
+    side: Floats,
+) -> None:
+    """Normal equations of veil and road."""
+    vv = vr = rr = v1 = r1 = vy = ry = 0.0
+    va = ra = vd = rd = vs = 0.0
+    for cell in range(len(seen)):
+        v, r = precision[cell] * veil[cell], precision[cell] * road[cell]
+        vv += v * veil[cell]
+        vr += v * road[cell]
+        rr += r * road[cell]
+        v1 += v
+        r1 += r
+        vy += v * seen[cell]
+        ry += r * seen[cell]
+        if terms > 2:
+            va += v * even[0, cell]
+            ra += r * even[0, cell]
+            vd += v * even[1, cell]
+            rd += r * even[1, cell]
+            vs += v * even[2, cell]
+    gram[0, 0], gram[0, 1], gram[1, 1], gram[0, 2], gram[1, 2] = vv, vr, rr, v1, r1
+    gram[0, 3], gram[1, 3], gram[0, 4], gram[1, 4], gram[0, 5], gram[1, 5] = va, ra, vd, rd, vs, 0.0
+    side[0], side[1] = vy, ry
+
+
+@kernel
+def _combine(gram: Floats, side: Floats, factor: float, terms: int, matrix: Floats, right: Floats) -> None:
+    """Normal equations of lamplight as one, with a ratio of veil and road."""
+    matrix[0, 0] = factor * factor * gram[0, 0] + 2.0 * factor * gram[0, 1] + gram[1, 1]
+    right[0] = factor * side[0] + side[1]
+    for i in range(1, terms):
+        matrix[0, i] = matrix[i, 0] = factor * gram[0, 1 + i] + gram[1, 1 + i]
+        right[i] = side[1 + i]
+        for j in range(i, terms):
+            matrix[i, j] = matrix[j, i] = gram[1 + i, 1 + j]
+
+
+@kernel
+def _solve(matrix: Floats, right: Floats, terms: int, sky_scale: float, lamp_scale: float, used: Floats) -> float:
+    """Amplitudes, none of the light's below 0, and the quadratic form less its constant."""
+    matrix[1, 1] += 1.0 / PEDESTAL**2
+    lamp = _of_lamps_alone(matrix, right, used)
+    if terms == 2:
+        return lamp
+    nothing = lamp
+    for _ in range(2 if lamp_scale > 0.0 else 1):
+        scale = max(sky_scale if lamp_scale == 0.0 else lamp_scale * used[0], 1e-7)
+        nothing = _of_lamps_and_day(matrix, right, scale, used)
+    return nothing
+
+
+@kernel
+def _of_lamps_alone(matrix: Floats, right: Floats, used: Floats) -> float:
+    used[:] = 0.0
+    det = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] ** 2
+    a = (right[0] * matrix[1, 1] - right[1] * matrix[0, 1]) / max(det, 1e-300)
+    used[0] = max(a, 0.0)
+    used[1] = (right[1] - used[0] * matrix[0, 1]) / matrix[1, 1]
+    return float(used[0] ** 2 * matrix[0, 0] + 2.0 * used[0] * used[1] * matrix[0, 1] + used[1] ** 2 * matrix[1, 1]) - (
+        2.0 * (used[0] * right[0] + used[1] * right[1])
+    )
+
+
+AIRLIGHT, AIRLIGHT_DEVIATION = 0.7, 0.5
+DAY_ROAD, DAY_ROAD_DEVIATION = 0.15, 0.12
+SLOPE_DEVIATION = 0.3
+"""What is known of airlight, of the road by day, and of how the sky brightens upward, over their scale [-]."""
+
+
+@kernel
+def _of_lamps_and_day(matrix: Floats, right: Floats, scale: float, used: Floats) -> float:
+    """As `_of_lamps_alone`, with daylight whose size is about known."""
+    a, b = np.zeros((TERMS, TERMS)), np.zeros(TERMS)
+    free = np.ones(TERMS, np.bool_)
+    mean = (0.0, 0.0, AIRLIGHT * scale, DAY_ROAD * scale, 0.0)
+    spread = (1.0, 1.0, AIRLIGHT_DEVIATION * scale, DAY_ROAD_DEVIATION * scale, SLOPE_DEVIATION * scale)
+    for _ in range(4):
+        for i in range(TERMS):
+            for j in range(TERMS):
+                a[i, j] = matrix[i, j] if free[i] and free[j] else 0.0
+            b[i] = right[i] if free[i] else 0.0
+            if not free[i]:
+                a[i, i] = 1.0
+            elif i > 1:
+                a[i, i] += 1.0 / spread[i] ** 2
+                b[i] += mean[i] / spread[i] ** 2
+        _eliminate(a, b, used)
+        worst = 0
+        for i in (0, 2, 3):
+            if free[i] and used[i] < 0.0:
+                worst = i + 1
+        if not worst:
+            break
+        free[worst - 1] = False
+    form = 0.0
+    for i in range(TERMS):
+        form -= 2.0 * used[i] * right[i]
+        for j in range(TERMS):
+            form += used[i] * matrix[i, j] * used[j]
+        if i > 1:
+            form += ((used[i] - mean[i]) / spread[i]) ** 2
+    return form
+
+
+@kernel
+def _eliminate(a: Floats, b: Floats, found: Floats) -> None:
+    """Solve positive definite equations by elimination, in place."""
+    for i in range(TERMS):
+        for k in range(i + 1, TERMS):
+            share = a[k, i] / a[i, i]
+            for j in range(i, TERMS):
+                a[k, j] -= share * a[i, j]
+            b[k] -= share * b[i]
+    for i in range(TERMS - 1, -1, -1):
+        rest = b[i]
+        for j in range(i + 1, TERMS):
+            rest -= a[i, j] * found[j]
+        found[i] = rest / a[i, i]
+
+
+@kernel
+def robust_weights(seen: Floats, model: Floats, variance: Floats) -> Floats:
+    """How much each cell counts where a model is given: little where others' lamps shine, or something is in front."""
+    weight = np.ones(len(seen))
+    for cell in range(len(seen)):
+        above = (seen[cell] - model[cell]) / math.sqrt(variance[cell])
+        limit = SOFT if above > 0.0 else HARD
+        weight[cell] = min(1.0, (limit / max(abs(above), 1e-9)) ** 2)
+    return weight

@@ -1,0 +1,152 @@
+"""Where the light of the own head lamps is measured in an image, and what a camera sees of it in any fog."""
+
+import functools
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+from fogsim.values.camera import Camera, CameraPose
+from fogsim.values.pinhole import camera_axes, ray_from_pixel
+from fogsim.vision.light.pixel_kernels import Pixels
+
+VISIBILITIES = np.geomspace(8.0, 10_000.0, 37)
+"""Meteorological visibilities of the model, in equal steps of ln V [m]."""
+
+SKY = np.radians(np.geomspace(0.7, 18.0, 11)), np.radians((-12.0, -6.0, 0.0, 6.0, 12.0)), math.radians(2.0)
+"""Elevations between which the fog above the road is measured, azimuths of the columns, half of their width [rad]."""
+
+ROAD = np.radians(np.geomspace(0.55, 10.5, 13)), (-0.9, 0.0, 0.9), 0.35
+"""Angles below the horizon between which the road is measured [rad]; middles of the strips and half their width [m]."""
+
+SUB_ROWS = 3
+"""Rows of a cell for which the model is computed: near the horizon neither veil nor road is linear in a cell."""
+
+LEAST_SEEN = 0.6
+"""Share of a cell that must be inside the image [-]."""
+
+
+class Cells(NamedTuple):
+    """Rectangles of an image, and where they look.
+
+    Attributes
+    ----------
+    box : (n, 4) int64
+        First and last row and column + 1 of each [px].
+    rays : (n, SUB_ROWS, 3) float64
+        Unit vectors forward, left and up to the middles of the sub-rows, by the assumed pitch.
+    is_sky : (n,) bool
+        Whether a cell is above the horizon.
+    """
+
+    box: NDArray[np.int64]
+    rays: NDArray[np.float64]
+    is_sky: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OwnLight:
+    """What the own head lamps light, for draws of all that an estimator does not know about lamps, fog and road.
+
+    Attributes
+    ----------
+    veil, road : (draws, visibilities, cells) float32
+        Luminance of the lit fog before road and sky, and of the lit road through the fog [cd/m²]; visibilities are
+        `VISIBILITIES`, cells those of `cells_of`.
+    """
+
+    veil: NDArray[np.float32]
+    road: NDArray[np.float32]
+
+
+@functools.lru_cache(maxsize=8)
+def cells_of(camera: Camera) -> Cells:
+    """Cells of a camera's image.
+
+    Parameters
+    ----------
+    camera : Camera
+        The assumed calibration.
+    """
+    edges, azimuths, half = SKY
+    looks = [
+        (azimuth - half, azimuth + half, low, high)
+        for low, high in zip(edges[:-1], edges[1:], strict=True)
+        for azimuth in azimuths
+    ]
+    edges, sides, half = ROAD
+    for high, low in zip(-edges[:-1], -edges[1:], strict=True):
+        away = camera.mount_height / math.tan(math.sqrt(low * high))
+        looks += [(math.atan((side - half) / away), math.atan((side + half) / away), low, high) for side in sides]
+    boxes = np.array([_box(camera, *look) for look in looks])
+    size = np.array((camera.height, camera.height, camera.width, camera.width))
+    inside = np.clip(boxes, 0, size)
+    seen = _areas(inside) >= LEAST_SEEN * np.maximum(_areas(boxes), 1)
+    is_sky = np.array([low > 0.0 for _, _, low, _ in looks])
+    box = np.ascontiguousarray(inside[seen])
+    return Cells(box, _rays(camera, box), is_sky[seen])
+
+
+def _box(camera: Camera, left: float, right: float, low: float, high: float) -> tuple[int, int, int, int]:
+    """Rows and columns of a cell between azimuths to the right and elevations; at least one pixel."""
+    axes = camera_axes(camera, CameraPose((0.0, 0.0, 0.0), 0.0))
+    middle, up = 0.5 * (left + right), np.array((low, high))
+    ray = np.stack((np.cos(up) * math.cos(middle), -np.cos(up) * math.sin(middle), np.sin(up)))
+    across, down, ahead = (axes[:, :, None] * ray).sum(axis=1)
+    u, v = (
+        principal + camera.focal_length * part / ahead
+        for principal, part in zip(camera.principal_point, (across, down), strict=True)
+    )
+    half = max(0.5 * camera.focal_length * (math.tan(right) - math.tan(left)), 0.5)
+    first, left_column = math.floor(v.min() + 0.5), math.floor(u.mean() - half + 0.5)
+    last, right_column = math.floor(v.max() + 0.5), math.floor(u.mean() + half + 0.5)
+    return first, max(last, first + 1), left_column, max(right_column, left_column + 1)
+
+
+def _areas(boxes: NDArray[np.int64]) -> NDArray[np.int64]:
+    area: NDArray[np.int64] = (boxes[:, 1] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 2])
+    return area
+
+
+def _rays(camera: Camera, box: NDArray[np.int64]) -> NDArray[np.float64]:
+    part = (np.arange(SUB_ROWS) + 0.5) / SUB_ROWS
+    v = box[:, :1] - 0.5 + (box[:, 1:2] - box[:, :1]) * part
+    u = np.broadcast_to(0.5 * (box[:, 2:3] + box[:, 3:4] - 1.0), v.shape)
+    pixels = np.stack((u, v, np.ones_like(v)), axis=-1)
+    rays = (pixels[..., None, :] * ray_from_pixel(camera, CameraPose((0.0, 0.0, 0.0), 0.0))).sum(axis=-1)
+    unit: NDArray[np.float64] = rays / np.sqrt((rays**2).sum(axis=-1, keepdims=True))
+    return unit
+
+
+@kernel
+def cell_luminance(
+    pixels: Pixels, table: NDArray[np.float32], box: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean luminance of cells, full scale being 1, and which share of their pixels is as bright as can be told.
+
+    Parameters
+    ----------
+    pixels : (rows, cols) uint8 or uint16
+        One channel.
+    table : (levels,) float32
+        Light behind each pixel value.
+    box : (n, 4) int64
+        The cells.
+    """
+    mean, clipped = np.zeros(len(box)), np.zeros(len(box))
+    last = len(table) - 1
+    for cell in range(len(box)):
+        top, bottom, left, right = box[cell]
+        for row in range(top, bottom):
+            for col in range(left, right):
+                value = pixels[row, col]
+                mean[cell] += table[value]
+                if value >= last:
+                    clipped[cell] += 1.0
+        share = 1.0 / ((bottom - top) * (right - left))
+        mean[cell] *= share / table[last]
+        clipped[cell] *= share
+    return mean, clipped

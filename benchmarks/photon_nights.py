@@ -206,7 +206,10 @@ def _smooth(grid_e, grid_a, values, e, a, degree):
 
 
 def _fine_rays(camera, pitch, step):
-    rows, cols = np.arange(0, camera.height, step) + 0.5 * (step - 1), np.arange(0, camera.width, step) + 0.5 * (step - 1)
+    rows, cols = (
+        np.arange(0, camera.height, step) + 0.5 * (step - 1),
+        np.arange(0, camera.width, step) + 0.5 * (step - 1),
+    )
     across = (cols - camera.principal_point[0]) / camera.focal_length
     down = (rows[:, None] - camera.principal_point[1]) / camera.focal_length
     cosine, sine = math.cos(pitch), math.sin(pitch)
@@ -303,7 +306,10 @@ def photograph(night_radiance, camera, rng, illuminance=0.0):
     ahead, left = (reach * rays[:, 0]).reshape(shape), (reach * rays[:, 1]).reshape(shape)
     on_road = reach.reshape(shape) < 1e5
     coarse = rng.standard_normal((4096,))
-    cell = (np.floor(np.clip(ahead, 0, 1000) / 1.5).astype(int) * 31 + np.floor(np.clip(left, -300, 300) / 0.7).astype(int) * 17) % 4096
+    cell = (
+        np.floor(np.clip(ahead, 0, 1000) / 1.5).astype(int) * 31
+        + np.floor(np.clip(left, -300, 300) / 0.7).astype(int) * 17
+    ) % 4096
     texture = np.exp(0.1 * coarse[cell] + 0.05 * rng.standard_normal(shape))
     dashed = (np.abs(np.abs(left) - 1.75) < 0.07) & ((left < 0) | ((ahead + rng.uniform(0, 12)) % 12 < 4))
     texture = np.where(dashed, rng.uniform(2.0, 5.0), texture)
@@ -321,7 +327,9 @@ def photograph(night_radiance, camera, rng, illuminance=0.0):
     share = share + 0.004 * share.mean() + 4e-4 * abs(rng.standard_normal())
     share = share.repeat(2, axis=0).repeat(2, axis=1)[: camera.height, : camera.width]
     electrons = 1500.0
-    noisy = rng.poisson(electrons * np.clip(share, 0, 3)) / electrons + 3.0 / electrons * rng.standard_normal(share.shape)
+    noisy = rng.poisson(electrons * np.clip(share, 0, 3)) / electrons + 3.0 / electrons * rng.standard_normal(
+        share.shape
+    )
     value = np.round(255 * respond(np.clip(noisy, 0.0, 1.0), camera.response, camera.black_level)).astype(np.uint8)
     return np.repeat(value[:, :, None], 3, axis=2)
 

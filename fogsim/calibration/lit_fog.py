@@ -26,8 +26,8 @@ from fogsim.values.luminous_intensity import luminous_intensity
 Floats = NDArray[np.float64]
 Watch = Callable[[int, int], None]
 
-DRAWS, PATTERNS = 100, 20
-"""How many draws are made, and how many different beams are among them."""
+DRAWS, PATTERNS = 100, {True: 20, False: 100}
+"""How many draws are made, and how many different beams are among them, by whether the beam is known."""
 
 PITCH_DEVIATION, AIM_DEVIATION, APART_DEVIATION = np.radians((0.1, 0.2, 0.1))
 """Standard deviations of the camera's pitch, of the aim of all lamps and of each lamp's own [rad]."""
@@ -70,7 +70,7 @@ def lit_fog(
     *,
     mount: LampMount | None = None,
     known: bool = True,
-    watch: Watch = lambda done, total: None,
+    watch: Watch | None = None,
 ) -> OwnLight:
     """Compute what a camera sees of own lamps; with ``known`` false the pattern of the low beam is drawn, too."""
     cells, rng = cells_of(camera), np.random.default_rng(47)
@@ -78,13 +78,15 @@ def lit_fog(
     veil = np.zeros((DRAWS, len(VISIBILITIES), len(cells.box)), np.float32)
     road = np.zeros_like(veil)
     returned = _road_glow(camera, cells, lit)
-    for pattern in range(PATTERNS):
-        shown = _redrawn(lit, rng, known=known)
-        for number in range(pattern * DRAWS // PATTERNS, (pattern + 1) * DRAWS // PATTERNS):
-            draw = _draw(rng, len(lit))
-            veil[number], road[number] = _light(camera, cells, shown, draw)
-            veil[number] += draw.glow * returned
-        watch(pattern + 1, PATTERNS)
+    shown: list[HeadLamp] = []
+    for number in range(DRAWS):
+        if number % (DRAWS // PATTERNS[known]) == 0:
+            shown = _redrawn(lit, rng, known=known)
+        draw = _draw(rng, len(lit))
+        veil[number], road[number] = _light(camera, cells, shown, draw)
+        veil[number] += draw.glow * returned
+        if watch is not None:
+            watch(number + 1, DRAWS)
     return OwnLight(veil, road)
 
 
@@ -133,8 +135,8 @@ def _any_low_beam(rng: np.random.Generator) -> Beam:
     azimuth = np.linspace(-40.0, 40.0, 81)
     elevation = np.unique(np.concatenate((np.arange(-20.0, 20.1, 1.0), np.arange(-3.0, 3.01, 0.1))))
     h, v = azimuth, elevation[:, None]
-    aside, wide, deep = rng.normal(1.0, 1.0), rng.uniform(2.5, 6.0), rng.uniform(1.0, 2.2)
-    foreground, wider = math.exp(rng.uniform(*np.log((0.12, 0.5)))), rng.uniform(10.0, 20.0)
+    aside, wide, deep = rng.normal(1.0, 1.0), rng.uniform(2.5, 6.0), rng.uniform(0.6, 2.2)
+    foreground, wider = math.exp(rng.uniform(*np.log((0.03, 0.5)))), rng.uniform(10.0, 20.0)
     edge = rng.normal(-0.5, 0.12) + (rng.random() < 0.7) * np.clip(h * math.tan(math.radians(15.0)), 0.0, 1.0)
     sharpness = math.exp(rng.uniform(*np.log((0.08, 0.4))))
     stray = math.exp(rng.uniform(*np.log((0.002, 0.03))))
@@ -166,7 +168,7 @@ def _light(
     for lamp, aim in zip(lit, draw.aims, strict=True):
         # A lamp that is aimed lower by an angle lights what it would otherwise light that much higher.
         back = _turned(-float(aim[0]), -float(aim[1]))
-        offset = np.array(lamp.offset) + (0.0, 0.0, draw.raised)
+        offset = np.array(lamp.offset) + np.array((0.0, 0.0, draw.raised))
         turned = np.ascontiguousarray(matrix_product(rays, back.T), dtype=np.float32)
         seen = VeilRays((1, len(rays)), turned, at, length)
         moved = matrix_product(back, offset[:, None])[:, 0]

@@ -46,7 +46,7 @@ class Estimator(Protocol):
 class Calibrations(Protocol):
     """Calibrations of a camera, each made when it is first needed; InputError if the camera cannot be calibrated."""
 
-    def veil_references(self, camera: Camera, lamps: Lamp, setback: float) -> tuple[VeilReferences, ...]:
+    def veil_references(self, camera: Camera, lamps: Lamp, setback: float) -> VeilReferences:
         """References of the lit head lamps' veil; `setback` is from the front bumper back to the camera [m]."""
         ...
 

@@ -62,7 +62,7 @@ class Measured(NamedTuple):
 def log_likelihoods(
     measured: Measured, extinction: Floats, veil: Templates, road: Templates, weight: Floats, best: Floats
 ) -> Floats:
-    """ln of the likelihood (draws, extinctions), maximal over amplitudes and summed over ratios of veil and road.
+    """Logarithm of the likelihood (draws, extinctions), largest over amplitudes, summed over ratios.
 
     Parameters
     ----------
@@ -209,12 +209,11 @@ def _solve(matrix: Floats, right: Floats, terms: int, sky_scale: float, lamp_sca
 def _of_lamps_alone(matrix: Floats, right: Floats, used: Floats) -> float:
     used[:] = 0.0
     det = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] ** 2
-    a = (right[0] * matrix[1, 1] - right[1] * matrix[0, 1]) / max(det, 1e-300)
-    used[0] = max(a, 0.0)
-    used[1] = (right[1] - used[0] * matrix[0, 1]) / matrix[1, 1]
-    return float(used[0] ** 2 * matrix[0, 0] + 2.0 * used[0] * used[1] * matrix[0, 1] + used[1] ** 2 * matrix[1, 1]) - (
-        2.0 * (used[0] * right[0] + used[1] * right[1])
-    )
+    lamp = max((right[0] * matrix[1, 1] - right[1] * matrix[0, 1]) / max(det, 1e-300), 0.0)
+    dark = (right[1] - lamp * matrix[0, 1]) / matrix[1, 1]
+    used[0], used[1] = lamp, dark
+    form = lamp * lamp * matrix[0, 0] + 2.0 * lamp * dark * matrix[0, 1] + dark * dark * matrix[1, 1]
+    return float(form - 2.0 * (lamp * right[0] + dark * right[1]))
 
 
 AIRLIGHT, AIRLIGHT_DEVIATION = 0.7, 0.5
@@ -226,36 +225,29 @@ SLOPE_DEVIATION = 0.3
 @kernel
 def _of_lamps_and_day(matrix: Floats, right: Floats, scale: float, used: Floats) -> float:
     """As `_of_lamps_alone`, with daylight whose size is about known."""
-    a, b = np.zeros((TERMS, TERMS)), np.zeros(TERMS)
-    free = np.ones(TERMS, np.bool_)
+    a, b, free = np.empty((TERMS, TERMS)), np.empty(TERMS), np.ones(TERMS, np.bool_)
     mean = (0.0, 0.0, AIRLIGHT * scale, DAY_ROAD * scale, 0.0)
-    spread = (1.0, 1.0, AIRLIGHT_DEVIATION * scale, DAY_ROAD_DEVIATION * scale, SLOPE_DEVIATION * scale)
-    for _ in range(4):
+    weight = (
+        0.0,
+        0.0,
+        1.0 / (AIRLIGHT_DEVIATION * scale) ** 2,
+        1.0 / (DAY_ROAD_DEVIATION * scale) ** 2,
+        1.0 / (SLOPE_DEVIATION * scale) ** 2,
+    )
+    while True:
         for i in range(TERMS):
+            b[i] = right[i] + weight[i] * mean[i] if free[i] else 0.0
             for j in range(TERMS):
                 a[i, j] = matrix[i, j] if free[i] and free[j] else 0.0
-            b[i] = right[i] if free[i] else 0.0
-            if not free[i]:
-                a[i, i] = 1.0
-            elif i > 1:
-                a[i, i] += 1.0 / spread[i] ** 2
-                b[i] += mean[i] / spread[i] ** 2
+            a[i, i] = matrix[i, i] + weight[i]
         _eliminate(a, b, used)
-        worst = 0
+        fixed = False
+        # Lamplight, airlight and the road by day are not negative.
         for i in (0, 2, 3):
-            if free[i] and used[i] < 0.0:
-                worst = i + 1
-        if not worst:
-            break
-        free[worst - 1] = False
-    form = 0.0
-    for i in range(TERMS):
-        form -= 2.0 * used[i] * right[i]
-        for j in range(TERMS):
-            form += used[i] * matrix[i, j] * used[j]
-        if i > 1:
-            form += ((used[i] - mean[i]) / spread[i]) ** 2
-    return form
+            if used[i] < 0.0 and not fixed:
+                free[i], fixed = False, True
+        if not fixed:
+            return _form(matrix, right, mean, weight, used)
 
 
 @kernel
@@ -272,6 +264,17 @@ def _eliminate(a: Floats, b: Floats, found: Floats) -> None:
         for j in range(i + 1, TERMS):
             rest -= a[i, j] * found[j]
         found[i] = rest / a[i, i]
+
+
+@kernel
+def _form(matrix: Floats, right: Floats, mean: tuple[float, ...], weight: tuple[float, ...], used: Floats) -> float:
+    """Quadratic form of amplitudes, and what is known of them, less the form's constant."""
+    form = 0.0
+    for i in range(TERMS):
+        form += weight[i] * (used[i] - mean[i]) ** 2 - 2.0 * used[i] * right[i]
+        for j in range(TERMS):
+            form += used[i] * matrix[i, j] * used[j]
+    return form
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""Fog by the own head lamps: one model of veil, lit road, daylight and dark offset, whose unknowns are averaged over."""
+"""Fog by the own head lamps: one model of veil, lit road, daylight and dark offset, averaged over its unknowns."""
 
 import math
 from collections import deque
@@ -10,22 +10,25 @@ from numpy.typing import NDArray
 
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.night.light_fit import Measured, log_likelihoods, robust_weights
-from fogsim.estimators.night.own_light import SKY, VISIBILITIES, OwnLight, cell_luminance, cells_of
+from fogsim.estimators.night.own_light import (
+    SKY,
+    VISIBILITIES,
+    OwnLight,
+    cell_luminance,
+    cells_of,
+    lit_head_lamps,
+    setback_of,
+    without_noise,
+)
 from fogsim.estimators.protocol import Calibrations
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import extinction_from_visibility
-from fogsim.values.camera import Camera, Response
+from fogsim.values.camera import Camera
 from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate, ExtinctionBounds
 from fogsim.values.light import Lamp
 from fogsim.values.observation import Observation
 from fogsim.vision.light.luminance import linear_table
 from fogsim.vision.light.pixel_kernels import Pixels
-
-HEAD_LAMPS = Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.FRONT_FOG
-"""Lamps that throw light ahead."""
-
-USUAL_SETBACK = 1.9
-"""Distance of the camera behind the front bumper where no vehicle tells it [m]."""
 
 DAYLIGHT, NIGHT = 100.0, 0.003
 """Illuminance of the sky from which methods of the day take over, and below which it lights nothing [lx]."""
@@ -42,7 +45,7 @@ MOST_CLIPPED = 0.02
 ROAD_TEXTURE, SKY_TEXTURE, LEVEL, FLOOR = 0.1, 0.2, 0.02, 2e-4
 """Deviations of the model: over what is seen of road and sky, over the mean of all cells, and of full scale [-]."""
 
-INDEPENDENT = {True: 16.0, False: 12.0}
+INDEPENDENT = {True: 16.0, False: 8.0}
 """Number of cells that err independently of one another, of all in use, by whether the beam is known [-]."""
 
 MOST_MISFIT, LEAST_WEIGHT = 4.0, 0.6
@@ -146,7 +149,7 @@ class NightRoad:
             If camera, image or time do not fit (see `fogsim.estimators.image_check`).
         """
         image = self._check.kernel_image(observation)
-        lit = HEAD_LAMPS & (Lamp.LOW_BEAM if observation.lamps is None else observation.lamps)
+        lit = lit_head_lamps(observation)
         if not lit:
             return Estimate.invalid(self.method, "no head lamp is lit: this is a method for the night")
         light = math.nan if observation.light is None else observation.light.illuminance
@@ -163,8 +166,7 @@ class NightRoad:
             return Estimate.invalid(self.method, why)
         if self._source is None:
             return Estimate.invalid(self.method, "it has no calibration; fogsim.estimators.make supplies one")
-        setback = round(observation.camera_setback or USUAL_SETBACK, 3)
-        own = self._source.own_light(_without_noise(self._camera), lit, setback, self._lamps)
+        own = self._source.own_light(without_noise(self._camera), lit, setback_of(observation), self._lamps)
         return self._estimate(self._measured(seen, used, light), _of_cells(own, used))
 
     def _look(self, image: Pixels) -> _Seen:
@@ -224,17 +226,12 @@ class NightRoad:
 
 
 def _quantiles(share: Floats) -> tuple[float, float, float]:
-    """Visibilities below which 5, 50 and 95 % of the posterior are [m]; within a step of the grid it is even in ln V."""
+    """Visibilities below which 5, 50 and 95 % of the posterior are [m]; within a step of the grid ln V is even."""
     step = math.log(VISIBILITIES[1] / VISIBILITIES[0])
     edges = np.concatenate((np.log(VISIBILITIES) - 0.5 * step, [math.log(VISIBILITIES[-1]) + 0.5 * step]))
     below = np.concatenate(([0.0], np.cumsum(share)))
     low, middle, high = np.exp(np.interp((0.05, 0.5, 0.95), below, edges)).tolist()
     return low, middle, high
-
-
-def _without_noise(camera: Camera) -> Camera:
-    """What of a camera decides where it sees what."""
-    return replace(camera, bits=8, black_level=0.0, response=Response.LINEAR)
 
 
 def _of_cells(own: OwnLight, used: NDArray[np.bool_]) -> OwnLight:

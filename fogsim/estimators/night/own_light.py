@@ -1,17 +1,29 @@
 """Where the light of the own head lamps is measured in an image, and what a camera sees of it in any fog."""
 
 import functools
+import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
-from fogsim.values.camera import Camera, CameraPose
+from fogsim.values.camera import Camera, CameraPose, Response
+from fogsim.values.light import Lamp
+from fogsim.values.observation import Observation
 from fogsim.values.pinhole import camera_axes, ray_from_pixel
 from fogsim.vision.light.pixel_kernels import Pixels
+
+HEAD_LAMPS = Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.FRONT_FOG
+"""Lamps that throw light ahead."""
+
+KNOWN_HEAD_LAMPS = ("usual", "unknown")
+"""Names of head lamps: a car's, and low beams of any pattern; every other name is that of a file."""
+
+USUAL_SETBACK = 1.9
+"""Distance of the camera behind the front bumper where no vehicle reports it [m]."""
 
 VISIBILITIES = np.geomspace(8.0, 10_000.0, 37)
 """Meteorological visibilities of the model, in equal steps of ln V [m]."""
@@ -62,6 +74,21 @@ class OwnLight:
     road: NDArray[np.float32]
 
 
+def lit_head_lamps(observation: Observation) -> Lamp:
+    """Own lamps that throw light ahead; low beams where an observation does not have lamps."""
+    return HEAD_LAMPS & (Lamp.LOW_BEAM if observation.lamps is None else observation.lamps)
+
+
+def setback_of(observation: Observation) -> float:
+    """Distance of the camera behind the front bumper [m]."""
+    return round(observation.camera_setback or USUAL_SETBACK, 3)
+
+
+def without_noise(camera: Camera) -> Camera:
+    """What of a camera decides where it sees what."""
+    return replace(camera, bits=8, black_level=0.0, response=Response.LINEAR)
+
+
 @functools.lru_cache(maxsize=8)
 def cells_of(camera: Camera) -> Cells:
     """Cells of a camera's image.
@@ -73,12 +100,10 @@ def cells_of(camera: Camera) -> Cells:
     """
     edges, azimuths, half = SKY
     looks = [
-        (azimuth - half, azimuth + half, low, high)
-        for low, high in zip(edges[:-1], edges[1:], strict=True)
-        for azimuth in azimuths
+        (azimuth - half, azimuth + half, low, high) for low, high in itertools.pairwise(edges) for azimuth in azimuths
     ]
     edges, sides, half = ROAD
-    for high, low in zip(-edges[:-1], -edges[1:], strict=True):
+    for high, low in itertools.pairwise(-edges):
         away = camera.mount_height / math.tan(math.sqrt(low * high))
         looks += [(math.atan((side - half) / away), math.atan((side + half) / away), low, high) for side in sides]
     boxes = np.array([_box(camera, *look) for look in looks])

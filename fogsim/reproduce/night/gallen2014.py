@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fogsim.atmosphere.visibility.night_visibility import FogKind
 from fogsim.calibration.halo_calibration import measure_halo_threshold
 from fogsim.calibration.staged_night import SETBACK, NightRoad, NightScene, NightVehicle
-from fogsim.calibration.veil_references import DROPLETS, PUBLISHED_VISIBILITIES, compute_references
+from fogsim.calibration.veil_references import PUBLISHED_VISIBILITIES, compute_references
 from fogsim.estimators import make
 from fogsim.estimators.night.cells import cell_means, cell_size
 from fogsim.estimators.night.gallen2014 import DENSE, LIGHT
@@ -174,7 +174,7 @@ def _dissipating(camera: Camera, fogs: int, steps: Steps) -> Iterator[dict[str, 
 
         cells = np.array([_mean_cells(drive(one, 0, number), camera) for number, one in enumerate(REFERENCES)])
         of_images = replace(camera, response=Response.LINEAR)
-        references = VeilReferences(of_images, _LOW, "", SETBACK, np.array(REFERENCES), cells, np.zeros_like(cells))
+        references = VeilReferences(of_images, np.array(REFERENCES), cells, np.zeros_like(cells))
         templates = VeilTemplates(references)
         for number, visibility in enumerate(np.geomspace(REFERENCES[0], REFERENCES[-1], fogs).tolist()):
             images = drive(visibility, 1, number)
@@ -206,7 +206,7 @@ def _mean_cells(images: Sequence[Pixels], camera: Camera) -> NDArray[np.float64]
 def _open_road(camera: Camera) -> dict[str, Any]:
     """Scores of the paper's six simulated references with the mean of successive frames."""
     visibilities, lit = PUBLISHED_VISIBILITIES, Lamp.LOW_BEAM
-    (made,) = compute_references(camera, lit, SETBACK, visibilities=visibilities, droplets=DROPLETS[:1])
+    made = compute_references(camera, lit, SETBACK, visibilities)
     with NightRoad(camera, seed=6) as road:
         cells = _mean_cells(_driven(road, LIDAR, (22,)), camera)
     record: dict[str, Any] = {"visibility_m": LIDAR}

@@ -79,7 +79,6 @@ class CachedCalibrations:
         )
 
 
-@functools.lru_cache(maxsize=12)
 def _own_light(camera: Camera, lamps: Lamp, setback: float, head_lamps: str) -> OwnLight:
     known, mount = head_lamps != "unknown", LampMount()
     if head_lamps not in KNOWN_HEAD_LAMPS:

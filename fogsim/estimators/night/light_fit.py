@@ -11,7 +11,7 @@ from fogsim.jit import kernel
 Floats = NDArray[np.float64]
 Templates = NDArray[np.float32]
 
-RATIOS = np.linspace(-1.8, 1.8, 9)
+RATIOS = np.linspace(-1.8, 1.8, 7)
 """ln of the veil over the road, relative to what is drawn: pavement and droplets [-]."""
 
 RATIO_DEVIATION = 0.7

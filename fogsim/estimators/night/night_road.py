@@ -3,14 +3,17 @@
 import math
 from collections import deque
 from dataclasses import replace
+from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.errors import InputError, shown
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.night.light_fit import Measured, log_likelihoods, robust_weights
 from fogsim.estimators.night.own_light import (
+    KNOWN_HEAD_LAMPS,
     SKY,
     VISIBILITIES,
     OwnLight,
@@ -33,8 +36,8 @@ from fogsim.vision.light.pixel_kernels import Pixels
 DAYLIGHT, NIGHT = 100.0, 0.003
 """Illuminance of the sky from which methods of the day take over, and below which it lights nothing [lx]."""
 
-LEAST_CELLS = 40
-"""Fewer cells show neither veil nor road."""
+LEAST_CELLS, LEAST_ROAD = 40, 6
+"""Fewer cells, and fewer of the road, show neither veil nor road."""
 
 LEAST_PEAK = 0.02
 """Luminance that something must have for there to be head lamps' light, full scale being 1 [-]."""
@@ -46,17 +49,28 @@ ROAD_TEXTURE, SKY_TEXTURE, LEVEL, FLOOR = 0.1, 0.2, 0.02, 2e-4
 """Deviations of the model: over what is seen of road and sky, over the mean of all cells, and of full scale [-]."""
 
 INDEPENDENT = {True: 16.0, False: 8.0}
-"""Number of cells that err independently of one another, of all in use, by whether the beam is known [-]."""
+"""Number of cells that err independently, where all of the road is seen, by whether the beam is known [-]."""
 
-MOST_MISFIT, LEAST_WEIGHT = 4.0, 0.6
-"""Mean squared deviation above which the model explains nothing, and mean weight of the cells below which lamps of
+MOST_MISFIT, LEAST_WEIGHT = {True: 1.2, False: 2.5}, 0.6
+"""Mean squared deviation above which other light is seen, by whether the beam is known [-], and mean weight of the cells below which lamps of
 others shine over too much of the image [-]."""
+
+ROUNDS, SETTLED = 4, 0.05
+"""How often weights of the cells are found again, and changes of them that change nothing [-]."""
 
 CLEAR, MAY_BE_CLEAR = 2000.0, 0.05
 """Visibility above which own lamps show no fog [m], and its probability from which on there is no upper bound [-]."""
 
-LEAD_HALF_WIDTH, LEAD_HEIGHT, CLOSEST_LEAD = 1.5, 4.0, 8.0
-"""What a vehicle ahead covers at most, and how near it leaves too little [m]."""
+LAMPS_FROM, HALO = 40.0, 0.06
+"""Distance on the road beyond which what is as bright as can be told may be a lamp [m], and how far from it cells are
+left out [rad]."""
+
+MAY_BE_DENSER = 0.25
+"""Probability of the densest fog of the model from which on there may be denser fog [-]."""
+
+LEAD_HALF_WIDTH, LEAD_HEIGHT, LEAD_MARGIN, CLOSEST_LEAD = 1.5, 4.0, 0.4, 8.0
+"""What a vehicle ahead covers at most, below its wheels too, for they and the pitch are not known, and how near it
+leaves too little [m]."""
 
 BOUND_SOFTNESS = 0.1
 """Standard deviation of bounds in ln k [-]."""
@@ -96,7 +110,7 @@ class NightRoad:
     Raises
     ------
     InputError
-        If a parameter is out of range.
+        If a parameter is out of range, or there is no such file.
     """
 
     method = "night_road"
@@ -108,9 +122,12 @@ class NightRoad:
         head_lamps: str = "usual",
         frames: Annotated[int, Range(1, 1000)] = 3,
     ) -> None:
+        if head_lamps not in KNOWN_HEAD_LAMPS and not Path(head_lamps).is_file():
+            raise InputError(f"head_lamps must be usual, unknown or a file, got {shown(head_lamps)}")
         self._camera, self._check = camera, ObservationCheck(camera)
         self._lamps, self._frames = head_lamps, int(frames)
         self._source: Calibrations | None = None
+        self._own: tuple[tuple[Lamp, float], OwnLight] | None = None
         self._cells = cells_of(camera)
         rays = self._cells.rays.mean(axis=1)
         self._depth = np.where(self._cells.is_sky, np.inf, camera.mount_height / np.maximum(-rays[:, 2], 1e-3))
@@ -161,13 +178,15 @@ class NightRoad:
         if observation.lead is not None and observation.lead.distance < CLOSEST_LEAD:
             return Estimate.invalid(self.method, "a vehicle close ahead hides the road")
         seen = self._look(image)
-        used = (seen.clipped < MOST_CLIPPED) & ~self._hidden(observation)
+        used = (seen.clipped < MOST_CLIPPED) & ~self._hidden(observation) & ~self._beside_lamps(image)
         if why := _too_little(seen, used, self._cells.is_sky):
             return Estimate.invalid(self.method, why)
         if self._source is None:
             return Estimate.invalid(self.method, "it has no calibration; fogsim.estimators.make supplies one")
-        own = self._source.own_light(without_noise(self._camera), lit, setback_of(observation), self._lamps)
-        return self._estimate(self._measured(seen, used, light), _of_cells(own, used))
+        wanted = lit, setback_of(observation)
+        if self._own is None or self._own[0] != wanted:
+            self._own = wanted, self._source.own_light(without_noise(self._camera), *wanted, self._lamps)
+        return self._estimate(self._measured(seen, used, light), _of_cells(self._own[1], used))
 
     def _look(self, image: Pixels) -> _Seen:
         """Mean of the last frames in green light: tail lamps are red, and so is their glow."""
@@ -184,8 +203,23 @@ class NightRoad:
             return np.zeros(len(self._depth), np.bool_)
         height, depth = self._camera.mount_height, observation.lead.distance + observation.camera_setback
         below, aside = self._below * depth, np.abs(self._aside) * depth
-        hidden: NDArray[np.bool_] = (below < height) & (below > height - LEAD_HEIGHT) & (aside < LEAD_HALF_WIDTH)
+        upright = (below < height + LEAD_MARGIN) & (below > height - LEAD_HEIGHT)
+        hidden: NDArray[np.bool_] = upright & (aside < LEAD_HALF_WIDTH)
         return hidden
+
+    def _beside_lamps(self, image: Pixels) -> NDArray[np.bool_]:
+        """Cells near lamps of others, which are as bright as can be told: their halos are not of the model."""
+        camera, green = self._camera, image if image.ndim == 2 else image[:, :, 1]
+        end = max(min(round(camera.horizon_row + camera.row_distance / LAMPS_FROM), camera.height), 0)
+        v, u = np.nonzero(green[:end] >= 2**camera.bits - 1)
+        beside = np.zeros(len(self._below), np.bool_)
+        # One pixel in each square of some pixels is enough.
+        step = max(camera.width // 80, 1)
+        for down, across in set(zip((v // step).tolist(), (u // step).tolist(), strict=True)):
+            below = (step * (down + 0.5) - camera.horizon_row) / camera.focal_length
+            aside = (camera.principal_point[0] - step * (across + 0.5)) / camera.focal_length
+            beside |= np.hypot(self._below - below, self._aside - aside) < HALO
+        return beside
 
     def _measured(self, seen: _Seen, used: NDArray[np.bool_], light: float) -> Measured:
         luminance, is_sky = seen.luminance[used], self._cells.is_sky[used]
@@ -193,21 +227,25 @@ class NightRoad:
         variance = texture**2 + FLOOR**2 + (LEVEL * luminance.mean()) ** 2
         lamp_scale = light / math.pi if light > NIGHT else 0.0
         sky_scale = float(luminance[is_sky].mean()) if math.isnan(light) else 0.0
-        independent = INDEPENDENT[self._lamps != "unknown"]
+        seen_road = np.count_nonzero(~is_sky) / np.count_nonzero(~self._cells.is_sky)
+        independent = INDEPENDENT[self._lamps != "unknown"] * seen_road
         return Measured(luminance, variance, self._depth[used], self._up[used], sky_scale, lamp_scale, independent)
 
     def _estimate(self, measured: Measured, own: OwnLight) -> Estimate:
         extinction = np.array([extinction_from_visibility(one) for one in VISIBILITIES.tolist()])
         weight, best = np.ones(len(measured.seen)), np.empty(len(measured.seen) + 1)
-        log_likelihoods(measured, extinction, own.veil, own.road, weight, best)
-        weight = robust_weights(measured.seen, best[:-1], measured.variance)
         found = log_likelihoods(measured, extinction, own.veil, own.road, weight, best)
+        for _ in range(ROUNDS):
+            earlier, weight = weight, robust_weights(measured.seen, best[:-1], measured.variance)
+            if np.abs(weight - earlier).max() < SETTLED:
+                break
+            found = log_likelihoods(measured, extinction, own.veil, own.road, weight, best)
         likelihood = np.exp(found - found.max()).sum(axis=0)
         share = likelihood / likelihood.sum()
         low, middle, high = _quantiles(share)
         told: dict[str, object] = {"visibility_quantiles": (low, middle, high), "misfit": float(best[-1])}
         told["weight"] = float(weight.mean())
-        if best[-1] > MOST_MISFIT:
+        if best[-1] > MOST_MISFIT[self._lamps != "unknown"]:
             return Estimate.invalid(self.method, "other light than that of the own head lamps", **told)
         if weight.mean() < LEAST_WEIGHT:
             return Estimate.invalid(self.method, "lamps of others outshine what the own ones light", **told)
@@ -216,7 +254,7 @@ class NightRoad:
             bounds = ExtinctionBounds(most=extinction_from_visibility(low) / widened, softness=BOUND_SOFTNESS)
             reason = f"own lamps show no fog for certain, and visibility is at least {low:.0f} m"
             return replace(Estimate.invalid(self.method, reason, **told), bounds=bounds)
-        if share[0] > MAY_BE_CLEAR:
+        if share[0] > MAY_BE_DENSER:
             reason = "fog so dense that only the densest of the model is like it"
             bounds = ExtinctionBounds(least=extinction_from_visibility(high) * widened, softness=BOUND_SOFTNESS)
             return replace(Estimate.invalid(self.method, reason, **told), bounds=bounds)
@@ -242,7 +280,7 @@ def _of_cells(own: OwnLight, used: NDArray[np.bool_]) -> OwnLight:
 
 def _too_little(seen: _Seen, used: NDArray[np.bool_], is_sky: NDArray[np.bool_]) -> str:
     """Why nothing can be told from the cells of use; empty if something may."""
-    if np.count_nonzero(used) < LEAST_CELLS or np.count_nonzero(used & ~is_sky) < LEAST_CELLS // 4:
+    if np.count_nonzero(used) < LEAST_CELLS or np.count_nonzero(used & ~is_sky) < LEAST_ROAD:
         return "too little is seen that is neither too bright nor too dark"
     if float(seen.luminance[used].max()) < LEAST_PEAK:
         return "too dark: the head lamps light nothing"

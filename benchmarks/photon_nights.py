@@ -29,7 +29,7 @@ SETBACK = 1.8
 LAMP_HEIGHT, HALF_SPACING = 0.65, 0.6
 PHASES = (*FOGS, "two lobes, radiation", "two lobes, advection")
 LOBES = {"two lobes, radiation": (0.972, 0.915, -0.564), "two lobes, advection": (0.978, 0.930, -0.522)}
-BEAMS = ("halogen", "projector", "regulation")
+BEAMS = ("halogen", "projector", "regulation", "fitted")
 # Measured points of a low beam, FMVSS test report 108-CAN-17-004 (degrees right, up; candela).
 HALOGEN = np.array(
     [
@@ -73,6 +73,12 @@ def _intensity(name, h, v):
         inside = np.exp((weight * np.log(HALOGEN[:, 2])).sum(axis=-1) / weight.sum(axis=-1))
         beyond = np.hypot(np.maximum(np.abs(h) - 18.0, 0.0), np.maximum(np.maximum(v - 3.0, -4.0 - v), 0.0))
         return inside * 10.0 ** (-0.07 * beyond)
+    if name == "fitted":
+        # A fit to the median US low beam (UMTRI-2004-23): ../shared/physics.md, section 2.4.
+        spot = 26965.0 * np.exp(-((np.abs(h - 1.982) / 3.046) ** 1.837) - (np.maximum(-0.279 - v, 0.0) / 1.656) ** 1.844)
+        near = 7683.0 * np.exp(-((h / 14.82) ** 2) - (np.abs(v + 2.5) / 2.45) ** 1.5)
+        below = 1.0 / (1.0 + np.exp(np.clip((v + 0.279) / 0.31, -50, 50)))
+        return (spot + near) * below + 601.0 * np.exp(-np.maximum(v, 0.0) / 4.486 - (np.abs(h) / 14.0) ** 1.2) + 1.0
     edge = -0.57 + np.clip(h * math.tan(math.radians(15.0)), 0.0, 1.2)
     if name == "projector":
         below = np.exp(np.interp(edge - v, -TAPER[:, 0], np.log(TAPER[:, 1])))
@@ -339,7 +345,9 @@ def drawn_nights(pool, count, visibilities, lux=(0.0,)):
     for number, visibility in enumerate(visibilities):
         for index in range(count):
             rng = np.random.default_rng((pool, number, index, 47))
-            camera, beam = CAMERAS[index % len(CAMERAS)], BEAMS[index // 2 % len(BEAMS)]
+            # The last beam is kept for pools from which no constants are chosen.
+            beams = BEAMS if pool else BEAMS[:-1]
+            camera, beam = CAMERAS[index % len(CAMERAS)], beams[index // 2 % len(beams)]
             phase = PHASES[int(rng.integers(len(PHASES)))]
             seen = radiance(
                 camera,

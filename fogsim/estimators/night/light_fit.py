@@ -77,55 +77,56 @@ def log_likelihoods(
     best : (cells + 1,) float64
         Written to: luminance of the cells by the likeliest fit, and its mean squared deviation.
     """
-    seen, variance, depth, up, sky_scale, lamp_scale, independent = measured
+    seen, independent = measured.seen, measured.independent
     draws, count, cells = veil.shape
-    found = np.empty((draws, count))
-    precision, total = weight / variance, weight.sum()
-    even = np.empty((3, cells))
-    gram, side = np.zeros((TERMS + 1, TERMS + 1)), np.zeros(TERMS + 1)
-    used, matrix, right = np.zeros(TERMS), np.zeros((TERMS, TERMS + 1)), np.zeros(TERMS)
-    highest, power = -np.inf, 0.0
-    kept = np.zeros(TERMS + 3)
-    is_day = sky_scale > 0.0 or lamp_scale > 0.0
-    terms = TERMS if is_day else 2
-    for cell in range(cells):
-        power += precision[cell] * seen[cell] ** 2
+    found, precision, total = np.empty((draws, count)), weight / measured.variance, weight.sum()
+    power = (precision * seen * seen).sum()
+    even, gram, side = np.empty((3, cells)), np.zeros((TERMS + 1, TERMS + 1)), np.zeros(TERMS + 1)
+    matrix, right, used = np.zeros((TERMS, TERMS)), np.zeros(TERMS), np.zeros(TERMS)
+    scratch = np.empty((TERMS, TERMS + 1))
+    is_day = measured.sky_scale > 0.0 or measured.lamp_scale > 0.0
+    terms, scale, highest = TERMS if is_day else 2, 0.0, -np.inf
     for place in range(count):
-        for cell in range(cells):
-            clear = math.exp(-extinction[place] * depth[cell])
-            even[0, cell] = 1.0 - clear
-            even[1, cell] = clear if np.isfinite(depth[cell]) else 0.0
-            even[2, cell] = 4.0 * up[cell]
-        # Rows and columns: veil, road, pedestal, airlight, road by day, slope of the sky.
+        _even_light(measured, extinction[place], even)
         _sums_of_light(even, seen, precision, gram, side)
         for draw in range(draws):
             _sums_of_lamps(veil[draw, place], road[draw, place], even, seen, precision, terms, gram, side)
-            total_likelihood = 0.0
-            reference = -np.inf
-            for number in range(len(RATIOS)):
-                factor = math.exp(RATIOS[number])
-                _combine(gram, side, factor, terms, matrix, right)
-                rest = power + _solve(matrix, right, terms, sky_scale, lamp_scale, used)
-                square = max(rest, 0.0) / total
-                value = -0.5 * independent * math.log(SOFTNESS + square) - 0.5 * (RATIOS[number] / RATIO_DEVIATION) ** 2
-                if value > reference:
-                    total_likelihood = total_likelihood * math.exp(reference - value) + 1.0
-                    reference = value
+            if is_day:
+                _combine(gram, side, 1.0, terms, matrix, right)
+                scale = max(_daylight_scale(matrix, right, measured, used, scratch), 1e-7)
+            likelihood = 0.0
+            for ratio in RATIOS:
+                _combine(gram, side, math.exp(ratio), terms, matrix, right)
+                if is_day:
+                    rest = power + _of_lamps_and_day(matrix, right, scale, used, scratch)
                 else:
-                    total_likelihood += math.exp(value - reference)
+                    rest = power + _of_lamps_alone(matrix, right, used)
+                square = max(rest, 0.0) / total
+                value = -0.5 * (independent * math.log(SOFTNESS + square) + (ratio / RATIO_DEVIATION) ** 2)
+                likelihood += math.exp(value)
                 if value > highest:
-                    highest = value
-                    kept[:TERMS] = used
-                    kept[TERMS], kept[TERMS + 1], kept[TERMS + 2] = draw, place, factor
-                    best[cells] = square
-            found[draw, place] = reference + math.log(total_likelihood)
-    draw, place, factor = int(kept[TERMS]), int(kept[TERMS + 1]), kept[TERMS + 2]
-    for cell in range(cells):
-        clear = math.exp(-extinction[place] * depth[cell])
-        lit = kept[0] * (factor * veil[draw, place, cell] + road[draw, place, cell]) + kept[1]
-        by_day = kept[2] * (1.0 - clear) + kept[4] * 4.0 * up[cell]
-        best[cell] = lit + by_day + (kept[3] * clear if np.isfinite(depth[cell]) else 0.0)
+                    highest, best[cells] = value, square
+                    _model(used, math.exp(ratio), veil[draw, place], road[draw, place], even, best)
+            found[draw, place] = math.log(max(likelihood, 1e-300))
     return found
+
+
+@kernel
+def _even_light(measured: Measured, extinction: float, even: Floats) -> None:
+    """What daylight adds to cells: airlight, the road behind it, and how the sky brightens upward."""
+    for cell in range(len(measured.seen)):
+        kept = math.exp(-extinction * measured.depth[cell])
+        even[0, cell], even[1, cell], even[2, cell] = 1.0 - kept, kept, 4.0 * measured.up[cell]
+
+
+@kernel
+def _model(
+    used: Floats, factor: float, veil: NDArray[np.float32], road: NDArray[np.float32], even: Floats, best: Floats
+) -> None:
+    """Luminance of the cells by amplitudes, written to `best`."""
+    for cell in range(len(veil)):
+        by_day = used[2] * even[0, cell] + used[3] * even[1, cell] + used[4] * even[2, cell]
+        best[cell] = used[0] * (factor * veil[cell] + road[cell]) + used[1] + by_day
 
 
 @kernel
@@ -138,7 +139,7 @@ def _sums_of_light(even: Floats, seen: Floats, precision: Floats, gram: Floats, 
                 a = 1.0 if i == 0 else even[i - 1, cell]
                 b = 1.0 if j == 0 else even[j - 1, cell]
                 total += precision[cell] * a * b
-            gram[2 + i, 2 + j] = total
+            gram[2 + i, 2 + j] = total + (1.0 / PEDESTAL**2 if i == j == 0 else 0.0)
         total = 0.0
         for cell in range(len(seen)):
             total += precision[cell] * (1.0 if i == 0 else even[i - 1, cell]) * seen[cell]
@@ -192,17 +193,13 @@ def _combine(gram: Floats, side: Floats, factor: float, terms: int, matrix: Floa
 
 
 @kernel
-def _solve(matrix: Floats, right: Floats, terms: int, sky_scale: float, lamp_scale: float, used: Floats) -> float:
-    """Amplitudes, none of the light's below 0, and the quadratic form less its constant."""
-    matrix[1, 1] += 1.0 / PEDESTAL**2
-    lamp = _of_lamps_alone(matrix, right, used)
-    if terms == 2:
-        return lamp
-    nothing = lamp
-    for _ in range(2 if lamp_scale > 0.0 else 1):
-        scale = max(sky_scale if lamp_scale == 0.0 else lamp_scale * used[0], 1e-7)
-        nothing = _of_lamps_and_day(matrix, right, scale, used)
-    return nothing
+def _daylight_scale(matrix: Floats, right: Floats, measured: Measured, used: Floats, scratch: Floats) -> float:
+    """Standard size of the airlight: of the sky that is seen, or by the light sensor and the lamplight's amplitude."""
+    if measured.lamp_scale == 0.0:
+        return measured.sky_scale
+    _of_lamps_alone(matrix, right, used)
+    _of_lamps_and_day(matrix, right, max(measured.lamp_scale * used[0], 1e-7), used, scratch)
+    return float(measured.lamp_scale * used[0])
 
 
 @kernel
@@ -223,9 +220,9 @@ SLOPE_DEVIATION = 0.3
 
 
 @kernel
-def _of_lamps_and_day(matrix: Floats, right: Floats, scale: float, used: Floats) -> float:
+def _of_lamps_and_day(matrix: Floats, right: Floats, scale: float, used: Floats, scratch: Floats) -> float:
     """As `_of_lamps_alone`, with daylight whose size is about known."""
-    a, b, free = np.empty((TERMS, TERMS)), np.empty(TERMS), np.ones(TERMS, np.bool_)
+    free = np.ones(TERMS, np.bool_)
     mean = (0.0, 0.0, AIRLIGHT * scale, DAY_ROAD * scale, 0.0)
     weight = (
         0.0,
@@ -236,11 +233,11 @@ def _of_lamps_and_day(matrix: Floats, right: Floats, scale: float, used: Floats)
     )
     while True:
         for i in range(TERMS):
-            b[i] = right[i] + weight[i] * mean[i] if free[i] else 0.0
+            scratch[i, TERMS] = right[i] + weight[i] * mean[i] if free[i] else 0.0
             for j in range(TERMS):
-                a[i, j] = matrix[i, j] if free[i] and free[j] else 0.0
-            a[i, i] = matrix[i, i] + weight[i]
-        _eliminate(a, b, used)
+                scratch[i, j] = matrix[i, j] if free[i] and free[j] else 0.0
+            scratch[i, i] = matrix[i, i] + weight[i]
+        _eliminate(scratch, used)
         fixed = False
         # Lamplight, airlight and the road by day are not negative.
         for i in (0, 2, 3):
@@ -251,16 +248,16 @@ def _of_lamps_and_day(matrix: Floats, right: Floats, scale: float, used: Floats)
 
 
 @kernel
-def _eliminate(a: Floats, b: Floats, found: Floats) -> None:
-    """Solve positive definite equations by elimination, in place."""
+def _eliminate(a: Floats, found: Floats) -> None:
+    """Solve positive definite equations, whose right side is the last column, by elimination in place."""
     for i in range(TERMS):
+        scale = 1.0 / a[i, i]
         for k in range(i + 1, TERMS):
-            share = a[k, i] / a[i, i]
-            for j in range(i, TERMS):
+            share = a[k, i] * scale
+            for j in range(i + 1, TERMS + 1):
                 a[k, j] -= share * a[i, j]
-            b[k] -= share * b[i]
     for i in range(TERMS - 1, -1, -1):
-        rest = b[i]
+        rest = a[i, TERMS]
         for j in range(i + 1, TERMS):
             rest -= a[i, j] * found[j]
         found[i] = rest / a[i, i]

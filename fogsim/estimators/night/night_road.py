@@ -48,12 +48,12 @@ MOST_CLIPPED = 0.02
 ROAD_TEXTURE, SKY_TEXTURE, LEVEL, FLOOR = 0.1, 0.2, 0.02, 2e-4
 """Deviations of the model: over what is seen of road and sky, over the mean of all cells, and of full scale [-]."""
 
-INDEPENDENT = {True: 16.0, False: 8.0}
+INDEPENDENT = {True: 16.0, False: 6.0}
 """Number of cells that err independently, where all of the road is seen, by whether the beam is known [-]."""
 
 MOST_MISFIT, LEAST_WEIGHT = {True: 1.2, False: 2.5}, 0.6
-"""Mean squared deviation above which other light is seen, by whether the beam is known [-], and mean weight of the cells below which lamps of
-others shine over too much of the image [-]."""
+"""Mean squared deviation above which other light is seen, by whether the beam is known, and mean weight of the cells
+below which lamps of others shine over too much of the image [-]."""
 
 ROUNDS, SETTLED = 4, 0.05
 """How often weights of the cells are found again, and changes of them that change nothing [-]."""

@@ -53,7 +53,7 @@ def test_a_clear_night_has_a_lower_bound_alone(head_lamps: str, light: LightMeas
     found = estimate(night_picture(np.inf), head_lamps=head_lamps, light=light)
     low, high = found.visibility_interval
     assert not found.valid
-    assert low > {"usual": 800.0, "unknown": 200.0}[head_lamps]
+    assert low > {"usual": 800.0, "unknown": 150.0}[head_lamps]
     assert high == np.inf
 
 
@@ -86,7 +86,7 @@ def test_at_dusk_daylight_is_part_of_the_model(lux: float) -> None:
     for light in (LightMeasurement(lux), None):
         found = estimate(night_picture(80.0, daylight=0.7 * lux / np.pi, saturation=2.5 + 0.5 * lux), light=light)
         assert holds(found, 80.0)
-        assert found.visibility_interval[0] > 30.0
+        assert found.valid
 
 
 def test_grey_pictures_and_a_black_level_are_read_alike() -> None:

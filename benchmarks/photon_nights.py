@@ -75,7 +75,9 @@ def _intensity(name, h, v):
         return inside * 10.0 ** (-0.07 * beyond)
     if name == "fitted":
         # A fit to the median US low beam (UMTRI-2004-23): ../shared/physics.md, section 2.4.
-        spot = 26965.0 * np.exp(-((np.abs(h - 1.982) / 3.046) ** 1.837) - (np.maximum(-0.279 - v, 0.0) / 1.656) ** 1.844)
+        spot = 26965.0 * np.exp(
+            -((np.abs(h - 1.982) / 3.046) ** 1.837) - (np.maximum(-0.279 - v, 0.0) / 1.656) ** 1.844
+        )
         near = 7683.0 * np.exp(-((h / 14.82) ** 2) - (np.abs(v + 2.5) / 2.45) ** 1.5)
         below = 1.0 / (1.0 + np.exp(np.clip((v + 0.279) / 0.31, -50, 50)))
         return (spot + near) * below + 601.0 * np.exp(-np.maximum(v, 0.0) / 4.486 - (np.abs(h) / 14.0) ** 1.2) + 1.0

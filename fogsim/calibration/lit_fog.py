@@ -74,14 +74,15 @@ def lit_fog(
 ) -> OwnLight:
     """Compute what a camera sees of own lamps; with ``known`` false the pattern of the low beam is drawn, too."""
     cells, rng = cells_of(camera), np.random.default_rng(47)
-    lit = own_head_lamps(lamps, camera.mount_height, setback, mount)
+    where = mount or LampMount()
+    lit = own_head_lamps(lamps, camera.mount_height, setback, where)
     veil = np.zeros((DRAWS, len(VISIBILITIES), len(cells.box)), np.float32)
     road = np.zeros_like(veil)
-    returned = _road_glow(camera, cells, lit)
+    returned, low_beam = _road_glow(camera, cells, lit), where.beams.get(Lamp.LOW_BEAM)
     shown: list[HeadLamp] = []
     for number in range(DRAWS):
         if number % (DRAWS // PATTERNS[known]) == 0:
-            shown = _redrawn(lit, rng, known=known)
+            shown = _redrawn(lit, rng, None if known else low_beam)
         draw = _draw(rng, len(lit))
         veil[number], road[number] = _light(camera, cells, shown, draw)
         veil[number] += draw.glow * returned
@@ -110,12 +111,12 @@ def _draw(rng: np.random.Generator, lamps: int) -> _Draw:
     )
 
 
-def _redrawn(lit: Sequence[HeadLamp], rng: np.random.Generator, *, known: bool) -> list[HeadLamp]:
-    """The lamps with a beam that may be theirs."""
+def _redrawn(lit: Sequence[HeadLamp], rng: np.random.Generator, unknown: Beam | None) -> list[HeadLamp]:
+    """The lamps with a beam that may be theirs; in place of the unknown one any low beam."""
     drawn: dict[Beam, Beam] = {}
     for lamp in lit:
         if lamp.beam not in drawn:
-            drawn[lamp.beam] = _changed(lamp.beam, rng) if known else _any_low_beam(rng)
+            drawn[lamp.beam] = _any_low_beam(rng) if lamp.beam is unknown else _changed(lamp.beam, rng)
     return [replace(lamp, beam=drawn[lamp.beam]) for lamp in lit]
 
 

@@ -4,7 +4,7 @@ import math
 from collections import deque
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,12 @@ from fogsim.estimators.night.own_light import (
     SKY,
     VISIBILITIES,
     OwnLight,
+    Seen,
     cell_luminance,
     cells_of,
     lit_head_lamps,
     setback_of,
+    without_cut_noise,
     without_noise,
 )
 from fogsim.estimators.protocol import Calibrations
@@ -76,13 +78,6 @@ BOUND_SOFTNESS = 0.1
 """Standard deviation of bounds in ln k [-]."""
 
 Floats = NDArray[np.float64]
-
-
-class _Seen(NamedTuple):
-    """Cells of an image: their luminance, full scale being 1, and the share of their pixels that is clipped."""
-
-    luminance: Floats
-    clipped: Floats
 
 
 @checked_parameters
@@ -143,7 +138,7 @@ class NightRoad:
     def reset(self) -> None:
         """Forget all earlier frames."""
         self._check.reset()
-        self._earlier: deque[_Seen] = deque(maxlen=self._frames)
+        self._earlier: deque[Seen] = deque(maxlen=self._frames)
         self._lit: Lamp | None = None
 
     def update(self, observation: Observation) -> Estimate:
@@ -188,14 +183,13 @@ class NightRoad:
             self._own = wanted, self._source.own_light(without_noise(self._camera), *wanted, self._lamps)
         return self._estimate(self._measured(seen, used, light), _of_cells(self._own[1], used))
 
-    def _look(self, image: Pixels) -> _Seen:
+    def _look(self, image: Pixels) -> Seen:
         """Mean of the last frames in green light: tail lamps are red, and so is their glow."""
         green: NDArray[Any] = image if image.ndim == 2 else np.ascontiguousarray(image[:, :, 1])
         camera = self._camera
         table = linear_table(camera.response, camera.bits, camera.black_level).copy()
-        self._earlier.append(_Seen(*cell_luminance(green, table, self._cells.box)))
-        luminance, clipped = (np.mean(part, axis=0) for part in zip(*self._earlier, strict=True))
-        return _Seen(luminance, clipped)
+        self._earlier.append(cell_luminance(green, table, self._cells.box))
+        return without_cut_noise(Seen(*(np.mean(part, axis=0) for part in zip(*self._earlier, strict=True))))
 
     def _hidden(self, observation: Observation) -> NDArray[np.bool_]:
         """Cells that the vehicle ahead may cover."""
@@ -221,7 +215,7 @@ class NightRoad:
             beside |= np.hypot(self._below - below, self._aside - aside) < HALO
         return beside
 
-    def _measured(self, seen: _Seen, used: NDArray[np.bool_], light: float) -> Measured:
+    def _measured(self, seen: Seen, used: NDArray[np.bool_], light: float) -> Measured:
         luminance, is_sky = seen.luminance[used], self._cells.is_sky[used]
         texture = np.where(is_sky, SKY_TEXTURE, ROAD_TEXTURE) * luminance
         variance = texture**2 + FLOOR**2 + (LEVEL * luminance.mean()) ** 2
@@ -278,7 +272,7 @@ def _of_cells(own: OwnLight, used: NDArray[np.bool_]) -> OwnLight:
     return OwnLight(np.ascontiguousarray(own.veil[:, :, used]), np.ascontiguousarray(own.road[:, :, used]))
 
 
-def _too_little(seen: _Seen, used: NDArray[np.bool_], is_sky: NDArray[np.bool_]) -> str:
+def _too_little(seen: Seen, used: NDArray[np.bool_], is_sky: NDArray[np.bool_]) -> str:
     """Why nothing can be told from the cells of use; empty if something may."""
     if np.count_nonzero(used) < LEAST_CELLS or np.count_nonzero(used & ~is_sky) < LEAST_ROAD:
         return "too little is seen that is neither too bright nor too dark"

@@ -4,6 +4,7 @@ import functools
 import itertools
 import math
 from dataclasses import dataclass, replace
+from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
@@ -36,6 +37,9 @@ ROAD = np.radians(np.geomspace(0.55, 10.5, 13)), (-0.9, 0.0, 0.9), 0.35
 
 SUB_ROWS = 3
 """Rows of a cell for which the model is computed: near the horizon neither veil nor road is linear in a cell."""
+
+LEAST_DARK, MOST_DARK = 0.01, 0.95
+"""Share of a cell's pixels that read no light from which on noise is cut off, and most that is reckoned with [-]."""
 
 LEAST_SEEN = 0.6
 """Share of a cell that must be inside the image [-]."""
@@ -146,11 +150,35 @@ def _rays(camera: Camera, box: NDArray[np.int64]) -> NDArray[np.float64]:
     return unit
 
 
+class Seen(NamedTuple):
+    """Cells of an image.
+
+    Attributes
+    ----------
+    luminance : (n,) float64
+        Means, full scale being 1.
+    clipped, dark : (n,) float64
+        Shares of their pixels that are as bright, and as dark, as a pixel can be [-].
+    """
+
+    luminance: NDArray[np.float64]
+    clipped: NDArray[np.float64]
+    dark: NDArray[np.float64]
+
+
+def without_cut_noise(seen: Seen) -> Seen:
+    """Cells with the luminance that they would have were noise about the dark not cut off, if it is normal."""
+    luminance, normal = seen.luminance.copy(), NormalDist()
+    for cell in np.flatnonzero(seen.dark > LEAST_DARK).tolist():
+        # Of a normal variable, the share below 0 and the mean of what is above, with 0 in place of the rest.
+        place = normal.inv_cdf(1.0 - min(float(seen.dark[cell]), MOST_DARK))
+        luminance[cell] *= max(place, 0.0) / (place * normal.cdf(place) + normal.pdf(place))
+    return seen._replace(luminance=luminance)
+
+
 @kernel
-def cell_luminance(
-    pixels: Pixels, table: NDArray[np.float32], box: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Mean luminance of cells, full scale being 1, and which share of their pixels is as bright as can be told.
+def cell_luminance(pixels: Pixels, table: NDArray[np.float32], box: NDArray[np.int64]) -> Seen:
+    """Luminance of cells.
 
     Parameters
     ----------
@@ -161,7 +189,7 @@ def cell_luminance(
     box : (n, 4) int64
         The cells.
     """
-    mean, clipped = np.zeros(len(box)), np.zeros(len(box))
+    mean, clipped, dark = np.zeros(len(box)), np.zeros(len(box)), np.zeros(len(box))
     last = len(table) - 1
     for cell in range(len(box)):
         top, bottom, left, right = box[cell]
@@ -171,7 +199,10 @@ def cell_luminance(
                 mean[cell] += table[value]
                 if value >= last:
                     clipped[cell] += 1.0
+                elif value == 0:
+                    dark[cell] += 1.0
         share = 1.0 / ((bottom - top) * (right - left))
         mean[cell] *= share / table[last]
         clipped[cell] *= share
-    return mean, clipped
+        dark[cell] *= share
+    return Seen(mean, clipped, dark)

@@ -13,7 +13,7 @@ from fogsim.errors import InputError
 from fogsim.estimators import make
 from fogsim.estimators.night.light_fit import Measured, log_likelihoods
 from fogsim.estimators.night.night_road import DAYLIGHT, NightRoad
-from fogsim.estimators.night.own_light import VISIBILITIES, cell_luminance, cells_of
+from fogsim.estimators.night.own_light import VISIBILITIES, cell_luminance, cells_of, without_cut_noise
 from fogsim.values import Camera, Estimate, Lamp, LeadMeasurement, Observation
 from fogsim.values.observation import LightMeasurement
 from tests.estimators.night.pictures import CAMERA, SETBACK, night_picture
@@ -152,7 +152,7 @@ def test_cells_are_measured_where_they_look() -> None:
     cells = cells_of(CAMERA)
     rows = np.arange(CAMERA.height)
     image = np.repeat(rows[:, None], CAMERA.width, axis=1).astype(np.uint8)
-    mean, clipped = cell_luminance(image, np.arange(256, dtype=np.float32), cells.box)
+    mean, clipped, _ = cell_luminance(image, np.arange(256, dtype=np.float32), cells.box)
     middle = 0.5 * (cells.box[:, 0] + cells.box[:, 1] - 1)
     assert np.allclose(255.0 * mean, middle, rtol=1e-5)
     assert not clipped.any()
@@ -172,3 +172,14 @@ def test_the_likelihood_is_largest_where_the_light_was_made() -> None:
     assert np.unravel_index(np.argmax(found), found.shape) == (1, 20)
     assert np.allclose(best[:-1], seen, rtol=1e-3)
     assert best[-1] < 1e-3
+
+
+def test_noise_that_is_cut_off_at_the_dark_is_allowed_for() -> None:
+    rng, cells = np.random.default_rng(3), cells_of(CAMERA)
+    table = np.arange(256, dtype=np.float32)
+    for true in (0.0, 4.0, 12.0, 40.0):
+        noisy = np.maximum(np.round(true + 8.0 * rng.standard_normal((CAMERA.height, CAMERA.width))), 0.0)
+        seen = cell_luminance(noisy.astype(np.uint8), table, cells.box)
+        found = 255.0 * np.average(without_cut_noise(seen).luminance[cells.is_sky])
+        assert found == pytest.approx(true, abs=0.7)
+    assert 255.0 * seen.luminance.mean() > 35.0

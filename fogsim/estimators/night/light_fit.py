@@ -74,8 +74,9 @@ def log_likelihoods(
         What lamps light.
     weight : (cells,) float64
         How much each cell counts.
-    best : (cells + 1,) float64
-        Written to: luminance of the cells by the likeliest fit, and its mean squared deviation.
+    best : (cells + 2,) float64
+        Written to: luminance of the cells by the likeliest fit, its mean squared deviation, and which share of the
+        light of all cells is the lamps'.
     """
     seen, independent = measured.seen, measured.independent
     draws, count, cells = veil.shape
@@ -123,10 +124,15 @@ def _even_light(measured: Measured, extinction: float, even: Floats) -> None:
 def _model(
     used: Floats, factor: float, veil: NDArray[np.float32], road: NDArray[np.float32], even: Floats, best: Floats
 ) -> None:
-    """Luminance of the cells by amplitudes, written to `best`."""
+    """Luminance of the cells by amplitudes, and the lamps' share of it, written to `best`."""
+    by_lamps = total = 0.0
     for cell in range(len(veil)):
+        lit = used[0] * (factor * veil[cell] + road[cell])
         by_day = used[2] * even[0, cell] + used[3] * even[1, cell] + used[4] * even[2, cell]
-        best[cell] = used[0] * (factor * veil[cell] + road[cell]) + used[1] + by_day
+        best[cell] = lit + used[1] + by_day
+        by_lamps += lit
+        total += best[cell]
+    best[len(veil) + 1] = by_lamps / max(total, 1e-12)
 
 
 @kernel

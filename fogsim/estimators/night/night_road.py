@@ -53,9 +53,12 @@ ROAD_TEXTURE, SKY_TEXTURE, LEVEL, FLOOR = 0.1, 0.2, 0.02, 2e-4
 INDEPENDENT = {True: 16.0, False: 6.0}
 """Number of cells that err independently, where all of the road is seen, by whether the beam is known [-]."""
 
-MOST_MISFIT, LEAST_WEIGHT = {True: 1.2, False: 2.5}, 0.6
+MOST_MISFIT, LEAST_WEIGHT = {True: 1.0, False: 2.5}, 0.6
 """Mean squared deviation above which other light is seen, by whether the beam is known, and mean weight of the cells
 below which lamps of others shine over too much of the image [-]."""
+
+LEAST_LAMPLIGHT = 0.5
+"""Share of the light that the own lamps must give where no sensor reports the daylight [-]."""
 
 ROUNDS, SETTLED = 4, 0.05
 """How often weights of the cells are found again, and changes of them that change nothing [-]."""
@@ -152,8 +155,8 @@ class NightRoad:
         Returns
         -------
         Estimate
-            Diagnostics: ``visibility_quantiles``, of 5, 50 and 95 % [m], ``misfit``, mean squared deviation [-], and
-            ``weight``, mean of the cells; or ``reason``.
+            Diagnostics: ``visibility_quantiles``, of 5, 50 and 95 % [m], ``misfit``, mean squared deviation [-],
+            ``lamplight``, share of the light that is the lamps' [-], and ``weight``, mean of the cells; or ``reason``.
 
         Raises
         ------
@@ -227,20 +230,26 @@ class NightRoad:
 
     def _estimate(self, measured: Measured, own: OwnLight) -> Estimate:
         extinction = np.array([extinction_from_visibility(one) for one in VISIBILITIES.tolist()])
-        weight, best = np.ones(len(measured.seen)), np.empty(len(measured.seen) + 1)
+        weight, best = np.ones(len(measured.seen)), np.empty(len(measured.seen) + 2)
         found = log_likelihoods(measured, extinction, own.veil, own.road, weight, best)
         for _ in range(ROUNDS):
-            earlier, weight = weight, robust_weights(measured.seen, best[:-1], measured.variance)
+            earlier, weight = weight, robust_weights(measured.seen, best[:-2], measured.variance)
             if np.abs(weight - earlier).max() < SETTLED:
                 break
             found = log_likelihoods(measured, extinction, own.veil, own.road, weight, best)
         likelihood = np.exp(found - found.max()).sum(axis=0)
         share = likelihood / likelihood.sum()
         low, middle, high = _quantiles(share)
-        told: dict[str, object] = {"visibility_quantiles": (low, middle, high), "misfit": float(best[-1])}
+        told: dict[str, object] = {
+            "visibility_quantiles": (low, middle, high),
+            "misfit": float(best[-2]),
+            "lamplight": float(best[-1]),
+        }
         told["weight"] = float(weight.mean())
-        if best[-1] > MOST_MISFIT[self._lamps != "unknown"]:
+        if best[-2] > MOST_MISFIT[self._lamps != "unknown"]:
             return Estimate.invalid(self.method, "other light than that of the own head lamps", **told)
+        if measured.sky_scale > 0.0 and best[-1] < LEAST_LAMPLIGHT:
+            return Estimate.invalid(self.method, "light of the day, or of lamps all around", **told)
         if weight.mean() < LEAST_WEIGHT:
             return Estimate.invalid(self.method, "lamps of others outshine what the own ones light", **told)
         widened = math.exp(NORMAL_90_PERCENT * BOUND_SOFTNESS)

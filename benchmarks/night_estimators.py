@@ -1,12 +1,13 @@
 """Accuracy of the estimators of the night that go by the own head lamps, on a road without other lamps.
 
-`--part drawn`: FogSim's own images of a straight road with marks, signs and trees, at visibilities drawn from 15 to 500 m
-evenly in ln V and a fifth in clear air, at exposures of 0.6 to 1.6 of the automatic one, with noise; in each variant one
-thing is not as usual. `--part photons`: images by photons (`photon_nights.py`): other lamps, droplets, pavement, pitch, aim
-and cameras than the model's, with light scattered more than once, by night and at dusk, and with the beam's pattern
-known or not. Both are 640×480 pixels. Errors are |V_est − V| / V of valid estimates of fog; `bounded`: answers with a bound
-in place of a value; `holds`: 90 % intervals and bounds that hold the truth; `lower`, `upper`: medians of their ends.
-Constants were chosen on `--pool 0`; what is reported is of `--pool 1`, where one beam is not among those of pool 0.
+`--part drawn`: FogSim's own images of a straight road with marks, signs and trees, at visibilities from 15 to 500 m,
+even in ln V, and a fifth in clear air, at exposures of 0.6 to 1.6 of the automatic one, with noise; in each variant
+one thing is not as usual. `--part photons`: images by photons (`photon_nights.py`) of other lamps, droplets,
+pavements, pitches, aims and cameras than the model's, with light scattered more than once, by night and at dusk, and
+with the beam's pattern known or not. All are 640×480 pixels. Errors are |V_est − V| / V of valid estimates of fog;
+`bounded` answers have a bound in place of a value; `holds`: share of 90 % intervals and bounds that hold the truth;
+`lower`, `upper`: medians of their ends. Constants were chosen on `--pool 0`; what is reported is of `--pool 1`, where
+one beam is not among those of pool 0.
 
     python benchmarks/night_estimators.py [--json] [--docs] [--pool 1] [--images 40] [--part all]
 """

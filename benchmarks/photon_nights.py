@@ -26,6 +26,11 @@ CAMERAS = (
     Camera(640, 480, 720.0, (316.0, 232.0), 1.25, pitch=0.02, response=Response.SRGB),
 )
 SETBACK = 1.8
+ELEVATIONS = np.array([14.0, 8.0, 4.0, 2.0, 0.7, -0.7, -2.0, -4.0, -8.0, -12.0])
+AZIMUTHS = np.array([0.0, 10.0, 20.0])
+"""Where photons' paths begin [degrees]."""
+
+PATHS = 4000
 LAMP_HEIGHT, HALF_SPACING = 0.65, 0.6
 PHASES = (*FOGS, "two lobes, radiation", "two lobes, advection")
 LOBES = {"two lobes, radiation": (0.972, 0.915, -0.564), "two lobes, advection": (0.978, 0.930, -0.522)}
@@ -117,34 +122,26 @@ def _single(rays, reach, k, phase, beam, lamps, start):
 
 
 @njit
-def _illuminance_ratio(photons, rng, k, cosines, beam_cumulative, beam_shape, lamps, ground, edges):
-    """Light of all and of unscattered photons that falls on the road before the lamps, by distance [lm]."""
+def _photons_on_road(photons, rng, k, cosines, cumulative, shape, lamps, ground, edges):
+    """Photons of the lamps that fall on the road ahead, by distance: all, and those that were not scattered."""
     total, direct = np.zeros(len(edges) - 1), np.zeros(len(edges) - 1)
     for n in range(photons):
-        cell = np.searchsorted(beam_cumulative, rng.random() * beam_cumulative[-1])
-        v = ((cell // beam_shape[1]) + rng.random()) / beam_shape[0] * math.pi - 0.5 * math.pi
-        h = ((cell % beam_shape[1]) + rng.random()) / beam_shape[1] * math.pi - 0.5 * math.pi
+        cell = np.searchsorted(cumulative, rng.random() * cumulative[-1])
+        v = ((cell // shape[1]) + rng.random()) / shape[0] * math.pi - 0.5 * math.pi
+        h = ((cell % shape[1]) + rng.random()) / shape[1] * math.pi - 0.5 * math.pi
         x, y, z = lamps[n % len(lamps)]
         dx, dy, dz = math.cos(v) * math.cos(h), -math.cos(v) * math.sin(h), math.sin(v)
-        first = True
-        for _ in range(30):
+        for flight in range(30):
             length = -math.log(1.0 - rng.random()) / k
             if z + length * dz < ground:
                 t = (ground - z) / dz
-                if first:
-                    # The same photon, without the fog.
-                    pass
-                place, aside = x + t * dx, y + t * dy
-                if abs(aside) < 2.5:
-                    b = np.searchsorted(edges, place) - 1
-                    if 0 <= b < len(total):
-                        total[b] += 1.0
-                        if first:
-                            direct[b] += 1.0
+                b = np.searchsorted(edges, x + t * dx) - 1
+                if abs(y + t * dy) < 2.5 and 0 <= b < len(total):
+                    total[b] += 1.0
+                    direct[b] += 1.0 if flight == 0 else 0.0
                 break
             x, y, z = x + length * dx, y + length * dy, z + length * dz
             dx, dy, dz = turned(dx, dy, dz, cosines[int(rng.random() * len(cosines))], 2 * math.pi * rng.random())
-            first = False
     return total, direct
 
 
@@ -205,12 +202,16 @@ def _road_of(rays, reach, k, beam, lamps, ground, exponent):
     return out
 
 
-def _smooth(grid_e, grid_a, values, e, a, degree):
-    """Polynomial through ln of values over elevation and azimuth."""
-    powers = [(i, j) for i in range(degree + 1) for j in range(0, 3, 2) if i + j <= degree]
-    left = np.stack([grid_e**i * grid_a**j for i, j in powers], axis=1)
-    found = np.linalg.lstsq(left, np.log(values), rcond=None)[0]
-    return np.exp(sum(f * e**i * a**j for f, (i, j) in zip(found, powers, strict=True)))
+def _smooth(values, rays):
+    """Cubic polynomial in elevation and azimuth through ln of values at `ELEVATIONS` and `AZIMUTHS`."""
+    powers = [(i, j) for i in range(4) for j in (0, 2) if i + j < 4]
+    at = np.tile(ELEVATIONS, len(AZIMUTHS)) / 10.0, np.repeat(AZIMUTHS, len(ELEVATIONS)) / 20.0
+    up, aside = np.degrees(np.arcsin(rays[:, 2])), np.abs(np.degrees(np.arctan2(rays[:, 1], rays[:, 0])))
+    where = np.clip(up, -13.0, 15.0) / 10.0, np.minimum(aside, 25.0) / 20.0
+    found = np.linalg.lstsq(np.stack([at[0] ** i * at[1] ** j for i, j in powers], axis=1), np.log(values), rcond=None)[
+        0
+    ]
+    return np.exp(sum(f * where[0] ** i * where[1] ** j for f, (i, j) in zip(found, powers, strict=True)))
 
 
 def _fine_rays(camera, pitch, step):
@@ -249,62 +250,58 @@ def _look(up, right):
 
 def radiance(camera, visibility, beam, phase, rng, *, exponent, start, pitch, aim, level):
     """Veil (rows, cols) and road without texture (rows, cols) [cd/m²] in every second pixel, and where it is [m]."""
-    step = 2
-    rays, shape = _fine_rays(camera, pitch, step)
-    ground = -camera.mount_height
-    reach = np.where(rays[:, 2] < -1e-4, ground / np.minimum(rays[:, 2], -1e-4), 1e6)
-    lamps = np.array([[SETBACK, side * HALF_SPACING, LAMP_HEIGHT - camera.mount_height] for side in (1, -1)])
-    table = level * _aimed(beam, *aim)
+    rays, shape = _fine_rays(camera, pitch, 2)
+    ground, k = -camera.mount_height, max(extinction_from_visibility(visibility), 1e-6)
+    lamps = np.array([[SETBACK, side * HALF_SPACING, LAMP_HEIGHT + ground] for side in (1, -1)])
+    lit = level * _aimed(beam, *aim), lamps, ground
+    reach = _reach(rays, ground)
+    road = _road_of(rays, reach, k, *lit, exponent) * np.exp(-k * np.minimum(reach, 1e5))
     if not math.isfinite(visibility):
-        k = 1e-6
-        road = _road_of(rays, reach, k, table, lamps, ground, exponent)
         return np.zeros(shape), road.reshape(shape), (rays, reach, k)
-    k = extinction_from_visibility(visibility)
     cosines = likely_cosines(phase)
+    edges = np.geomspace(3.0, 150.0, 12)
+    line = _forward_light(rng, k, cosines, lit, edges)
+    road *= np.exp(np.maximum(np.polyval(line, np.log(np.clip(reach * rays[:, 0], 3.0, 150.0))), 0.0))
+    ratio = np.exp(np.maximum(np.polyval(line, np.log(np.sqrt(edges[1:] * edges[:-1]))), 0.0))
+    looks = [_look(up, right) for right in AZIMUTHS for up in ELEVATIONS]
+    ends = [min(ground / ray[2] if ray[2] < 0 else 400.0, 400.0) for ray in looks]
+    phases, every, returned = np.stack((phase, without_peak(phase))), [], []
+    for ray, end in zip(looks, ends, strict=True):
+        once, _, all_of_it, _ = veil(PATHS, rng, k, ray, end, phases, cosines, STEP, *lit, LAMP_SIZES)
+        every.append(max(all_of_it / max(once, 1e-12), 1.0))
+        returned.append(max(_scattered_road(PATHS, rng, ray, end, k, cosines, *lit, exponent, edges, ratio), 1e-9))
     # The veil on a coarser grid: it is smooth.
     coarse, small = _fine_rays(camera, pitch, 8)
-    near = np.where(coarse[:, 2] < -1e-4, ground / np.minimum(coarse[:, 2], -1e-4), 1e6)
-    single = _single(coarse, near, k, phase, table, lamps, start)
-    phases = np.stack((phase, without_peak(phase)))
-    e = np.degrees(np.arcsin(coarse[:, 2]))
-    a = np.degrees(np.arctan2(-coarse[:, 1], coarse[:, 0]))
-    es = np.array([14.0, 8.0, 4.0, 2.0, 0.7, -0.7, -2.0, -4.0, -8.0, -12.0])
-    looks = [_look(up, right) for right in (0.0, 10.0, 20.0) for up in es]
-    ends = [min(ground / ray[2] if ray[2] < 0 else 400.0, 400.0) for ray in looks]
-    grid_e, grid_a = np.tile(es, 3), np.repeat((0.0, 10.0, 20.0), 10)
-    ratios = []
-    for ray, end in zip(looks, ends, strict=True):
-        once, _, every, _ = veil(4000, rng, k, ray, end, phases, cosines, STEP, table, lamps, ground, LAMP_SIZES)
-        ratios.append(max(every / max(once, 1e-12), 1.0))
-    where = np.clip(e, -15.0, 18.0) / 10, np.minimum(np.abs(a), 25) / 20
-    single *= np.maximum(_smooth(grid_e / 10, grid_a / 20, np.array(ratios), *where, 3), 1.0)
-    edges = np.geomspace(3.0, 150.0, 12)
+    single = _single(coarse, _reach(coarse, ground), k, phase, *lit[:2], start)
+    veil_map = single * np.maximum(_smooth(every, coarse), 1.0) + _smooth(returned, coarse)
+    return _enlarged(veil_map.reshape(small), shape), road.reshape(shape), (rays, reach, k)
+
+
+def _reach(rays, ground):
+    return np.where(rays[:, 2] < -1e-4, ground / np.minimum(rays[:, 2], -1e-4), 1e6)
+
+
+def _forward_light(rng, k, cosines, lit, edges):
+    """Line in ln of the distance through ln of all light on the road over that which was not scattered."""
+    table, lamps, ground = lit
     weight = (table * np.cos(np.linspace(-math.pi / 2, math.pi / 2, len(table)))[:, None]).ravel()
-    total, direct = _illuminance_ratio(
-        60_000, rng, k, cosines, np.cumsum(weight), np.array(table.shape), lamps, ground, edges
+    shape = np.array(table.shape)
+    total, direct = _photons_on_road(60_000, rng, k, cosines, np.cumsum(weight), shape, lamps, ground, edges)
+    good, middle = direct > 30, np.sqrt(edges[1:] * edges[:-1])
+    if good.sum() < 3:
+        return np.zeros(2)
+    return np.polyfit(np.log(middle[good]), np.log(total[good] / direct[good]), 1)
+
+
+def _enlarged(small, shape):
+    """A map of every eighth pixel as one of every second, linear in the logarithm."""
+    rows, cols = (
+        np.clip((2.0 * np.arange(n) - 3.0) / 8.0, 0.0, m - 1.001) for n, m in zip(shape, small.shape, strict=True)
     )
-    good = direct > 30
-    middle = np.sqrt(edges[1:] * edges[:-1])
-    line = np.polyfit(np.log(middle[good]), np.log(total[good] / direct[good]), 1) if good.sum() > 2 else (0.0, 0.0)
-    ratio = np.exp(np.maximum(np.polyval(line, np.log(middle)), 0.0))
-    road = _road_of(rays, reach, k, table, lamps, ground, exponent)
-    road *= np.exp(np.maximum(np.polyval(line, np.log(np.clip(reach * rays[:, 0], 3.0, 150.0))), 0.0))
-    road *= np.exp(-k * np.minimum(reach, 1e5))
-    road = np.where(reach < 1e5, road, 0.0)
-    returned = [
-        max(_scattered_road(4000, rng, ray, end, k, cosines, table, lamps, ground, exponent, edges, ratio), 1e-9)
-        for ray, end in zip(looks, ends, strict=True)
-    ]
-    veil_map = (single + _smooth(grid_e / 10, grid_a / 20, np.array(returned), *where, 3)).reshape(small)
-    rows = np.clip((np.arange(shape[0]) * step + 0.5 - 3.5) / 8, 0, small[0] - 1.001)
-    cols = np.clip((np.arange(shape[1]) * step + 0.5 - 3.5) / 8, 0, small[1] - 1.001)
     i, j = rows.astype(int), cols.astype(int)
-    dr, dc = (rows - i)[:, None], cols - j
-    lifted = np.log(np.maximum(veil_map, 1e-12))
-    full = (lifted[i][:, j] * (1 - dr) + lifted[i + 1][:, j] * dr) * (1 - dc) + (
-        lifted[i][:, j + 1] * (1 - dr) + lifted[i + 1][:, j + 1] * dr
-    ) * dc
-    return np.exp(full), road.reshape(shape), (rays, reach, k)
+    down, right, log = (rows - i)[:, None], cols - j, np.log(np.maximum(small, 1e-12))
+    tall = [log[i][:, n] * (1.0 - down) + log[i + 1][:, n] * down for n in (j, j + 1)]
+    return np.exp(tall[0] * (1.0 - right) + tall[1] * right)
 
 
 def photograph(night_radiance, camera, rng, illuminance=0.0):
@@ -313,12 +310,11 @@ def photograph(night_radiance, camera, rng, illuminance=0.0):
     shape = veil_map.shape
     ahead, left = (reach * rays[:, 0]).reshape(shape), (reach * rays[:, 1]).reshape(shape)
     on_road = reach.reshape(shape) < 1e5
-    coarse = rng.standard_normal((4096,))
-    cell = (
-        np.floor(np.clip(ahead, 0, 1000) / 1.5).astype(int) * 31
-        + np.floor(np.clip(left, -300, 300) / 0.7).astype(int) * 17
-    ) % 4096
-    texture = np.exp(0.1 * coarse[cell] + 0.05 * rng.standard_normal(shape))
+    along, across = (
+        np.floor(np.clip(part, -300, 1000) / size).astype(int) for part, size in ((ahead, 1.5), (left, 0.7))
+    )
+    patch = rng.standard_normal(4096)[(along * 31 + across * 17) % 4096]
+    texture = np.exp(0.1 * patch + 0.05 * rng.standard_normal(shape))
     dashed = (np.abs(np.abs(left) - 1.75) < 0.07) & ((left < 0) | ((ahead + rng.uniform(0, 12)) % 12 < 4))
     texture = np.where(dashed, rng.uniform(2.0, 5.0), texture)
     verge = np.where(np.abs(left) > rng.uniform(3.5, 6.0), rng.uniform(0.5, 2.0), 1.0)

@@ -8,7 +8,7 @@ from fogsim.estimators import ESTIMATORS
 from fogsim.parameters import accepted_parameters
 from fogsim.values import Lamp
 
-NIGHT_METHODS = ("gallen2014", "gallen2014_halo", "gallen2014_veil", "night_road", "night_glow")
+NIGHT_METHODS = ("gallen2014", "gallen2014_halo", "gallen2014_veil", "night_road")
 """Methods that use lamplight."""
 
 

@@ -53,7 +53,7 @@ ROAD_TEXTURE, SKY_TEXTURE, LEVEL, FLOOR = 0.1, 0.2, 0.02, 2e-4
 INDEPENDENT = {True: 16.0, False: 6.0}
 """Number of cells that err independently, where all of the road is seen, by whether the beam is known [-]."""
 
-MOST_MISFIT, LEAST_WEIGHT = {True: 1.0, False: 2.5}, 0.6
+MOST_MISFIT, LEAST_WEIGHT = {True: 2.0, False: 2.5}, 0.6
 """Mean squared deviation above which other light is seen, by whether the beam is known, and mean weight of the cells
 below which lamps of others shine over too much of the image [-]."""
 

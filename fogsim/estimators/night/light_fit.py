@@ -20,9 +20,6 @@ RATIO_DEVIATION = 0.7
 SOFTNESS = 0.25
 """Mean square of the deviations below which a fit is not better [-]."""
 
-PEDESTAL = 6e-4
-"""Standard deviation of the sensor's dark offset and of light that the lens scatters evenly, of full scale [-]."""
-
 SOFT, HARD = 2.5, 3.5
 """Deviations from which on a cell that is too bright or too dark counts less: others' lamps, things on the road [-]."""
 
@@ -45,6 +42,8 @@ class Measured(NamedTuple):
         Elevation of sky cells over the highest [-], 0 on the road.
     sky_scale, lamp_scale : float
         Standard size of the airlight: of full scale, and relative to the lamplight's amplitude; 0 where unused.
+    even : float
+        Standard deviation of light that is the same everywhere, of full scale [-].
     independent : float
         How many of the cells err independently of one another.
     """
@@ -55,6 +54,7 @@ class Measured(NamedTuple):
     up: Floats
     sky_scale: float
     lamp_scale: float
+    even: float
     independent: float
 
 
@@ -90,6 +90,7 @@ def log_likelihoods(
     for place in range(count):
         _even_light(measured, extinction[place], even)
         _sums_of_light(even, seen, precision, gram, side)
+        gram[2, 2] += 1.0 / measured.even**2
         for draw in range(draws):
             _sums_of_lamps(veil[draw, place], road[draw, place], even, seen, precision, terms, gram, side)
             if is_day:
@@ -145,7 +146,7 @@ def _sums_of_light(even: Floats, seen: Floats, precision: Floats, gram: Floats, 
                 a = 1.0 if i == 0 else even[i - 1, cell]
                 b = 1.0 if j == 0 else even[j - 1, cell]
                 total += precision[cell] * a * b
-            gram[2 + i, 2 + j] = total + (1.0 / PEDESTAL**2 if i == j == 0 else 0.0)
+            gram[2 + i, 2 + j] = total
         total = 0.0
         for cell in range(len(seen)):
             total += precision[cell] * (1.0 if i == 0 else even[i - 1, cell]) * seen[cell]

@@ -57,6 +57,10 @@ MOST_MISFIT, LEAST_WEIGHT = {True: 2.0, False: 2.5}, 0.6
 """Mean squared deviation above which other light is seen, by whether the beam is known, and mean weight of the cells
 below which lamps of others shine over too much of the image [-]."""
 
+PEDESTAL, GLOW = 6e-4, 0.5
+"""Standard deviation of the sensor's dark offset and of light that the lens scatters evenly, of full scale, and where
+lamps of others are seen that of their glow, over the luminance of the sky [-]."""
+
 LEAST_LAMPLIGHT = 0.5
 """Share of the light that the own lamps must give where no sensor reports the daylight [-]."""
 
@@ -176,7 +180,8 @@ class NightRoad:
         if observation.lead is not None and observation.lead.distance < CLOSEST_LEAD:
             return Estimate.invalid(self.method, "a vehicle close ahead hides the road")
         seen = self._look(image)
-        used = (seen.clipped < MOST_CLIPPED) & ~self._hidden(observation) & ~self._beside_lamps(image)
+        beside = self._beside_lamps(image)
+        used = (seen.clipped < MOST_CLIPPED) & ~self._hidden(observation) & ~beside
         if why := _too_little(seen, used, self._cells.is_sky):
             return Estimate.invalid(self.method, why)
         if self._source is None:
@@ -184,7 +189,9 @@ class NightRoad:
         wanted = lit, setback_of(observation)
         if self._own is None or self._own[0] != wanted:
             self._own = wanted, self._source.own_light(without_noise(self._camera), *wanted, self._lamps)
-        return self._estimate(self._measured(seen, used, light), _of_cells(self._own[1], used))
+        return self._estimate(
+            self._measured(seen, used, light, others=bool(beside.any())), _of_cells(self._own[1], used)
+        )
 
     def _look(self, image: Pixels) -> Seen:
         """Mean of the last frames in green light: tail lamps are red, and so is their glow."""
@@ -218,7 +225,7 @@ class NightRoad:
             beside |= np.hypot(self._below - below, self._aside - aside) < HALO
         return beside
 
-    def _measured(self, seen: Seen, used: NDArray[np.bool_], light: float) -> Measured:
+    def _measured(self, seen: Seen, used: NDArray[np.bool_], light: float, *, others: bool) -> Measured:
         luminance, is_sky = seen.luminance[used], self._cells.is_sky[used]
         texture = np.where(is_sky, SKY_TEXTURE, ROAD_TEXTURE) * luminance
         variance = texture**2 + FLOOR**2 + (LEVEL * luminance.mean()) ** 2
@@ -226,7 +233,9 @@ class NightRoad:
         sky_scale = float(luminance[is_sky].mean()) if math.isnan(light) else 0.0
         seen_road = np.count_nonzero(~is_sky) / np.count_nonzero(~self._cells.is_sky)
         independent = INDEPENDENT[self._lamps != "unknown"] * seen_road
-        return Measured(luminance, variance, self._depth[used], self._up[used], sky_scale, lamp_scale, independent)
+        even = math.hypot(PEDESTAL, GLOW * float(luminance[is_sky].mean()) if others else 0.0)
+        scales = sky_scale, lamp_scale, even, independent
+        return Measured(luminance, variance, self._depth[used], self._up[used], *scales)
 
     def _estimate(self, measured: Measured, own: OwnLight) -> Estimate:
         extinction = np.array([extinction_from_visibility(one) for one in VISIBILITIES.tolist()])

@@ -166,7 +166,7 @@ def test_the_likelihood_is_largest_where_the_light_was_made() -> None:
     veil, road = (np.exp(rng.standard_normal((3, 37, 30))).astype(np.float32) for _ in range(2))
     depth = np.where(np.arange(30) < 12, np.inf, np.geomspace(5.0, 100.0, 30))
     seen = 0.2 * (veil[1, 20] + road[1, 20]).astype(np.float64) + 1e-4
-    known = Measured(seen, (0.05 * seen) ** 2, depth, np.zeros(30), 0.0, 0.0, 16.0)
+    known = Measured(seen, (0.05 * seen) ** 2, depth, np.zeros(30), 0.0, 0.0, 6e-4, 16.0)
     best = np.empty(32)
     found = log_likelihoods(known, 3.0 / VISIBILITIES, veil, road, np.ones(30), best)
     assert np.unravel_index(np.argmax(found), found.shape) == (1, 20)

@@ -230,10 +230,11 @@ class NightRoad:
         texture = np.where(is_sky, SKY_TEXTURE, ROAD_TEXTURE) * luminance
         variance = texture**2 + FLOOR**2 + (LEVEL * luminance.mean()) ** 2
         lamp_scale = light / math.pi if light > NIGHT else 0.0
-        sky_scale = float(luminance[is_sky].mean()) if math.isnan(light) else 0.0
+        sky = float(luminance[is_sky].mean()) if is_sky.any() else float(luminance.min())
+        sky_scale = sky if math.isnan(light) else 0.0
         seen_road = np.count_nonzero(~is_sky) / np.count_nonzero(~self._cells.is_sky)
         independent = INDEPENDENT[self._lamps != "unknown"] * seen_road
-        even = math.hypot(PEDESTAL, GLOW * float(luminance[is_sky].mean()) if others else 0.0)
+        even = math.hypot(PEDESTAL, GLOW * sky if others else 0.0)
         scales = sky_scale, lamp_scale, even, independent
         return Measured(luminance, variance, self._depth[used], self._up[used], *scales)
 
@@ -249,12 +250,8 @@ class NightRoad:
         likelihood = np.exp(found - found.max()).sum(axis=0)
         share = likelihood / likelihood.sum()
         low, middle, high = _quantiles(share)
-        told: dict[str, object] = {
-            "visibility_quantiles": (low, middle, high),
-            "misfit": float(best[-2]),
-            "lamplight": float(best[-1]),
-        }
-        told["weight"] = float(weight.mean())
+        told: dict[str, object] = {"visibility_quantiles": (low, middle, high), "misfit": float(best[-2])}
+        told |= {"lamplight": float(best[-1]), "weight": float(weight.mean())}
         if best[-2] > MOST_MISFIT[self._lamps != "unknown"]:
             return Estimate.invalid(self.method, "other light than that of the own head lamps", **told)
         if measured.sky_scale > 0.0 and best[-1] < LEAST_LAMPLIGHT:

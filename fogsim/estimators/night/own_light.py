@@ -39,7 +39,7 @@ SUB_ROWS = 3
 """Rows of a cell for which the model is computed: near the horizon neither veil nor road is linear in a cell."""
 
 LEAST_DARK, MOST_DARK = 0.01, 0.95
-"""Share of a cell's pixels that read no light from which on noise is cut off, and most that is reckoned with [-]."""
+"""Share of a cell's pixels that read no light from which on noise is cut off, and the largest that is used [-]."""
 
 LEAST_SEEN = 0.6
 """Share of a cell that must be inside the image [-]."""

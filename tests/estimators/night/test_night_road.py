@@ -127,6 +127,13 @@ def test_vehicles_ahead_and_lamps_of_others_are_left_out() -> None:
     assert estimate(picture, lead=LeadMeasurement(20.0, 0.0)).visibility == pytest.approx(100.0, rel=0.3)
 
 
+def test_a_camera_that_sees_no_sky_reads_the_road() -> None:
+    camera = dataclasses.replace(CAMERA, pitch=0.45)
+    found = estimate(night_picture(60.0, camera=camera), camera, light=None)
+    assert not found.valid or holds(found, 60.0)
+    assert not cells_of(camera).is_sky.any()
+
+
 def test_a_change_of_lamps_begins_anew() -> None:
     estimator = night_road(frames=50)
     high = Lamp.LOW_BEAM | Lamp.HIGH_BEAM

@@ -43,6 +43,9 @@ METHODS: dict[str, tuple[str, dict[str, bool]]] = {
 CLEAR_SHARE = 0.2
 VISIBILITIES = (40.0, 80.0, 150.0, 300.0, np.inf)
 LUX = (0.0, 0.1, 1.0, 3.0, 10.0, 30.0, 100.0)
+TOGETHER = (((0.0, 0.0), (40.0, 300.0)), ((0.1, 100.0), (40.0, 150.0)))
+"""Light and visibilities of images that are also counted together."""
+
 COLUMNS = {"images": "images", "valid": "valid", "bounded": "bounded", "median_pct": "median error [%]"}
 COLUMNS |= {"p95_pct": "p95 [%]", "holds": "holds", "lower": "lower [m]", "upper": "upper [m]"}
 
@@ -154,13 +157,23 @@ def drawn_records(pool: int, count: int) -> list[dict[str, Any]]:
 def photon_records(pool: int, count: int) -> list[dict[str, Any]]:
     """Errors in images by photons."""
     nights = list(drawn_nights(pool, count, VISIBILITIES, LUX))
+    found = {known: [(one, estimate_of(one, known)) for one in nights] for known in (True, False)}
+    cells = [((lux, lux), (visibility, visibility)) for lux in LUX for visibility in VISIBILITIES]
     records = []
-    for known, lux, visibility in ((k, e, v) for k in (True, False) for e in LUX for v in VISIBILITIES):
-        seen = [one for one in nights if (one.illuminance, one.visibility) == (lux, visibility)]
-        told = {"beam": "known" if known else "unknown", "light [lx]": lux, "V_met [m]": visibility}
-        records.append(record(told, [(visibility, estimate_of(one, known)) for one in seen]))
+    for known, (lux, fog) in ((known, cell) for known in found for cell in (*TOGETHER, *cells)):
+        told = {"beam": "known" if known else "unknown", "light [lx]": _span(*lux), "V_met [m]": _span(*fog)}
+        chosen = [
+            (one.visibility, estimate)
+            for one, estimate in found[known]
+            if lux[0] <= one.illuminance <= lux[1] and fog[0] <= one.visibility <= fog[1]
+        ]
+        records.append(record(told, chosen))
         print(*records[-1].values(), flush=True)
     return records
+
+
+def _span(first: float, last: float) -> str:
+    return f"{first:g}" if first == last else f"{first:g} … {last:g}"
 
 
 def milliseconds() -> dict[str, float]:

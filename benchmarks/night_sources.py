@@ -1,28 +1,24 @@
-"""Fog by the lamps of others: halos told from clear nights, and the glow of tail lamps ahead.
+"""Fog by the halos about lamps of others, told from clear nights.
 
 For docs/explanation/night.md:
 
 ``python benchmarks/night_sources.py --part halos`` calibrates a threshold on one pool of scenes and counts on another,
-at exposures and strengths of lamps that the calibration did not see; ``--part glow`` drives up to a vehicle ahead;
-``--part speed`` takes the time of both. Constants were chosen on ``--pool 1`` and 2; what is reported is of 7.
+at exposures and strengths of lamps that the calibration did not see; ``--part speed`` takes the time.
+Constants were chosen on ``--pool 1`` and 2; what is reported is of 7.
 """
 
 import argparse
 import json
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 
-from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.calibration.halo_calibration import measure_halo_threshold, random_scene
-from fogsim.calibration.staged_night import SETBACK, NightRoad, NightScene, NightVehicle
-from fogsim.calibration.staged_road import StagedVehicle
+from fogsim.calibration.staged_night import NightRoad, NightScene, NightVehicle
 from fogsim.estimators.night.halos import HaloWatch, largest_sharpness, mean_steepness
-from fogsim.estimators.night.night_glow import NightGlow
-from fogsim.units import extinction_from_visibility
-from fogsim.values import Camera, Estimate, Frame, Lamp, LeadMeasurement, Observation, Response
+from fogsim.values import Camera, Lamp, Response
 from fogsim.vision.sources.halo_profile import halos_of
 from fogsim.vision.sources.source_tree import source_tree
 
@@ -33,7 +29,6 @@ UNSEEN = ((0.4, 0.6), (1.6, 2.2))
 """Exposures, and strengths of lamps, outside what the calibration draws."""
 
 LOW = Lamp.POSITION | Lamp.LOW_BEAM
-LOOKS = 14  # on the way up to a vehicle ahead
 Record = dict[str, object]
 
 
@@ -70,61 +65,6 @@ def halo_records(camera: Camera, pool: int, scenes: int) -> list[Record]:
     ]
 
 
-def approach(
-    road: NightRoad, rng: np.random.Generator, *, oncoming: bool, looks: int = LOOKS
-) -> Iterator[tuple[Observation, float]]:
-    """A drive up to a vehicle in fog of one visibility, frame by frame, and k."""
-    visibility = float(np.exp(rng.uniform(math.log(35.0), math.log(400.0))))
-    nearest = float(rng.uniform(14.0, 35.0))
-    farthest = nearest * float(rng.uniform(1.3, 3.0))
-    lamps = (LOW, LOW | Lamp.STOP, LOW | Lamp.REAR_FOG)[rng.integers(3)]
-    red, green, blue = rng.uniform(0.05, 0.5, 3) if rng.random() < 0.5 else np.full(3, rng.uniform(0.03, 0.7))
-    paint = (float(red), float(green), float(blue))
-    vehicle = StagedVehicle("truck", 10.0, 2.5, 3.6, paint) if rng.random() < 0.25 else StagedVehicle(paint=paint)
-    strength, exposure = np.exp(rng.uniform(-0.7, 0.7, 2)).tolist()
-    left, place, other = float(rng.normal(0.0, 0.3)), float(rng.uniform(0.0, 100.0)), float(rng.uniform(40.0, 150.0))
-    for number, distance in enumerate(np.geomspace(farthest, nearest, looks).tolist()):
-        vehicles = [NightVehicle(distance, left, lamps, vehicle=vehicle)]
-        if oncoming and other - 20.0 * number > 12.0:
-            vehicles.append(NightVehicle(other - 20.0 * number, 3.5, LOW, oncoming=True))
-        scene = NightScene(place + 8.0 * number, tuple(vehicles), strength=strength)
-        image = road.photograph(road.radiances(scene, [visibility])[0], exposure, rng)
-        lead = LeadMeasurement(distance - SETBACK + float(rng.normal(0.0, 0.25)), 0.0)
-        frame = Frame(float(number), image, road.camera)
-        seen = Observation(frame, 20.0, lead, camera_setback=SETBACK, lamps=LOW)
-        yield seen, extinction_from_visibility(visibility)
-
-
-def glow_records(camera: Camera, pool: int, drives: int) -> list[Record]:
-    """What `NightGlow` says on drives up to a vehicle ahead, alone and with oncoming traffic."""
-    return [_glow_record(camera, pool, drives, oncoming=oncoming) for oncoming in (False, True)]
-
-
-def _glow_record(camera: Camera, pool: int, drives: int, *, oncoming: bool) -> Record:
-    found: list[tuple[Estimate, float]] = []
-    for kind, droplets in enumerate(Droplets):
-        for share, glare in enumerate((0.0, 0.01, 0.02)):
-            with NightRoad(camera, droplets, glare, seed=pool) as road:
-                for number in range(drives):
-                    estimator = NightGlow(camera)
-                    drawn = np.random.default_rng((pool, kind, share, number))
-                    found += [(estimator.update(seen), k) for seen, k in approach(road, drawn, oncoming=oncoming)]
-    valid = [(told, k) for told, k in found if told.valid]
-    bounded = [(told.bounds, k) for told, k in found if told.bounds is not None]
-    inside = [abs(told.extinction - k) <= 1.645 * told.standard_deviation for told, k in valid]
-    errors = np.array([math.log(told.extinction / k) for told, k in valid])
-    return {
-        "oncoming traffic": oncoming,
-        "pictures": len(found),
-        "valid": len(valid),
-        "90 % intervals hold [%]": round(100.0 * float(np.mean(inside)), 1),
-        "median of ln k over the true": round(float(np.median(errors)), 3),
-        "rms of ln": round(float(np.sqrt((errors**2).mean())), 3),
-        "bounds": len(bounded),
-        "90 % bounds hold [%]": round(100.0 * float(np.mean([one.least <= k <= one.most for one, k in bounded])), 1),
-    }
-
-
 def speed_records() -> list[Record]:
     """Processor time of a picture of 1280×800, the median of many on the worst of some scenes."""
     out: list[Record] = []
@@ -138,14 +78,12 @@ def speed_records() -> list[Record]:
                 (math.inf, 200.0, 50.0), road.radiances(scene, (math.inf, 200.0, 50.0)), strict=True
             ):
                 image = road.photograph(light, 1.0, np.random.default_rng(0))
-                seen = Observation(image, 20.0, LeadMeasurement(38.3, 0.0), camera_setback=SETBACK, lamps=LOW)
-                watch, glow = HaloWatch(), NightGlow(PAPERS_CAMERA)
+                watch = HaloWatch()
                 out.append(
                     {
                         "scene": name,
                         "V_met [m]": visibility if math.isfinite(visibility) else "clear",
                         "halos [ms]": _milliseconds(lambda watch=watch, image=image: watch.look(image)),
-                        "night_glow [ms]": _milliseconds(lambda glow=glow, seen=seen: glow.update(seen)),
                     }
                 )
     return out
@@ -168,9 +106,9 @@ def _milliseconds(call: Callable[[], object], times: int = 30) -> float:
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--part", choices=("halos", "glow", "speed"), default="halos", help="what is measured")
-    parser.add_argument("--pool", type=int, default=7, help="which scenes or drives")
-    parser.add_argument("--count", type=int, default=80, help="scenes; drives for each droplets and glare")
+    parser.add_argument("--part", choices=("halos", "speed"), default="halos", help="what is measured")
+    parser.add_argument("--pool", type=int, default=7, help="which scenes")
+    parser.add_argument("--count", type=int, default=80, help="scenes")
     parser.add_argument("--small", action="store_true", help="pictures of 640×480 in place of 1280×800")
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
     arguments = parser.parse_args()
@@ -178,8 +116,6 @@ def main() -> None:
     match arguments.part:
         case "halos":
             found = halo_records(camera, arguments.pool, arguments.count)
-        case "glow":
-            found = glow_records(camera, arguments.pool, arguments.count)
         case _:
             found = speed_records()
     if arguments.json:

@@ -233,7 +233,7 @@ UNWRITTEN = (
     Unwritten("docs/explanation/drivers.md", "collisions with standing vehicles", "`python benchmarks/collisions.py`"),
     Unwritten("docs/explanation/drivers.md", "networks from other sources", "`python benchmarks/networks.py`"),
     Unwritten("docs/explanation/drivers.md", "cost beside SUMO's step", "`python benchmarks/traffic.py`"),
-    Unwritten("docs/explanation/night.md", "pictures taken for fog, glow", "`python benchmarks/night_sources.py`"),
+    Unwritten("docs/explanation/night.md", "pictures taken for fog", "`python benchmarks/night_sources.py`"),
     Unwritten("docs/explanation/night.md", "sight by low and high beams", "`fogsim.lighting.own_sight`, by hand"),
     Unwritten("docs/explanation/physics.md", "how roads reflect", "`python tools/make_road_reflectance.py`"),
     Unwritten("docs/explanation/signs.md", "how well signs are found", "`python benchmarks/sign_detector.py`"),

@@ -4,28 +4,36 @@ import contextlib
 import fcntl
 import functools
 import hashlib
+import io
 import json
 import logging
+import pickle
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import asdict
-from importlib import metadata
+from dataclasses import asdict, replace
+from importlib import import_module, metadata
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar, cast
+
+import numpy as np
 
 from fogsim.calibration.halo_calibration import Watch, measure_halo_threshold
+from fogsim.calibration.lit_fog import lit_fog
 from fogsim.calibration.sign_calibration import measure_operating_range
 from fogsim.calibration.veil_references import usual_references
 from fogsim.estimators import Estimator
 from fogsim.estimators.night.halos import HaloThreshold
+from fogsim.estimators.night.own_light import KNOWN_HEAD_LAMPS, OwnLight
 from fogsim.estimators.night.references import VeilReferences
 from fogsim.estimators.protocol import TakesCalibrations
 from fogsim.estimators.signs.operating_range import OperatingRange
 from fogsim.files.cache_entries import keep_newest, read_entry, write_entry
 from fogsim.files.user_cache import cache_directory
+from fogsim.lighting import LampMount
 from fogsim.values import Camera, Lamp
+from fogsim.values.light import lamp_names
 
-_T = TypeVar("_T", HaloThreshold, OperatingRange)
+_T = TypeVar("_T")
 
 _RESTS_ON = (
     "atmosphere",
@@ -47,22 +55,45 @@ _NEWS_PERIOD = 10.0  # between two lines about the progress [s]
 
 
 class CachedCalibrations:
-    """Calibrations by staged scenes; those of halos and signs are made once for each camera and then read."""
+    """Calibrations by staged scenes and by the night model, made once for each camera and then read."""
 
-    def veil_references(self, camera: Camera, lamps: Lamp, setback: float) -> tuple[VeilReferences, ...]:
+    def veil_references(self, camera: Camera, lamps: Lamp, setback: float) -> VeilReferences:
         """References for a car's head lamps, computed once in each process."""
         return usual_references(camera, lamps, setback)
 
+    def own_light(self, camera: Camera, lamps: Lamp, setback: float, head_lamps: str) -> OwnLight:
+        """What a camera sees of its own head lamps: a car's, of an unknown pattern, or of a file."""
+        return _own_light(camera, lamps, setback, head_lamps)
+
     def halo_threshold(self, camera: Camera) -> HaloThreshold:
         """Sharpness of halos below which there is fog; InputError if the camera shows none."""
-        return _cached(HaloThreshold, "halos", camera, lambda watch: measure_halo_threshold(camera, watch=watch))
+        return _cached(
+            _as_json(HaloThreshold), "halos", camera, lambda watch: measure_halo_threshold(camera, watch=watch)
+        )
 
     def operating_range(self, camera: Camera, diameter: float) -> OperatingRange:
         """Distances at which signs of a diameter [m] are detected in fog; InputError if the camera is too coarse."""
         name = f"signs of {diameter:g} m"
         return _cached(
-            OperatingRange, name, camera, lambda watch: measure_operating_range(camera, diameter, watch=watch)
+            _as_json(OperatingRange), name, camera, lambda watch: measure_operating_range(camera, diameter, watch=watch)
         )
+
+
+def _own_light(camera: Camera, lamps: Lamp, setback: float, head_lamps: str) -> OwnLight:
+    known, mount = head_lamps != "unknown", LampMount()
+    if head_lamps not in KNOWN_HEAD_LAMPS:
+        # By name, for YAML is read by a room that no calibration may import.
+        mount = import_module("fogsim.offline.lamp_file").load_lamps(Path(head_lamps))
+    beams = [(str(lamp), one.azimuth, one.elevation, one.intensity) for lamp, one in mount.beams.items()]
+    digest = hashlib.sha256(pickle.dumps((known, replace(mount, beams={}), beams))).hexdigest()
+    name = f"the light of {lamp_names(lamps)} {setback:g} m ahead"
+    return _cached(
+        _OWN_LIGHT,
+        name,
+        camera,
+        lambda watch: lit_fog(camera, lamps, setback, mount=mount, known=known, watch=watch),
+        digest,
+    )
 
 
 def supply(estimator: Estimator) -> None:
@@ -71,27 +102,51 @@ def supply(estimator: Estimator) -> None:
         estimator.take_calibrations(CachedCalibrations())
 
 
-def _cached(kind: Callable[..., _T], name: str, camera: Camera, measure: Callable[[Watch], _T]) -> _T:
+class _Form(NamedTuple, Generic[_T]):
+    """How a calibration is kept in a file."""
+
+    encode: Callable[[_T], bytes]
+    decode: Callable[[bytes], _T]
+
+
+def _as_json(kind: Callable[..., _T]) -> _Form[_T]:
+    def decode(kept: bytes) -> _T:
+        values = json.loads(kept)
+        return kind(**{name: tuple(value) if isinstance(value, list) else value for name, value in values.items()})
+
+    return _Form(lambda made: json.dumps(asdict(cast("Any", made))).encode(), decode)
+
+
+def _encoded_light(light: OwnLight) -> bytes:
+    file = io.BytesIO()
+    np.savez_compressed(file, veil=light.veil, road=light.road)
+    return file.getvalue()
+
+
+def _decoded_light(kept: bytes) -> OwnLight:
+    with np.load(io.BytesIO(kept), allow_pickle=False) as arrays:
+        return OwnLight(arrays["veil"], arrays["road"])
+
+
+_OWN_LIGHT = _Form(_encoded_light, _decoded_light)
+
+
+def _cached(form: _Form[_T], name: str, camera: Camera, measure: Callable[[Watch], _T], digest: str = "") -> _T:
     """The calibration from the cache; measured if it is not there, by one process at a time."""
-    key = hashlib.sha256(repr((name, camera, _code())).encode()).hexdigest()[:24]
+    key = hashlib.sha256(repr((name, digest, camera, _code())).encode()).hexdigest()[:24]
     folder = cache_directory() / "calibrations"
     path = folder / f"{key}.json"
     if (kept := read_entry(path)) is not None:
-        return _decoded(kind, kept)
+        return form.decode(kept)
     with _turn(folder):
         # Another process may have made it in the meantime.
         if (kept := read_entry(path)) is not None:
-            return _decoded(kind, kept)
+            return form.decode(kept)
         made = measure(_Progress(f"{name} for a camera of {camera.width} × {camera.height} px"))
         with contextlib.suppress(OSError):
-            write_entry(path, json.dumps(asdict(made)).encode())
+            write_entry(path, form.encode(made))
             keep_newest(folder, _MOST_KEPT)
         return made
-
-
-def _decoded(kind: Callable[..., _T], kept: bytes) -> _T:
-    values = json.loads(kept)
-    return kind(**{name: tuple(value) if isinstance(value, list) else value for name, value in values.items()})
 
 
 @functools.cache

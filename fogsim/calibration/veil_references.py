@@ -14,7 +14,7 @@ from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.errors import UnknownNameError
 from fogsim.estimators.night.cells import camera_of_cells
 from fogsim.estimators.night.references import VeilReferences
-from fogsim.lighting import LampMount, own_head_lamps
+from fogsim.lighting import own_head_lamps
 from fogsim.linear_algebra import matrix_product
 from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera, CameraPose
@@ -29,14 +29,6 @@ PUBLISHED_VISIBILITIES = (15.0, 50.0, 100.0, 200.0, 500.0, math.inf)
 LOG_SPACED_VISIBILITIES = (*np.geomspace(12.0, 1500.0, 20).tolist(), math.inf)
 """References in equal steps of ln V, and a clear night [m]."""
 
-DROPLETS = (
-    Droplets.MODERATE_RADIATION,
-    Droplets.HEAVY_RADIATION,
-    Droplets.MODERATE_ADVECTION,
-    Droplets.HEAVY_ADVECTION,
-)
-"""Kinds of droplets, which differ in how they send light back; the first are for methods that reckon with one kind."""
-
 RETROREFLECTION = 0.015
 """Coefficient of retroreflected luminance of dry asphalt [cd/m² per lx] (middle of gallen2014's range)."""
 
@@ -49,29 +41,19 @@ _FARTHEST = 1000.0
 
 
 def compute_references(
-    camera: Camera,
-    lamps: Lamp,
-    setback: float,
-    *,
-    visibilities: Sequence[float] = LOG_SPACED_VISIBILITIES,
-    mount: LampMount | None = None,
-    droplets: Sequence[Droplets] = DROPLETS,
-) -> tuple[VeilReferences, ...]:
-    """Draw references by the night model for each droplet type; visibilities rise [m], a car's without `mount`."""
+    camera: Camera, lamps: Lamp, setback: float, visibilities: Sequence[float] = LOG_SPACED_VISIBILITIES
+) -> VeilReferences:
+    """Draw references of a car's lamps by the night model in moderate radiation fog; visibilities rise [m]."""
     cells = camera_of_cells(camera)
-    lit = own_head_lamps(lamps, camera.mount_height, setback, mount)
+    lit = own_head_lamps(lamps, camera.mount_height, setback)
     extinctions = [extinction_from_visibility(visibility) for visibility in visibilities]
-    road = _roads(cells, lit, extinctions)
-    made = []
-    for kind in droplets:
-        veil = np.array([_veil(cells, lit, extinction, kind) for extinction in extinctions])
-        made.append(VeilReferences(camera, lamps, str(kind), setback, np.array(visibilities), veil, road))
-    return tuple(made)
+    veil = np.array([_veil(cells, lit, extinction) for extinction in extinctions])
+    return VeilReferences(camera, np.array(visibilities), veil, _roads(cells, lit, extinctions))
 
 
-def _veil(cells: Camera, lit: tuple[HeadLamp, ...], extinction: float, droplets: Droplets) -> NDArray[np.float64]:
+def _veil(cells: Camera, lit: tuple[HeadLamp, ...], extinction: float) -> NDArray[np.float64]:
     camera, pose = _finer(cells, VEIL_SAMPLES), _pose(cells)
-    air = Air(FogField(extinction, (0.0, 0.0, 0.0)), droplets)
+    air = Air(FogField(extinction, (0.0, 0.0, 0.0)), Droplets.MODERATE_RADIATION)
     view = flat_road(camera, pose, response=0.0)
     return _means(air.radiance(view, camera, pose, Lights(lit, LightSources.none()))[:, :, 1], VEIL_SAMPLES)
 
@@ -130,7 +112,7 @@ def flat_road(camera: Camera, pose: CameraPose, response: float) -> View:
 
 
 @lru_cache(maxsize=12)
-def usual_references(camera: Camera, lamps: Lamp, setback: float) -> tuple[VeilReferences, ...]:
+def usual_references(camera: Camera, lamps: Lamp, setback: float) -> VeilReferences:
     """References of a car's usual lamps, computed once per process; `setback` from the front bumper [m]."""
     return compute_references(camera, lamps, setback)
 

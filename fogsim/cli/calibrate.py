@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 from rich.table import Table
@@ -10,9 +10,6 @@ from rich.table import Table
 from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
 from fogsim.cli.progress import progress_bar
 from fogsim.interruption import interruptible
-
-if TYPE_CHECKING:
-    from fogsim.estimators.night.references import VeilReferences
 
 calibrate = typer.Typer(no_args_is_help=True, help="Measure what a method must know of a camera.")
 
@@ -116,52 +113,5 @@ def calibrate_halos_command(
         f"fog below a sharpness of {measured.sharpness:g} levels a pixel, as published a mean Br50 of "
         f"{measured.steepness:g} (of {measured.pictures} pictures, at most {100 * measured.largest_errors:.1f} and "
         f"{100 * measured.mean_errors:.1f} % of the clear or the foggy ones are taken for the other): {escape(out)}",
-        soft_wrap=True,
-    )
-
-
-@calibrate.command("veil")
-def calibrate_veil_command(
-    camera: Annotated[Path, typer.Option(help="Camera file (docs/how_to/own_camera.md), of images that are straight.")],
-    lamps: Annotated[
-        Path | None, typer.Option(help="File of the head lamps (docs/explanation/night.md). Default: a car's.")
-    ] = None,
-    lit: Annotated[
-        list[str] | None,
-        typer.Option(metavar="LAMPS", help="Lamps that are lit together, such as low_beam+front_fog; may be repeated."),
-    ] = None,
-    setback: Annotated[float, typer.Option(help="Metres from the front bumper back to the lens.", min=0, max=10)] = 1.9,
-    published: Annotated[
-        bool, typer.Option("--published", help="The paper's six visibilities in place of twenty.")
-    ] = False,
-    out: Annotated[Path, typer.Option(help="File of the references.")] = Path("veil.npz"),
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it is there already.")] = False,
-) -> None:
-    """What the own head lamps show in fog of any density: references of gallen2014_veil and night_road."""
-    from fogsim.calibration.veil_references import (
-        LOG_SPACED_VISIBILITIES,
-        PUBLISHED_VISIBILITIES,
-        compute_references,
-        lamps_named,
-    )
-    from fogsim.estimators.night.reference_file import references_as_bytes
-    from fogsim.files.atomic import write_bytes
-    from fogsim.files.output_targets import refuse_unwritable
-    from fogsim.lighting import LampMount
-    from fogsim.offline.camera_file import load_camera
-    from fogsim.offline.lamp_file import load_lamps
-
-    refuse_unwritable(out, "--out", overwrite=overwrite, read=[camera, *([lamps] if lamps else [])])
-    known, mount = load_camera(camera), LampMount() if lamps is None else load_lamps(lamps)
-    sets = [lamps_named(one) for one in lit or ["low_beam", "high_beam", "low_beam+front_fog"]]
-    visibilities = PUBLISHED_VISIBILITIES if published else LOG_SPACED_VISIBILITIES
-    made: list[VeilReferences] = []
-    with progress_bar(stderr) as progress:
-        for one in progress.track(sets, description="veil: references of each set of lamps"):
-            made += compute_references(known, one, setback, visibilities=visibilities, mount=mount)
-    write_bytes(out, references_as_bytes(made))
-    stdout.print(
-        f"{len(visibilities) - 1} visibilities from {visibilities[0]:g} to {visibilities[-2]:g} m and a clear night, "
-        f"for {len(sets)} sets of lamps and {len(made) // len(sets)} kinds of droplets: {escape(out)}",
         soft_wrap=True,
     )

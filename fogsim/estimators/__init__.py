@@ -13,7 +13,6 @@ from fogsim.estimators.lead_contrast import LeadContrast
 from fogsim.estimators.negru2013 import Negru2013
 from fogsim.estimators.night.gallen2014 import Gallen2014, Gallen2014Halo
 from fogsim.estimators.night.gallen2014_veil import Gallen2014Veil
-from fogsim.estimators.night.night_glow import NightGlow
 from fogsim.estimators.night.night_road import NightRoad
 from fogsim.estimators.other_sensors.gabb2014 import Gabb2014
 from fogsim.estimators.other_sensors.hautiere2006_stereo import Hautiere2006Stereo
@@ -47,7 +46,6 @@ ESTIMATORS: Registry[Callable[..., Estimator]] = Registry(
         "sign_contrast": _refusing(SignContrast),
         "gallen2014_veil": _refusing(Gallen2014Veil),
         "night_road": _refusing(NightRoad),
-        "night_glow": _refusing(NightGlow),
         "hautiere2006_stereo": _refusing(Hautiere2006Stereo),
         "gallen2014": _refusing(Gallen2014),
         "gallen2014_halo": _refusing(Gallen2014Halo),

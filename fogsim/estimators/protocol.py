@@ -3,6 +3,7 @@
 from typing import Protocol, runtime_checkable
 
 from fogsim.estimators.night.halos import HaloThreshold
+from fogsim.estimators.night.own_light import OwnLight
 from fogsim.estimators.night.references import VeilReferences
 from fogsim.estimators.signs.operating_range import OperatingRange
 from fogsim.values.camera import Camera
@@ -45,8 +46,12 @@ class Estimator(Protocol):
 class Calibrations(Protocol):
     """Calibrations of a camera, each made when it is first needed; InputError if the camera cannot be calibrated."""
 
-    def veil_references(self, camera: Camera, lamps: Lamp, setback: float) -> tuple[VeilReferences, ...]:
+    def veil_references(self, camera: Camera, lamps: Lamp, setback: float) -> VeilReferences:
         """References of the lit head lamps' veil; `setback` is from the front bumper back to the camera [m]."""
+        ...
+
+    def own_light(self, camera: Camera, lamps: Lamp, setback: float, head_lamps: str) -> OwnLight:
+        """What a camera sees of the lit head lamps in any fog; see `NightRoad` for `head_lamps`."""
         ...
 
     def halo_threshold(self, camera: Camera) -> HaloThreshold:

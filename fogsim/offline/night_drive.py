@@ -8,7 +8,7 @@ from fogsim.estimators import ESTIMATORS
 from fogsim.parameters import accepted_parameters
 from fogsim.values import Lamp
 
-NIGHT_METHODS = ("gallen2014", "gallen2014_halo", "gallen2014_veil", "night_road", "night_glow")
+NIGHT_METHODS = ("gallen2014", "gallen2014_halo", "gallen2014_veil", "night_road")
 """Methods that use lamplight."""
 
 
@@ -21,17 +21,16 @@ class NightDrive:
     lamps : Lamp
         Own head lamps that were lit.
     setback : float
-        Distance of the camera behind the front bumper [m]; 0 if unknown: then that of the references' file,
-        or 1.9 m.
-    veil : Path or None
-        File of ``fogsim calibrate veil``; None for a car's usual lamps.
+        Distance of the camera behind the front bumper [m]; 0 if unknown: then 1.9 m.
+    head_lamps : Path or None
+        File of the head lamps (docs/explanation/night.md); None for a car's usual lamps.
     halos : Path or None
         File of ``fogsim calibrate halos``; None for the paper's threshold.
     """
 
     lamps: Lamp = Lamp.LOW_BEAM
     setback: float = 0.0
-    veil: Path | None = None
+    head_lamps: Path | None = None
     halos: Path | None = None
 
     def parameters_of(self, method: str) -> Mapping[str, object]:
@@ -43,5 +42,5 @@ class NightDrive:
             Its name in the registry.
         """
         taken = accepted_parameters(ESTIMATORS[method])
-        files = {"references": self.veil, "halos": self.halos}
+        files = {"head_lamps": self.head_lamps, "halos": self.halos}
         return {name: str(path) for name, path in files.items() if path is not None and name in taken}

@@ -51,7 +51,6 @@ _NAMED = (
     "sign_contrast",
     "night_road",
     "gallen2014_veil",
-    "night_glow",
     "gallen2014",
     "gallen2014_halo",
     "hautiere2006_stereo",

@@ -14,8 +14,9 @@ from fogsim.calibration.cached import CachedCalibrations
 from fogsim.errors import InputError
 from fogsim.estimators import make
 from fogsim.estimators.night.halos import HaloThreshold
+from fogsim.estimators.night.own_light import OwnLight
 from fogsim.estimators.signs.operating_range import OperatingRange
-from fogsim.values import Camera, Estimate, Observation
+from fogsim.values import Camera, Estimate, Lamp, Observation
 from tests.estimators.night.test_gallen2014 import CAMERA as NIGHT_CAMERA
 from tests.estimators.night.test_gallen2014 import LAMPS, MEASURED
 from tests.estimators.night.test_gallen2014 import seen as night_image
@@ -115,3 +116,28 @@ def test_a_camera_that_cannot_be_calibrated_says_why(measured: list[object], mon
     assert not estimate.valid
     assert estimate.diagnostics["reason"] == "too few pixels"
     assert len(measured) == 1
+
+
+def test_own_light_is_kept_for_its_camera_and_lamps(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setenv("FOGSIM_CACHE_DIR", str(tmp_path / "cache"))
+    made: list[tuple[object, ...]] = []
+    light = OwnLight(np.ones((2, 3, 4), np.float32), np.zeros((2, 3, 4), np.float32))
+
+    def compute(camera: Camera, lamps: Lamp, setback: float, **options: object) -> OwnLight:
+        made.append((camera, lamps, setback, options["known"]))
+        return light
+
+    monkeypatch.setattr(cached, "lit_fog", compute)
+    for head_lamps in ("usual", "usual", "unknown", "unknown"):
+        kept = CachedCalibrations().own_light(CAMERA, Lamp.LOW_BEAM, 1.7, head_lamps)
+        assert np.array_equal(kept.veil, light.veil)
+        assert kept.road.dtype == np.float32
+    CachedCalibrations().own_light(CAMERA, Lamp.HIGH_BEAM, 1.7, "usual")
+    assert made == [
+        (CAMERA, Lamp.LOW_BEAM, 1.7, True),
+        (CAMERA, Lamp.LOW_BEAM, 1.7, False),
+        (CAMERA, Lamp.HIGH_BEAM, 1.7, True),
+    ]
+    assert "the light of low_beam 1.7 m ahead for a camera of 320 × 160 px, once" in caplog.text

@@ -27,7 +27,6 @@ NOT_BY_DAY = {
     "gabb2014": "needs a vehicle that disappears: tests/estimators/test_gabb2014.py",
     "scatterometer": "needs a sensor of its own: tests/estimators/test_scatterometer.py",
     "night_road": "reads lamplight: tests/estimators/night/test_night_road.py",
-    "night_glow": "reads lamplight: tests/estimators/night/test_night_glow.py",
     "gallen2014": "reads lamplight: tests/estimators/night/test_gallen2014.py",
     "gallen2014_halo": "reads lamplight: tests/estimators/night/test_gallen2014.py",
     "gallen2014_veil": "reads lamplight: tests/estimators/night/test_gallen2014_veil.py",

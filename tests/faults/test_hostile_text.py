@@ -1,27 +1,19 @@
-"""JSON, CSV and arrays that are hostile or broken: each ends at once, in one message that names the file."""
+"""JSON and CSV that are hostile or broken: each ends at once, in one message that names the file."""
 
-import io
 import json
 import os
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from fogsim.errors import InputError
 from fogsim.estimators.night.halos import HaloThreshold
-from fogsim.estimators.night.reference_file import read_references, references_as_bytes
-from fogsim.estimators.night.references import VeilReferences
 from fogsim.estimators.signs.operating_range import OperatingRange
-from fogsim.files import array_archive
 from fogsim.offline.lamp_file import load_lamps
 from fogsim.offline.sign_file import load_sign_file
 from fogsim.offline.track_file import load_track
-from fogsim.values import Camera, Lamp
 
 Reader = Callable[[Path], object]
 SIGN = {
@@ -159,81 +151,3 @@ def test_tables_of_places(tmp_path: Path, text: str, told: str) -> None:
 def test_tables_of_intensities(tmp_path: Path, number: str) -> None:
     (tmp_path / "beam.csv").write_text(BEAM.replace("5", number), encoding="utf-8")
     refused(lamps_with_table, tmp_path / "beam.csv")
-
-
-CAMERA = Camera(32, 24, 40.0, (15.5, 11.5), 1.3)
-
-
-def references() -> bytes:
-    cells = np.ones((2, 24, 32))
-    one = VeilReferences(CAMERA, Lamp.LOW_BEAM, "radiation", 1.9, np.array([50.0, np.inf]), cells, cells)
-    return references_as_bytes([one])
-
-
-def archive(**changes: NDArray[Any] | None) -> bytes:
-    """The references with other arrays in place of some; None for none."""
-    with np.load(io.BytesIO(references())) as file:
-        arrays = {name: file[name] for name in file.files} | changes
-    packed = io.BytesIO()
-    np.savez(packed, **{name: array for name, array in arrays.items() if array is not None})
-    return packed.getvalue()
-
-
-def head(**changes: object) -> NDArray[Any]:
-    with np.load(io.BytesIO(references())) as file:
-        return np.array(json.dumps({**json.loads(str(file["head0"])), **changes}))
-
-
-def with_pickle() -> bytes:
-    return archive(veil0=np.array([{"a": 1}], dtype=object))
-
-
-def not_arrays() -> bytes:
-    packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w") as file:
-        file.writestr("head0.npy", b"\x93NUMPY nothing")
-    return packed.getvalue()
-
-
-@pytest.mark.parametrize(
-    "content",
-    [
-        lambda: b"",
-        lambda: b"PK nothing",
-        lambda: references()[:200],
-        lambda: references()[:-30],
-        lambda: archive().replace(b"NUMPY", b"NUMPI"),
-        with_pickle,
-        not_arrays,
-        lambda: archive(head0=None),
-        lambda: archive(head0=np.array("[1]")),
-        lambda: archive(head0=np.array("[" * 50_000)),
-        lambda: archive(head0=np.zeros(3)),
-        lambda: archive(head0=head(camera=3)),
-        lambda: archive(head0=head(camera={"width": "wide"})),
-        lambda: archive(head0=head(lamps="low")),
-        lambda: archive(head0=head(lamps=10**30)),
-        lambda: archive(head0=head(setback=None)),
-        lambda: archive(visibility0=np.array([100.0, 50.0])),
-        lambda: archive(visibility0=np.array([50.0, np.nan])),
-        lambda: archive(visibility0=np.array(50.0)),
-        lambda: archive(veil0=np.ones((2, 5, 32))),
-        lambda: archive(veil0=np.full((2, 24, 32), np.nan)),
-        lambda: archive(veil0=np.ones((2, 24, 32), complex)),
-        lambda: archive(veil0=np.full((2, 24, 32), "x")),
-        lambda: archive(road0=np.zeros(0)),
-    ],
-)
-def test_references_that_are_damaged(tmp_path: Path, content: Callable[[], bytes]) -> None:
-    file = tmp_path / "file.npz"
-    file.write_bytes(references())
-    assert len(read_references(file)) == 1
-    file.write_bytes(content())
-    refused(read_references, file, "references must be a file of `fogsim calibrate veil`")
-
-
-def test_archives_are_not_unpacked_without_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(array_archive, "MOST_UNPACKED", 100_000)
-    file = tmp_path / "file.npz"
-    np.savez_compressed(file, head0=np.zeros(100_000))
-    refused(read_references, file, "larger than 100000 bytes, unpacked")

@@ -35,7 +35,7 @@ def drive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_a_drive_by_night_is_read_by_the_own_lamps_that_are_told(drive: Path) -> None:
     told = NightDrive(Lamp.LOW_BEAM, SETBACK)
     for result in estimate_images([drive / "0.png", drive / "1.png"], CAMERA, "night_road", night=told):
-        assert result.estimates[0].visibility == pytest.approx(60.0, rel=0.04)
+        assert result.estimates[0].visibility == pytest.approx(60.0, rel=0.2)
     dark = estimate_images(drive / "0.png", CAMERA, "night_road", night=NightDrive(Lamp.NONE))
     assert "no head lamp" in str(next(dark).estimates[0].diagnostics["reason"])
     with pytest.raises(InputError, match="fogsim calibrate halos"):
@@ -55,7 +55,7 @@ def test_by_the_command_line() -> None:
     for arguments, why in (
         (("--lamps", "low_beam"), "--lamps goes with --night"),
         (("--night", "--lamps", "low_bean"), "did you mean 'low_beam'?"),
-        (("--night", "--veil", "none.npz"), "none.npz"),
+        (("--night", "--head-lamps", "none.yaml"), "none.yaml"),
     ):
         code, told = run(*arguments)
         assert code != 0

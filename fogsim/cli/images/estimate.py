@@ -60,7 +60,9 @@ def estimate_command(
         float | None,
         typer.Option(min=0, max=10, help="Metres from the front bumper back to the lens, by night. Default: 1.9."),
     ] = None,
-    veil: Annotated[Path | None, typer.Option(help="File of fogsim calibrate veil.")] = None,
+    head_lamps: Annotated[
+        Path | None, typer.Option(help="File of the own head lamps (docs/explanation/night.md). Default: a car's.")
+    ] = None,
     halos: Annotated[Path | None, typer.Option(help="File of fogsim calibrate halos.")] = None,
     guess_camera: Annotated[
         bool, typer.Option("--guess-camera", help="Write the camera file from the images, and stop.")
@@ -91,26 +93,31 @@ def estimate_command(
     ):
         if value is not None:
             raise InputError(f"{option} goes with --guess-camera; else the camera file has it")
-    drive = _night_drive(night, lamps, setback, veil, halos)
+    drive = _night_drive(night, lamps, setback, head_lamps, halos)
     names = method or (["all"] if drive is None else list(NIGHT_METHODS))
     mapped = (signs, track, track_offset)
     _estimate(images, camera, names, as_json, overlay, sequence, rate, overwrite, mapped, drive)
 
 
 def _night_drive(
-    night: bool, lamps: str | None, setback: float | None, veil: Path | None, halos: Path | None
+    night: bool, lamps: str | None, setback: float | None, head_lamps: Path | None, halos: Path | None
 ) -> "NightDrive | None":
     from fogsim.calibration.veil_references import lamps_named
     from fogsim.offline import NightDrive
 
     if not night:
-        for option, value in (("--lamps", lamps), ("--setback", setback), ("--veil", veil), ("--halos", halos)):
+        for option, value in (
+            ("--lamps", lamps),
+            ("--setback", setback),
+            ("--head-lamps", head_lamps),
+            ("--halos", halos),
+        ):
             if value is not None:
                 raise InputError(f"{option} goes with --night")
         return None
     usual = NightDrive()
     lit = usual.lamps if lamps is None else lamps_named(lamps)
-    return NightDrive(lit, usual.setback if setback is None else setback, veil, halos)
+    return NightDrive(lit, usual.setback if setback is None else setback, head_lamps, halos)
 
 
 def _estimate(

@@ -55,8 +55,8 @@ class Gallen2014:
     halos : str or None
         File of ``fogsim calibrate halos`` for this camera; None to calibrate it, once, when
         it is first needed.
-    references : str or None
-        File of ``fogsim calibrate veil``; see `NightRoad`.
+    head_lamps : str
+        See `NightRoad`.
     window : int
         Pictures over which the halos' value is smoothed.
     as_published : bool
@@ -76,13 +76,13 @@ class Gallen2014:
         camera: Camera,
         *,
         halos: str | None = None,
-        references: str | None = None,
+        head_lamps: str = "usual",
         window: Annotated[int, Range(1, 10_000)] = WINDOW,
         as_published: bool = False,
     ) -> None:
         self._camera, self._check = camera, ObservationCheck(camera)
         self._window, self._as_published = int(window), as_published
-        self._veil = Gallen2014Veil(camera, references=references, as_published=as_published)
+        self._veil = Gallen2014Veil(camera, head_lamps=head_lamps, as_published=as_published)
         self._watch, self._is_calibrated = HaloWatch(PUBLISHED, window=self._window), False
         self._source: Calibrations | None = None
         self._trouble = "halos are not calibrated for this camera: fogsim calibrate halos, parameter halos"

@@ -1,4 +1,4 @@
-"""Fog by night from the shape of the own head lamps' veil: Gallen et al. 2014, sections III-A and III-D."""
+"""Fog by night from the veil of the own head lamps: Gallen et al. 2014, sections III-A and III-D."""
 
 from collections import deque
 from dataclasses import replace
@@ -9,13 +9,9 @@ from numpy.typing import NDArray
 
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.night.cells import CellMeans, cell_means, cell_size
-from fogsim.estimators.night.reference_file import HEAD_LAMPS, References
-from fogsim.estimators.night.veil_correlation import (
-    VeilScores,
-    VeilTemplates,
-    visibility_by_parabola,
-    visibility_by_peak,
-)
+from fogsim.estimators.night.night_road import NightRoad
+from fogsim.estimators.night.own_light import lit_head_lamps, setback_of, without_noise
+from fogsim.estimators.night.veil_correlation import VeilScores, VeilTemplates, visibility_by_parabola
 from fogsim.estimators.protocol import Calibrations
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import extinction_from_visibility
@@ -23,7 +19,7 @@ from fogsim.values.camera import Camera, Response
 from fogsim.values.estimate import Estimate
 from fogsim.values.light import Lamp
 from fogsim.values.observation import Observation
-from fogsim.vision.light.daylight import darkens_ahead, lit_by_lamps
+from fogsim.vision.light.daylight import lit_by_lamps
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.lines.horizon import levelled
 
@@ -32,10 +28,6 @@ PUBLISHED = (15.0, 50.0, 100.0, 200.0, 500.0)
 
 BANDS = ((50.0, 10.0), (100.0, 20.0), (200.0, 40.0), (np.inf, 100.0))
 """Published accuracy: up to a visibility, so much [m] (section IV-C)."""
-
-DEVIATION = 0.25
-"""Least deviation of k, relative to it: the published errors alone leave out the truth in two of five frames, for road
-and droplets change the shape (`python benchmarks/night_estimators.py --pool 0`) [-]."""
 
 LIGHT_FOG = 300.0
 """Visibility from which fog is light, and is not to be detected [m] (table I)."""
@@ -51,43 +43,37 @@ LEAST_BRIGHT = 8.0
 
 NORMAL_95_PERCENT = 1.645
 
-ROAD_NOT_LIT = "no veil of the own lamps, nor a road that darkens ahead as they light it"
-"""Why a night cannot be called clear."""
-
 
 @checked_parameters
 class Gallen2014Veil:
-    """Correlation of the mean of some frames with references of the own head lamps' veil (Gallen et al. 2014).
+    """The own head lamps' veil (Gallen et al. 2014).
 
-    Each reference is compared inside its own mask, by Otsu's threshold, by the zero-mean normalised cross-correlation;
-    the best score detects fog. The visibility is that at the top of exp(a V² + b V + c) through the scores (equation
-    13), and its error the published one, or a quarter if that is more.
-
-    As published, that top lies far off where references are far apart: with the paper's six it is near 1100 m in any
-    fog thinner than 80 m. By default references in equal steps of ln V, one mask for all, and a parabola in ln V
-    through Fisher's z of the three best take their place. Road, albedo and amplitude stay unused, so
-    in thin fog, where the veil's shape hardly depends on the visibility, both read what the road does; `NightRoad` does
-    not.
+    As published, the mean of some frames is compared with references, each inside its own mask, by Otsu's threshold, by
+    the zero-mean normalised cross-correlation; the best score detects fog. The visibility is that at the top of
+    exp(a V² + b V + c) through the scores (equation 13), and its error the published one. That top lies far off where
+    references are far apart: with the paper's six it is near 1100 m in any fog thinner than 80 m; and scores discard
+    amplitude and know one beam, one pavement and one kind of droplets. By default `NightRoad`, which averages over
+    these, takes the place of the correlation.
 
     Parameters
     ----------
     camera : Camera
         The assumed calibration.
-    references : str or None
-        File of ``fogsim calibrate veil``; see `NightRoad`.
+    head_lamps : str
+        See `NightRoad`; as published, those of a usual car.
     frames : int
         How many successive frames are composed.
     median : bool
-        Whether the rank filter composes them in place of the mean.
+        Whether, as published, the rank filter composes them in place of the mean.
     threshold : float
-        Score from which on there is fog; 0.4 in figure 11.
+        Score from which on there is fog, as published; 0.4 in figure 11.
     as_published : bool
         Whether the visibility is found as the paper has it; docs/explanation/night.md lists what this adds.
 
     Raises
     ------
     InputError
-        If a parameter is out of range, or the file cannot be read or is of another camera.
+        If a parameter is out of range.
     """
 
     method = "gallen2014_veil"
@@ -96,7 +82,7 @@ class Gallen2014Veil:
         self,
         camera: Camera,
         *,
-        references: str | None = None,
+        head_lamps: str = "usual",
         frames: Annotated[int, Range(1, 1000)] = 10,
         median: bool = False,
         threshold: Annotated[float, Range(0.0, 1.0)] = 0.4,
@@ -105,18 +91,22 @@ class Gallen2014Veil:
         self._camera, self._check = camera, ObservationCheck(camera)
         # Scores are of pixel values, not of light.
         self._values = replace(camera, response=Response.LINEAR, black_level=0.0)
-        self._references = References(camera, references)
-        self._frames, self._median = int(frames), median
-        self._threshold, self._as_published = threshold, as_published
+        self._frames, self._median, self._threshold = int(frames), median, threshold
+        self._model = None if as_published else NightRoad(camera, head_lamps=head_lamps, frames=frames)
+        self._source: Calibrations | None = None
         self.reset()
 
     def take_calibrations(self, source: Calibrations) -> None:
-        """Take references from a source where no file was named."""
-        self._references.source = source.veil_references
+        """Take what the lamps light from a source."""
+        self._source = source
+        if self._model is not None:
+            self._model.take_calibrations(source)
 
     def reset(self) -> None:
         """Forget all earlier frames."""
         self._check.reset()
+        if self._model is not None:
+            self._model.reset()
         self._earlier: deque[CellMeans] = deque(maxlen=self._frames)
         self._templates: tuple[Lamp, VeilTemplates] | None = None
 
@@ -131,30 +121,31 @@ class Gallen2014Veil:
         Returns
         -------
         Estimate
-            Diagnostics: ``score`` (best), ``scores`` by reference, ``detected``, whether fog is likelier than a clear
-            night; or ``reason``.
+            Diagnostics: those of `NightRoad`; as published ``score`` (best), ``scores`` by reference, and ``detected``,
+            whether fog is likelier than a clear night; or ``reason``.
 
         Raises
         ------
         InputError
             If camera, image or time do not fit (see `fogsim.estimators.image_check`).
         """
+        if self._model is not None:
+            return replace(self._model.update(observation), method=self.method)
         image = self._check.kernel_image(observation)
-        lit = HEAD_LAMPS & (Lamp.LOW_BEAM if observation.lamps is None else observation.lamps)
+        lit = lit_head_lamps(observation)
         if not lit:
             return Estimate.invalid(self.method, "no head lamp is lit: this is a method for the night")
         means = cell_means(linear_pixels(image, self._values), cell_size(self._camera))
         if why := self._unfit(image, means):
             return Estimate.invalid(self.method, why)
-        templates = self._templates_of(lit, observation.camera_setback)
-        if templates is None:
-            return Estimate.invalid(self.method, "it has no references; fogsim calibrate veil makes them")
+        if self._source is None:
+            return Estimate.invalid(self.method, "it has no calibration; fogsim.estimators.make supplies one")
+        if self._templates is None or self._templates[0] != lit:
+            self._earlier.clear()
+            made = self._source.veil_references(without_noise(self._camera), lit, setback_of(observation))
+            self._templates = lit, VeilTemplates(replace(made, camera=self._camera), PUBLISHED)
         self._earlier.append(means)
-        found = self._estimate(templates.scores(self._composed()))
-        clear, high = found.valid and found.extinction == 0.0, bool(lit & Lamp.HIGH_BEAM)
-        if clear and not high and not darkens_ahead(levelled(image, self._camera), self._camera):
-            return Estimate.invalid(self.method, ROAD_NOT_LIT, **found.diagnostics)
-        return found
+        return self._estimate(self._templates[1].scores(self._composed()))
 
     def _unfit(self, image: NDArray[np.uint8] | NDArray[np.uint16], means: CellMeans) -> str:
         row = self._camera.horizon_row
@@ -168,17 +159,6 @@ class Gallen2014Veil:
             return ""
         return "no lamps light the road: this is a method for the night"
 
-    def _templates_of(self, lit: Lamp, setback: float) -> VeilTemplates | None:
-        if self._templates is None or self._templates[0] != lit:
-            self._earlier.clear()
-            found = self._references.find(lit, setback)
-            if not found:
-                return None
-            wanted = PUBLISHED if self._as_published else ()
-            of_camera = replace(found[0], camera=self._camera)
-            self._templates = lit, VeilTemplates(of_camera, wanted, common_mask=not self._as_published)
-        return self._templates[1]
-
     def _composed(self) -> NDArray[np.float64]:
         frames = np.array([one.luminance for one in self._earlier])
         composed: NDArray[np.float64] = np.median(frames, axis=0) if self._median else frames.mean(axis=0)
@@ -191,10 +171,9 @@ class Gallen2014Veil:
         if not found["detected"]:
             least = extinction_from_visibility(LIGHT_FOG)
             return Estimate(self.method, 0.0, least / NORMAL_95_PERCENT, diagnostics=found)
-        visibility = (visibility_by_parabola if self._as_published else visibility_by_peak)(scores)
+        visibility = visibility_by_parabola(scores)
         if visibility is None:
             return Estimate.invalid(self.method, "the scores have no top between the references", **found)
         extinction = extinction_from_visibility(visibility)
         accuracy = next(error for most, error in BANDS if visibility < most) / visibility / NORMAL_95_PERCENT
-        deviation = accuracy if self._as_published else max(accuracy, DEVIATION)
-        return Estimate(self.method, extinction, extinction * deviation, diagnostics=found)
+        return Estimate(self.method, extinction, extinction * accuracy, diagnostics=found)

@@ -1,118 +1,101 @@
-"""Fog by the own head lamps: veil and road fitted together to what they light."""
+"""Fog by the own head lamps: one model of veil, lit road, daylight and dark offset, averaged over its unknowns."""
 
 import math
 from collections import deque
 from dataclasses import replace
-from typing import Annotated, Any, NamedTuple
+from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.errors import InputError, shown
 from fogsim.estimators.image_check import ObservationCheck
-from fogsim.estimators.night.cells import CellMeans, camera_of_cells, cell_means, cell_size
-from fogsim.estimators.night.reference_file import HEAD_LAMPS, References
-from fogsim.estimators.night.references import VeilReferences
-from fogsim.estimators.night.veil_fit import Parts, VeilFit, fit_veil
+from fogsim.estimators.night.light_fit import Measured, log_likelihoods, robust_weights
+from fogsim.estimators.night.own_light import (
+    KNOWN_HEAD_LAMPS,
+    SKY,
+    VISIBILITIES,
+    OwnLight,
+    Seen,
+    cell_luminance,
+    cells_of,
+    lit_head_lamps,
+    setback_of,
+    without_cut_noise,
+    without_noise,
+)
 from fogsim.estimators.protocol import Calibrations
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera
-from fogsim.values.estimate import Estimate, ExtinctionBounds
+from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate, ExtinctionBounds
 from fogsim.values.light import Lamp
 from fogsim.values.observation import Observation
-from fogsim.vision.light.daylight import darkens_ahead
-from fogsim.vision.light.luminance import linear_pixels
+from fogsim.vision.light.luminance import linear_table
 from fogsim.vision.light.pixel_kernels import Pixels
-from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation, levelled
 
-NEAREST, FARTHEST, HALF_LANE = 5.0, 80.0, 1.4
-"""The road is looked at between these distances, and so far to the left and right of the own middle [m]."""
+DAYLIGHT, NIGHT = 100.0, 0.003
+"""Illuminance of the sky from which methods of the day take over, and below which it lights nothing [lx]."""
 
-LOW_SKY, HIGH_SKY, HALF_SKY = 0.015, 0.25, 0.5
-"""The fog above the road is looked at between these angles above the horizon, and so far aside [rad]."""
+LEAST_CELLS, LEAST_ROAD = 40, 6
+"""Fewer cells, and fewer of the road, show neither veil nor road."""
 
-LEAST_CELLS = 150
-"""Fewer cells show neither veil nor road."""
+LEAST_PEAK = 0.02
+"""Luminance that something must have for there to be head lamps' light, full scale being 1 [-]."""
 
-LEAST_PEAK = 8.0
-"""Luminance that something must have for there to be head lamps' light [linear grey levels]."""
+MOST_CLIPPED = 0.02
+"""Share of a cell's pixels that may be as bright as can be told [-]."""
 
-LEAST_EXPLAINED = 0.93
-"""Share of the cells' variance that veil, road and even light must explain, or other light lights them [-]."""
+ROAD_TEXTURE, SKY_TEXTURE, LEVEL, FLOOR = 0.1, 0.2, 0.02, 2e-4
+"""Deviations of the model: over what is seen of road and sky, over the mean of all cells, and of full scale [-]."""
 
-NOT_BY_OWN_LAMPS = "other light than that of the own head lamps"
-"""Why an image is refused."""
+INDEPENDENT = {True: 16.0, False: 6.0}
+"""Number of cells that err independently, where all of the road is seen, by whether the beam is known [-]."""
 
-MOST_EVEN = 0.5
-"""Share of the brightest cells that light may have that is the same everywhere: by day it is most of the light [-]."""
+MOST_MISFIT, LEAST_WEIGHT = {True: 2.0, False: 2.5}, 0.6
+"""Mean squared deviation above which other light is seen, by whether the beam is known, and mean weight of the cells
+below which lamps of others shine over too much of the image [-]."""
 
-ROAD_DEVIATION = 0.35
-"""Deviation of ln of what asphalt returns [-]: 5 to 30 mcd/(lx m²), gallen2014."""
+PEDESTAL, GLOW = 6e-4, 0.5
+"""Standard deviation of the sensor's dark offset and of light that the lens scatters evenly, of full scale, and where
+lamps of others are seen that of their glow, over the luminance of the sky [-]."""
 
-INDEPENDENT = 60.0
-"""Number of cells that err independently of one another, of all in use; what the model leaves out is smooth."""
+LEAST_LAMPLIGHT = 0.5
+"""Share of the light that the own lamps must give where no sensor reports the daylight [-]."""
 
-LEAST_MISFIT = 0.05
-"""Mean squared deviation below which a picture only by chance fits better [-]."""
+ROUNDS, SETTLED = 4, 0.05
+"""How often weights of the cells are found again, and changes of them that change nothing [-]."""
 
-MODEL_DEVIATION = 0.03
-"""Deviation of ln k by what no picture shows: aim and pattern of the lamps, mount of the camera [-]."""
+CLEAR, MAY_BE_CLEAR = 2000.0, 0.05
+"""Visibility above which own lamps show no fog [m], and its probability from which on there is no upper bound [-]."""
 
-LEAST_DEVIATION = 1e-3
-"""Deviation of k by what else is lit: verges, trees, signs [1/m]."""
+LAMPS_FROM, HALO = 40.0, 0.06
+"""Distance on the road beyond which what is as bright as can be told may be a lamp [m], and how far from it cells are
+left out [rad]."""
 
-LEAST_WEIGHT = 0.85
-"""Mean weight of the cells below which others' lamps shine over too much of the picture [-]."""
+MAY_BE_DENSER = 0.25
+"""Probability of the densest fog of the model from which on there may be denser fog [-]."""
 
-OUTSHONE = 1.0
-"""Deviation of ln k by lamps of others, over the weight that the cells have lost to them [-]."""
+LEAD_HALF_WIDTH, LEAD_HEIGHT, LEAD_MARGIN, CLOSEST_LEAD = 1.5, 4.0, 0.4, 8.0
+"""What a vehicle ahead covers at most, below its wheels too, for they and the pitch are not known, and how near it
+leaves too little [m]."""
 
-BETWEEN = 9
-"""References that are interpolated about the likeliest one."""
+BOUND_SOFTNESS = 0.1
+"""Standard deviation of bounds in ln k [-]."""
 
-UNLIKELY = 4.0
-"""By how much ln of the likelihood of droplets is below the largest where they no longer count [-]."""
-
-MOST_UNSURE = 0.5
-"""Deviation of ln k from which on no fog is seen rather than some [-]."""
-
-CLEAR_BUT_FOR = 2.0
-"""By how much ln of the likelihood of some fog must exceed that of none for it to be seen [-]."""
-
-LEAD_HALF_WIDTH, LEAD_HEIGHT, CLOSEST_LEAD = 1.5, 4.0, 8.0
-"""What a vehicle ahead covers at most, and how near it leaves too little [m]."""
-
-NORMAL_95_PERCENT = 1.645
-
-
-class _Cells(NamedTuple):
-    """Where cells look: angle below the horizon and to the right of the axis [rad]; which see sky, which are of use."""
-
-    below: NDArray[np.float64]
-    aside: NDArray[np.float64]
-    sky: NDArray[np.bool_]
-    used: NDArray[np.bool_]
-
-
-class _Seen(NamedTuple):
-    """The cells that tell: their luminance, where they are, and the deviation of dark ones [grey levels]."""
-
-    luminance: NDArray[np.float64]
-    used: NDArray[np.bool_]
-    floor: float
+Floats = NDArray[np.float64]
 
 
 @checked_parameters
 class NightRoad:
     """Extinction by night from the light of the own head lamps: in the fog, and on the road behind it.
 
-    The linear picture is taken by cells as a veil(V) + b road(V) + c: what the fog returns of the lamps' light, what
-    the road returns of what gets there and back, and even light of anything else. Pictures of veil and road for many
-    visibilities come from the night model, for the told camera and the own lamps that are lit; a, b, c ≥ 0 and a small
-    error of the told pitch are fitted for each, so neither the camera's exposure nor the road's albedo needs be known,
-    though b / a must be that of some asphalt; and so for four kinds of droplets. Where others' lamps shine, cells are
-    brighter than the model, and count less. About the likeliest reference more of them are interpolated; the visibility
-    is the likeliest of these, over the droplets that are likely.
+    Linear luminance of some rectangles of sky and road is explained as veil, lit road, daylight that is left, and an
+    even dark offset. What a vehicle does not know is drawn, once for each camera and set of lamps: aim and intensity of
+    the beam, pitch, height of the lamps, where the veil begins, droplets, how light that is scattered more than once
+    spreads, and how the pavement returns it. The posterior of ln V is the mean over the draws, with amplitudes of
+    the light fitted in each. Where it leaves clear air possible the estimate is not valid and has a bound.
 
     Own method. gallen2014 compares shapes alone, by correlation, which in thin fog hardly depend on the visibility, and
     amplitude alone is that of two visibilities; together they tell both.
@@ -121,18 +104,15 @@ class NightRoad:
     ----------
     camera : Camera
         The assumed calibration.
-    references : str or None
-        File of ``fogsim calibrate veil``; None for a car's usual lamps, whose references are computed
-        once for each camera and set of lamps.
-    pitch_deviation : float
-        Standard deviation of the true pitch about the assumed one [rad].
+    head_lamps : str
+        "usual" for a car's, "unknown" for low beams of any pattern, or a file of lamps (docs/explanation/night.md).
     frames : int
         How many of the last frames are averaged: noise and lane marks go, and a change of fog is seen later.
 
     Raises
     ------
     InputError
-        If a parameter is out of range, or the file cannot be read or is of another camera.
+        If a parameter is out of range, or there is no such file.
     """
 
     method = "night_road"
@@ -141,25 +121,31 @@ class NightRoad:
         self,
         camera: Camera,
         *,
-        references: str | None = None,
-        pitch_deviation: PitchDeviation = PITCH_DEVIATION,
+        head_lamps: str = "usual",
         frames: Annotated[int, Range(1, 1000)] = 3,
     ) -> None:
+        if head_lamps not in KNOWN_HEAD_LAMPS and not Path(head_lamps).is_file():
+            raise InputError(f"head_lamps must be usual, unknown or a file, got {shown(head_lamps)}")
         self._camera, self._check = camera, ObservationCheck(camera)
-        self._references = References(camera, references)
-        self._shift = pitch_deviation * camera_of_cells(camera).focal_length
-        self._cells = _cells(camera)
-        self._frames = int(frames)
+        self._lamps, self._frames = head_lamps, int(frames)
+        self._source: Calibrations | None = None
+        self._own: tuple[tuple[Lamp, float], OwnLight] | None = None
+        self._cells = cells_of(camera)
+        rays = self._cells.rays.mean(axis=1)
+        self._depth = np.where(self._cells.is_sky, np.inf, camera.mount_height / np.maximum(-rays[:, 2], 1e-3))
+        self._up = np.where(self._cells.is_sky, np.arcsin(rays[:, 2]) / SKY[0][-1], 0.0)
+        self._aside = rays[:, 1] / rays[:, 0]
+        self._below = -rays[:, 2] / rays[:, 0]
         self.reset()
 
     def take_calibrations(self, source: Calibrations) -> None:
-        """Take references from a source where no file was named."""
-        self._references.source = source.veil_references
+        """Take what the lamps light from a source."""
+        self._source = source
 
     def reset(self) -> None:
         """Forget all earlier frames."""
         self._check.reset()
-        self._earlier: deque[CellMeans] = deque(maxlen=self._frames)
+        self._earlier: deque[Seen] = deque(maxlen=self._frames)
         self._lit: Lamp | None = None
 
     def update(self, observation: Observation) -> Estimate:
@@ -168,13 +154,13 @@ class NightRoad:
         Parameters
         ----------
         observation : Observation
-            Its image, lead, lamps and the camera's place are used; if it does not tell lamps, low beams are assumed.
+            Its image, lead, lamps, light and the camera's place are used; without lamps, low beams are assumed.
 
         Returns
         -------
         Estimate
-            Diagnostics: ``veil`` and ``road`` [linear grey levels per cd/m²], ``even`` [linear grey levels],
-            ``explained`` [-] and ``droplets``; or ``reason``.
+            Diagnostics: ``visibility_quantiles``, of 5, 50 and 95 % [m], ``misfit``, mean squared deviation [-],
+            ``lamplight``, share of the light that is the lamps' [-], and ``weight``, mean of the cells; or ``reason``.
 
         Raises
         ------
@@ -182,162 +168,129 @@ class NightRoad:
             If camera, image or time do not fit (see `fogsim.estimators.image_check`).
         """
         image = self._check.kernel_image(observation)
-        lit = HEAD_LAMPS & (Lamp.LOW_BEAM if observation.lamps is None else observation.lamps)
+        lit = lit_head_lamps(observation)
         if not lit:
             return Estimate.invalid(self.method, "no head lamp is lit: this is a method for the night")
+        light = math.nan if observation.light is None else observation.light.illuminance
+        if light > DAYLIGHT:
+            return Estimate.invalid(self.method, f"{light:.0f} lx of daylight: this is a method for the night")
         if lit != self._lit:
             self._earlier.clear()
             self._lit = lit
         if observation.lead is not None and observation.lead.distance < CLOSEST_LEAD:
             return Estimate.invalid(self.method, "a vehicle close ahead hides the road")
-        self._earlier.append(cell_means(linear_pixels(_green(image), self._camera), cell_size(self._camera)))
-        means = _mean(self._earlier)
-        used = self._cells.used & ~means.clipped & ~self._hidden(observation)
-        if why := _too_little(means, used, self._cells.sky):
+        seen = self._look(image)
+        beside = self._beside_lamps(image)
+        used = (seen.clipped < MOST_CLIPPED) & ~self._hidden(observation) & ~beside
+        if why := _too_little(seen, used, self._cells.is_sky):
             return Estimate.invalid(self.method, why)
-        references = self._references.find(lit, observation.camera_setback)
-        if not references:
-            return Estimate.invalid(self.method, "it has no references; fogsim calibrate veil makes them")
-        floor = max(1.0, float(np.quantile(means.luminance, 0.05)))
-        found = self._estimate(_Seen(means.luminance[used], used, floor), references)
-        high = bool(lit & Lamp.HIGH_BEAM)
-        if found.valid and not high and not darkens_ahead(levelled(image, self._camera), self._camera):
-            return Estimate.invalid(self.method, NOT_BY_OWN_LAMPS, **found.diagnostics)
-        return found
+        if self._source is None:
+            return Estimate.invalid(self.method, "it has no calibration; fogsim.estimators.make supplies one")
+        wanted = lit, setback_of(observation)
+        if self._own is None or self._own[0] != wanted:
+            self._own = wanted, self._source.own_light(without_noise(self._camera), *wanted, self._lamps)
+        return self._estimate(
+            self._measured(seen, used, light, others=bool(beside.any())), _of_cells(self._own[1], used)
+        )
+
+    def _look(self, image: Pixels) -> Seen:
+        """Mean of the last frames in green light: tail lamps are red, and so is their glow."""
+        green: NDArray[Any] = image if image.ndim == 2 else np.ascontiguousarray(image[:, :, 1])
+        camera = self._camera
+        table = linear_table(camera.response, camera.bits, camera.black_level).copy()
+        self._earlier.append(cell_luminance(green, table, self._cells.box))
+        return without_cut_noise(Seen(*(np.mean(part, axis=0) for part in zip(*self._earlier, strict=True))))
 
     def _hidden(self, observation: Observation) -> NDArray[np.bool_]:
         """Cells that the vehicle ahead may cover."""
         if observation.lead is None:
-            return np.zeros(self._cells.used.shape, np.bool_)
+            return np.zeros(len(self._depth), np.bool_)
         height, depth = self._camera.mount_height, observation.lead.distance + observation.camera_setback
-        below, aside = self._cells.below * depth, np.abs(self._cells.aside) * depth
-        hidden: NDArray[np.bool_] = (below < height) & (below > height - LEAD_HEIGHT) & (aside < LEAD_HALF_WIDTH)
+        below, aside = self._below * depth, np.abs(self._aside) * depth
+        upright = (below < height + LEAD_MARGIN) & (below > height - LEAD_HEIGHT)
+        hidden: NDArray[np.bool_] = upright & (aside < LEAD_HALF_WIDTH)
         return hidden
 
-    def _fit(self, seen: _Seen, references: VeilReferences) -> VeilFit:
-        # By rows, as those are of which one reference is made of three: one kernel is compiled for both.
-        kinds = (references.veil, references.road, *references.slopes)
-        parts = Parts(*(np.ascontiguousarray(part[:, seen.used]) for part in kinds))
-        return fit_veil(seen.luminance, seen.floor, parts, self._shift)
+    def _beside_lamps(self, image: Pixels) -> NDArray[np.bool_]:
+        """Cells near lamps of others, which are as bright as can be told: their halos are not of the model."""
+        camera, green = self._camera, image if image.ndim == 2 else image[:, :, 1]
+        end = max(min(round(camera.horizon_row + camera.row_distance / LAMPS_FROM), camera.height), 0)
+        v, u = np.nonzero(green[:end] >= 2**camera.bits - 1)
+        beside = np.zeros(len(self._below), np.bool_)
+        # One pixel in each square of some pixels is enough.
+        step = max(camera.width // 80, 1)
+        for down, across in set(zip((v // step).tolist(), (u // step).tolist(), strict=True)):
+            below = (step * (down + 0.5) - camera.horizon_row) / camera.focal_length
+            aside = (camera.principal_point[0] - step * (across + 0.5)) / camera.focal_length
+            beside |= np.hypot(self._below - below, self._aside - aside) < HALO
+        return beside
 
-    def _estimate(self, seen: _Seen, references: tuple[VeilReferences, ...]) -> Estimate:
-        fits = [self._fit(seen, one) for one in references]
-        least = max(min(float(fit.misfit.min()) for fit in fits), LEAST_MISFIT)
-        likelihoods = np.array([_log_likelihood(fit, least) for fit in fits])
-        kind, best = np.unravel_index(int(np.argmax(likelihoods)), likelihoods.shape)
-        fit = fits[kind]
-        veil, road, even, _ = fit.amplitude[best].tolist()
-        found: dict[str, object] = {"veil": veil, "road": road, "even": even, "explained": fit.explained}
-        found["droplets"] = references[kind].droplets
-        if fit.explained < LEAST_EXPLAINED or even > MOST_EVEN * float(seen.luminance.max()):
-            return Estimate.invalid(self.method, NOT_BY_OWN_LAMPS, **found)
-        outshone = 1.0 - float(fit.weight.mean())
-        if outshone > 1.0 - LEAST_WEIGHT:
-            return Estimate.invalid(self.method, "lamps of others outshine what the own ones light", **found)
-        extinction = np.array([extinction_from_visibility(one) for one in references[0].visibility.tolist()])
-        if best == 0:
-            reason = "fog so dense that only the densest reference is like it"
-            bounds = ExtinctionBounds(least=float(extinction[1]))
-            return replace(Estimate.invalid(self.method, reason, **found), bounds=bounds)
-        likely = np.flatnonzero(likelihoods.max(axis=1) > likelihoods.max() - UNLIKELY)
-        peaks = [self._refined(seen, references[one], likelihoods[one], least) for one in likely.tolist()]
-        log_extinction, deviation = _together(peaks)
-        some, none = likelihoods[:, :-1].max(), likelihoods[:, -1].max()
-        if none > some - CLEAR_BUT_FOR or deviation > MOST_UNSURE:
-            most = _most(extinction, np.logaddexp.reduce(likelihoods, axis=0))
-            return Estimate(self.method, 0.0, most / NORMAL_95_PERCENT, diagnostics=found)
-        value = math.exp(log_extinction)
-        relative = math.hypot(deviation, MODEL_DEVIATION, OUTSHONE * outshone)
-        deviation = math.hypot(value * relative, LEAST_DEVIATION)
-        return Estimate(self.method, value, deviation, diagnostics=found)
+    def _measured(self, seen: Seen, used: NDArray[np.bool_], light: float, *, others: bool) -> Measured:
+        luminance, is_sky = seen.luminance[used], self._cells.is_sky[used]
+        texture = np.where(is_sky, SKY_TEXTURE, ROAD_TEXTURE) * luminance
+        variance = texture**2 + FLOOR**2 + (LEVEL * luminance.mean()) ** 2
+        lamp_scale = light / math.pi if light > NIGHT else 0.0
+        sky = float(luminance[is_sky].mean()) if is_sky.any() else float(luminance.min())
+        sky_scale = sky if math.isnan(light) else 0.0
+        seen_road = np.count_nonzero(~is_sky) / np.count_nonzero(~self._cells.is_sky)
+        independent = INDEPENDENT[self._lamps != "unknown"] * seen_road
+        even = math.hypot(PEDESTAL, GLOW * sky if others else 0.0)
+        scales = sky_scale, lamp_scale, even, independent
+        return Measured(luminance, variance, self._depth[used], self._up[used], *scales)
 
-    def _refined(
-        self, seen: _Seen, references: VeilReferences, likelihood: NDArray[np.float64], least: float
-    ) -> tuple[float, float, float]:
-        """Where the likelihood of a kind of droplets is largest in ln k, its deviation, and how large it is there."""
-        place = np.log([extinction_from_visibility(one) for one in references.visibility[:-1].tolist()])
-        best = min(max(int(np.argmax(likelihood[:-1])), 1), len(place) - 2)
-        # Lagrange's polynomials through three references.
-        at = np.linspace(-1.0, 1.0, BETWEEN)[:, None]
-        shares = np.concatenate((0.5 * at * (at - 1.0), 1.0 - at**2, 0.5 * at * (at + 1.0)), axis=1)
-        parts = (references.veil, references.road, *references.slopes)
-        near = Parts(*((shares[:, :, None] * part[None, best - 1 : best + 2, seen.used]).sum(axis=1) for part in parts))
-        finer = _log_likelihood(fit_veil(seen.luminance, seen.floor, near, self._shift), least)
-        places = (shares * place[best - 1 : best + 2]).sum(axis=1)
-        return (*_peak(places, finer), float(finer.max()))
-
-
-def _cells(camera: Camera) -> _Cells:
-    cells = camera_of_cells(camera)
-    row, col = np.mgrid[: cells.height, : cells.width].astype(np.float64)
-    below = (row - cells.horizon_row) / cells.focal_length
-    aside = (col - cells.principal_point[0]) / cells.focal_length
-    distance = camera.mount_height / np.maximum(below, 1e-6)
-    road = (distance > NEAREST) & (distance < FARTHEST) & (np.abs(aside * distance) < HALF_LANE)
-    sky = (below < -LOW_SKY) & (below > -HIGH_SKY) & (np.abs(aside) < HALF_SKY)
-    return _Cells(below, aside, sky, road | sky)
+    def _estimate(self, measured: Measured, own: OwnLight) -> Estimate:
+        extinction = np.array([extinction_from_visibility(one) for one in VISIBILITIES.tolist()])
+        weight, best = np.ones(len(measured.seen)), np.empty(len(measured.seen) + 2)
+        found = log_likelihoods(measured, extinction, own.veil, own.road, weight, best)
+        for _ in range(ROUNDS):
+            earlier, weight = weight, robust_weights(measured.seen, best[:-2], measured.variance)
+            if np.abs(weight - earlier).max() < SETTLED:
+                break
+            found = log_likelihoods(measured, extinction, own.veil, own.road, weight, best)
+        likelihood = np.exp(found - found.max()).sum(axis=0)
+        share = likelihood / likelihood.sum()
+        low, middle, high = _quantiles(share)
+        told: dict[str, object] = {"visibility_quantiles": (low, middle, high), "misfit": float(best[-2])}
+        told |= {"lamplight": float(best[-1]), "weight": float(weight.mean())}
+        if best[-2] > MOST_MISFIT[self._lamps != "unknown"]:
+            return Estimate.invalid(self.method, "other light than that of the own head lamps", **told)
+        if measured.sky_scale > 0.0 and best[-1] < LEAST_LAMPLIGHT:
+            return Estimate.invalid(self.method, "light of the day, or of lamps all around", **told)
+        if weight.mean() < LEAST_WEIGHT:
+            return Estimate.invalid(self.method, "lamps of others outshine what the own ones light", **told)
+        widened = math.exp(NORMAL_90_PERCENT * BOUND_SOFTNESS)
+        if share[VISIBILITIES > CLEAR].sum() > MAY_BE_CLEAR:
+            bounds = ExtinctionBounds(most=extinction_from_visibility(low) / widened, softness=BOUND_SOFTNESS)
+            reason = f"own lamps show no fog for certain, and visibility is at least {low:.0f} m"
+            return replace(Estimate.invalid(self.method, reason, **told), bounds=bounds)
+        if share[0] > MAY_BE_DENSER:
+            reason = "fog so dense that only the densest of the model is like it"
+            bounds = ExtinctionBounds(least=extinction_from_visibility(high) * widened, softness=BOUND_SOFTNESS)
+            return replace(Estimate.invalid(self.method, reason, **told), bounds=bounds)
+        value = extinction_from_visibility(middle)
+        deviation = (extinction_from_visibility(low) - value) / NORMAL_90_PERCENT
+        return Estimate(self.method, value, deviation, diagnostics=told)
 
 
-def _green(image: Pixels) -> Pixels:
-    """The image in green light: tail lamps are red, and so is their glow."""
-    if image.ndim == 2:
-        return image
-    green: NDArray[Any] = np.ascontiguousarray(image[:, :, 1])
-    return green
+def _quantiles(share: Floats) -> tuple[float, float, float]:
+    """Visibilities below which 5, 50 and 95 % of the posterior are [m]; within a step of the grid ln V is even."""
+    step = math.log(VISIBILITIES[1] / VISIBILITIES[0])
+    edges = np.concatenate((np.log(VISIBILITIES) - 0.5 * step, [math.log(VISIBILITIES[-1]) + 0.5 * step]))
+    below = np.concatenate(([0.0], np.cumsum(share)))
+    low, middle, high = np.exp(np.interp((0.05, 0.5, 0.95), below, edges)).tolist()
+    return low, middle, high
 
 
-def _mean(frames: deque[CellMeans]) -> CellMeans:
-    luminance = np.mean([frame.luminance for frame in frames], axis=0)
-    return CellMeans(luminance, np.logical_or.reduce([frame.clipped for frame in frames]))
+def _of_cells(own: OwnLight, used: NDArray[np.bool_]) -> OwnLight:
+    if used.all():
+        return own
+    return OwnLight(np.ascontiguousarray(own.veil[:, :, used]), np.ascontiguousarray(own.road[:, :, used]))
 
 
-def _too_little(means: CellMeans, used: NDArray[np.bool_], sky: NDArray[np.bool_]) -> str:
+def _too_little(seen: Seen, used: NDArray[np.bool_], is_sky: NDArray[np.bool_]) -> str:
     """Why nothing can be told from the cells of use; empty if something may."""
-    if np.count_nonzero(used) < LEAST_CELLS or not sky.any():
+    if np.count_nonzero(used) < LEAST_CELLS or np.count_nonzero(used & ~is_sky) < LEAST_ROAD:
         return "too little is seen that is neither too bright nor too dark"
-    bright = float(np.quantile(means.luminance[used], 0.99))
-    if bright < LEAST_PEAK:
+    if float(seen.luminance[used].max()) < LEAST_PEAK:
         return "too dark: the head lamps light nothing"
-    if float(np.median(means.luminance[sky])) > MOST_EVEN * bright:
-        return "light of the day, or of lamps all around"
     return ""
-
-
-def _log_likelihood(fit: VeilFit, least: float) -> NDArray[np.float64]:
-    """Of each reference, with what is known of roads, where the best one of all has the given misfit."""
-    veil, road = np.maximum(fit.amplitude[:, 0], 1e-9), np.maximum(fit.amplitude[:, 1], 1e-9)
-    unusual = np.minimum(np.abs(np.log(road / veil)) / ROAD_DEVIATION, 4.0)
-    # Where there is no veil nothing is known of its amplitude.
-    return -0.5 * (INDEPENDENT * fit.misfit / least + np.where(fit.amplitude[:, 0] > 0.0, unusual**2, 0.0))
-
-
-def _together(peaks: list[tuple[float, float, float]]) -> tuple[float, float]:
-    """Mean and deviation over kinds of droplets, each with mean, deviation and ln of its likelihood."""
-    mean, deviation, likelihood = np.array(peaks).T
-    weight = np.exp(likelihood - likelihood.max())
-    weight /= weight.sum()
-    middle = float((weight * mean).sum())
-    return middle, math.sqrt(float((weight * (deviation**2 + (mean - middle) ** 2)).sum()))
-
-
-def _peak(place: NDArray[np.float64], likelihood: NDArray[np.float64]) -> tuple[float, float]:
-    """Place of the largest likelihood by a parabola through its neighbours, and the deviation that it has there."""
-    best = min(max(int(np.argmax(likelihood)), 1), len(place) - 2)
-    before, here, after = likelihood[best - 1 : best + 2].tolist()
-    left, right = place[best] - place[best - 1], place[best + 1] - place[best]
-    rise, fall = (here - before) / left, (after - here) / right
-    curvature = 2.0 * (fall - rise) / (left + right)
-    if curvature >= 0.0:
-        return float(place[int(np.argmax(likelihood))]), math.inf
-    slope = (rise * right + fall * left) / (left + right)
-    step = -slope / curvature
-    farthest = min(abs(left), abs(right))
-    return float(place[best] + min(max(step, -farthest), farthest)), 1.0 / math.sqrt(-curvature)
-
-
-def _most(extinction: NDArray[np.float64], likelihood: NDArray[np.float64]) -> float:
-    """Extinction coefficient below which 95 % of the likelihood are, that of the thinnest fog at least [1/m]."""
-    order = np.argsort(extinction)
-    weight = np.exp(likelihood[order] - likelihood.max())
-    most = float(np.interp(0.95, np.cumsum(weight) / weight.sum(), extinction[order]))
-    return max(most, float(extinction[order[1]]))

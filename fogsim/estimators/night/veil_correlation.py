@@ -144,30 +144,3 @@ def visibility_by_parabola(scores: VeilScores) -> float | None:
     side = matrix_product(np.ascontiguousarray(powers.T), np.log(scores.score[some]))
     a, b, _ = matrix_product(inverse_of(matrix_product(powers.T, powers)), side).tolist()
     return -b / (2.0 * a) * scale if a < 0.0 < b else None
-
-
-def visibility_by_peak(scores: VeilScores) -> float | None:
-    """Visibility at the top of a parabola in ln V through the three best of Fisher's z of the scores [m].
-
-    References in equal steps of ln V have scores that are nearly such a parabola about the best one; one in V through
-    references far apart is none, and is off by half and more in thin fog.
-
-    Parameters
-    ----------
-    scores : VeilScores
-        The scores.
-
-    Returns
-    -------
-    float or None
-        None where the best reference is the first or last, so that there is no top.
-    """
-    z = np.arctanh(np.clip(np.nan_to_num(scores.score, nan=-1.0), -0.999999, 0.999999))
-    best = int(np.argmax(z))
-    if not 0 < best < len(z) - 1:
-        return None
-    before, here, after = z[best - 1 : best + 2].tolist()
-    bend = before - 2.0 * here + after
-    step = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
-    place = np.log(scores.visibility[best - 1 : best + 2])
-    return float(np.exp(np.interp(step, (-1.0, 0.0, 1.0), place)))

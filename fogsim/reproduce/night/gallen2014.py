@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fogsim.atmosphere.visibility.night_visibility import FogKind
 from fogsim.calibration.halo_calibration import measure_halo_threshold
 from fogsim.calibration.staged_night import SETBACK, NightRoad, NightScene, NightVehicle
-from fogsim.calibration.veil_references import DROPLETS, PUBLISHED_VISIBILITIES, compute_references
+from fogsim.calibration.veil_references import PUBLISHED_VISIBILITIES, compute_references
 from fogsim.estimators import make
 from fogsim.estimators.night.cells import cell_means, cell_size
 from fogsim.estimators.night.gallen2014 import DENSE, LIGHT
@@ -54,7 +54,7 @@ NOTES = (
     " neither how dense its fog was nor whether its rate counts clear frames; ours does. 'As published' has the mean"
     " Br50 and the threshold 9, 'corrected' the largest sharpness and a threshold from other scenes.",
     "Veil: a straight road with marks and signs, not a fog chamber. 'As published' compares with six frames of the same"
-    " drive and takes the top of exp(aV² + bV + c); 'corrected' is gallen2014_veil with simulated references.",
+    " drive and takes the top of exp(aV² + bV + c); 'corrected' is the model of night_road.",
     "Equations 11 and 12: 'as published' has one L_v (eq. 9) for both beams, 'corrected' each beam's own veil by"
     " FogSim's model. The beams are median US ones; the paper does not print its European ones.",
     "Not compared: Br50 in the photographs of figure 10, whose visibility is unknown, and figures without values.",
@@ -62,7 +62,7 @@ NOTES = (
 
 _LOW = Lamp.POSITION | Lamp.LOW_BEAM
 _HALOS = {"published": mean_steepness, "mean": mean_steepness, "largest": largest_sharpness}
-_METHODS = ("as_published", "corrected", "night_road")
+_METHODS = ("as_published", "corrected")
 _CLASSES: tuple[tuple[str, float, float, float, Literal["at_least", "equal", "at_most"]], ...] = (
     ("dense fog (3), < 100 m", 0.0, DENSE, 0.6, "at_least"),
     ("fog (2), 100 to 300 m", DENSE, LIGHT, 0.4, "equal"),
@@ -165,7 +165,7 @@ def _scene(way: float, seed: int) -> NightScene:
 
 
 def _dissipating(camera: Camera, fogs: int, steps: Steps) -> Iterator[dict[str, Any]]:
-    """Estimates in each fog, by the paper's six references from the same drive and by simulated references."""
+    """Estimates in each fog, by the paper's six references from the same drive, and by the model of `night_road`."""
     with NightRoad(camera, seed=5) as road:
 
         def drive(visibility: float, *seed: int) -> list[Pixels]:
@@ -174,16 +174,15 @@ def _dissipating(camera: Camera, fogs: int, steps: Steps) -> Iterator[dict[str, 
 
         cells = np.array([_mean_cells(drive(one, 0, number), camera) for number, one in enumerate(REFERENCES)])
         of_images = replace(camera, response=Response.LINEAR)
-        references = VeilReferences(of_images, _LOW, "", SETBACK, np.array(REFERENCES), cells, np.zeros_like(cells))
+        references = VeilReferences(of_images, np.array(REFERENCES), cells, np.zeros_like(cells))
         templates = VeilTemplates(references)
         for number, visibility in enumerate(np.geomspace(REFERENCES[0], REFERENCES[-1], fogs).tolist()):
             images = drive(visibility, 1, number)
             scores = templates.scores(_mean_cells(images, camera))
-            methods = make("gallen2014_veil", camera, frames=COMPOSED), make("night_road", camera, frames=COMPOSED)
+            corrected = make("gallen2014_veil", camera, frames=COMPOSED)
             for image in images:
-                seen = Observation(image, camera_setback=SETBACK, lamps=_LOW)
-                veil, whole = (method.update(seen) for method in methods)
-            found = visibility_by_parabola(scores), found_visibility(veil), found_visibility(whole)
+                veil = corrected.update(Observation(image, camera_setback=SETBACK, lamps=_LOW))
+            found = visibility_by_parabola(scores), found_visibility(veil)
             record: dict[str, Any] = {"visibility_m": round(visibility, 1)}
             for one, score in zip(REFERENCES, scores.score.tolist(), strict=True):
                 record[f"score_{one:g}"] = round(score, 3)
@@ -206,11 +205,11 @@ def _mean_cells(images: Sequence[Pixels], camera: Camera) -> NDArray[np.float64]
 def _open_road(camera: Camera) -> dict[str, Any]:
     """Scores of the paper's six simulated references with the mean of successive frames."""
     visibilities, lit = PUBLISHED_VISIBILITIES, Lamp.LOW_BEAM
-    (made,) = compute_references(camera, lit, SETBACK, visibilities=visibilities, droplets=DROPLETS[:1])
+    made = compute_references(camera, lit, SETBACK, visibilities)
     with NightRoad(camera, seed=6) as road:
         cells = _mean_cells(_driven(road, LIDAR, (22,)), camera)
     record: dict[str, Any] = {"visibility_m": LIDAR}
-    for name in _METHODS[:2]:
+    for name in _METHODS:
         found = VeilTemplates(made, common_mask=name == "corrected").scores(cells)
         for one, score in zip(visibilities, (*found.score.tolist(), found.clear), strict=True):
             record[f"{name}_score_{one:g}"] = round(score, 3)
@@ -315,7 +314,7 @@ def fog_cells(records: Sequence[Record], wanted: Sequence[str] = TABLES) -> list
 
 def _road_rows(record: Record) -> Rows:
     names = ("clear" if math.isinf(one) else f"{one:g} m" for one in PUBLISHED_VISIBILITIES)
-    scores = {name: [record[f"{name}_score_{one:g}"] for one in PUBLISHED_VISIBILITIES] for name in _METHODS[:2]}
+    scores = {name: [record[f"{name}_score_{one:g}"] for one in PUBLISHED_VISIBILITIES] for name in _METHODS}
     return (("reference", *names), *((_words(name), *map(str, scores[name])) for name in scores))
 
 

@@ -59,7 +59,7 @@ def _draw_estimates(axes: Axes, fogs: Records) -> None:
     axes.plot(truth, truth, color="0.6", lw=1)
     error = np.select([truth < 50.0, truth < 100.0, truth < 200.0], [10.0, 20.0, 40.0], 100.0)
     axes.fill_between(truth, np.maximum(truth - error, 1.0), truth + error, color="0.9", label="published accuracy")
-    for name, mark in (("as_published", "x"), ("corrected", "s"), ("night_road", "o")):
+    for name, mark in (("as_published", "x"), ("corrected", "s")):
         axes.plot(truth, _column(fogs, f"{name}_m"), mark, ms=4, label=name.replace("_", " "))
     axes.set(xscale="log", yscale="log", xlabel="true V_met [m]", ylabel="estimated V_met [m]", title="Figure 14")
     axes.set_ylim(8.0, 3000.0)

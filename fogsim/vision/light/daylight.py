@@ -37,10 +37,6 @@ that the sky has in the median where lamps stand out of it [linear grey levels].
 BEAM = 1.15
 """Luminance of the own lane over that of both sides from which on it may be a beam's [-]."""
 
-FAR_AHEAD, DARKER = (30.0, 45.0), 1.5
-"""Distances [m] at which a road that low beams light is darker than near, and at least how many times [-]: three times
-in any fog, where high beams may light it no less than near."""
-
 OVERHEAD = 0.08
 """Angle from straight ahead within which there is open sky above the lane, or a roof [rad]."""
 
@@ -99,16 +95,6 @@ def lit_by_lamps(level: Pixels, camera: Camera, lead: LeadMeasurement | None = N
     if shining and _has_beam(lane, _row_medians(road, view.left), _row_medians(road, view.right)):
         return "lamps light the sky and the road: this is a daytime method"
     return ""
-
-
-def darkens_ahead(level: Pixels, camera: Camera) -> bool:
-    """Whether the own lane of a level image is darker far ahead than near: low beams light it so, the sky does not."""
-    view, far = _view_of(camera), np.geomspace(*FAR_AHEAD, ROAD_ROWS)
-    rows = np.minimum(np.rint(camera.horizon_row + camera.row_distance / far).astype(np.int64), camera.height - 1)
-    levels = level[np.concatenate((view.rows[-ROAD_ROWS:], rows))]
-    luminance = linear_luminance(levels, camera.response, camera.bits, camera.black_level)
-    near = median(_row_medians(luminance[:ROAD_ROWS], view.lane))
-    return near > DARKER * median(_row_medians(luminance[ROAD_ROWS:], _strip(far, camera, -HALF_LANE, HALF_LANE)))
 
 
 @functools.lru_cache(maxsize=8)

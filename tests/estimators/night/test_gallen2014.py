@@ -43,7 +43,7 @@ def test_without_lamps_the_veil_is_asked() -> None:
     told = Gallen2014(CAMERA).calibrated(MEASURED).update(seen())
     assert told.method == "gallen2014"
     assert told.diagnostics["by"] == "veil"
-    assert "no references" in told.diagnostics["reason"]
+    assert "no calibration" in told.diagnostics["reason"]
 
 
 def test_halos_alone_ask_no_veil() -> None:

@@ -24,8 +24,9 @@ LOG_LOW, LOG_HIGH = (math.log(extinction_from_visibility(v)) for v in (FARTHEST,
 LOG_RANGE = LOG_HIGH - LOG_LOW
 _MOST_STEPS = 64
 
-MOST_COMMON = 3.0
-"""Largest common deviation that counts [-]: a wider one leaves nothing known either."""
+MOST_COMMON, COMMON_TIME = 3.0, 5.0
+"""Largest common deviation that counts [-]: a wider one leaves nothing known either; and the time over which that of
+worse estimates comes to count [s]."""
 
 LEAST_UNBOUND = 0.2
 """Least share of bounds that are taken for wrong [-]: signs that bound the fog may be missing or hidden."""
@@ -105,7 +106,7 @@ class GridFilter:
         self._announcements.reset()
         self._time: float | None = None
         self._weight = 1.0
-        self._common = 0.0
+        self._common, self._elapsed = 0.0, math.inf
 
     def update(self, estimates: Sequence[Estimate], time: float) -> Belief:
         """Take in the estimates of one instant.
@@ -143,7 +144,10 @@ class GridFilter:
         # The largest exponent is zero: no product of densities can overflow, and the sum cannot vanish.
         posterior = self._probability * np.exp(log_likelihood - log_likelihood.max())
         self._probability = posterior / posterior.sum()
-        self._common = self._common if common == math.inf else min(common, MOST_COMMON)
+        if common < math.inf:
+            # What better images have shown stays known for some seconds.
+            worse = min(max(common - self._common, 0.0), MOST_COMMON)
+            self._common = min(common, self._common + worse * min(self._elapsed / COMMON_TIME, 1.0))
         return Belief(self._log_extinction, self._with_common_errors(), denser)
 
     def _with_common_errors(self) -> Floats:
@@ -158,7 +162,7 @@ class GridFilter:
         if self._time is not None and time < self._time:
             raise InputError(f"grid_filter: time went back from {self._time!r} to {time!r} s; reset() starts anew")
         if self._time is not None and time > self._time:
-            elapsed = time - self._time
+            elapsed = self._elapsed = time - self._time
             self._weight = min(1.0, elapsed / self._correlation_time)
             self._probability = self._diffused(elapsed)
         self._time = time

@@ -269,7 +269,9 @@ class NightRoad:
             return replace(Estimate.invalid(self.method, reason, **told), bounds=bounds)
         value = extinction_from_visibility(middle)
         deviation = (extinction_from_visibility(low) - value) / NORMAL_90_PERCENT
-        return Estimate(self.method, value, deviation, diagnostics=told)
+        # Lamps, droplets and pavement, of which the posterior is the doubt, are the same in all frames.
+        common = math.log(middle / low) / NORMAL_90_PERCENT
+        return Estimate(self.method, value, deviation, diagnostics=told, common_deviation=common)
 
 
 def _quantiles(share: Floats) -> tuple[float, float, float]:

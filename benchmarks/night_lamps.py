@@ -40,7 +40,7 @@ def settings(scenario: str, visibility: str) -> Iterator[str]:
     yield f"advice={{method: fixed_speed, parameters: {{speed: {SPEED}}}}}"
     if scenario == "rural_night_fog":
         yield from (f"fog.visibility_m={visibility.removesuffix(' m')}", "timeline=[]", "duration_s=30")
-    if scenario == "night_motorway_fog":
+    if scenario in ("clear_night", "night_motorway_fog"):
         yield "duration_s=60"
 
 

@@ -10,7 +10,7 @@ BY_DAY = Lamp.POSITION | Lamp.LOW_BEAM
 
 Quantile = Annotated[float, Range(0.0, 0.5)]
 CAREFUL = 0.25
-"""Quantile of the visibility that must allow high beams; fog lamps need the opposite one, 0.75, to be below theirs."""
+"""Quantile of the visibility that must allow high beams; the opposite one, 0.75, must call for rear fog lamps."""
 
 
 @checked_parameters
@@ -28,7 +28,8 @@ class FogLampRules:
     hysteresis : float
         They go off when visibility exceeds the threshold by this share [-].
     quantile : float
-        They are lit only if visibility is below the threshold with probability 1 - `quantile` [-].
+        Rear fog lamps, which dazzle who follows, are lit only if visibility is below the threshold with probability
+        1 - `quantile` [-]; front fog lamps by the median.
 
     Raises
     ------
@@ -49,12 +50,14 @@ class FogLampRules:
         belief, previous
             What is believed about the fog, and lamps lit now.
         """
-        lit, visibility = BY_DAY, belief.known_visibility(1.0 - self.quantile)
-        if visibility is None:
-            return lit
-        for lamp, threshold in ((Lamp.REAR_FOG, self.rear_fog_below), (Lamp.FRONT_FOG, self.front_fog_below)):
+        lit = BY_DAY
+        for lamp, threshold, share in (
+            (Lamp.REAR_FOG, self.rear_fog_below, 1.0 - self.quantile),
+            (Lamp.FRONT_FOG, self.front_fog_below, 0.5),
+        ):
             margin = 1.0 + self.hysteresis if lamp in previous else 1.0
-            if visibility < threshold * margin:
+            visibility = belief.known_visibility(share)
+            if visibility is not None and visibility < threshold * margin:
                 lit |= lamp
         return lit
 

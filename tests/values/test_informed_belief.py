@@ -97,9 +97,9 @@ def test_constant_lamps_ask_nothing(name: str) -> None:
     ("belief", "gallen2014", "fog_lamp_rules"),
     [
         (normal(40.0, 0.1), FOG, FOG),
-        # More than a quarter says that there is too much visibility for the lamp.
+        # With a quarter of chance or more the visibility is too good for the rear fog lamps, which dazzle.
         (normal(47.0, 0.3), LOW | Lamp.FRONT_FOG, LOW | Lamp.FRONT_FOG),
-        (normal(90.0, 0.3), LOW, LOW),
+        (normal(90.0, 0.3), LOW | Lamp.FRONT_FOG, LOW | Lamp.FRONT_FOG),
         (normal(130.0, 0.03), HIGH, LOW),
         (normal(130.0, 0.3), LOW, LOW),
         (AT_LEAST_400, HIGH, LOW),

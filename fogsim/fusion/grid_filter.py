@@ -41,7 +41,7 @@ class GridFilter:
     fog without claiming any particular visibility; a share of estimates is taken for outliers that could be anything.
     Neighbouring frames share their errors (road texture, pitch), so an estimate counts only for the share of
     `correlation_time` that has passed since the one before: the likelihood is raised to that power. What all images
-    share (`Estimate.common_deviation`) widens the belief, whatever their number. Invalid estimates
+    share (`Estimate.common_share`) widens the belief, whatever their number. Invalid estimates
     change nothing but by their bounds, beyond which k is as unlikely as bounds are wrong; time alone widens the belief.
     Before the first estimate every ln k on the grid is equally likely.
 
@@ -205,7 +205,7 @@ class GridFilter:
         # A deviation far beyond the grid says as little as one a bit beyond it, and squares to no infinity.
         seen = estimate.reach * measured / OPTICAL_DEPTH_AT_VISIBILITY if measured > 0.0 else 1.0
         unseen = self._unseen_deviation * max(0.0, 1.0 - seen) * measured
-        deviation = math.hypot(min(max(estimate.standard_deviation, 0.0), 10.0), floor, unseen)
+        deviation = math.hypot(min(max(estimate.own_deviation, 0.0), 10.0), floor, unseen)
         return _log_likelihoods(self._extinction, measured, deviation, self._outlier_share)
 
     def _log_likelihood_within(self, bounds: ExtinctionBounds) -> Floats:

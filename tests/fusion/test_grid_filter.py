@@ -101,12 +101,16 @@ def test_no_fog_seen_excludes_dense_fog_only():
 
 
 def test_what_all_images_have_wrong_in_common_stays_in_the_belief():
-    alike = [dataclasses.replace(measured(100.0), common_deviation=0.2)] * 200
+    alike = [dataclasses.replace(measured(100.0, 0.25), common_share=0.9)] * 200
     fusion = make("grid_filter")
+    assert alike[0].common_deviation == pytest.approx(0.2, abs=0.01)
     assert feed(fusion, alike).log_standard_deviation == pytest.approx(0.2, abs=0.05)
+    # What the images do not have in common is little, so that a change is followed at once.
+    thinner = [dataclasses.replace(one, extinction=0.3 * one.extinction) for one in alike[:20]]
+    assert feed(fusion, thinner, start=20.0).visibility > 250.0
     # A method without such errors, once it speaks, counts as it did.
-    assert feed(fusion, [measured(100.0)] * 50, start=20.0).log_standard_deviation < 0.15
-    assert feed(fusion, [Estimate.invalid("test", "nothing seen")], start=25.0).log_standard_deviation < 0.2
+    assert feed(fusion, [measured(100.0)] * 50, start=30.0).log_standard_deviation < 0.15
+    assert feed(fusion, [Estimate.invalid("test", "nothing seen")], start=35.0).log_standard_deviation < 0.2
 
 
 def test_agreeing_methods_narrow_the_belief():

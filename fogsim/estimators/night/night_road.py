@@ -81,6 +81,9 @@ LEAD_HALF_WIDTH, LEAD_HEIGHT, LEAD_MARGIN, CLOSEST_LEAD = 1.5, 4.0, 0.4, 8.0
 """What a vehicle ahead covers at most, below its wheels too, for they and the pitch are not known, and how near it
 leaves too little [m]."""
 
+COMMON_SHARE = 0.9
+"""Share of the variance that is of lamps, droplets and pavement, which are the same in all frames of a drive [-]."""
+
 BOUND_SOFTNESS = 0.1
 """Standard deviation of bounds in ln k [-]."""
 
@@ -269,9 +272,7 @@ class NightRoad:
             return replace(Estimate.invalid(self.method, reason, **told), bounds=bounds)
         value = extinction_from_visibility(middle)
         deviation = (extinction_from_visibility(low) - value) / NORMAL_90_PERCENT
-        # Lamps, droplets and pavement, of which the posterior is the doubt, are the same in all frames.
-        common = math.log(middle / low) / NORMAL_90_PERCENT
-        return Estimate(self.method, value, deviation, diagnostics=told, common_deviation=common)
+        return Estimate(self.method, value, deviation, diagnostics=told, common_share=COMMON_SHARE)
 
 
 def _quantiles(share: Floats) -> tuple[float, float, float]:

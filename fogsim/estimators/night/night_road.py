@@ -173,22 +173,16 @@ class NightRoad:
         """
         image = self._check.kernel_image(observation)
         lit = lit_head_lamps(observation)
-        if not lit:
-            return Estimate.invalid(self.method, "no head lamp is lit: this is a method for the night")
         light = math.nan if observation.light is None else observation.light.illuminance
-        if light > DAYLIGHT:
-            return Estimate.invalid(self.method, f"{light:.0f} lx of daylight: this is a method for the night")
+        if why := _why_not(observation, lit, light):
+            return Estimate.invalid(self.method, why)
         if lit != self._lit:
             self._earlier.clear()
             self._lit = lit
-        if observation.lead is not None and observation.lead.distance < CLOSEST_LEAD:
-            return Estimate.invalid(self.method, "a vehicle close ahead hides the road")
         seen = self._look(image)
         beside, glare = self._beside_lamps(image)
-        if glare > MOST_GLARE:
-            return Estimate.invalid(self.method, "lamps of others outshine what the own ones light")
         used = (seen.clipped < MOST_CLIPPED) & ~self._hidden(observation) & ~beside
-        if why := _too_little(seen, used, self._cells.is_sky):
+        if why := _too_little(seen, used, self._cells.is_sky, glare):
             return Estimate.invalid(self.method, why)
         if self._source is None:
             return Estimate.invalid(self.method, "it has no calibration; fogsim.estimators.make supplies one")
@@ -281,6 +275,17 @@ class NightRoad:
         return Estimate(self.method, value, deviation, diagnostics=told, common_share=COMMON_SHARE)
 
 
+def _why_not(observation: Observation, lit: Lamp, light: float) -> str:
+    """Why an image is not looked at, by the lamps that are lit and the light [lx]; empty if it is."""
+    if not lit:
+        return "no head lamp is lit: this is a method for the night"
+    if light > DAYLIGHT:
+        return f"{light:.0f} lx of daylight: this is a method for the night"
+    if observation.lead is not None and observation.lead.distance < CLOSEST_LEAD:
+        return "a vehicle close ahead hides the road"
+    return ""
+
+
 def _quantiles(share: Floats) -> tuple[float, float, float]:
     """Visibilities below which 5, 50 and 95 % of the posterior are [m]; within a step of the grid ln V is even."""
     step = math.log(VISIBILITIES[1] / VISIBILITIES[0])
@@ -296,8 +301,10 @@ def _of_cells(own: OwnLight, used: NDArray[np.bool_]) -> OwnLight:
     return OwnLight(np.ascontiguousarray(own.veil[:, :, used]), np.ascontiguousarray(own.road[:, :, used]))
 
 
-def _too_little(seen: Seen, used: NDArray[np.bool_], is_sky: NDArray[np.bool_]) -> str:
-    """Why nothing can be told from the cells of use; empty if something may."""
+def _too_little(seen: Seen, used: NDArray[np.bool_], is_sky: NDArray[np.bool_], glare: float) -> str:
+    """Why nothing can be told from the cells of use, beside lamps of others [sr]; empty if something may."""
+    if glare > MOST_GLARE:
+        return "lamps of others outshine what the own ones light"
     if np.count_nonzero(used) < LEAST_CELLS or np.count_nonzero(used & ~is_sky) < LEAST_ROAD:
         return "too little is seen that is neither too bright nor too dark"
     if float(seen.luminance[used].max()) < LEAST_PEAK:

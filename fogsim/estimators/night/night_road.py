@@ -303,10 +303,8 @@ def _of_cells(own: OwnLight, used: NDArray[np.bool_]) -> OwnLight:
 
 def _too_little(seen: Seen, used: NDArray[np.bool_], is_sky: NDArray[np.bool_], glare: float) -> str:
     """Why nothing can be told from the cells of use, beside lamps of others [sr]; empty if something may."""
-    if glare > MOST_GLARE:
-        return "lamps of others outshine what the own ones light"
     if np.count_nonzero(used) < LEAST_CELLS or np.count_nonzero(used & ~is_sky) < LEAST_ROAD:
         return "too little is seen that is neither too bright nor too dark"
     if float(seen.luminance[used].max()) < LEAST_PEAK:
         return "too dark: the head lamps light nothing"
-    return ""
+    return "lamps of others outshine what the own ones light" if glare > MOST_GLARE else ""

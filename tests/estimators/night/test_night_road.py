@@ -123,8 +123,11 @@ def test_what_it_cannot_tell() -> None:
 def test_vehicles_ahead_and_lamps_of_others_are_left_out() -> None:
     picture = night_picture(100.0)
     picture[58:66, 74:86] = 30  # its rear, 20 m ahead
-    picture[50:56, 30:36] = 255
+    picture[50:54, 30:34] = 255
     assert estimate(picture, lead=LeadMeasurement(20.0, 0.0)).visibility == pytest.approx(100.0, rel=0.3)
+    # Near lamps have halos that reach everywhere.
+    picture[44:60, 26:40] = 255
+    assert "outshine" in str(estimate(picture).diagnostics["reason"])
 
 
 def test_a_camera_that_sees_no_sky_reads_the_road() -> None:

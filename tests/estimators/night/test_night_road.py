@@ -103,7 +103,7 @@ def test_what_it_cannot_tell() -> None:
         (night, {"light": LightMeasurement(2.0 * DAYLIGHT)}, "200 lx of daylight"),
         (np.full_like(night, 255), {}, "too bright nor too dark"),
         (np.full_like(night, 1), {}, "too dark"),
-        (night[::-1].copy(), {}, "other light than that of the own head lamps"),
+        (night[::-1].copy(), {}, "lamps of others"),
         (np.where(lamps[:, :, :1] > 200, 254, night), {}, "lamp"),
         (night, {"lamps": Lamp.POSITION}, "no head lamp is lit"),
         (night, {"lead": LeadMeasurement(5.0, 0.0)}, "close ahead"),

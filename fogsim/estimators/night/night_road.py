@@ -83,8 +83,8 @@ LEAD_HALF_WIDTH, LEAD_HEIGHT, LEAD_MARGIN, CLOSEST_LEAD = 1.5, 4.0, 0.4, 8.0
 leaves too little [m]."""
 
 COMMON_SHARE = {False: 0.9, True: 0.5}
-"""Share of the variance that is of lamps, droplets and pavement, which are the same in all frames of a drive, by whether
-others' lamps, which pass, shine too [-]."""
+"""Share of the variance that is of lamps, droplets and pavement, which are the same in all frames of a drive [-]: by
+whether others' lamps, which pass, shine too."""
 
 BOUND_SOFTNESS = 0.1
 """Standard deviation of bounds in ln k [-]."""

@@ -41,7 +41,7 @@ class GridFilter:
     fog without claiming any particular visibility; a share of estimates is taken for outliers that could be anything.
     Neighbouring frames share their errors (road texture, pitch), so an estimate counts only for the share of
     `correlation_time` that has passed since the one before: the likelihood is raised to that power. What all images
-    share (`Estimate.common_share`) widens the belief, whatever their number. Invalid estimates
+    share (`Estimate.common_deviation`) widens the belief, whatever their number. Invalid estimates
     change nothing but by their bounds, beyond which k is as unlikely as bounds are wrong; time alone widens the belief.
     Before the first estimate every ln k on the grid is equally likely.
 

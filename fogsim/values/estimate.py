@@ -165,9 +165,9 @@ class Estimate:
         How the fog varies along the road, of a method that tells.
     denser : DenserFog or None
         Denser fog ahead, of a method that tells.
-    common_share : float
-        Share of the variance that all images of a drive have in common, as by the droplets or the pattern of the own
-        beam [-]: averaging over images does not reduce it.
+    common_deviation : float
+        Standard deviation of ln k that all images of a drive have in common, as by the droplets or the pattern of the
+        own beam [-], a part of the whole: averaging over images does not reduce it.
     """
 
     method: str
@@ -179,7 +179,7 @@ class Estimate:
     reach: float = math.inf
     optical_depths: OpticalDepths | None = None
     denser: DenserFog | None = None
-    common_share: float = 0.0
+    common_deviation: float = 0.0
 
     @classmethod
     def invalid(cls, method: str, reason: str, **diagnostics: object) -> "Estimate":
@@ -219,17 +219,12 @@ class Estimate:
         )
 
     @property
-    def common_deviation(self) -> float:
-        """Standard deviation of ln k that all images of a drive have in common [-]; 0 where no fog is seen."""
-        if self.common_share == 0.0 or self.extinction <= 0.0:
-            return 0.0
-        wide = math.log1p(NORMAL_90_PERCENT * self.standard_deviation / self.extinction) / NORMAL_90_PERCENT
-        return wide * math.sqrt(self.common_share)
-
-    @property
     def own_deviation(self) -> float:
         """Standard deviation of k that this image alone has [1/m]."""
-        return self.standard_deviation * math.sqrt(1.0 - self.common_share)
+        if self.common_deviation == 0.0:
+            return self.standard_deviation
+        common = self.extinction * math.expm1(NORMAL_90_PERCENT * self.common_deviation) / NORMAL_90_PERCENT
+        return math.sqrt(max(self.standard_deviation**2 - common**2, 0.0))
 
     @property
     def category(self) -> FogCategory:

@@ -44,8 +44,7 @@ def checked_estimate(method: str, value: object) -> Estimate:
     if estimate.valid:
         _check_number(who, "extinction", estimate.extinction, " [1/m]; say Estimate.invalid where it cannot tell")
         _check_number(who, "standard_deviation", estimate.standard_deviation, " [1/m]")
-        if not 0.0 <= estimate.common_share <= 1.0:
-            raise InputError(f"{who}: common_share must be 0 … 1, got {shown(estimate.common_share)}")
+        _check_number(who, "common_deviation", estimate.common_deviation, " [-]")
     return estimate
 
 

@@ -101,9 +101,9 @@ def test_no_fog_seen_excludes_dense_fog_only():
 
 
 def test_what_all_images_have_wrong_in_common_stays_in_the_belief():
-    alike = [dataclasses.replace(measured(100.0, 0.25), common_share=0.9)] * 200
+    alike = [dataclasses.replace(measured(100.0, 0.25), common_deviation=0.2)] * 200
     fusion = make("grid_filter")
-    assert alike[0].common_deviation == pytest.approx(0.2, abs=0.01)
+    assert 0.0 < alike[0].own_deviation < 0.5 * alike[0].standard_deviation
     assert feed(fusion, alike).log_standard_deviation == pytest.approx(0.2, abs=0.05)
     # What the images do not have in common is little, so that a change is followed at once.
     thinner = [dataclasses.replace(one, extinction=0.3 * one.extinction) for one in alike[:20]]

@@ -82,9 +82,9 @@ LEAD_HALF_WIDTH, LEAD_HEIGHT, LEAD_MARGIN, CLOSEST_LEAD = 1.5, 4.0, 0.4, 8.0
 """What a vehicle ahead covers at most, below its wheels too, for they and the pitch are not known, and how near it
 leaves too little [m]."""
 
-COMMON_SHARE = {False: 0.9, True: 0.5}
-"""Share of the variance that is of lamps, droplets and pavement, which are the same in all frames of a drive [-]: by
-whether others' lamps, which pass, shine too."""
+COMMON, MOSTLY_LAMPS = {False: 0.95, True: 0.7}, 0.9
+"""Part of the deviation of ln V that is of lamps, droplets and pavement, the same in all frames of a drive, by whether
+others' lamps, which pass, shine too; and share of lamplight above which there is little daylight [-]."""
 
 BOUND_SOFTNESS = 0.1
 """Standard deviation of bounds in ln k [-]."""
@@ -273,8 +273,10 @@ class NightRoad:
             return replace(Estimate.invalid(self.method, reason, **told), bounds=bounds)
         value = extinction_from_visibility(middle)
         deviation = (extinction_from_visibility(low) - value) / NORMAL_90_PERCENT
-        common = COMMON_SHARE[measured.even > PEDESTAL]
-        return Estimate(self.method, value, deviation, diagnostics=told, common_share=common)
+        # By dusk the way to clear air is as doubtful as that to dense fog.
+        side = math.log(middle / low) if best[-1] > MOSTLY_LAMPS else 0.5 * math.log(high / low)
+        common = COMMON[measured.even > PEDESTAL] * side / NORMAL_90_PERCENT
+        return Estimate(self.method, value, deviation, diagnostics=told, common_deviation=common)
 
 
 def _why_not(observation: Observation, lit: Lamp, light: float) -> str:

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from fogsim.linear_algebra import matrix_product
 from fogsim.values.camera import Camera, CameraPose
 
+OWN_FRAME = CameraPose((0.0, 0.0, 0.0), 0.0)
+"""The pose in which directions are those relative to the own vehicle, wherever it is."""
+
 
 @functools.lru_cache(maxsize=8)
 def camera_axes(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:

@@ -215,7 +215,6 @@ REFUSED: Sequence[tuple[Sequence[str], str]] = (
     (("estimate", "image.png", "--guess-camera", "--camera", "mine/a"), "not a folder"),
     (("calibrate", "signs", *CALIBRATION, "camera.yaml"), "would replace"),
     (("calibrate", "halos", *CALIBRATION, "mine/a"), "not a folder"),
-    (("calibrate", "veil", *CALIBRATION, "there"), "is a folder"),
     (("reproduce", "negru2013", "--out", "mine"), "not a folder"),
     (("reproduce", "negru2013", "--out", "out"), "is a folder"),
 )

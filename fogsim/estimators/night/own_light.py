@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
-from fogsim.values.camera import Camera, CameraPose, Response
+from fogsim.values.camera import Camera, Response
 from fogsim.values.light import Lamp
 from fogsim.values.observation import Observation
-from fogsim.values.pinhole import camera_axes, ray_from_pixel
+from fogsim.values.pinhole import OWN_FRAME, camera_axes, ray_from_pixel
 from fogsim.vision.light.pixel_kernels import Pixels
 
 HEAD_LAMPS = Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.FRONT_FOG
@@ -121,7 +121,7 @@ def cells_of(camera: Camera) -> Cells:
 
 def _box(camera: Camera, left: float, right: float, low: float, high: float) -> tuple[int, int, int, int]:
     """Rows and columns of a cell between azimuths to the right and elevations; at least one pixel."""
-    axes = camera_axes(camera, CameraPose((0.0, 0.0, 0.0), 0.0))
+    axes = camera_axes(camera, OWN_FRAME)
     middle, up = 0.5 * (left + right), np.array((low, high))
     ray = np.stack((np.cos(up) * math.cos(middle), -np.cos(up) * math.sin(middle), np.sin(up)))
     across, down, ahead = (axes[:, :, None] * ray).sum(axis=1)
@@ -145,7 +145,7 @@ def _rays(camera: Camera, box: NDArray[np.int64]) -> NDArray[np.float64]:
     v = box[:, :1] - 0.5 + (box[:, 1:2] - box[:, :1]) * part
     u = np.broadcast_to(0.5 * (box[:, 2:3] + box[:, 3:4] - 1.0), v.shape)
     pixels = np.stack((u, v, np.ones_like(v)), axis=-1)
-    rays = (pixels[..., None, :] * ray_from_pixel(camera, CameraPose((0.0, 0.0, 0.0), 0.0))).sum(axis=-1)
+    rays = (pixels[..., None, :] * ray_from_pixel(camera, OWN_FRAME)).sum(axis=-1)
     unit: NDArray[np.float64] = rays / np.sqrt((rays**2).sum(axis=-1, keepdims=True))
     return unit
 

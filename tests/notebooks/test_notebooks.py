@@ -72,8 +72,10 @@ def test_a_notebook_runs(path: Path, tmp_path: Path) -> None:
         notebook, timeout=600, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}}
     ).execute()
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", ())]
-    told = [output.text for output in outputs if output.output_type == "stream" and output.name == "stderr"]
-    assert told == []
+    errors = [output.text for output in outputs if output.output_type == "stream" and output.name == "stderr"]
+    told = [line for text in errors for line in text.splitlines()]
+    # Calibrations that are not cached yet say what they do.
+    assert [line for line in told if not line.startswith("fogsim: calibrating ")] == []
     kinds = {kind for output in outputs for kind in output.get("data", {})}
     assert kinds & PICTURES
     assert "text/html" in kinds, "no table"

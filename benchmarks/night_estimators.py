@@ -119,7 +119,7 @@ def estimate_of(night: Night, known: bool) -> Estimate:
 def record(label: dict[str, Any], found: list[tuple[float, Estimate]]) -> dict[str, Any]:
     """Errors of estimates, each with the true visibility."""
     valid = [(v, one) for v, one in found if one.valid]
-    told = [(v, one.visibility_interval) for v, one in found if one.valid or one.bounds is not None]
+    answers = [(v, one.visibility_interval) for v, one in found if one.valid or one.bounds is not None]
     error = np.array([abs(one.visibility - v) / v for v, one in valid if np.isfinite(v)])
 
     def rounded(values: Any, kind: Any, digits: int = 0) -> float | None:
@@ -131,12 +131,12 @@ def record(label: dict[str, Any], found: list[tuple[float, Estimate]]) -> dict[s
     return label | {
         "images": len(found),
         "valid": len(valid),
-        "bounded": len(told) - len(valid),
+        "bounded": len(answers) - len(valid),
         "median_pct": rounded(100 * error, np.median),
         "p95_pct": rounded(100 * error, lambda all_of_it: np.quantile(all_of_it, 0.95)),
-        "holds": rounded([low <= min(v, 1e5) <= high for v, (low, high) in told], np.mean, 2),
-        "lower": rounded([low for _, (low, _) in told], np.median),
-        "upper": rounded([high for _, (_, high) in told], np.median),
+        "holds": rounded([low <= min(v, 1e5) <= high for v, (low, high) in answers], np.mean, 2),
+        "lower": rounded([low for _, (low, _) in answers], np.median),
+        "upper": rounded([high for _, (_, high) in answers], np.median),
     }
 
 
@@ -148,8 +148,8 @@ def drawn_records(pool: int, count: int) -> list[dict[str, Any]]:
         for name, (method, options) in METHODS.items():
             found = [(v, make(method, assumed, **options).update(one)) for v, assumed, one in seen]
             for air, chosen in (("fog", np.isfinite), ("clear", np.isinf)):
-                told = {"method": name, "not as usual": label, "air": air}
-                records.append(record(told, [(v, one) for v, one in found if chosen(v)]))
+                labels = {"method": name, "not as usual": label, "air": air}
+                records.append(record(labels, [(v, one) for v, one in found if chosen(v)]))
                 print(*records[-1].values(), flush=True)
     return records
 
@@ -161,13 +161,13 @@ def photon_records(pool: int, count: int) -> list[dict[str, Any]]:
     cells = [((lux, lux), (visibility, visibility)) for lux in LUX for visibility in VISIBILITIES]
     records = []
     for known, (lux, fog) in ((known, cell) for known in found for cell in (*TOGETHER, *cells)):
-        told = {"beam": "known" if known else "unknown", "light [lx]": _span(*lux), "V_met [m]": _span(*fog)}
+        labels = {"beam": "known" if known else "unknown", "light [lx]": _span(*lux), "V_met [m]": _span(*fog)}
         chosen = [
             (one.visibility, estimate)
             for one, estimate in found[known]
             if lux[0] <= one.illuminance <= lux[1] and fog[0] <= one.visibility <= fog[1]
         ]
-        records.append(record(told, chosen))
+        records.append(record(labels, chosen))
         print(*records[-1].values(), flush=True)
     return records
 

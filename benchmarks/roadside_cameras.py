@@ -1,4 +1,4 @@
-"""Error of what cameras beside the road report, and how long an image takes.
+"""Error of what roadside cameras report, and how long an image takes.
 
 Cameras stand every 60 m along the routes of three shipped scenarios, and each takes one image per seed: with other
 traffic, trees and noise. For each road and fog: images, share of them that are reported, median and 95th percentile of

@@ -352,7 +352,7 @@ class EgoEquipment:
         )
 
     def look_from_roadside(self, time: float, state: TrafficState) -> tuple[tuple[str, FogReport], ...]:
-        """See by cameras beside the road at a time [s]: part of what is `sent` to all in `complete_step`."""
+        """See by roadside cameras at a time [s]: part of what is `sent` to all in `complete_step`."""
         sensors = self._scenario.sensors.reports.roadside
         if sensors is None or sensors.camera is None:
             return ()

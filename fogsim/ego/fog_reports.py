@@ -193,7 +193,7 @@ class FogReports:
                 self._forward(report, radio)
 
     def _take_from_sensors(self, sensors: RoadsideReports, sent: Iterable[tuple[str, FogReport]]) -> None:
-        """Let what cameras beside the road have seen be on its way to the ego."""
+        """Let what roadside cameras have seen be on its way to the ego."""
         for _, report in sent:
             if is_of_sensor(report):
                 self._forward(report, sensors)

@@ -319,7 +319,7 @@ class ViewRenderer:
         state : TrafficState
             Every vehicle.
         ego : int or None
-            Row of the one that carries the camera; None for a camera beside the road.
+            Row of the one that carries the camera; None for a roadside camera.
         pose : CameraPose
             Where the camera is.
         time : float

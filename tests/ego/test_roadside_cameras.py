@@ -1,4 +1,4 @@
-"""Cameras beside the road: what they report comes from their images, and costs nothing where there are none."""
+"""Roadside cameras: what they report comes from their images, and costs nothing where there are none."""
 
 import dataclasses
 import math

@@ -95,7 +95,7 @@ def test_deleting_the_truth_changes_nothing(as_it_is: list[Step], monkeypatch: p
 def test_a_false_truth_changes_nothing(as_it_is: list[Step], monkeypatch: pytest.MonkeyPatch) -> None:
     """Another fog, visibility, calibration, place, distances, instances and leader than what was drawn and measured.
 
-    Reports of cameras beside the road stay the same too.
+    Reports of roadside cameras stay the same too.
     """
     from fogsim.ego.fog_reports import FogReports
     from fogsim.ego.view_rendering import ViewRenderer

@@ -45,7 +45,7 @@ LEAST_PEAK = 0.02
 """Luminance that something must have for there to be head lamps' light, full scale being 1 [-]."""
 
 MOST_CLIPPED = 0.02
-"""Share of a cell's pixels that may be as bright as can be told [-]."""
+"""Share of a cell's pixels that may be clipped [-]."""
 
 ROAD_TEXTURE, SKY_TEXTURE, LEVEL, FLOOR = 0.1, 0.2, 0.02, 2e-4
 """Deviations of the model: over what is seen of road and sky, over the mean of all cells, and of full scale [-]."""
@@ -71,7 +71,7 @@ CLEAR, MAY_BE_CLEAR = 2000.0, 0.05
 """Visibility above which own lamps show no fog [m], and its probability from which on there is no upper bound [-]."""
 
 LAMPS_FROM, HALO, MOST_GLARE = 40.0, 0.06, 1e-3
-"""Distance on the road beyond which what is as bright as can be told may be a lamp [m], how far from it cells are left
+"""Distance on the road beyond which what is clipped may be a lamp [m], how far from it cells are left
 out [rad], and solid angle of all of it from which on its halo is everywhere [sr]: chosen on seeds 100 and 101 of
 rural_night_fog, rural_night_oncoming and night_motorway_fog, where readings above it were a fifth of the truth."""
 
@@ -213,7 +213,7 @@ class NightRoad:
         return hidden
 
     def _beside_lamps(self, image: Pixels) -> tuple[NDArray[np.bool_], float]:
-        """Cells near lamps of others, which are as bright as can be told, and the solid angle of these [sr].
+        """Cells near lamps of others, which are clipped, and the solid angle of these [sr].
 
         Their halos are not of the model.
         """
@@ -254,29 +254,29 @@ class NightRoad:
         likelihood = np.exp(found - found.max()).sum(axis=0)
         share = likelihood / likelihood.sum()
         low, middle, high = _quantiles(share)
-        told: dict[str, object] = {"visibility_quantiles": (low, middle, high), "misfit": float(best[-2])}
-        told |= {"lamplight": float(best[-1]), "weight": float(weight.mean())}
+        diagnostics: dict[str, object] = {"visibility_quantiles": (low, middle, high), "misfit": float(best[-2])}
+        diagnostics |= {"lamplight": float(best[-1]), "weight": float(weight.mean())}
         if best[-2] > MOST_MISFIT[self._lamps != "unknown"]:
-            return Estimate.invalid(self.method, "other light than that of the own head lamps", **told)
+            return Estimate.invalid(self.method, "other light than that of the own head lamps", **diagnostics)
         if measured.sky_scale > 0.0 and best[-1] < LEAST_LAMPLIGHT:
-            return Estimate.invalid(self.method, "light of the day, or of lamps all around", **told)
+            return Estimate.invalid(self.method, "light of the day, or of lamps all around", **diagnostics)
         if weight.mean() < LEAST_WEIGHT:
-            return Estimate.invalid(self.method, "lamps of others outshine what the own ones light", **told)
+            return Estimate.invalid(self.method, "lamps of others outshine what the own ones light", **diagnostics)
         widened = math.exp(NORMAL_90_PERCENT * BOUND_SOFTNESS)
         if share[VISIBILITIES > CLEAR].sum() > MAY_BE_CLEAR:
             bounds = ExtinctionBounds(most=extinction_from_visibility(low) / widened, softness=BOUND_SOFTNESS)
             reason = f"own lamps show no fog for certain, and visibility is at least {low:.0f} m"
-            return replace(Estimate.invalid(self.method, reason, **told), bounds=bounds)
+            return replace(Estimate.invalid(self.method, reason, **diagnostics), bounds=bounds)
         if share[0] > MAY_BE_DENSER:
             reason = "fog so dense that only the densest of the model is like it"
             bounds = ExtinctionBounds(least=extinction_from_visibility(high) * widened, softness=BOUND_SOFTNESS)
-            return replace(Estimate.invalid(self.method, reason, **told), bounds=bounds)
+            return replace(Estimate.invalid(self.method, reason, **diagnostics), bounds=bounds)
         value = extinction_from_visibility(middle)
         deviation = (extinction_from_visibility(low) - value) / NORMAL_90_PERCENT
         # By dusk the way to clear air is as doubtful as that to dense fog.
         side = math.log(middle / low) if best[-1] > MOSTLY_LAMPS else 0.5 * math.log(high / low)
         common = COMMON[measured.even > PEDESTAL] * side / NORMAL_90_PERCENT
-        return Estimate(self.method, value, deviation, diagnostics=told, common_deviation=common)
+        return Estimate(self.method, value, deviation, diagnostics=diagnostics, common_deviation=common)
 
 
 def _why_not(observation: Observation, lit: Lamp, light: float) -> str:

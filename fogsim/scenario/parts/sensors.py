@@ -152,7 +152,7 @@ def body_pitch(scenario: Scenario) -> BodyPitch:
 
 
 def roadside_scenario(scenario: Scenario, section: RoadsideCamera) -> Scenario:
-    """The scenario with a camera beside the road in place of the ego's, and the estimator that reads it."""
+    """The scenario with a roadside camera in place of the ego's, and the estimator that reads it."""
     place = {
         name: getattr(section, name) for name in type(section).model_fields.keys() & CameraSection.model_fields.keys()
     }

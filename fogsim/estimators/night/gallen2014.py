@@ -7,7 +7,15 @@ from typing import Annotated, Self
 from fogsim.errors import InputError
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.night.gallen2014_veil import LEAST_ROWS, Gallen2014Veil
-from fogsim.estimators.night.halos import PUBLISHED, WINDOW, HaloReading, HaloThreshold, HaloWatch, largest_sharpness
+from fogsim.estimators.night.halos import (
+    NEAREST,
+    PUBLISHED,
+    WINDOW,
+    HaloReading,
+    HaloThreshold,
+    HaloWatch,
+    largest_sharpness,
+)
 from fogsim.estimators.night.own_light import HeadLamps
 from fogsim.estimators.protocol import Calibrations
 from fogsim.parameters import FileName, Range, checked_parameters
@@ -149,6 +157,8 @@ class Gallen2014:
             return Estimate.invalid(self.method, why)
         if not lit_by_lamps(levelled(image, self._camera), self._camera):
             return Estimate.invalid(self.method, "no lamps light the road: this is a method for the night")
+        if not self._as_published and observation.lead is not None and observation.lead.distance < NEAREST:
+            return Estimate.invalid(self.method, "a vehicle close ahead: so near, lamps have no halo in any fog")
         self._calibrate()
         reading = self._watch.look(image, self._camera.bits)
         if reading.is_fog is not None:

@@ -111,9 +111,7 @@ def _begun(simulation: Simulation, seed: int) -> tuple[Simulation, Step]:
 def refuse_copies(was_reset: bool) -> None:
     """Refuse to pickle or copy an environment that has begun an episode."""
     if was_reset:
-        raise InputError(
-            "an environment can be pickled or copied only before its first reset()"
-        )
+        raise InputError("an environment can be pickled or copied only before its first reset()")
 
 
 class TrafficSimulation(Protocol):

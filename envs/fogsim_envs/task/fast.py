@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from fogsim.atmosphere import extinction
 from fogsim.fusion import DatedFusion
@@ -114,7 +113,7 @@ def _panel_beside_view_from_above() -> FramePanel:
     return FramePanel(_view_from_above)
 
 
-def _view_from_above(step: Step) -> Image.Image:
+def _view_from_above(step: Step) -> Any:
     return draw_view_from_above(step, partial(_extinction_now, step))
 
 

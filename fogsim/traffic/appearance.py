@@ -73,6 +73,7 @@ PAINTS = (
 _SIGNALS = (
     (1 << 0, int(Lamp.INDICATOR_RIGHT)),
     (1 << 1, int(Lamp.INDICATOR_LEFT)),
+    (1 << 2, int(Lamp.INDICATOR_LEFT | Lamp.INDICATOR_RIGHT)),
     (1 << 3, int(Lamp.STOP)),
     (1 << 4, int(Lamp.LOW_BEAM | Lamp.POSITION)),
     (1 << 5, int(Lamp.REAR_FOG)),

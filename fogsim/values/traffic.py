@@ -125,6 +125,12 @@ class TrafficState:
         Heads of traffic lights near the ego; none without an ego.
     persons : PersonState
         Persons on foot near the ego; without one, all.
+    course : tuple of str
+        Names of what vehicles follow one another along: their lanes, as a rule. Vehicles that share lanes side by side
+        follow one another along an edge, where their widths overlap; those that overtake on the oncoming lane do not
+        follow those that come along it. Left out, the lanes.
+    across : (n,) float64
+        Offsets of vehicles' middles to one side on their course [m]; empty where vehicles do not share lanes.
     """
 
     time: float
@@ -145,11 +151,15 @@ class TrafficState:
     advised_speed: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     signals: SignalState = NO_SIGNALS
     persons: PersonState = NO_PERSONS
+    course: tuple[str, ...] = ()
+    across: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        """Put everybody on the level where no grade is given."""
+        """Put everybody on the level where no grade is given, and along lanes where no course is."""
         if not len(self.grade):
             object.__setattr__(self, "grade", np.zeros(len(self.ids)))
+        if not self.course:
+            object.__setattr__(self, "course", self.lane)
 
     def row(self, vehicle_id: str) -> int | None:
         """Row of a vehicle, or None if it is not on the road now.
@@ -195,6 +205,8 @@ def with_persons(state: TrafficState) -> TrafficState:
         width=np.append(state.width, np.full(count, _PERSON_WIDTH)),
         height=np.append(state.height, np.full(count, _PERSON_HEIGHT)),
         lane=state.lane + persons.lane,
+        course=state.course + persons.lane,
+        across=np.append(state.across, unknown) if len(state.across) else state.across,
         lamps=np.append(state.lamps, np.zeros(count, np.int32)),
         paint=np.concatenate((state.paint, np.full((count, 3), np.nan))),
         grade=np.append(state.grade, unknown),

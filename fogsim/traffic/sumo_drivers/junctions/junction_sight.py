@@ -21,6 +21,7 @@ from fogsim.traffic.sumo_drivers.junctions.junction_foes import JunctionFoes
 from fogsim.traffic.sumo_drivers.junctions.unseen_foes import UnseenFoes
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
+from fogsim.traffic.sumo_lanes.directions import LaneDirections
 
 FARTHEST_FOE = 250.0
 """Foes whose ways to the junction and the driver's add up to more than this do not matter [m]."""
@@ -99,7 +100,7 @@ class JunctionSight:
         self._speed, self._position, self._lane, self._lane_position = vehicle_getters(
             api, remote, ("getSpeed", "getPosition3D", "getLaneID", "getLanePosition")
         )
-        self._lane_length = api.lane.getLength
+        self._lane_length, self._directions = api.lane.getLength, LaneDirections(api)
         self._lane_lengths: dict[str, float] = {}
         self._vehicle_sight = vehicle_sight
         self._certainly_seen = self._vehicle_sight.certainly_seen
@@ -165,6 +166,8 @@ class JunctionSight:
     def _is_far(self, driver: str, speed: float) -> bool:
         """Whether no junction can come near a driver for `ALONG_A_LANE`."""
         lane = self._lane(driver)
+        if self._directions.is_against(driver, lane):
+            return False
         length = self._lane_lengths.get(lane)
         if length is None:
             length = self._lane_lengths[lane] = float(self._lane_length(lane)) if lane else 0.0

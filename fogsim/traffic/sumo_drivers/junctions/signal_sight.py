@@ -19,6 +19,7 @@ from fogsim.traffic.sumo.due_vehicles import Due, DueVehicles
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
+from fogsim.traffic.sumo_lanes.lights import Light, LightsAhead
 from fogsim.values.light import SIGNAL_INTENSITY
 
 SIGNAL_HEIGHT = 2.0
@@ -46,9 +47,6 @@ _OBEY_LIGHTS = 16
 _STOPPING = frozenset("ryu")
 _RAILWAYS = frozenset({"tram", "rail_urban", "rail", "rail_electric", "rail_fast", "subway", "cable_car"})
 _NOT_SEEN = math.inf
-
-Light = tuple[str, int, float, str]
-"""Of a light ahead: its id, its index, the way to its stop line [m], and what it shows."""
 
 
 class SignalSight:
@@ -84,7 +82,7 @@ class SignalSight:
         self._fog = fog
         self._sight = sight
         self._roster = roster
-        self._lights = vehicle_getter(api, "getNextTLS")
+        self._lights = LightsAhead(api)
         self._speed = vehicle_getter(api, "getSpeed")
         self._deceleration = vehicle_getter(api, "getEmergencyDecel")
         self._modes = Claims(api, SPEED_MODE, session)
@@ -139,7 +137,7 @@ class SignalSight:
 
     def _look(self, driver: str) -> float:
         """Decide for one driver, who need not look again for so long [s]."""
-        light = next(iter(self._lights(driver)), None)
+        light = self._lights.next_of(driver)
         if driver in self._braking_late:
             return self._brake_late(driver, light)
         if light is None or light[2] > REACH:

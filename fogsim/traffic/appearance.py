@@ -35,6 +35,9 @@ BODY_KINDS = {
 TRAINS = frozenset({"rail_urban", "rail", "rail_electric", "rail_fast", "subway", "cable_car"})
 """SUMO's vehicle classes whose drivers go by signals and not by what they see of the way; trams are not among them."""
 
+RAILWAYS = TRAINS | {"tram"}
+"""SUMO's classes of vehicles on rails."""
+
 SHAPE_KINDS = {
     "passenger/van": "van",
     "delivery": "van",

@@ -37,6 +37,7 @@ from fogsim.traffic.sumo_lanes.courses import Courses
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
 from fogsim.traffic.sumo_lanes.leaders import Leaders
 from fogsim.traffic.sumo_lanes.lights import LightsAhead
+from fogsim.traffic.sumo_lanes.long_bodies import LongBodies
 from fogsim.traffic.sumo_lanes.route_position import GapToEgo, RoutePosition
 from fogsim.traffic.sumo_street.person_reader import PersonReader
 from fogsim.traffic.sumo_street.signal_reader import SignalReader
@@ -79,6 +80,7 @@ class _Run:
     leaders: Leaders
     courses: Courses
     lights: LightsAhead
+    bodies: LongBodies
     perception: DriversPerception | None = None
     drivers: SumoDesiredSpeeds | None = None
 
@@ -167,6 +169,7 @@ class SumoTraffic:
             leaders=Leaders(api, self._link.remote),
             courses=Courses(api, self._link.remote),
             lights=LightsAhead(api),
+            bodies=LongBodies(api),
         )
         self._signals = None
         self._seed = seed
@@ -382,7 +385,7 @@ class SumoTraffic:
         route_position, route_length = self._route.update(state.position[row], state.lane[row])
         state = run.script.lamps.shown(run.lane_changes.smoothed(run.courses.add(state)), self._elapsed(run))
         return TrafficSnapshot(
-            state=self._with_street(run, state, state.position[row]),
+            state=self._with_street(run, run.bodies.add(state), state.position[row]),
             ego=row,
             route_position=route_position,
             route_length=route_length,
@@ -402,7 +405,7 @@ class SumoTraffic:
         limits = [float(run.api.lane.getMaxSpeed(lane)) for lane in {*state.lane} if lane]
         state = run.script.lamps.shown(run.lane_changes.smoothed(run.courses.add(state)), self._elapsed(run))
         return NetworkSnapshot(
-            state=self._with_street(run, state, None),
+            state=self._with_street(run, run.bodies.add(state), None),
             speed_limit=max(limits, default=math.inf),
             collisions=run.collisions.take(),
             is_over=run.api.simulation.getMinExpectedNumber() == 0,

@@ -84,6 +84,36 @@ NO_SIGNALS, NO_PERSONS = SignalState(), PersonState()
 """Where there are none."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyPieces:
+    """Rigid pieces of bodies that bend, as arrays; those of one body are one after another, its front first.
+
+    Attributes
+    ----------
+    row : (m,) intp
+        The vehicle that each belongs to.
+    kind : tuple of str
+        What each is: "tractor", "trailer", "bus" or "carriage".
+    position : (m, 3) float64
+        Middles of their front ends on the road surface [m].
+    heading, grade : (m,) float64
+        As of `TrafficState` [rad].
+    length : (m,) float64
+        Lengths [m]; width and height are the vehicle's.
+    """
+
+    row: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))
+    kind: tuple[str, ...] = ()
+    position: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
+    heading: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    grade: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    length: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+
+
+NO_PIECES = BodyPieces()
+"""Where every body is in one piece."""
+
+
 @dataclass(frozen=True, slots=True)
 class TrafficState:
     """All vehicles at one instant, as arrays; row i belongs to ``ids[i]``; and who and what is beside them.
@@ -131,6 +161,8 @@ class TrafficState:
         follow those that come along it. Left out, the lanes.
     across : (n,) float64
         Offsets of vehicles' middles to one side on their course [m]; empty where vehicles do not share lanes.
+    pieces : BodyPieces
+        Of those whose bodies bend, as trains; `heading` and `length` are those of the whole.
     """
 
     time: float
@@ -153,6 +185,7 @@ class TrafficState:
     persons: PersonState = NO_PERSONS
     course: tuple[str, ...] = ()
     across: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    pieces: BodyPieces = NO_PIECES
 
     def __post_init__(self) -> None:
         """Put everybody on the level where no grade is given, and along lanes where no course is."""
@@ -173,6 +206,26 @@ class TrafficState:
             return self.ids.index(vehicle_id)
         except ValueError:
             return None
+
+
+def rear_of(state: TrafficState, row: int) -> tuple[NDArray[np.float64], float]:
+    """Middle of a vehicle's rear bumper on the road surface (3,) [m], and the heading there [rad].
+
+    Parameters
+    ----------
+    state : TrafficState
+        The traffic.
+    row : int
+        The vehicle.
+    """
+    pieces = np.flatnonzero(state.pieces.row == row)
+    if len(pieces):
+        last = int(pieces[-1])
+        front, heading, length = state.pieces.position[last], state.pieces.heading[last], state.pieces.length[last]
+    else:
+        front, heading, length = state.position[row], state.heading[row], state.length[row]
+    rear = np.array([length * np.cos(heading), length * np.sin(heading), 0.0])
+    return front - rear, float(heading)
 
 
 PEDESTRIAN = "pedestrian"

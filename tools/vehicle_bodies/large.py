@@ -118,3 +118,42 @@ def bus() -> Mesh:
     )
     rolling = wheels((2.7, 8.9), 1.275, 0.50, 0.32)
     return finished([hull(_COACH, PAINT), pair(lamps), mirrors, *panes, *ends, rolling], 12.0, 1.275)
+
+
+# A flat end on either side, and windows all along.
+_CARRIAGE = np.array(
+    [
+        [0.00, 1.20, 0.40, 3.10, 1.12, 0.03],
+        [0.20, 1.26, 0.34, 3.26, 1.20, 0.06],
+        [0.50, 1.27, 0.32, 3.30, 1.24, 0.08],
+        [11.5, 1.27, 0.32, 3.30, 1.24, 0.08],
+        [11.8, 1.26, 0.34, 3.26, 1.20, 0.06],
+        [11.97, 1.20, 0.40, 3.10, 1.12, 0.03],
+    ]
+)
+
+
+def carriage() -> Mesh:
+    """Shape of a carriage of a train, or of a section of a tram or bus behind the first, in a unit box."""
+    lamps = merge(
+        (
+            panel_back(12.0, (0.86, 1.08), (1.15, 1.35), STOP_LAMP),
+            panel_back(12.0, (0.86, 1.08), (0.95, 1.15), POSITION_LAMP),
+            panel_back(12.0, (0.86, 1.08), (0.78, 0.95), LEFT_INDICATOR),
+            panel_back(12.0, (0.64, 0.80), (0.78, 0.90), FOG_LAMP),
+            panel_front(-0.02, (0.66, 1.02), (0.80, 1.00), HEAD_LAMP),
+            panel_front(-0.02, (1.02, 1.09), (0.80, 1.00), LEFT_INDICATOR),
+        )
+    )
+    edges = np.linspace(0.8, 11.2, 9)
+    panes = [
+        side_panel([(a, 1.282, 1.62), (b - 0.12, 1.282, 1.62), (b - 0.12, 1.275, 2.75), (a, 1.275, 2.75)], GLASS)
+        for a, b in pairwise(edges.tolist())
+    ]
+    ends = (
+        panel_front(-0.015, (-0.95, 0.95), (1.5, 2.85), GLASS),
+        panel_back(11.985, (-0.95, 0.95), (1.5, 2.85), GLASS),
+        panel_back(11.99, (-0.25, 0.25), (2.92, 2.98), STOP_LAMP),
+    )
+    rolling = wheels((1.6, 3.0, 9.0, 10.4), 1.26, 0.45, 0.32)
+    return finished([hull(_CARRIAGE, PAINT), pair(lamps), *panes, *ends, rolling], 12.0, 1.275)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from fogsim.scene.bodies import bodies
 from fogsim.scene.vehicles import body_names
 from fogsim.values.light import Beam, Lamp, RoadBeams, Side, burning
+from fogsim.values.pieces import with_pieces
 from fogsim.values.scene import Surface
 from fogsim.values.traffic import TrafficState
 
@@ -44,6 +45,7 @@ def road_beams(
     sky_illuminance : float
         Horizontal illuminance of the sky in which the scene is drawn [lx].
     """
+    state, _ = with_pieces(state, skip)
     shining = int(sum(beams))
     away = np.hypot(*(state.position[:, :2] - np.asarray(eye, np.float64)[:2]).T)
     lit = np.flatnonzero(((state.lamps & shining) != 0) & (away < FARTHEST))

@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from fogsim.obstruction import CLEAR_SIGHT, Obstructions
+from fogsim.traffic.appearance import RAILWAYS
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.claims import SPEED_MODE, Claims
 from fogsim.traffic.sumo.due_vehicles import Due, DueVehicles
@@ -45,7 +46,6 @@ FASTEST_GAIN = 10.0
 
 _OBEY_LIGHTS = 16
 _STOPPING = frozenset("ryu")
-_RAILWAYS = frozenset({"tram", "rail_urban", "rail", "rail_electric", "rail_fast", "subway", "cable_car"})
 _NOT_SEEN = math.inf
 
 
@@ -133,7 +133,7 @@ class SignalSight:
         for vehicle in self._left_passing.intersection(due.new):
             self._left_passing.discard(vehicle)
             self._modes.withdraw(vehicle)
-        return {v for v in due.new if self._api.vehicle.getVehicleClass(v) in _RAILWAYS}
+        return {v for v in due.new if self._api.vehicle.getVehicleClass(v) in RAILWAYS}
 
     def _look(self, driver: str) -> float:
         """Decide for one driver, who need not look again for so long [s]."""

@@ -23,7 +23,7 @@ from vehicle_bodies.parts import (
     side_panel,
     wheels,
 )
-from vehicle_bodies.solids import BLACK_PLASTIC, PAINT, both_sides
+from vehicle_bodies.solids import BLACK_PLASTIC, PAINT, UNDERBODY, both_sides
 
 _SEAM = Material((0.05, 0.05, 0.05))
 
@@ -123,12 +123,10 @@ def bus() -> Mesh:
 # A flat end on either side, and windows all along.
 _CARRIAGE = np.array(
     [
-        [0.00, 1.20, 0.40, 3.10, 1.12, 0.03],
-        [0.20, 1.26, 0.34, 3.26, 1.20, 0.06],
-        [0.50, 1.27, 0.32, 3.30, 1.24, 0.08],
-        [11.5, 1.27, 0.32, 3.30, 1.24, 0.08],
-        [11.8, 1.26, 0.34, 3.26, 1.20, 0.06],
-        [11.97, 1.20, 0.40, 3.10, 1.12, 0.03],
+        [0.00, 1.22, 0.60, 3.16, 1.16, 0.03],
+        [0.10, 1.27, 0.55, 3.30, 1.24, 0.08],
+        [11.87, 1.27, 0.55, 3.30, 1.24, 0.08],
+        [11.97, 1.22, 0.60, 3.16, 1.16, 0.03],
     ]
 )
 
@@ -155,5 +153,7 @@ def carriage() -> Mesh:
         panel_back(11.985, (-0.95, 0.95), (1.5, 2.85), GLASS),
         panel_back(11.99, (-0.25, 0.25), (2.92, 2.98), STOP_LAMP),
     )
-    rolling = wheels((1.6, 3.0, 9.0, 10.4), 1.26, 0.45, 0.32)
-    return finished([hull(_CARRIAGE, PAINT), pair(lamps), *panes, *ends, rolling], 12.0, 1.275)
+    # Wheels would be stretched with the body; bogies and boxes under the floor are of any length.
+    frame = box((0.3, -1.1, 0.35), (11.7, 1.1, 0.62), UNDERBODY)
+    bogies = [box((x, -1.12, 0.02), (x + 1.6, 1.12, 0.55), BLACK_PLASTIC) for x in (1.0, 9.4)]
+    return finished([hull(_CARRIAGE, PAINT), pair(lamps), *panes, *ends, frame, *bogies], 12.0, 1.275)

@@ -1,5 +1,6 @@
 """Bodies that bend: trains, trams, road trains and articulated buses in pieces along the lanes that they are on."""
 
+import functools
 import itertools
 import math
 from collections.abc import Iterator, Sequence
@@ -10,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.traffic.appearance import RAILWAYS
-from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
+from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
 from fogsim.values import TrafficState
-from fogsim.values.traffic import NO_PIECES, BodyPieces
+from fogsim.values.traffic import BodyPieces
 
 LONGEST_RIGID = 15.0
 """Longer bodies are in pieces [m]."""
@@ -30,7 +31,7 @@ _TRACTOR, _COUPLED = 6.2, 2.85
 _MODEL = 16.5
 """Length of the semitrailer that shapes are modelled after [m]."""
 
-_RAIL_GAP = 0.8
+_RAIL_GAP = 0.6
 """Between the carriages of a train [m]."""
 
 _STRAIGHT = 0.1
@@ -50,6 +51,27 @@ class _Section(NamedTuple):
     end: float
 
 
+class Part(NamedTuple):
+    """A straight part of a body.
+
+    Attributes
+    ----------
+    front : tuple of float
+        Middle of its front end on the road [m].
+    heading : float
+        Its direction [rad].
+    length : float
+        Its length [m].
+    behind : float
+        How far behind the front bumper of the body it begins [m].
+    """
+
+    front: _Point
+    heading: float
+    length: float
+    behind: float
+
+
 class LongBodies:
     """Adds the pieces of long bodies to a state.
 
@@ -61,15 +83,14 @@ class LongBodies:
 
     def __init__(self, api: Api) -> None:
         self._api = api
-        self._station = vehicle_getter(api, "getLanePosition")
-        self._route_id, self._index = vehicle_getter(api, "getRouteID"), vehicle_getter(api, "getRouteIndex")
-        self._length, self._links = getter(api, "lane", "getLength"), getter(api, "lane", "getLinks")
-        self._place = getter(api, "simulation", "convert3D")
-        self._directions = LaneDirections(api)
         self._ids: Sequence[str] = ()
         self._rows: list[tuple[int, tuple[_Section, ...]]] = []
         self._gentle: dict[str, bool] = {}
         self._before: dict[tuple[str, int, str], tuple[str, ...]] = {}
+
+    @functools.cached_property
+    def _directions(self) -> LaneDirections:
+        return LaneDirections(self._api)
 
     def add(self, state: TrafficState) -> TrafficState:
         """The state with `TrafficState.pieces`; as it is where no body bends.
@@ -86,8 +107,8 @@ class LongBodies:
         bent = [bent for row, sections in self._rows if (bent := self._bend(state, row, sections)) is not None]
         return replace(state, pieces=_joined(bent)) if bent else state
 
-    def pieces_of(self, vehicle: str, length: float, lane: str) -> BodyPieces:
-        """Pieces of one body, of row 0; none where it does not bend.
+    def parts(self, vehicle: str, length: float, front: _Point, heading: float) -> list[Part]:
+        """Straight parts of one body, the front first; the body itself where it does not bend.
 
         Parameters
         ----------
@@ -95,13 +116,22 @@ class LongBodies:
             Its id.
         length : float
             Its length [m].
-        lane : str
-            Id of the lane that it is on.
+        front : (float, float, float)
+            Middle of its front bumper [m].
+        heading : float
+            Its heading [rad].
         """
-        sections = self._sections(vehicle, length)
-        x, y, z = self._api.vehicle.getPosition3D(vehicle)
-        bent = self._joints(vehicle, lane, sections, (x, y, z))
-        return NO_PIECES if bent is None else _joined([(0, sections, bent)])
+        joints = None
+        if length > LONGEST_RIGID:
+            sections = self._sections(vehicle, length)
+            joints = self._joints(vehicle, self._api.vehicle.getLaneID(vehicle), sections, front)
+        if joints is None:
+            return [Part(front, heading, length, 0.0)]
+        ends = zip(sections, joints[::2], joints[1::2], strict=True)
+        return [
+            Part(start, math.atan2(start[1] - end[1], start[0] - end[0]), one.end - one.start, one.start)
+            for one, start, end in ends
+        ]
 
     def _sections(self, vehicle: str, length: float) -> tuple[_Section, ...]:
         vehicle_class = self._api.vehicle.getVehicleClass(vehicle)
@@ -123,7 +153,10 @@ class LongBodies:
         """Where sections begin and end, one after another [m]; None if they are in a straight line as one body."""
         if not lane or self._directions.is_against(vehicle, lane):
             return None
-        station, may_be_rigid = float(self._station(vehicle)), len(sections) == 2 and sections[0].kind == "tractor"
+        station, may_be_rigid = (
+            float(self._api.vehicle.getLanePosition(vehicle)),
+            len(sections) == 2 and sections[0].kind == "tractor",
+        )
         if may_be_rigid and station >= sections[-1].end and self._is_gentle(lane):
             return None
         lanes = self._lanes_behind(vehicle, lane, sections[-1].end - station)
@@ -145,10 +178,10 @@ class LongBodies:
         """A lane, and those before it on the vehicle's route over a distance [m], the nearest first."""
         if missing <= 0.0:
             return (lane,)
-        index = int(self._index(vehicle))
-        key = (self._route_id(vehicle), index, lane)
+        index = int(self._api.vehicle.getRouteIndex(vehicle))
+        key = (self._api.vehicle.getRouteID(vehicle), index, lane)
         known = self._before.get(key)
-        if known is None or sum(self._length(one) for one in known[1:]) < missing:
+        if known is None or sum(self._api.lane.getLength(one) for one in known[1:]) < missing:
             route = self._api.vehicle.getRoute(vehicle)
             known = self._before[key] = tuple(self._walk_back(lane, route[: index + 1], missing))
         return known
@@ -161,14 +194,14 @@ class LongBodies:
         while edges and missing > 0.0:
             for behind in self._lanes_to(last, edges.pop()):
                 yield behind
-                missing -= float(self._length(behind))
+                missing -= float(self._api.lane.getLength(behind))
                 last = behind
 
     def _lanes_to(self, lane: str, edge: str) -> list[str]:
         """Lanes that lead to one from an edge before it, the nearest first; from any lane of it if none leads there."""
         target, best = lane.rpartition("_")[0], list[str]()
         for number in range(int(self._api.edge.getLaneNumber(edge))):
-            for link in self._links(f"{edge}_{number}"):
+            for link in self._api.lane.getLinks(f"{edge}_{number}"):
                 way = [f"{edge}_{number}", *self._inner(link[4]), link[0]]
                 if lane in way:
                     return way[: way.index(lane)][::-1]
@@ -179,7 +212,7 @@ class LongBodies:
     def _inner(self, lane: str) -> Iterator[str]:
         while lane:
             yield lane
-            lane = next((link[4] for link in self._links(lane)), "")
+            lane = next((link[4] for link in self._api.lane.getLinks(lane)), "")
 
     def _point(self, lanes: Sequence[str], station: float) -> _Point:
         """Place along lanes, from the beginning of the first one on [m]; straight on behind the last one."""
@@ -187,11 +220,13 @@ class LongBodies:
             if station >= 0.0 or lane == lanes[-1]:
                 break
             lane_behind = lanes[lanes.index(lane) + 1]
-            station += float(self._length(lane_behind))
+            station += float(self._api.lane.getLength(lane_behind))
         edge, _, number = lane.rpartition("_")
-        x, y, z = self._place(edge, max(station, 0.0), int(number))
+        x, y, z = self._api.simulation.convert3D(edge, max(station, 0.0), int(number))
         if station < 0.0:
-            ahead_x, ahead_y, ahead_z = self._place(edge, min(1.0, float(self._length(lane))), int(number))
+            ahead_x, ahead_y, ahead_z = self._api.simulation.convert3D(
+                edge, min(1.0, float(self._api.lane.getLength(lane))), int(number)
+            )
             share = station / max(math.dist((x, y), (ahead_x, ahead_y)), 1e-6)
             return x + share * (ahead_x - x), y + share * (ahead_y - y), z + share * (ahead_z - z)
         return x, y, z

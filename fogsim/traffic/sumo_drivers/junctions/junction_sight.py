@@ -44,9 +44,6 @@ PAUSE_IN_DOUBT = 0.2
 For one who may be on the junction, in each step.
 """
 
-LONGEST_VEHICLE = 25.0
-"""No part of a vehicle is farther from its front than this [m]."""
-
 ALONG_A_LANE = 2.0
 """A driver for whom no junction can come near looks at least this often [s]."""
 
@@ -104,7 +101,7 @@ class JunctionSight:
         self._lane_lengths: dict[str, float] = {}
         self._vehicle_sight = vehicle_sight
         self._certainly_seen = self._vehicle_sight.certainly_seen
-        self._certainly_hidden = sight.hidden_distance(fog.minimum_extinction, _BRIGHTEST) + LONGEST_VEHICLE
+        self._certainly_hidden = sight.hidden_distance(fog.minimum_extinction, _BRIGHTEST)
         self._unseen = UnseenFoes(api, session, sight.reaction_time)
         self._due = DueVehicles(roster, float(api.simulation.getDeltaT()))
 
@@ -192,7 +189,7 @@ class JunctionSight:
             distance = math.dist(self._position(pair[0]), self._position(pair[1]))
             if distance <= self._certainly_seen:
                 seen.add(pair)
-            elif distance <= self._certainly_hidden or pair[1] in own_lamps:
+            elif distance <= self._certainly_hidden + self._vehicle_sight.length(pair[1]) or pair[1] in own_lamps:
                 doubtful.append(pair)
         seen.update(itertools.compress(doubtful, self._vehicle_sight.sees(doubtful, own_lamps)))
         return seen

@@ -153,10 +153,8 @@ class LongBodies:
         """Where sections begin and end, one after another [m]; None if they are in a straight line as one body."""
         if not lane or self._directions.is_against(vehicle, lane):
             return None
-        station, may_be_rigid = (
-            float(self._api.vehicle.getLanePosition(vehicle)),
-            len(sections) == 2 and sections[0].kind == "tractor",
-        )
+        station = float(self._api.vehicle.getLanePosition(vehicle))
+        may_be_rigid = len(sections) == 2 and sections[0].kind == "tractor"
         if may_be_rigid and station >= sections[-1].end and self._is_gentle(lane):
             return None
         lanes = self._lanes_behind(vehicle, lane, sections[-1].end - station)

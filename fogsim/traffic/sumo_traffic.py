@@ -38,6 +38,7 @@ from fogsim.traffic.sumo_lanes.directions import LaneDirections
 from fogsim.traffic.sumo_lanes.leaders import Leaders
 from fogsim.traffic.sumo_lanes.lights import LightsAhead
 from fogsim.traffic.sumo_lanes.long_bodies import LongBodies
+from fogsim.traffic.sumo_lanes.rail_collisions import rail_collisions
 from fogsim.traffic.sumo_lanes.route_position import GapToEgo, RoutePosition
 from fogsim.traffic.sumo_street.person_reader import PersonReader
 from fogsim.traffic.sumo_street.signal_reader import SignalReader
@@ -383,9 +384,9 @@ class SumoTraffic:
         state = run.reader.state(self._command.lamps, self._heard(run), self._command.lamps_of)
         row = state.ids.index(ego)
         route_position, route_length = self._route.update(state.position[row], state.lane[row])
-        state = run.script.lamps.shown(run.lane_changes.smoothed(run.courses.add(state)), self._elapsed(run))
+        state = self._shown(run, state)
         return TrafficSnapshot(
-            state=self._with_street(run, run.bodies.add(state), state.position[row]),
+            state=self._with_street(run, state, state.position[row]),
             ego=row,
             route_position=route_position,
             route_length=route_length,
@@ -403,14 +404,21 @@ class SumoTraffic:
         state = run.reader.state(self._command.lamps, self._heard(run))
         # Who is between lanes is on none.
         limits = [float(run.api.lane.getMaxSpeed(lane)) for lane in {*state.lane} if lane]
-        state = run.script.lamps.shown(run.lane_changes.smoothed(run.courses.add(state)), self._elapsed(run))
+        state = self._shown(run, state)
         return NetworkSnapshot(
-            state=self._with_street(run, run.bodies.add(state), None),
+            state=self._with_street(run, state, None),
             speed_limit=max(limits, default=math.inf),
             collisions=run.collisions.take(),
             is_over=run.api.simulation.getMinExpectedNumber() == 0,
             waiting=tuple(run.api.simulation.getPendingVehicles()),
         )
+
+    def _shown(self, run: _Run, state: TrafficState) -> TrafficState:
+        """The traffic as it is to be seen, and what has collided in it."""
+        smooth = run.lane_changes.smoothed(run.courses.add(state))
+        shown = run.bodies.add(run.script.lamps.shown(smooth, self._elapsed(run)))
+        run.collisions.add(rail_collisions(shown))
+        return shown
 
     def _with_street(self, run: _Run, state: TrafficState, here: NDArray[np.float64] | None) -> TrafficState:
         """The traffic with persons on foot and, near the ego, traffic lights."""

@@ -12,7 +12,7 @@ _MOST_EMPTY = 8
 
 
 class Following(NamedTuple):
-    """Followers and the vehicles ahead of them in the same lane.
+    """Followers and the vehicles ahead of them on the same course.
 
     Attributes
     ----------

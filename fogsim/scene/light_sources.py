@@ -37,9 +37,8 @@ from fogsim.scene.vehicles import body_names
 from fogsim.units import luminance_of
 from fogsim.values.light import Beam, Lamp, LampLobes, LightSources, StreetLighting, dark_shift, joined_sources
 from fogsim.values.luminous_intensity import FALL_OFF, LOBE_AZIMUTHS, LOBE_ELEVATIONS, SignalLobe, luminous_intensity
-from fogsim.values.pieces import with_pieces
 from fogsim.values.scene import Surface
-from fogsim.values.traffic import TrafficState
+from fogsim.values.traffic import TrafficState, with_pieces
 
 FARTHEST_VEHICLE = 1500.0
 """Distance beyond which lamps of vehicles are left out [m]."""

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from fogsim.jit import kernel
 from fogsim.scene.bodies import body_of
 from fogsim.scene.town import person_batches, signal_batches
-from fogsim.values.pieces import with_pieces
 from fogsim.values.scene import Batch, Instance
-from fogsim.values.traffic import TrafficState
+from fogsim.values.traffic import TrafficState, with_pieces
 
 
 def traffic_batches(state: TrafficState, skip: int | None) -> tuple[Batch, ...]:

@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw
 from fogsim.recorders.panel.frame_panel import PICTURE_SIZE
 from fogsim.recorders.style import ADVICE, AMBER, LINE, TEXT, TRUTH, font
 from fogsim.values import Lamp, Step
-from fogsim.values.pieces import with_pieces
+from fogsim.values.traffic import with_pieces
 
 SCALE = 1.6
 """Pixels a metre."""

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from fogsim.scene.bodies import bodies
 from fogsim.scene.vehicles import body_names
 from fogsim.values.light import Beam, Lamp, RoadBeams, Side, burning
-from fogsim.values.pieces import with_pieces
 from fogsim.values.scene import Surface
-from fogsim.values.traffic import TrafficState
+from fogsim.values.traffic import TrafficState, with_pieces
 
 FARTHEST, MOST = 150.0, 4
 """Distance beyond which beams on the road are left out [m], and how many vehicles' are drawn, the nearest."""

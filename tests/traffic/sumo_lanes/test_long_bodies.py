@@ -23,8 +23,8 @@ from fogsim.traffic.sumo_lanes.long_bodies import LONGEST_RIGID, LongBodies, sec
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Collision, Command, FogField, Lamp, SignalColour, TrafficState
 from fogsim.values.command import EgoControl
-from fogsim.values.pieces import with_pieces
 from fogsim.values.scene import Instance
+from fogsim.values.traffic import with_pieces
 
 CASES = Path(__file__).resolve().parents[2] / "data" / "sumo_cases"
 RAILS = CASES / "rails.sumocfg"

@@ -170,7 +170,7 @@ class SumoTraffic:
             leaders=Leaders(api, self._link.remote),
             courses=Courses(api, self._link.remote),
             lights=LightsAhead(api),
-            bodies=LongBodies(api),
+            bodies=LongBodies(api, self._link.remote),
         )
         self._signals = None
         self._seed = seed

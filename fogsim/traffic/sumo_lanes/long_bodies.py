@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.traffic.appearance import RAILWAYS
-from fogsim.traffic.sumo.link import Api
+from fogsim.traffic.sumo.link import Api, Getter
+from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
 from fogsim.values import TrafficState
 from fogsim.values.traffic import BodyPieces
@@ -79,14 +80,22 @@ class LongBodies:
     ----------
     api : Api
         The simulation.
+    remote : bool
+        True where every call is a message to another process: what is asked often is subscribed to.
     """
 
-    def __init__(self, api: Api) -> None:
-        self._api = api
+    def __init__(self, api: Api, remote: bool = False) -> None:
+        self._api, self._remote = api, remote
         self._ids: Sequence[str] = ()
         self._rows: list[tuple[int, tuple[_Section, ...]]] = []
+        self._known: dict[tuple[str, float], tuple[_Section, ...]] = {}
         self._gentle: dict[str, bool] = {}
         self._before: dict[tuple[str, int, str], tuple[str, ...]] = {}
+
+    @functools.cached_property
+    def _station(self) -> Getter:
+        (station,) = vehicle_getters(self._api, self._remote, ("getLanePosition",))
+        return station
 
     @functools.cached_property
     def _directions(self) -> LaneDirections:
@@ -134,6 +143,12 @@ class LongBodies:
         ]
 
     def _sections(self, vehicle: str, length: float) -> tuple[_Section, ...]:
+        known = self._known.get((vehicle, length))
+        if known is None:
+            known = self._known[vehicle, length] = self._read_sections(vehicle, length)
+        return known
+
+    def _read_sections(self, vehicle: str, length: float) -> tuple[_Section, ...]:
         vehicle_class = self._api.vehicle.getVehicleClass(vehicle)
         wanted = self._api.vehicletype.getParameter(self._api.vehicle.getTypeID(vehicle), "carriageLength")
         try:
@@ -153,7 +168,7 @@ class LongBodies:
         """Where sections begin and end, one after another [m]; None if they are in a straight line as one body."""
         if not lane or self._directions.is_against(vehicle, lane):
             return None
-        station = float(self._api.vehicle.getLanePosition(vehicle))
+        station = float(self._station(vehicle))
         may_be_rigid = len(sections) == 2 and sections[0].kind == "tractor"
         if may_be_rigid and station >= sections[-1].end and self._is_gentle(lane):
             return None

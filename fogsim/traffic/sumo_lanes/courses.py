@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from fogsim.traffic.sumo.link import Api
-from fogsim.traffic.sumo_lanes.directions import LaneDirections, OppositeEdges
+from fogsim.traffic.sumo_lanes.directions import LaneDirections
 from fogsim.traffic.sumo_lanes.leaders import LaneSpots
 from fogsim.values import TrafficState
 
@@ -23,8 +23,8 @@ class Courses:
 
     def __init__(self, api: Api, remote: bool = False) -> None:
         self._spots = LaneSpots(api, remote)
-        self._directions, self._opposite = LaneDirections(api), OppositeEdges(api)
-        self._two_way: dict[str, bool] = {"": False}
+        self._directions = LaneDirections(api)
+        self._two_way: dict[str, bool] = {}
         self._last: tuple[tuple[str, ...], tuple[str, ...]] = (), ()
         self._against: tuple[int, ...] = ()
 
@@ -55,9 +55,6 @@ class Courses:
     def _find_against(self, state: TrafficState) -> tuple[int, ...]:
         """Rows of those who drive against their lane's direction."""
         known = self._two_way
-        for lane in {*state.lane}.difference(known):
-            # On a junction somebody may be overtaking between two such edges.
-            edge = lane.rpartition("_")[0]
-            known[lane] = edge.startswith(":") or bool(self._opposite.of(edge))
+        known.update((lane, self._directions.is_two_way(lane)) for lane in {*state.lane}.difference(known))
         rows = [row for row, lane in enumerate(state.lane) if known[lane]]
         return tuple(row for row in rows if self._directions.is_against(state.ids[row], state.lane[row]))

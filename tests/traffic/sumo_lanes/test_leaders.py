@@ -90,7 +90,8 @@ def test_leaders_are_those_whose_widths_overlap(crowd: tuple[LibsumoLink, Any]) 
                 assert found is None or found.gap >= REACH
                 continue
             assert found is not None
-            assert (found.vehicle_id, found.gap) == (expected[0], pytest.approx(expected[1], abs=0.02))
+            assert found.vehicle_id == expected[0]
+            assert found.gap == pytest.approx(expected[1], abs=0.02)
             in_lane = api.vehicle.getLeader(vehicle, REACH)
             differing += in_lane is None or in_lane[0] != found.vehicle_id
             leader_lane = state.lane[state.ids.index(found.vehicle_id)]

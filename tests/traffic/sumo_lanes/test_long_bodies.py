@@ -131,7 +131,8 @@ def test_road_vehicles_bend_with_the_road(link: LibsumoLink, tmp_path: Path) -> 
 def test_bodies_are_divided(vehicle_class: str, length: float, carriage: float, lengths: list[float]) -> None:
     found = sections(vehicle_class, length, carriage)
     assert [one.end - one.start for one in found] == pytest.approx(lengths)
-    assert (found[0].start, found[-1].end) == (0.0, pytest.approx(length))
+    assert found[0].start == 0.0
+    assert found[-1].end == pytest.approx(length)
 
 
 def test_lamps_burn_at_the_ends_of_a_body(link: LibsumoLink) -> None:

@@ -104,7 +104,7 @@ def _drive(scenario: str, drives: Sequence[Sequence[str]]) -> None:
         metrics = RunMetrics()
         for step in islice(run(load_scenario(scenario, ["expect={}", _FEW, *overrides]), seed=1), _FRAMES):
             lane = (":junction_0_0",) * len(step.traffic.lane)
-            metrics.update(dataclasses.replace(step, traffic=dataclasses.replace(step.traffic, lane=lane)))
+            metrics.update(dataclasses.replace(step, traffic=dataclasses.replace(step.traffic, lane=lane, course=lane)))
         metrics.summary()
 
 

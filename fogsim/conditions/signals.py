@@ -326,7 +326,7 @@ _OF_PAIRS_BEYOND = {
 
 _OF_EGO = {
     "ego.gap": _metres(
-        "gap to the vehicle ahead in its lane; inf without one",
+        "gap to the vehicle ahead; inf without one",
         _of_leader(lambda ahead, _: ahead.gap),
         least=-math.inf,
         needs=_EGO,

@@ -24,6 +24,7 @@ from fogsim.sensors import (
 from fogsim.sensors.radar_shadow import HEIGHT
 from fogsim.values import FogField, LeadMeasurement, RunningFault, SignMap, SignSighting, Structure, TrafficSnapshot
 from fogsim.values.fault import Where
+from fogsim.values.traffic import rear_of
 
 Faults = Sequence[RunningFault]
 
@@ -142,13 +143,10 @@ def _rear(snapshot: TrafficSnapshot) -> NDArray[np.float64] | None:
     if leader is None or leader.vehicle_id not in state.ids:
         return None
     row = state.ids.index(leader.vehicle_id)
-    heading, length, width = (float(column[row]) for column in (state.heading, state.length, state.width))
-    forward, left = (math.cos(heading), math.sin(heading)), (-math.sin(heading), math.cos(heading))
-    aside = np.array([-0.5, 0.0, 0.5])[:, None] * width
-    points = np.zeros((3, 3))
-    points[:, :2] = aside * left - np.multiply(length, forward)
-    points[:, 2] = HEIGHT
-    rear: NDArray[np.float64] = points + state.position[row]
+    middle, heading = rear_of(state, row)
+    left = np.array([-math.sin(heading), math.cos(heading), 0.0])
+    aside = np.array([-0.5, 0.0, 0.5])[:, None] * float(state.width[row])
+    rear: NDArray[np.float64] = middle + aside * left + (0.0, 0.0, HEIGHT)
     return rear
 
 
@@ -158,7 +156,5 @@ def _bearing(snapshot: TrafficSnapshot) -> float:
     if leader is None or leader.vehicle_id not in state.ids:
         return 0.0
     row, own = state.ids.index(leader.vehicle_id), float(state.heading[ego])
-    x, y = (state.position[row] - state.position[ego])[:2].tolist()
-    x -= float(state.length[row]) * math.cos(float(state.heading[row]))
-    y -= float(state.length[row]) * math.sin(float(state.heading[row]))
+    x, y, _ = (rear_of(state, row)[0] - state.position[ego]).tolist()
     return math.atan2(y * math.cos(own) - x * math.sin(own), max(x * math.cos(own) + y * math.sin(own), 0.0))

@@ -59,7 +59,12 @@ def moved(state: TrafficState, seconds: float) -> TrafficState:
     seconds : float
         How much later [s].
     """
-    return replace(state, position=state.position + seconds * _velocities(state))
+    pieces = state.pieces
+    if pieces.kind:
+        along = seconds * state.speed[pieces.row]
+        way = along * np.array([np.cos(pieces.heading), np.sin(pieces.heading), np.sin(pieces.grade)])
+        pieces = replace(pieces, position=pieces.position + way.T)
+    return replace(state, position=state.position + seconds * _velocities(state), pieces=pieces)
 
 
 def exposed(

@@ -400,6 +400,7 @@ class ViewRenderer:
         moved = replace(
             state,
             position=state.position - self._origin,
+            pieces=replace(state.pieces, position=state.pieces.position - self._origin),
             signals=replace(signals, position=signals.position - self._origin),
             persons=replace(persons, position=persons.position - self._origin),
         )

@@ -23,9 +23,6 @@ from fogsim.values import (
 )
 from fogsim.values.script import Actions
 
-SAME_LANE = 1.6
-"""How far beside one another two vehicles of one lane are [m]."""
-
 
 class EquippedFleet:
     """All equipped vehicles beside the ego that are read and on its way.
@@ -163,9 +160,10 @@ def _speed_limit(place: float, places: RoutePlaces, roads: RoadNetwork, otherwis
 
 
 def _leader(row: int, at: Places, state: TrafficState) -> Leader | None:
-    """The nearest vehicle ahead of one in its lane."""
+    """The nearest vehicle ahead of one whose width overlaps."""
     ahead = at.along - state.length - at.along[row]
-    ahead[~at.on_way | (np.abs(at.aside - at.aside[row]) > SAME_LANE) | (at.along <= at.along[row])] = np.inf
+    is_beside = np.abs(at.aside - at.aside[row]) >= 0.5 * (state.width + state.width[row])
+    ahead[~at.on_way | is_beside | (at.along <= at.along[row])] = np.inf
     nearest = int(ahead.argmin())
     if not np.isfinite(ahead[nearest]):
         return None

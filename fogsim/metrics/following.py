@@ -12,7 +12,7 @@ _MOST_EMPTY = 8
 
 
 class Following(NamedTuple):
-    """Followers and the vehicles ahead of them in the same lane.
+    """Followers and the vehicles ahead of them on the same course.
 
     Attributes
     ----------
@@ -32,20 +32,24 @@ class Following(NamedTuple):
 
 
 def find_following(traffic: TrafficState) -> Following:
-    """Pair each vehicle with the nearest one ahead of it in its lane; see `pair_in_lanes`."""
+    """Pair each vehicle with the nearest one ahead of it on its course; see `pair_on_courses`."""
     known: dict[str, int] = {}
-    lane = np.array([known.setdefault(lane, len(known)) for lane in traffic.lane], dtype=np.intp)
-    return pair_in_lanes(traffic.position, traffic.heading, traffic.length, traffic.speed, lane)
+    course = np.array([known.setdefault(name, len(known)) for name in traffic.course], dtype=np.intp)
+    return pair_on_courses(
+        traffic.position, traffic.heading, traffic.length, traffic.speed, course, traffic.across, traffic.width
+    )
 
 
-def pair_in_lanes(
+def pair_on_courses(
     position: NDArray[np.float64],
     heading: NDArray[np.float64],
     length: NDArray[np.float64],
     speed: NDArray[np.float64],
-    lane: NDArray[np.intp],
+    course: NDArray[np.intp],
+    across: NDArray[np.float64],
+    width: NDArray[np.float64],
 ) -> Following:
-    """Pair each vehicle with the nearest one ahead of it in its lane; lanes end where SUMO's edges end.
+    """Pair each vehicle with the nearest one ahead of it on its course; lanes end where SUMO's edges end.
 
     Vehicles of a lane are in the order of their places along the mean of their headings, so a lane may turn by up to
     180° from its first vehicle to its last. Gaps are straight lines: in a curve of radius R they are too short by about
@@ -57,21 +61,48 @@ def pair_in_lanes(
         Middle of the front bumper [m].
     heading, length, speed : (n,) float64
         Headings [rad], lengths [m] and speeds [m/s].
-    lane : (n,) intp
-        Numbers of lanes, from 0; one number for each lane at each instant.
+    course : (n,) intp
+        Numbers of courses, from 0; one number for each at each instant.
+    across : (n,) float64
+        As of `TrafficState` [m]; a vehicle whose width does not overlap is not ahead. Empty where all overlap.
+    width : (n,) float64
+        Widths [m].
     """
-    lane = lane - lane.min(initial=0)
-    if lane.max(initial=0) > _MOST_EMPTY * len(lane):
-        _, lane = np.unique(lane, return_inverse=True)
+    course = course - course.min(initial=0)
+    if course.max(initial=0) > _MOST_EMPTY * len(course):
+        _, course = np.unique(course, return_inverse=True)
     cosine, sine = np.cos(heading), np.sin(heading)
     # The sum of the headings' unit vectors need not have the length 1 to give the order.
-    along = position[:, 0] * np.bincount(lane, cosine)[lane] + position[:, 1] * np.bincount(lane, sine)[lane]
+    along = position[:, 0] * np.bincount(course, cosine)[course] + position[:, 1] * np.bincount(course, sine)[course]
     # numpy sorts numbers of 16 bits and less by counting.
     order = np.argsort(along, kind="stable")
-    short = lane[order].astype(np.min_scalar_type(lane.max(initial=0)))
+    short = course[order].astype(np.min_scalar_type(course.max(initial=0)))
     order = order[np.argsort(short, kind="stable")]
-    same = lane[order[1:]] == lane[order[:-1]]
-    follower, leader = order[:-1][same], order[1:][same]
+    if len(across):
+        follower, leader = _overlapping(order, course, across, width)
+        aside = across[leader] - across[follower]
+    else:
+        same = course[order[1:]] == course[order[:-1]]
+        follower, leader = order[:-1][same], order[1:][same]
+        aside = np.zeros(len(leader))
     way = position[leader] - position[follower]
-    distance = np.sqrt(way[:, 0] ** 2 + way[:, 1] ** 2 + way[:, 2] ** 2)
+    distance = np.sqrt(np.maximum(way[:, 0] ** 2 + way[:, 1] ** 2 + way[:, 2] ** 2 - aside**2, 0.0))
     return Following(follower, leader, np.maximum(distance - length[leader], 0.0), speed[follower], speed[leader])
+
+
+def _overlapping(
+    order: NDArray[np.intp], course: NDArray[np.intp], across: NDArray[np.float64], width: NDArray[np.float64]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Followers and the next vehicles on their courses whose widths overlap with theirs, in the order given."""
+    waiting, leader = np.arange(len(order)), np.full(len(order), -1)
+    for ahead in range(1, len(order)):
+        waiting = waiting[waiting < len(order) - ahead]
+        waiting = waiting[course[order[waiting + ahead]] == course[order[waiting]]]
+        if not len(waiting):
+            break
+        one, other = order[waiting], order[waiting + ahead]
+        meets = np.abs(across[other] - across[one]) < 0.5 * (width[other] + width[one])
+        leader[waiting[meets]] = other[meets]
+        waiting = waiting[~meets]
+    found = np.flatnonzero(leader >= 0)
+    return order[found], leader[found].astype(np.intp)

@@ -28,7 +28,7 @@ _MOMENTS = 1 << 32
 
 @dataclass(slots=True)
 class TrafficConflicts(TrafficMetric):
-    """Conflicts between followers at 5 m/s or more and their leaders, moving or standing, in the same lane.
+    """Conflicts between followers at 5 m/s or more and their leaders, moving or standing.
 
     Attributes
     ----------

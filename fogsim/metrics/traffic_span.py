@@ -10,7 +10,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.metrics.following import Following, pair_in_lanes
+from fogsim.metrics.following import Following, pair_on_courses
 from fogsim.metrics.metric import Definition, JsonValue, share
 from fogsim.values import Cohort, Collision, Step, TrafficState, TrafficStep
 
@@ -22,6 +22,9 @@ HOUR = 3600.0
 
 KILOMETRE = 1000.0
 """Metres in a kilometre."""
+
+_FIRST_COURSE = 1 << 20
+"""Courses that are no lanes have numbers from here on, lanes smaller ones."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,10 @@ class TrafficSpan:
         Rows of the ego, one in each step; None without one.
     reading_radius : float
         As of `Step` [m]; ``inf`` without an ego.
+    course : (n,) intp
+        Number of the course of each, the same throughout a run.
+    across : (n,) float64
+        As of `TrafficState`; empty where vehicles do not share lanes.
     """
 
     moment: NDArray[np.intp]
@@ -93,12 +100,14 @@ class TrafficSpan:
     cohort_waiting_time: float = 0.0
     ego: NDArray[np.intp] | None = None
     reading_radius: float = math.inf
+    course: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))
+    across: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
     @cached_property
     def following(self) -> Following:
         """Who follows whom, found once for all metrics."""
-        lanes = len(self.lane_names)
-        return pair_in_lanes(self.position, self.heading, self.length, self.speed, self.moment * lanes + self.lane)
+        course = self.moment * (int(self.course.max(initial=0)) + 1) + self.course
+        return pair_on_courses(self.position, self.heading, self.length, self.speed, course, self.across, self.width)
 
     @cached_property
     def vehicle_time(self) -> float:
@@ -167,8 +176,9 @@ class TrafficGathering:
         self._vehicles: dict[str, int] = {}
         self._lanes: dict[str, int] = {}
         self._kinds: dict[str, int] = {}
+        self._courses: dict[str, int] = {}
         self._states: list[tuple[TrafficState, float, NDArray[np.float64] | None]] = []
-        self._numbers: list[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]] = []
+        self._numbers: list[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]] = []
         self._collisions: list[Collision] = []
         self._route: NDArray[np.float64] | None = None
         self._cohort: Cohort | None = None
@@ -202,7 +212,10 @@ class TrafficGathering:
         if traffic.lane != self._last_lanes:
             lanes, self._last_lanes = _numbers(self._lanes, traffic.lane), traffic.lane
         self._last = vehicles, lanes, kinds
-        self._numbers.append(self._last)
+        courses = lanes
+        if traffic.course is not traffic.lane:
+            courses = _FIRST_COURSE + _numbers(self._courses, traffic.course)
+        self._numbers.append((*self._last, courses))
         if isinstance(step, Step):
             self._egos.append(self._rows - len(self._states) + step.ego)
             self._reading_radius = step.reading_radius
@@ -214,7 +227,7 @@ class TrafficGathering:
         if not self._states:
             return None
         states, times, extinctions = zip(*self._states, strict=True)
-        vehicles, lanes, kinds = zip(*self._numbers, strict=True)
+        vehicles, lanes, kinds, courses = zip(*self._numbers, strict=True)
         counts = [len(state.ids) for state in states]
         clock = self._time + np.cumsum(times)
         free = [_known(state.free_speed, n, np.nan) for state, n in zip(states, counts, strict=True)]
@@ -246,6 +259,8 @@ class TrafficGathering:
             cohort_waiting_time=self._cohort_waiting_time,
             ego=np.array(self._egos, dtype=np.intp) if self._egos else None,
             reading_radius=self._reading_radius,
+            course=np.concatenate(courses),
+            across=_across(states),
         )
         self._moments += len(states)
         self._time = float(clock[-1])
@@ -261,6 +276,13 @@ class TrafficGathering:
 def _known(values: NDArray[np.float64], count: int, unknown: float) -> NDArray[np.float64]:
     """Values of each vehicle; the same for all where a state has none."""
     return values if len(values) else np.full(count, unknown)
+
+
+def _across(states: Sequence[TrafficState]) -> NDArray[np.float64]:
+    """`TrafficState.across` of all; empty where it is so in each."""
+    if not any(len(state.across) for state in states):
+        return np.zeros(0)
+    return np.concatenate([_known(state.across, len(state.ids), 0.0) for state in states])
 
 
 class GatheredMetrics:

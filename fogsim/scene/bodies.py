@@ -128,17 +128,18 @@ def body_of(vehicle_id: str, kind: str, length: float, height: float) -> str:
     vehicle_id : str
         Its id, by which vehicles of a kind and size are told apart.
     kind : str
-        "car", "van", "truck", "bus" or "motorcycle"; any other is a car.
+        "car", "van", "truck", "bus" or "motorcycle", or that of a piece of a body; any other is a car.
     length, height : float
         Its size [m]: trucks from 11 m are semitrailers, those below 2.9 m high flatbeds; cars shorter than 4.2 m are
         hatchbacks, those higher than 1.6 m sport utility vehicles, and none longer than 4.6 m is a hatchback.
     """
     chance = zlib.crc32(vehicle_id.encode()) / 2**32
+    if kind == "trailer" or (kind == "truck" and length >= 11.0):
+        name = "trailer" if kind == "trailer" else "semitrailer"
+        return name if chance < 0.5 else f"{name}_curtain"
     if kind == "truck":
-        if length >= 11.0:
-            return "semitrailer" if chance < 0.5 else "semitrailer_curtain"
         return "rigid_truck" if height >= 2.9 else "flatbed_truck"
-    if kind in {"van", "bus", "motorcycle"}:
+    if kind in {"van", "bus", "motorcycle", "tractor", "carriage"}:
         return kind
     if height > 1.6:
         return "suv"

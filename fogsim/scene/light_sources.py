@@ -38,7 +38,7 @@ from fogsim.units import luminance_of
 from fogsim.values.light import Beam, Lamp, LampLobes, LightSources, StreetLighting, dark_shift, joined_sources
 from fogsim.values.luminous_intensity import FALL_OFF, LOBE_AZIMUTHS, LOBE_ELEVATIONS, SignalLobe, luminous_intensity
 from fogsim.values.scene import Surface
-from fogsim.values.traffic import TrafficState
+from fogsim.values.traffic import TrafficState, with_pieces
 
 FARTHEST_VEHICLE = 1500.0
 """Distance beyond which lamps of vehicles are left out [m]."""
@@ -122,6 +122,7 @@ def light_sources(
 def _of_vehicles(
     state: TrafficState, skip: int | None, eye: NDArray[np.float64], beams: Mapping[Lamp, Beam]
 ) -> LightSources:
+    state, _ = with_pieces(state, skip)
     table = _lamps()
     numbers = _numbers(body_names(state))
     most = len(numbers) * table.lamps.of_body.shape[1]

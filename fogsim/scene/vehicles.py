@@ -11,7 +11,7 @@ from fogsim.jit import kernel
 from fogsim.scene.bodies import body_of
 from fogsim.scene.town import person_batches, signal_batches
 from fogsim.values.scene import Batch, Instance
-from fogsim.values.traffic import TrafficState
+from fogsim.values.traffic import TrafficState, with_pieces
 
 
 def traffic_batches(state: TrafficState, skip: int | None) -> tuple[Batch, ...]:
@@ -42,7 +42,9 @@ def vehicle_batches(state: TrafficState, skip: int | None) -> tuple[Batch, ...]:
     tuple of Batch
         Shapes fill a unit box, so the transforms scale them to length, width and height.
     """
-    shapes, rows, instance = _grouped(state.ids, state.types, state.length.tobytes(), state.height.tobytes(), skip)
+    state, owner = with_pieces(state, skip)
+    shapes, rows = _grouped(state.ids, state.types, state.length.tobytes(), state.height.tobytes(), skip)
+    instance = (Instance.FIRST_VEHICLE + owner[rows]).astype(np.int32)
     # Sorted all at once, and taken apart by slices, which cost little.
     transforms, paint = np.zeros((len(rows), 4, 4), np.float32), np.empty((len(rows), 3), np.float32)
     copies = _Copies(transforms, paint, np.empty(len(rows), np.int32))
@@ -97,8 +99,8 @@ def _place_copies(rows: NDArray[np.int64], vehicles: _Vehicles, copies: _Copies)
 @lru_cache(maxsize=16)
 def _grouped(
     ids: tuple[str, ...], types: tuple[str, ...], length: bytes, height: bytes, skip: int | None
-) -> tuple[tuple[tuple[str, slice], ...], NDArray[np.int64], NDArray[np.int32]]:
-    """Rows by shape: each shape with its slice of them, the rows, and their instance ids; all who ask get the same."""
+) -> tuple[tuple[tuple[str, slice], ...], NDArray[np.int64]]:
+    """Rows by shape: each shape with its slice of them, and the rows; all who ask get the same."""
     groups: dict[str, list[int]] = {}
     for row, name in enumerate(_names(ids, types, length, height)):
         group = groups.setdefault(name, [])
@@ -107,9 +109,8 @@ def _grouped(
     ends = np.cumsum([0, *map(len, groups.values())]).tolist()
     shapes = tuple((name, slice(*ends[n : n + 2])) for n, name in enumerate(groups) if groups[name])
     rows = np.array([row for group in groups.values() for row in group], np.int64)
-    instance = (Instance.FIRST_VEHICLE + rows).astype(np.int32)
-    rows.flags.writeable = instance.flags.writeable = False
-    return shapes, rows, instance
+    rows.flags.writeable = False
+    return shapes, rows
 
 
 def body_names(state: TrafficState) -> tuple[str, ...]:

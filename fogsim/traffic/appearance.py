@@ -35,6 +35,9 @@ BODY_KINDS = {
 TRAINS = frozenset({"rail_urban", "rail", "rail_electric", "rail_fast", "subway", "cable_car"})
 """SUMO's vehicle classes whose drivers go by signals and not by what they see of the way; trams are not among them."""
 
+RAILWAYS = TRAINS | {"tram"}
+"""SUMO's classes of vehicles on rails."""
+
 SHAPE_KINDS = {
     "passenger/van": "van",
     "delivery": "van",
@@ -73,6 +76,7 @@ PAINTS = (
 _SIGNALS = (
     (1 << 0, int(Lamp.INDICATOR_RIGHT)),
     (1 << 1, int(Lamp.INDICATOR_LEFT)),
+    (1 << 2, int(Lamp.INDICATOR_LEFT | Lamp.INDICATOR_RIGHT)),
     (1 << 3, int(Lamp.STOP)),
     (1 << 4, int(Lamp.LOW_BEAM | Lamp.POSITION)),
     (1 << 5, int(Lamp.REAR_FOG)),

@@ -27,13 +27,19 @@ from fogsim.traffic.sumo.link import Api, SumoLink
 from fogsim.traffic.sumo.loaded_files import check_step_length, describe_seen, loaded_additional, loaded_net
 from fogsim.traffic.sumo.planned_way import planned_way
 from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo.route_position import GapToEgo, RoutePosition
 from fogsim.traffic.sumo.vehicle_reader import SubscribedReader, VehicleReader
 from fogsim.traffic.sumo_behaviour.ego_driving import EgoDriving
 from fogsim.traffic.sumo_behaviour.scripted_actions import ScriptedActions, has_lane
 from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl, SumoDesiredSpeeds
 from fogsim.traffic.sumo_behaviour.told_lamps import ToldLamps
 from fogsim.traffic.sumo_drivers.drivers_perception import DriversPerception, drivers_perception
+from fogsim.traffic.sumo_lanes.courses import Courses
+from fogsim.traffic.sumo_lanes.directions import LaneDirections
+from fogsim.traffic.sumo_lanes.leaders import Leaders
+from fogsim.traffic.sumo_lanes.lights import LightsAhead
+from fogsim.traffic.sumo_lanes.long_bodies import LongBodies
+from fogsim.traffic.sumo_lanes.rail_collisions import rail_collisions
+from fogsim.traffic.sumo_lanes.route_position import GapToEgo, RoutePosition
 from fogsim.traffic.sumo_street.person_reader import PersonReader
 from fogsim.traffic.sumo_street.signal_reader import SignalReader
 from fogsim.values import (
@@ -72,6 +78,10 @@ class _Run:
     session: str
     mark: LoadMark
     persons: PersonReader
+    leaders: Leaders
+    courses: Courses
+    lights: LightsAhead
+    bodies: LongBodies
     perception: DriversPerception | None = None
     drivers: SumoDesiredSpeeds | None = None
 
@@ -157,6 +167,10 @@ class SumoTraffic:
             session=session,
             mark=mark,
             persons=PersonReader(api, self._link.shared),
+            leaders=Leaders(api, self._link.remote),
+            courses=Courses(api, self._link.remote),
+            lights=LightsAhead(api),
+            bodies=LongBodies(api, self._link.remote),
         )
         self._signals = None
         self._seed = seed
@@ -325,13 +339,13 @@ class SumoTraffic:
         return {**orders, **actions.orders}
 
     def _situation(self, run: _Run, present: set[str]) -> Situation:
-        vehicle, ego = run.api.vehicle, self._setup.ego
+        ego = self._setup.ego
 
         def gap_to_ego(other: str) -> float | None:
             return GapToEgo(run.api, ego).measure(other) if ego is not None and ego in present else None
 
         may_change = functools.partial(has_lane, run.api)
-        return Situation(self._elapsed(run), present, vehicle.getDistance, gap_to_ego, may_change)
+        return Situation(self._elapsed(run), present, LaneDirections(run.api).driven, gap_to_ego, may_change)
 
     def _step(self, run: _Run) -> None:
         self._update_drivers(run, _NO_ADVICE)
@@ -369,17 +383,17 @@ class SumoTraffic:
         self._route = RoutePosition(run.api, ego) if self._route is None or ego in new else self._route
         state = run.reader.state(self._command.lamps, self._heard(run), self._command.lamps_of)
         row = state.ids.index(ego)
-        route_position, route_length = self._route.update(state.position[row])
-        state = run.script.lamps.shown(run.lane_changes.smoothed(state), self._elapsed(run))
+        route_position, route_length = self._route.update(state.position[row], state.lane[row])
+        state = self._shown(run, state)
         return TrafficSnapshot(
             state=self._with_street(run, state, state.position[row]),
             ego=row,
             route_position=route_position,
             route_length=route_length,
             speed_limit=run.api.lane.getMaxSpeed(state.lane[row]),
-            leader=run.reader.leader(),
+            leader=run.leaders.of_ego(ego),
             collisions=run.collisions.take(),
-            signal_ahead=run.reader.signal_ahead(),
+            signal_ahead=run.lights.shown_to(ego),
         )
 
     @_translates_errors
@@ -390,7 +404,7 @@ class SumoTraffic:
         state = run.reader.state(self._command.lamps, self._heard(run))
         # Who is between lanes is on none.
         limits = [float(run.api.lane.getMaxSpeed(lane)) for lane in {*state.lane} if lane]
-        state = run.script.lamps.shown(run.lane_changes.smoothed(state), self._elapsed(run))
+        state = self._shown(run, state)
         return NetworkSnapshot(
             state=self._with_street(run, state, None),
             speed_limit=max(limits, default=math.inf),
@@ -398,6 +412,13 @@ class SumoTraffic:
             is_over=run.api.simulation.getMinExpectedNumber() == 0,
             waiting=tuple(run.api.simulation.getPendingVehicles()),
         )
+
+    def _shown(self, run: _Run, state: TrafficState) -> TrafficState:
+        """The traffic as it is to be seen, and what has collided in it."""
+        smooth = run.lane_changes.smoothed(run.courses.add(state))
+        shown = run.bodies.add(run.script.lamps.shown(smooth, self._elapsed(run)))
+        run.collisions.add(rail_collisions(shown))
+        return shown
 
     def _with_street(self, run: _Run, state: TrafficState, here: NDArray[np.float64] | None) -> TrafficState:
         """The traffic with persons on foot and, near the ego, traffic lights."""

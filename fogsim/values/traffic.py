@@ -7,6 +7,8 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.values.light import DARK_SHIFT, Lamp
+
 
 class SignalColour(StrEnum):
     """What a traffic light shows."""
@@ -84,6 +86,36 @@ NO_SIGNALS, NO_PERSONS = SignalState(), PersonState()
 """Where there are none."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyPieces:
+    """Rigid pieces of bodies that bend, as arrays; those of one body are one after another, its front first.
+
+    Attributes
+    ----------
+    row : (m,) intp
+        The vehicle that each belongs to.
+    kind : tuple of str
+        What each is: "tractor", "trailer", "bus" or "carriage".
+    position : (m, 3) float64
+        Middles of their front ends on the road surface [m].
+    heading, grade : (m,) float64
+        As of `TrafficState` [rad].
+    length : (m,) float64
+        Lengths [m]; width and height are the vehicle's.
+    """
+
+    row: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))
+    kind: tuple[str, ...] = ()
+    position: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
+    heading: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    grade: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    length: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+
+
+NO_PIECES = BodyPieces()
+"""Where every body is in one piece."""
+
+
 @dataclass(frozen=True, slots=True)
 class TrafficState:
     """All vehicles at one instant, as arrays; row i belongs to ``ids[i]``; and who and what is beside them.
@@ -125,6 +157,14 @@ class TrafficState:
         Heads of traffic lights near the ego; none without an ego.
     persons : PersonState
         Persons on foot near the ego; without one, all.
+    course : tuple of str
+        Names of what vehicles follow one another along: their lanes, as a rule. Vehicles that share lanes side by side
+        follow one another along an edge, where their widths overlap; those that overtake on the oncoming lane do not
+        follow those that come along it. Left out, the lanes.
+    across : (n,) float64
+        Offsets of vehicles' middles to one side on their course [m]; empty where vehicles do not share lanes.
+    pieces : BodyPieces
+        Of those whose bodies bend, as trains; `heading` and `length` are those of the whole.
     """
 
     time: float
@@ -145,11 +185,16 @@ class TrafficState:
     advised_speed: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     signals: SignalState = NO_SIGNALS
     persons: PersonState = NO_PERSONS
+    course: tuple[str, ...] = ()
+    across: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    pieces: BodyPieces = NO_PIECES
 
     def __post_init__(self) -> None:
-        """Put everybody on the level where no grade is given."""
+        """Put everybody on the level where no grade is given, and along lanes where no course is."""
         if not len(self.grade):
             object.__setattr__(self, "grade", np.zeros(len(self.ids)))
+        if not self.course:
+            object.__setattr__(self, "course", self.lane)
 
     def row(self, vehicle_id: str) -> int | None:
         """Row of a vehicle, or None if it is not on the road now.
@@ -163,6 +208,26 @@ class TrafficState:
             return self.ids.index(vehicle_id)
         except ValueError:
             return None
+
+
+def rear_of(state: TrafficState, row: int) -> tuple[NDArray[np.float64], float]:
+    """Middle of a vehicle's rear bumper on the road surface (3,) [m], and the heading there [rad].
+
+    Parameters
+    ----------
+    state : TrafficState
+        The traffic.
+    row : int
+        The vehicle.
+    """
+    pieces = np.flatnonzero(state.pieces.row == row)
+    if len(pieces):
+        last = int(pieces[-1])
+        front, heading, length = state.pieces.position[last], state.pieces.heading[last], state.pieces.length[last]
+    else:
+        front, heading, length = state.position[row], state.heading[row], state.length[row]
+    rear = np.array([length * np.cos(heading), length * np.sin(heading), 0.0])
+    return front - rear, float(heading)
 
 
 PEDESTRIAN = "pedestrian"
@@ -195,6 +260,8 @@ def with_persons(state: TrafficState) -> TrafficState:
         width=np.append(state.width, np.full(count, _PERSON_WIDTH)),
         height=np.append(state.height, np.full(count, _PERSON_HEIGHT)),
         lane=state.lane + persons.lane,
+        course=state.course + persons.lane,
+        across=np.append(state.across, unknown) if len(state.across) else state.across,
         lamps=np.append(state.lamps, np.zeros(count, np.int32)),
         paint=np.concatenate((state.paint, np.full((count, 3), np.nan))),
         grade=np.append(state.grade, unknown),
@@ -291,7 +358,7 @@ class TrafficSnapshot:
     speed_limit : float
         Speed limit where the ego is [m/s].
     leader : Leader or None
-        The vehicle ahead in its lane.
+        The next vehicle ahead that goes the same way and whose width overlaps.
     collisions : tuple of Collision
         Collisions of any vehicles since the last snapshot, each pair once.
     signal_ahead : SignalAhead or None
@@ -331,3 +398,73 @@ class NetworkSnapshot:
     collisions: tuple[Collision, ...]
     is_over: bool
     waiting: tuple[str, ...] = ()
+
+
+_AHEAD = Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.FRONT_FOG | Lamp.DAYTIME
+_BEHIND = Lamp.POSITION | Lamp.STOP | Lamp.REAR_FOG
+_INDICATORS = Lamp.INDICATOR_LEFT | Lamp.INDICATOR_RIGHT
+
+
+def with_pieces(state: TrafficState, skip: int | None) -> tuple[TrafficState, NDArray[np.intp]]:
+    """Traffic with each piece of a body as a row, and the vehicle that each row belongs to (n,).
+
+    The first piece of a vehicle has its row, further ones have rows behind all vehicles. Lamps burn at the front of the
+    first and at the rear of the last piece.
+
+    Parameters
+    ----------
+    state : TrafficState
+        The traffic; without pieces it is given back as it is.
+    skip : int or None
+        A vehicle of which only its first piece is a row, since it is not drawn.
+    """
+    pieces, count = state.pieces, len(state.ids)
+    if not pieces.kind:
+        return state, np.arange(count)
+    is_first = np.append(True, pieces.row[1:] != pieces.row[:-1])
+    is_last = np.append(is_first[1:], True)
+    lit = _lamps_of_pieces(state.lamps[pieces.row], is_first, is_last)
+    further = np.flatnonzero(~is_first & (pieces.row != (-1 if skip is None else skip)))
+    rows = pieces.row[is_first]
+    types = list(state.types)
+    for row, kind in zip(rows.tolist(), np.array(pieces.kind)[is_first].tolist(), strict=True):
+        types[row] = kind
+    owner = pieces.row[further]
+    body = np.concatenate((np.arange(count), owner))
+
+    def column(own: NDArray[np.float64], of_pieces: NDArray[np.float64]) -> NDArray[np.float64]:
+        first = own.copy()
+        first[rows] = of_pieces[is_first]
+        return np.concatenate((first, of_pieces[further]))
+
+    lamps = state.lamps.copy()
+    lamps[rows] = lit[is_first]
+    drawn = replace(
+        state,
+        ids=state.ids + tuple(state.ids[row] for row in owner.tolist()),
+        types=(*types, *(pieces.kind[piece] for piece in further.tolist())),
+        lane=state.lane + tuple(state.lane[row] for row in owner.tolist()),
+        position=column(state.position, pieces.position),
+        heading=column(state.heading, pieces.heading),
+        grade=column(state.grade, pieces.grade),
+        length=column(state.length, pieces.length),
+        lamps=np.concatenate((lamps, lit[further])).astype(np.int32),
+        pieces=NO_PIECES,
+        speed=state.speed[body],
+        acceleration=state.acceleration[body],
+        width=state.width[body],
+        height=state.height[body],
+        paint=state.paint[body],
+        course=tuple(state.course[row] for row in body.tolist()),
+    )
+    return drawn, body
+
+
+def _lamps_of_pieces(
+    lamps: NDArray[np.int32], is_first: NDArray[np.bool_], is_last: NDArray[np.bool_]
+) -> NDArray[np.int32]:
+    """What burns of the lamps of whole vehicles on each of their pieces."""
+    at_ends = np.where(is_first | is_last, int(_INDICATORS), 0)
+    kinds = at_ends | np.where(is_first, int(_AHEAD), 0) | np.where(is_last, int(_BEHIND), 0)
+    known = sum((kinds << shift for shift in DARK_SHIFT.values()), kinds)
+    return np.asarray(lamps & known, np.int32)

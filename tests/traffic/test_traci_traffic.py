@@ -133,7 +133,6 @@ def readers_agree(link: SumoLink, api: Api) -> None:
     for _ in range(30):
         plain, subscribed = (reader.state(Lamp.REAR_FOG) for reader in readers)
         assert equal(plain, subscribed)
-        assert readers[0].leader() == readers[1].leader()
         link.step()
 
 

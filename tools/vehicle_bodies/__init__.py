@@ -7,12 +7,12 @@ from functools import partial
 from fogsim.scene.solids import Material
 from fogsim.values.scene import FAR, SPECK, TINY, Mesh
 from vehicle_bodies.car import ESTATE, HATCHBACK, SALOON, SUV, CarForm, car, car_size
-from vehicle_bodies.large import bus, van
+from vehicle_bodies.large import bus, carriage, van
 from vehicle_bodies.levels import Detail, levels_of_detail
 from vehicle_bodies.motorcycle import motorcycle
 from vehicle_bodies.projection import Size
 from vehicle_bodies.solids import PAINT
-from vehicle_bodies.truck import flatbed, rigid, semitrailer
+from vehicle_bodies.truck import flatbed, rigid, semitrailer, tractor, trailer
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,9 +48,13 @@ MODELS: Mapping[str, Model] = {
     "van": Model(van, (5.92, 2.0, 2.59)),
     "semitrailer": Model(partial(semitrailer, _WHITE_BOX), (16.5, 2.55, 4.0)),
     "semitrailer_curtain": Model(partial(semitrailer, PAINT), (16.5, 2.55, 4.0)),
+    "tractor": Model(tractor, (6.2, 2.55, 3.93)),
+    "trailer": Model(partial(trailer, _WHITE_BOX), (13.65, 2.55, 4.0)),
+    "trailer_curtain": Model(partial(trailer, PAINT), (13.65, 2.55, 4.0)),
     "rigid_truck": Model(rigid, (8.5, 2.5, 3.6)),
     "flatbed_truck": Model(flatbed, (7.1, 2.4, 2.4)),
     "bus": Model(bus, (12.0, 2.55, 3.38)),
+    "carriage": Model(carriage, (12.0, 2.55, 3.38)),
     "motorcycle": Model(motorcycle, (2.17, 0.8, 1.6), shadow=0.25),
 }
 """Bodies by the name of their shape."""

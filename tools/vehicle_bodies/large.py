@@ -23,7 +23,7 @@ from vehicle_bodies.parts import (
     side_panel,
     wheels,
 )
-from vehicle_bodies.solids import BLACK_PLASTIC, PAINT, both_sides
+from vehicle_bodies.solids import BLACK_PLASTIC, PAINT, UNDERBODY, both_sides
 
 _SEAM = Material((0.05, 0.05, 0.05))
 
@@ -118,3 +118,42 @@ def bus() -> Mesh:
     )
     rolling = wheels((2.7, 8.9), 1.275, 0.50, 0.32)
     return finished([hull(_COACH, PAINT), pair(lamps), mirrors, *panes, *ends, rolling], 12.0, 1.275)
+
+
+# A flat end on either side, and windows all along.
+_CARRIAGE = np.array(
+    [
+        [0.00, 1.22, 0.60, 3.16, 1.16, 0.03],
+        [0.10, 1.27, 0.55, 3.30, 1.24, 0.08],
+        [11.87, 1.27, 0.55, 3.30, 1.24, 0.08],
+        [11.97, 1.22, 0.60, 3.16, 1.16, 0.03],
+    ]
+)
+
+
+def carriage() -> Mesh:
+    """Shape of a carriage of a train, or of a section of a tram or bus behind the first, in a unit box."""
+    lamps = merge(
+        (
+            panel_back(12.0, (0.86, 1.08), (1.15, 1.35), STOP_LAMP),
+            panel_back(12.0, (0.86, 1.08), (0.95, 1.15), POSITION_LAMP),
+            panel_back(12.0, (0.86, 1.08), (0.78, 0.95), LEFT_INDICATOR),
+            panel_back(12.0, (0.64, 0.80), (0.78, 0.90), FOG_LAMP),
+            panel_front(-0.02, (0.66, 1.02), (0.80, 1.00), HEAD_LAMP),
+            panel_front(-0.02, (1.02, 1.09), (0.80, 1.00), LEFT_INDICATOR),
+        )
+    )
+    edges = np.linspace(0.8, 11.2, 9)
+    panes = [
+        side_panel([(a, 1.282, 1.62), (b - 0.12, 1.282, 1.62), (b - 0.12, 1.275, 2.75), (a, 1.275, 2.75)], GLASS)
+        for a, b in pairwise(edges.tolist())
+    ]
+    ends = (
+        panel_front(-0.015, (-0.95, 0.95), (1.5, 2.85), GLASS),
+        panel_back(11.985, (-0.95, 0.95), (1.5, 2.85), GLASS),
+        panel_back(11.99, (-0.25, 0.25), (2.92, 2.98), STOP_LAMP),
+    )
+    # Wheels would be stretched with the body; bogies and boxes under the floor are of any length.
+    frame = box((0.3, -1.1, 0.35), (11.7, 1.1, 0.62), UNDERBODY)
+    bogies = [box((x, -1.12, 0.02), (x + 1.6, 1.12, 0.55), BLACK_PLASTIC) for x in (1.0, 9.4)]
+    return finished([hull(_CARRIAGE, PAINT), pair(lamps), *panes, *ends, frame, *bogies], 12.0, 1.275)

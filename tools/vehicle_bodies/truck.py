@@ -57,6 +57,31 @@ def semitrailer(box_material: Material) -> Mesh:
     return finished(parts, 16.5, 1.275)
 
 
+def tractor() -> Mesh:
+    """Shape of the tractor of such a truck in a unit box, as long as from its front to the end of its frame."""
+    chassis = box((2.0, -0.45, 0.55), (6.2, 0.45, 1.08), UNDERBODY)
+    tanks = both_sides(box((2.4, 0.7, 0.40), (4.4, 1.20, 1.0), BLACK_PLASTIC))
+    axles = wheels((1.4, 5.0), 1.26, 0.50, 0.34, arch=False)
+    return finished([hull(_CAB, columns=3, levels=3), chassis, tanks, axles, _cab_front()], 6.2, 1.275)
+
+
+def trailer(box_material: Material) -> Mesh:
+    """Shape of the trailer of such a truck in a unit box.
+
+    Parameters
+    ----------
+    box_material : Material
+        Its sides.
+    """
+    load = _load((0.0, 13.5), (1.10, 4.0), 1.27, box_material)
+    front = panel_front(0.005, (-1.26, 1.26), (1.10, 4.0), box_material)
+    chassis = box((3.6, -0.45, 0.55), (13.35, 0.45, 1.12), UNDERBODY)
+    skirts = both_sides(box((3.35, 1.18, 0.45), (7.35, 1.24, 1.10), STEEL))
+    axles = wheels((8.55, 9.85, 11.15), 1.26, 0.50, 0.34, arch=False)
+    rear = (_doors(13.525, (1.10, 4.0), 1.25, box_material), _tail(13.6, 1.24, 0.86))
+    return finished([load, front, chassis, skirts, axles, *rear], 13.65, 1.275)
+
+
 def rigid() -> Mesh:
     """Shape of a truck with a box body in a unit box."""
     cab = _CAB * (0.88, 0.97, 1.0, 0.80, 0.97, 1.0)

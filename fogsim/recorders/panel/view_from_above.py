@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from PIL import Image, ImageDraw
 from fogsim.recorders.panel.frame_panel import PICTURE_SIZE
 from fogsim.recorders.style import ADVICE, AMBER, LINE, TEXT, TRUTH, font
 from fogsim.values import Lamp, Step
+from fogsim.values.traffic import with_pieces
 
 SCALE = 1.6
 """Pixels a metre."""
@@ -53,8 +55,10 @@ def draw_view_from_above(step: Step, extinction: Extinctions) -> Image.Image:
     if step.truth.route is not None:
         draw.line([tuple(point) for point in _pixels(step.truth.route, step, axes)], fill=LINE, width=round(8 * SCALE))
     _draw_sight(draw, step, axes)
-    for row in range(len(step.traffic.ids)):
-        _draw_vehicle(draw, step, row, axes)
+    traffic, body = with_pieces(step.traffic, None)
+    drawn = replace(step, traffic=traffic)
+    for row, vehicle in enumerate(body.tolist()):
+        _draw_vehicle(draw, drawn, row, axes, vehicle == step.ego)
     _draw_scale(draw)
     return picture
 
@@ -92,14 +96,14 @@ def _draw_sight(draw: ImageDraw.ImageDraw, step: Step, axes: NDArray[np.float64]
         draw.arc([column - sight, row - sight, column + sight, row + sight], -30.0, 30.0, fill=TRUTH, width=2)
 
 
-def _draw_vehicle(draw: ImageDraw.ImageDraw, step: Step, row: int, axes: NDArray[np.float64]) -> None:
+def _draw_vehicle(draw: ImageDraw.ImageDraw, step: Step, row: int, axes: NDArray[np.float64], is_ego: bool) -> None:
     traffic = step.traffic
     heading, length = float(traffic.heading[row]), float(traffic.length[row]) * _LONGER
     forward, half = np.array([math.cos(heading), math.sin(heading)]), float(traffic.width[row]) * _WIDER / 4.0
     left, front = np.array([-forward[1], forward[0]]), traffic.position[row, :2]
     corners = np.array([front + half * left, front - half * left])
     outline = np.concatenate([corners, corners[::-1] - length * forward])
-    colour = ADVICE if row == step.ego else AMBER if Lamp.STOP & int(traffic.lamps[row]) else TEXT
+    colour = ADVICE if is_ego else AMBER if Lamp.STOP & int(traffic.lamps[row]) else TEXT
     draw.polygon([tuple(point) for point in _pixels(outline, step, axes)], fill=colour, outline=LINE)
 
 

@@ -10,7 +10,7 @@ from fogsim.scene.bodies import bodies
 from fogsim.scene.vehicles import body_names
 from fogsim.values.light import Beam, Lamp, RoadBeams, Side, burning
 from fogsim.values.scene import Surface
-from fogsim.values.traffic import TrafficState
+from fogsim.values.traffic import TrafficState, with_pieces
 
 FARTHEST, MOST = 150.0, 4
 """Distance beyond which beams on the road are left out [m], and how many vehicles' are drawn, the nearest."""
@@ -44,6 +44,7 @@ def road_beams(
     sky_illuminance : float
         Horizontal illuminance of the sky in which the scene is drawn [lx].
     """
+    state, _ = with_pieces(state, skip)
     shining = int(sum(beams))
     away = np.hypot(*(state.position[:, :2] - np.asarray(eye, np.float64)[:2]).T)
     lit = np.flatnonzero(((state.lamps & shining) != 0) & (away < FARTHEST))

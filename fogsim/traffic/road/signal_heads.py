@@ -85,7 +85,9 @@ def crossing_heads(crossing: Any, side: float) -> Iterator[SignalHead]:
 
 def _signals(lane: Any) -> list[tuple[str, tuple[int, ...]]]:
     """The traffic light at the end of a lane with the links of the lane; none without a light."""
-    ways = [(way.getTLSID(), way.getTLLinkIndex()) for way in lane.getOutgoing() if way.getTLSID()]
+    # A link with the index −1 is not controlled, as that of a track across a level crossing.
+    outgoing = lane.getOutgoing()
+    ways = [(w.getTLSID(), w.getTLLinkIndex()) for w in outgoing if w.getTLSID() and w.getTLLinkIndex() >= 0]
     return [(ways[0][0], tuple(sorted(link for signal, link in ways if signal == ways[0][0])))] if ways else []
 
 

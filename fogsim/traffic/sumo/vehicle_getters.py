@@ -12,6 +12,7 @@ _VARIABLES = {
     "getSignals": 0x5B,
     "getLaneID": 0x51,
     "getLanePosition": 0x56,
+    "getLateralLanePosition": 0xB8,
     "getLeader": 0x68,
     "getNeighbors": 0xBF,
 }

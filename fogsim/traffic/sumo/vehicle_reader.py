@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from fogsim.traffic.appearance import (
     OTHERS_LAMPS,
-    SIGNAL_COLOURS,
     body_kind,
     cross_section,
     lamps_from_many_signals,
@@ -20,11 +19,8 @@ from fogsim.traffic.sumo.claims import SPEED_FACTOR, TOP_SPEED, Claims
 from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
 from fogsim.traffic.sumo.nearby_vehicles import AllVehicles, NearbyVehicles
 from fogsim.traffic.sumo.roster import Roster
-from fogsim.values import Collision, Lamp, Leader, SignalAhead, TrafficState
+from fogsim.values import Collision, Lamp, TrafficState
 from fogsim.values.traffic import advised_speeds
-
-LEADER_RANGE = 500.0
-"""How far ahead a leader is looked for [m]."""
 
 _CHANGING = ("getAngle", "getSpeed", "getAcceleration", "getSignals", "getLaneID")
 """Getters of what changes."""
@@ -178,11 +174,6 @@ class VehicleReader:
         self._getters = tuple(vehicle_getter(api, name) for name in _CHANGING)
         self._slope = vehicle_getter(api, "getSlope")
         self._level = math.nan
-        self._leader = vehicle_getter(api, "getLeader")
-        self._speed = vehicle_getter(api, "getSpeed")
-        self._minimum_gap = vehicle_getter(api, "getMinGap")
-        self._lights = vehicle_getter(api, "getNextTLS")
-        self._has_signals: bool | None = None
         self._hits = getter(api, "simulation", "getCollisions")
         self._lane_limit = getter(api, "lane", "getMaxSpeed")
         # Who is between lanes is limited by nothing but the vehicle.
@@ -283,21 +274,6 @@ class VehicleReader:
     def _is_near(self, ids: Sequence[str], position: NDArray[np.float64]) -> NDArray[np.bool_]:
         offset = position - position[ids.index(self._ego)]
         return np.asarray(np.hypot(offset[:, 0], offset[:, 1]) <= self._radius)
-
-    def leader(self) -> Leader | None:
-        """The vehicle ahead of the ego in its lane."""
-        found = None if self._ego is None else self._leader(self._ego, LEADER_RANGE)
-        if found is None or not found[0]:
-            return None
-        # SUMO's gap leaves out the follower's minimum gap.
-        return Leader(found[0], found[1] + self._minimum_gap(self._ego), self._speed(found[0]))
-
-    def signal_ahead(self) -> SignalAhead | None:
-        """The next traffic light on the ego's way."""
-        if self._has_signals is None:
-            self._has_signals = int(self._api.trafficlight.getIDCount()) > 0
-        lights = self._lights(self._ego) if self._has_signals and self._ego is not None else ()
-        return next((SignalAhead(light, SIGNAL_COLOURS[state], way) for light, _, way, state in lights), None)
 
     def collisions(self) -> list[Collision]:
         """Collisions of the last step; SUMO tells one in every step while the vehicles overlap."""

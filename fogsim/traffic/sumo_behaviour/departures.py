@@ -4,6 +4,8 @@ import itertools
 from collections.abc import Collection, Sequence
 
 from fogsim.traffic.sumo.link import Api
+from fogsim.traffic.sumo_lanes.directions import LaneDirections
+from fogsim.traffic.sumo_lanes.route_position import RoutePlaces
 from fogsim.traffic.templates.vehicle_types import VEHICLE_KINDS
 from fogsim.values.script import Depart, Enter
 
@@ -33,18 +35,20 @@ def depart(api: Api, action: Depart, present: Collection[str]) -> bool:
         return False
     kind = _type(api, action.vehicle, action.kind) if action.kind else get.getTypeID(like)
     length = float(get.getLength(like)) if action.gap < 0.0 else -float(api.vehicletype.getLength(kind))
-    place = float(get.getLanePosition(like)) + action.gap - length
-    edges, at = list(get.getRoute(like)), int(get.getRouteIndex(like))
-    if str(get.getRoadID(like)).startswith(":"):
-        place += _length(api, edges[at])
+    here = RoutePlaces(api).find(like)
+    place = here.station + here.past_end + action.gap - length
+    edges, at = list(get.getRoute(like)), here.number
     while place < 0.0 and at > 0:
         at -= 1
         place += _length(api, edges[at])
     while at < len(edges) - 1 and place > _length(api, edges[at]):
         place -= _length(api, edges[at])
         at += 1
-    lane = int(get.getLaneIndex(like)) if action.lane is None else action.lane + _footways(api, edges[at])
-    if not 0.0 <= place <= _length(api, edges[at]) or lane >= int(api.edge.getLaneNumber(edges[at])):
+    # Next to one that overtakes on the oncoming lane is the lane farthest to the left.
+    leftmost = int(api.edge.getLaneNumber(edges[at])) - 1
+    own = leftmost if LaneDirections(api).is_against(like, get.getLaneID(like)) else int(get.getLaneIndex(like))
+    lane = own if action.lane is None else action.lane + _footways(api, edges[at])
+    if not 0.0 <= place <= _length(api, edges[at]) or lane > leftmost:
         return False
     route = f"fogsim.{action.vehicle}.{api.simulation.getTime():g}"
     api.route.add(route, edges[at:])

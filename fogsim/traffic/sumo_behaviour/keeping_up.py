@@ -12,6 +12,7 @@ from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
 from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
 from fogsim.traffic.sumo_drivers.perception import REACH
+from fogsim.traffic.sumo_lanes.leaders import Leaders
 
 
 class KeepingUp:
@@ -30,7 +31,8 @@ class KeepingUp:
     """
 
     def __init__(self, api: Api, table: DriverTable, sight: DriverSight | None, remote: bool) -> None:
-        self._leader, self._speed = vehicle_getters(api, remote, ("getLeader", "getSpeed"), {"getLeader": ("d", REACH)})
+        self._leader = Leaders(api, remote).within(REACH)
+        (self._speed,) = vehicle_getters(api, remote, ("getSpeed",))
         self._table = table
         self._sight = sight
         self._keeps_up = np.array([kind.keeps_up for kind in table.kinds])

@@ -6,10 +6,11 @@ from fogsim.traffic.drivers.playing import Lamps, Motion, Playing
 from fogsim.traffic.sumo.claims import LANE_CHANGE_MODE, Claims
 from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
 from fogsim.traffic.sumo.link import Api
-from fogsim.traffic.sumo.route_position import GapToEgo
 from fogsim.traffic.sumo_behaviour.departures import depart, enter
 from fogsim.traffic.sumo_behaviour.signal_control import SignalControl
 from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl
+from fogsim.traffic.sumo_lanes.directions import LaneDirections
+from fogsim.traffic.sumo_lanes.route_position import GapToEgo
 from fogsim.values.script import ChangeLane, Depart, Enter, SetSignal, TrafficAction, Walk
 
 _REGARD_OF_OTHERS, _NO_COLLISION = 3 << 8, 1 << 8
@@ -106,7 +107,7 @@ class ScriptedActions:
             signed = GapToEgo(self._api, leader).measure(follower)
             return None if signed is None or signed > 0.0 else -signed
 
-        return Motion(time, self._step, present, vehicle.getDistance, vehicle.getSpeed, gap)
+        return Motion(time, self._step, present, LaneDirections(self._api).driven, vehicle.getSpeed, gap)
 
     def play(self, time: float, present: Collection[str]) -> None:
         """Go on with what has begun, for the next step.

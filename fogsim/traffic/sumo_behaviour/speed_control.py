@@ -17,13 +17,14 @@ from fogsim.traffic.drivers.speed_choice import CHOICE_PERIOD, speed_by_complian
 from fogsim.traffic.setup import TrafficSetup
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo.vehicle_places import SumoVehiclePlaces
 from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
 from fogsim.traffic.sumo_behaviour.fog_choices import FogChoices
 from fogsim.traffic.sumo_behaviour.headways import HeadwayControl
 from fogsim.traffic.sumo_behaviour.keeping_up import KeepingUp
 from fogsim.traffic.sumo_behaviour.speed_shares import SpeedShareControl
 from fogsim.traffic.sumo_behaviour.top_speeds import TopSpeedControl
+from fogsim.traffic.sumo_lanes.leaders import Leaders
+from fogsim.traffic.sumo_lanes.vehicle_places import SumoVehiclePlaces
 from fogsim.values import Command, Display
 
 _SUMO_DRIVES = -1.0
@@ -55,6 +56,7 @@ class SpeedControl:
     def __init__(self, api: Api, step_length: float) -> None:
         self._vehicles = api.vehicle
         self._step_length = step_length
+        self._leader = Leaders(api).within(_LEADER_RANGE)
         self._held: set[str] = set()
         self._modes: dict[str, int] = {}
 
@@ -110,7 +112,7 @@ class SpeedControl:
     def _is_in_danger(self, vehicle: str) -> bool:
         """Whether somebody ahead is so near, or so slow, that the type's deceleration hardly does to hit nobody."""
         get = self._vehicles
-        found = get.getLeader(vehicle, _LEADER_RANGE)
+        found = self._leader(vehicle, _LEADER_RANGE)
         if not found or not found[0]:
             return False
         # SUMO's gap leaves out the follower's minimum gap.

@@ -1,7 +1,8 @@
 """Which vehicles are behind what stands beside the road, to a driver's eyes."""
 
 import itertools
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from fogsim.obstruction import Obstructions
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
 from fogsim.traffic.sumo_drivers.seen_vehicles import SeenVehicles
+from fogsim.traffic.sumo_lanes.long_bodies import LongBodies, Part
 
 _Point = tuple[float, float, float]
 
@@ -35,6 +37,7 @@ class HiddenVehicles:
         self._vehicles = SeenVehicles(api, remote)
         self._position, self._angle = vehicle_getters(api, remote, ("getPosition3D", "getAngle"))
         self._height = vehicle_getter(api, "getHeight")
+        self._bodies = LongBodies(api)
         self._sizes: dict[str, _Point] = {}
 
     def forget(self, vehicles: Iterable[str]) -> None:
@@ -62,23 +65,16 @@ class HiddenVehicles:
             return []
         # Mostly who leads one follows another.
         places = {vehicle: self._position(vehicle) for pair in pairs for vehicle in pair}
+        angles = {target: math.radians(90.0 - self._angle(target)) for _, target in pairs}
+        parts = [self._bodies.parts(t, self._size(t)[0], places[t], angles[t]) for _, t in pairs]
         eyes = np.array([places[observer] for observer, _ in pairs])
         eyes[:, 2] += [self._vehicles.eye_height(observer) for observer, _ in pairs]
-        targets = [target for _, target in pairs]
-        hidden: list[bool] = self._obstructions.hide(eyes, self._corners(targets, places)).tolist()
-        return hidden
-
-    def _corners(self, targets: Sequence[str], places: Mapping[str, _Point]) -> NDArray[np.float64]:
-        """Corners of bodies (n, 8, 3) [m], of which the lower ones are halfway up."""
-        heading = np.radians(90.0 - np.array([self._angle(target) for target in targets]))
-        sizes = np.array([self._size(target) for target in targets])
-        forward = np.stack([np.cos(heading), np.sin(heading)], axis=1)[:, None]
-        left = forward[..., ::-1] * (-1.0, 1.0)
-        offsets = sizes[:, None] * _CORNERS
-        corners = np.array([places[target] for target in targets])[:, None] + np.zeros((1, len(_CORNERS), 1))
-        corners[..., :2] += offsets[..., :1] * forward + offsets[..., 1:2] * left
-        corners[..., 2] += offsets[..., 2]
-        return corners
+        counts = [len(own) for own in parts]
+        sizes = [(part.length, *self._size(t)[1:]) for (_, t), own in zip(pairs, parts, strict=True) for part in own]
+        corners = _corners(list(itertools.chain.from_iterable(parts)), np.array(sizes))
+        hidden = self._obstructions.hide(eyes.repeat(counts, axis=0), corners)
+        each: list[bool] = np.logical_and.reduceat(hidden, np.cumsum([0, *counts[:-1]])).tolist()
+        return each
 
     def _size(self, vehicle: str) -> _Point:
         """Length, width and height [m]."""
@@ -87,3 +83,15 @@ class HiddenVehicles:
             body = self._vehicles.body(vehicle)
             known = self._sizes[vehicle] = body.length, body.width, float(self._height(vehicle))
         return known
+
+
+def _corners(parts: Sequence[Part], sizes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Corners of parts of bodies (n, 8, 3) [m], of which the lower ones are halfway up."""
+    heading = np.array([part.heading for part in parts])
+    forward = np.stack([np.cos(heading), np.sin(heading)], axis=1)[:, None]
+    left = forward[..., ::-1] * (-1.0, 1.0)
+    offsets = sizes[:, None] * _CORNERS
+    corners = np.array([part.front for part in parts])[:, None] + np.zeros((1, len(_CORNERS), 1))
+    corners[..., :2] += offsets[..., :1] * forward + offsets[..., 1:2] * left
+    corners[..., 2] += offsets[..., 2]
+    return corners

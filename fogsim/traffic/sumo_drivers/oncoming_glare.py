@@ -12,6 +12,7 @@ from fogsim.traffic.drivers.sight import FogAccess
 from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
 from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps, SeenVehicles
+from fogsim.traffic.sumo_lanes.directions import LaneDirections, OppositeEdges
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim.values.eye import disability_glare
 
@@ -46,37 +47,6 @@ def most_glare(illuminance: float) -> float:
     return 0.0 if illuminance >= DAY_ILLUMINANCE else MOST_GLARE
 
 
-class OppositeEdges:
-    """Edges that lead from an edge's end back to its beginning: the other side of a two-way road.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    """
-
-    def __init__(self, api: Api) -> None:
-        self._from, self._to = getter(api, "edge", "getFromJunction"), getter(api, "edge", "getToJunction")
-        self._outgoing = getter(api, "junction", "getOutgoingEdges")
-        self._known: dict[str, tuple[str, ...]] = {}
-
-    def of(self, edge: str) -> tuple[str, ...]:
-        """Ids of the edges opposite to one; none for what lies inside a junction.
-
-        Parameters
-        ----------
-        edge : str
-            Its id.
-        """
-        known = self._known.get(edge)
-        if known is None:
-            inside = not edge or edge.startswith(":")
-            back = () if inside else self._outgoing(self._to(edge))
-            known = tuple(e for e in back if not e.startswith(":") and self._to(e) == self._from(edge))
-            self._known[edge] = known
-        return known
-
-
 class OncomingGlare:
     """Computes the veil that oncoming head lamps lay over drivers' eyes.
 
@@ -96,7 +66,8 @@ class OncomingGlare:
         self._fog = fog
         self._vehicles = vehicles
         self._farthest = min(FARTHEST_SOURCE, DEEPEST_SOURCE / max(fog.minimum_extinction, 1e-6))
-        self._opposite = OppositeEdges(api)
+        self._opposite, self._directions = OppositeEdges(api), LaneDirections(api)
+        self._lane = vehicle_getter(api, "getLaneID")
         self._road = vehicle_getter(api, "getRoadID")
         self._on_edge = getter(api, "edge", "getLastStepVehicleIDs")
         self._position, self._angle = vehicle_getters(api, remote, ("getPosition3D", "getAngle"))
@@ -111,11 +82,17 @@ class OncomingGlare:
         own_lamps : dict
             Lamps of vehicles whose lamps are not SUMO's.
         """
-        edges = {e for vehicle in (observer, target) for e in self._opposite.of(self._road(vehicle))}
+        edges = {e for vehicle in (observer, target) for e in self._oncoming_edges(vehicle)}
         oncoming = [v for edge in sorted(edges) for v in self._on_edge(edge)]
         veil = self._veil_of(observer, target, oncoming, own_lamps) if oncoming else 0.0
         dazzling = [v for v, lamps in own_lamps.items() if v != observer and uses_high_beam(lamps)]
         return min(veil + self._veil_in_mirrors(observer, dazzling, own_lamps), MOST_GLARE) if dazzling else veil
+
+    def _oncoming_edges(self, vehicle: str) -> tuple[str, ...]:
+        """Edges on which others come toward a vehicle: its own while it overtakes on the oncoming lane."""
+        road = self._road(vehicle)
+        opposite = self._opposite.of(road)
+        return (road,) if opposite and self._directions.is_against(vehicle, self._lane(vehicle)) else opposite
 
     def _veil_in_mirrors(self, observer: str, dazzling: Sequence[str], own_lamps: OwnLamps) -> float:
         """Veil of high beams that follow an observer on the same road [cd/m²]."""

@@ -29,6 +29,7 @@ from fogsim.traffic.sumo_drivers.lane_change_switches import LaneChangeSwitch
 from fogsim.traffic.sumo_drivers.leader_sight import LeaderSight, Pair
 from fogsim.traffic.sumo_drivers.oncoming_glare import most_glare
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
+from fogsim.traffic.sumo_lanes.leaders import Leaders
 
 REACH = 250.0
 """Leaders farther ahead than this do not matter [m]: from 150 km/h one stops in less."""
@@ -122,7 +123,7 @@ class Perception:
     Attributes
     ----------
     leader, speed : Getter
-        SUMO's ``getLeader``, to be asked with `REACH`, and ``getSpeed``.
+        Leaders as SUMO's ``getLeader`` tells them, to be asked with `REACH`, and SUMO's ``getSpeed``.
     hidden : mapping from str to str
         Leaders that are not reacted to, by follower, as they are at any time.
     """
@@ -139,7 +140,8 @@ class Perception:
     ) -> None:
         self._hidden_vehicles = HiddenVehicles(api, obstructions, remote) if obstructions else None
         self._ignored_leaders = IgnoredLeaders(api, session)
-        self.leader, self.speed = vehicle_getters(api, remote, ("getLeader", "getSpeed"), {"getLeader": ("d", REACH)})
+        self.leader = Leaders(api, remote).within(REACH)
+        (self.speed,) = vehicle_getters(api, remote, ("getSpeed",))
         self._roster = Roster(api) if roster is None else roster
         self._reaction_time = sight.reaction_time
         self._leader_sight = LeaderSight(api, fog, sight, self.speed, remote)

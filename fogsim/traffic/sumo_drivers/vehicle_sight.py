@@ -13,6 +13,7 @@ from fogsim.traffic.sumo.link import Api
 from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
 from fogsim.traffic.sumo_drivers.hidden_vehicles import HiddenVehicles
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps, SeenVehicles
+from fogsim.traffic.sumo_lanes.long_bodies import LongBodies, Part
 
 NEAREST = 0.1
 """Distances are at least this [m]."""
@@ -78,6 +79,7 @@ class VehicleSight:
         self._sight = sight
         self._vehicles = SeenVehicles(api, remote, sight.airlight_share)
         self._position, self._angle = vehicle_getters(api, remote, ("getPosition3D", "getAngle"))
+        self._bodies = LongBodies(api)
         self._extinction = fog.maximum_extinction if fog.minimum_extinction == fog.maximum_extinction else None
         self._seen_through_fog = sight.sure_distance(fog.maximum_extinction)
 
@@ -128,20 +130,25 @@ class VehicleSight:
         """
         # Plain numbers: mostly there is a pair or two, and making arrays of them would cost more than all the rest.
         x, y, z = self._position(observer)
-        front_x, front_y, front_z = self._position(target)
-        heading = math.radians(90.0 - self._angle(target))
-        east, north = math.cos(heading), math.sin(heading)
-        body = self._vehicles.body(target)
-        ahead = (x - front_x) * east + (y - front_y) * north
-        aside = (y - front_y) * east - (x - front_x) * north
-        along = min(max(ahead, -body.length), 0.0)
-        across = min(max(aside, -0.5 * body.width), 0.5 * body.width)
-        end_x, end_y = front_x + along * east - across * north, front_y + along * north + across * east
+        body, heading = self._vehicles.body(target), math.radians(90.0 - self._angle(target))
+        parts = self._bodies.parts(target, body.length, self._position(target), heading)
+        seen = [_nearest_point(x, y, part, body.width) for part in parts]
+        end_x, end_y, front_z, ahead, aside = min(seen, key=lambda point: math.dist(point[:2], (x, y)))
         forward = math.radians(90.0 - self._angle(observer))
         bearing = math.remainder(math.atan2(end_y - y, end_x - x) - forward, math.tau)
         height = self._vehicles.eye_height(observer)
         eyes, end = (x, y, z + height), (end_x, end_y, front_z + min(height, BODY_MIDDLE))
         return LineOfSight(eyes, end, max(math.dist(eyes, end), NEAREST), bearing, ahead, aside)
+
+    def length(self, vehicle: str) -> float:
+        """Length of a vehicle [m]; no part of it is farther from its front.
+
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        """
+        return self._vehicles.body(vehicle).length
 
     def _depth_limit(self, pair: tuple[str, str], line: LineOfSight, own_lamps: OwnLamps) -> float:
         observer, target = pair
@@ -162,3 +169,18 @@ class VehicleSight:
         eyes, ends = [line.eyes for line in lines], [line.end for line in lines]
         depths: list[float] = self._fog.optical_depth(eyes, ends).tolist()
         return depths
+
+
+def _nearest_point(x: float, y: float, part: Part, width: float) -> tuple[float, float, float, float, float]:
+    """Point of a part of a body that is nearest to a place, the height of its road, and where the place is [m].
+
+    The last two are as of `LineOfSight`, with the distance along the body up to where the part begins.
+    """
+    front_x, front_y, front_z = part.front
+    east, north = math.cos(part.heading), math.sin(part.heading)
+    ahead = (x - front_x) * east + (y - front_y) * north
+    aside = (y - front_y) * east - (x - front_x) * north
+    along = min(max(ahead, -part.length), 0.0)
+    across = min(max(aside, -0.5 * width), 0.5 * width)
+    point_x, point_y = front_x + along * east - across * north, front_y + along * north + across * east
+    return point_x, point_y, front_z, ahead - part.behind, aside

@@ -8,7 +8,7 @@ import pytest
 
 from fogsim.traffic import BrakeEvent, Event, LampFailureEvent, LaneChangeEvent, Trigger
 from fogsim.traffic.drivers.events import Script, Situation
-from fogsim.traffic.sumo.route_position import signed_gap
+from fogsim.traffic.sumo_lanes.route_position import signed_gap
 from fogsim.values import Reason, Unplayed, UnplayedEvent
 
 NOW = Trigger(at_time=0.0, name="now")

@@ -18,10 +18,10 @@ from fogsim.traffic.sumo_drivers.oncoming_glare import (
     LAMP_HEIGHT,
     MOST_GLARE,
     OncomingGlare,
-    OppositeEdges,
     most_glare,
 )
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps, SeenVehicles
+from fogsim.traffic.sumo_lanes.directions import OppositeEdges
 from fogsim.units import extinction_from_visibility
 from fogsim.values import FogField, Lamp
 from fogsim.values.light import ALL_LAMPS, Side, dark_on

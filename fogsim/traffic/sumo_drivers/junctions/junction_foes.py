@@ -11,6 +11,7 @@ from pathlib import Path
 
 from fogsim.files.xml_reader import open_unpacked
 from fogsim.traffic.sumo.link import Api, vehicle_getter
+from fogsim.traffic.sumo_lanes.route_position import RoutePlaces
 
 Foe = tuple[str, float, float, float, float, str, str, bool, bool]
 """SUMO's answer: foe, ways of driver and foe to where they cross, and so on; see libsumo's ``getJunctionFoes``."""
@@ -34,7 +35,7 @@ class JunctionFoes:
         self._api = api
         self._net = net
         self._foes = vehicle_getter(api, "getJunctionFoes")
-        self._vehicles = api.vehicle
+        self._vehicles, self._places = api.vehicle, RoutePlaces(api)
         self._lanes = api.lane
         self._lengths: dict[str, float] = {}
 
@@ -68,7 +69,7 @@ class JunctionFoes:
         road = str(vehicles.getRoadID(driver))
         if road.startswith(":") and road[1:].rpartition("_")[0] in self._unregulated:
             return True
-        way = -float(vehicles.getLanePosition(driver))
+        way = -self._places.find(driver).station
         for edge in vehicles.getRoute(driver)[max(int(vehicles.getRouteIndex(driver)), 0) :]:
             if edge in self._leading_there:
                 return True

@@ -21,6 +21,7 @@ from fogsim.traffic.sumo_drivers.junctions.junction_foes import JunctionFoes
 from fogsim.traffic.sumo_drivers.junctions.unseen_foes import UnseenFoes
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
+from fogsim.traffic.sumo_lanes.directions import LaneDirections
 
 FARTHEST_FOE = 250.0
 """Foes whose ways to the junction and the driver's add up to more than this do not matter [m]."""
@@ -42,9 +43,6 @@ PAUSE_IN_DOUBT = 0.2
 
 For one who may be on the junction, in each step.
 """
-
-LONGEST_VEHICLE = 25.0
-"""No part of a vehicle is farther from its front than this [m]."""
 
 ALONG_A_LANE = 2.0
 """A driver for whom no junction can come near looks at least this often [s]."""
@@ -99,11 +97,11 @@ class JunctionSight:
         self._speed, self._position, self._lane, self._lane_position = vehicle_getters(
             api, remote, ("getSpeed", "getPosition3D", "getLaneID", "getLanePosition")
         )
-        self._lane_length = api.lane.getLength
+        self._lane_length, self._directions = api.lane.getLength, LaneDirections(api)
         self._lane_lengths: dict[str, float] = {}
         self._vehicle_sight = vehicle_sight
         self._certainly_seen = self._vehicle_sight.certainly_seen
-        self._certainly_hidden = sight.hidden_distance(fog.minimum_extinction, _BRIGHTEST) + LONGEST_VEHICLE
+        self._certainly_hidden = sight.hidden_distance(fog.minimum_extinction, _BRIGHTEST)
         self._unseen = UnseenFoes(api, session, sight.reaction_time)
         self._due = DueVehicles(roster, float(api.simulation.getDeltaT()))
 
@@ -165,6 +163,8 @@ class JunctionSight:
     def _is_far(self, driver: str, speed: float) -> bool:
         """Whether no junction can come near a driver for `ALONG_A_LANE`."""
         lane = self._lane(driver)
+        if self._directions.is_against(driver, lane):
+            return False
         length = self._lane_lengths.get(lane)
         if length is None:
             length = self._lane_lengths[lane] = float(self._lane_length(lane)) if lane else 0.0
@@ -189,7 +189,7 @@ class JunctionSight:
             distance = math.dist(self._position(pair[0]), self._position(pair[1]))
             if distance <= self._certainly_seen:
                 seen.add(pair)
-            elif distance <= self._certainly_hidden or pair[1] in own_lamps:
+            elif distance <= self._certainly_hidden + self._vehicle_sight.length(pair[1]) or pair[1] in own_lamps:
                 doubtful.append(pair)
         seen.update(itertools.compress(doubtful, self._vehicle_sight.sees(doubtful, own_lamps)))
         return seen

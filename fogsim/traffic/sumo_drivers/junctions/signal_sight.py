@@ -13,12 +13,14 @@ import math
 import numpy as np
 
 from fogsim.obstruction import CLEAR_SIGHT, Obstructions
+from fogsim.traffic.appearance import RAILWAYS
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.sumo.claims import SPEED_MODE, Claims
 from fogsim.traffic.sumo.due_vehicles import Due, DueVehicles
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
+from fogsim.traffic.sumo_lanes.lights import Light, LightsAhead
 from fogsim.values.light import SIGNAL_INTENSITY
 
 SIGNAL_HEIGHT = 2.0
@@ -44,11 +46,7 @@ FASTEST_GAIN = 10.0
 
 _OBEY_LIGHTS = 16
 _STOPPING = frozenset("ryu")
-_RAILWAYS = frozenset({"tram", "rail_urban", "rail", "rail_electric", "rail_fast", "subway", "cable_car"})
 _NOT_SEEN = math.inf
-
-Light = tuple[str, int, float, str]
-"""Of a light ahead: its id, its index, the way to its stop line [m], and what it shows."""
 
 
 class SignalSight:
@@ -84,7 +82,7 @@ class SignalSight:
         self._fog = fog
         self._sight = sight
         self._roster = roster
-        self._lights = vehicle_getter(api, "getNextTLS")
+        self._lights = LightsAhead(api)
         self._speed = vehicle_getter(api, "getSpeed")
         self._deceleration = vehicle_getter(api, "getEmergencyDecel")
         self._modes = Claims(api, SPEED_MODE, session)
@@ -135,11 +133,11 @@ class SignalSight:
         for vehicle in self._left_passing.intersection(due.new):
             self._left_passing.discard(vehicle)
             self._modes.withdraw(vehicle)
-        return {v for v in due.new if self._api.vehicle.getVehicleClass(v) in _RAILWAYS}
+        return {v for v in due.new if self._api.vehicle.getVehicleClass(v) in RAILWAYS}
 
     def _look(self, driver: str) -> float:
         """Decide for one driver, who need not look again for so long [s]."""
-        light = next(iter(self._lights(driver)), None)
+        light = self._lights.next_of(driver)
         if driver in self._braking_late:
             return self._brake_late(driver, light)
         if light is None or light[2] > REACH:

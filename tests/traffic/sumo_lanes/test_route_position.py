@@ -10,7 +10,7 @@ import pytest
 from fogsim.errors import InputError
 from fogsim.scenario import load_scenario
 from fogsim.traffic import BrakeEvent, LampFailureEvent, Trigger, libsumo_traffic
-from fogsim.traffic.sumo.route_position import GapToEgo
+from fogsim.traffic.sumo_lanes.route_position import GapToEgo
 from fogsim.values import Command
 from tests.traffic.test_libsumo_traffic import SETUP
 

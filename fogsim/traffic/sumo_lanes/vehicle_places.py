@@ -2,23 +2,28 @@
 
 import itertools
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from fogsim.errors import InputError
 from fogsim.traffic.drivers.advice_hearing import check_edges, check_start
 from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
-from fogsim.traffic.sumo.route_position import connections
+from fogsim.traffic.sumo_lanes.directions import LaneDirections, OppositeEdges
+from fogsim.traffic.sumo_lanes.route_position import connections
 from fogsim.values import Stretch
 
 
 class _Piece(NamedTuple):
-    """An edge, also one inside a junction, and the positions along a road at which it begins and ends [m]."""
+    """An edge, also one inside a junction, and the positions along a road at which it begins and ends [m].
+
+    Those who overtake on the oncoming lane are on one of the opposite edges.
+    """
 
     edge: str
     start: float
     end: float
+    opposite: tuple[str, ...] = ()
 
 
 class SumoVehiclePlaces:
@@ -40,6 +45,8 @@ class SumoVehiclePlaces:
         self._roster = roster
         self._position = vehicle_getter(api, "getPosition3D")
         self._station = vehicle_getter(api, "getLanePosition")
+        self._lane = vehicle_getter(api, "getLaneID")
+        self._opposite, self._directions = OppositeEdges(api), LaneDirections(api)
         self._edge = vehicle_getter(api, "getRoadID")
         self.speed = vehicle_getter(api, "getSpeed")
         self._on_edge = getter(api, "edge", "getLastStepVehicleIDs")
@@ -62,18 +69,36 @@ class SumoVehiclePlaces:
             If the network has no such edge, edges do not follow one another, or the stretch begins behind their end.
         """
         past = {}
-        for vehicle, piece in self._on_pieces(self._find_pieces(stretch), among):
-            position = piece.start + float(self._station(vehicle))
+        for vehicle, piece, is_against in self._on_pieces(self._find_pieces(stretch), among):
+            station = float(self._station(vehicle))
+            # SUMO counts from where the oncoming lane begins.
+            position = piece.end - station if is_against else piece.start + station
             if stretch.start <= position < stretch.end:
                 past[vehicle] = position - stretch.start
         return past
 
-    def _on_pieces(self, pieces: Sequence[_Piece], among: Collection[str] | None) -> Iterator[tuple[str, _Piece]]:
+    def _on_pieces(self, pieces: Sequence[_Piece], among: Collection[str] | None) -> Iterator[tuple[str, _Piece, bool]]:
+        """Vehicles on pieces, each with its piece and whether it is there on the oncoming lane."""
+        found = self._present_on if among is None else self._sorted_by_edge(among)
+        for piece in pieces:
+            for edge in (piece.edge, *piece.opposite):
+                is_against = edge is not piece.edge
+                for vehicle in found(edge):
+                    if not piece.opposite or self._is_against(vehicle) == is_against:
+                        yield vehicle, piece, is_against
+
+    def _present_on(self, edge: str) -> Iterable[str]:
         present = self._roster.present
-        if among is None:
-            return ((v, piece) for piece in pieces for v in self._on_edge(piece.edge) if v in present)
-        edges = [(v, self._edge(v)) for v in among]
-        return ((v, piece) for piece in pieces for v, edge in edges if edge == piece.edge)
+        return (v for v in self._on_edge(edge) if v in present)
+
+    def _sorted_by_edge(self, vehicles: Iterable[str]) -> Callable[[str], Iterable[str]]:
+        there: dict[str, list[str]] = {}
+        for vehicle in vehicles:
+            there.setdefault(self._edge(vehicle), []).append(vehicle)
+        return lambda edge: there.get(edge, ())
+
+    def _is_against(self, vehicle: str) -> bool:
+        return self._directions.is_against(vehicle, self._lane(vehicle))
 
     def _ego_route(self) -> tuple[str, ...]:
         """Edges of the ego's route; of its last one when it has left the road."""
@@ -97,21 +122,32 @@ class SumoVehiclePlaces:
         begin = 0.0
         for edge, following in itertools.pairwise((*edges, "")):
             end = begin + float(self._api.lane.getLength(f"{edge}_0"))
-            yield _Piece(edge, begin, end)
+            yield _Piece(edge, begin, end, self._opposite.of(edge))
             begin = end
-            ways = [list(inner) for target, inner in connections(self._api, edge) if target == following]
+            ways = self._ways(edge, following)
             if following and not ways and must_follow:
                 raise InputError(f"an advised stretch: no lane leads from edge {edge!r} to edge {following!r}")
             crossed: dict[str, _Piece] = {}
+            back = self._ways_back(edge, following) if ways else ()
             for lanes in ways:
                 at = end
                 for lane in lanes:
-                    inner = _Piece(lane.rpartition("_")[0], at, at + float(self._api.lane.getLength(lane)))
+                    inner = _Piece(lane.rpartition("_")[0], at, at + float(self._api.lane.getLength(lane)), back)
                     crossed.setdefault(inner.edge, inner)
                     at = inner.end
                 # As `RoutePosition` counts: the first way is the length of the crossing.
                 begin = at if begin == end else begin
             yield from crossed.values()
+
+    def _ways(self, edge: str, following: str) -> list[list[str]]:
+        """Lanes inside the junction on each way from an edge to another."""
+        return [list(inner) for target, inner in connections(self._api, edge) if target == following]
+
+    def _ways_back(self, edge: str, following: str) -> tuple[str, ...]:
+        """Edges inside the junction between two edges on the ways opposite to theirs."""
+        back = ((b, a) for b in self._opposite.of(following) for a in self._opposite.of(edge))
+        lanes = [lane for b, a in back for inner in self._ways(b, a) for lane in inner]
+        return tuple(dict.fromkeys(lane.rpartition("_")[0] for lane in lanes))
 
     def near_ego(self, distance: float, among: Collection[str] | None = None) -> Collection[str]:
         """Vehicles near the ego; see `VehiclePlaces.near_ego`.

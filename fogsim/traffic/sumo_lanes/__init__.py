@@ -1,0 +1,1 @@
+"""Where SUMO's vehicles are along lanes and routes, and whom they follow."""

@@ -1,0 +1,102 @@
+"""Which vehicles drive on the oncoming lane, where SUMO counts their position from the far end."""
+
+import math
+
+from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
+
+
+class OppositeEdges:
+    """Edges that lead from an edge's end back to its beginning: the other side of a two-way road.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    """
+
+    def __init__(self, api: Api) -> None:
+        self._from, self._to = getter(api, "edge", "getFromJunction"), getter(api, "edge", "getToJunction")
+        self._outgoing = getter(api, "junction", "getOutgoingEdges")
+        self._known: dict[str, tuple[str, ...]] = {}
+
+    def of(self, edge: str) -> tuple[str, ...]:
+        """Ids of the edges opposite to one; none for what lies inside a junction.
+
+        Parameters
+        ----------
+        edge : str
+            Its id.
+        """
+        known = self._known.get(edge)
+        if known is None:
+            inside = not edge or edge.startswith(":")
+            back = () if inside else self._outgoing(self._to(edge))
+            known = tuple(e for e in back if not e.startswith(":") and self._to(e) == self._from(edge))
+            self._known[edge] = known
+        return known
+
+
+class LaneDirections:
+    """Tells which vehicles drive against the direction of their lane, as those that overtake on the oncoming one.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    """
+
+    def __init__(self, api: Api) -> None:
+        self._get = api.vehicle
+        self._angle = vehicle_getter(api, "getAngle")
+        self._lane_angle = getter(api, "lane", "getAngle")
+        self._distance, self._length = vehicle_getter(api, "getDistance"), getter(api, "lane", "getLength")
+        self._opposite = OppositeEdges(api)
+        self._known: dict[str, tuple[str, bool]] = {}
+
+    def is_against(self, vehicle: str, lane: str) -> bool:
+        """Whether a vehicle drives against the direction of its lane; read again only where the lane is another.
+
+        Parameters
+        ----------
+        vehicle, lane : str
+            Ids of the vehicle and of the lane that it is on; no lane for one that is on none.
+        """
+        known = self._known.get(vehicle)
+        if known is None or known[0] != lane:
+            known = self._known[vehicle] = lane, self.is_two_way(lane) and self._turns_back(vehicle, lane)
+        return known[1]
+
+    def is_two_way(self, lane: str) -> bool:
+        """Whether somebody may overtake on a lane against its direction; inside junctions it is taken to be so.
+
+        Parameters
+        ----------
+        lane : str
+            Its id; no lane is none.
+        """
+        edge = lane.rpartition("_")[0]
+        return edge.startswith(":") or bool(self._opposite.of(edge))
+
+    def _turns_back(self, vehicle: str, lane: str) -> bool:
+        turn = self._angle(vehicle) - self._lane_angle(lane, self._get.getLanePosition(vehicle))
+        if math.cos(math.radians(turn)) >= 0.0:
+            return False
+        # The angle of a long vehicle is that of the chord between its ends, whatever its lane does.
+        route, index = self._get.getRoute(vehicle), self._get.getRouteIndex(vehicle)
+        return bool(index < 0 or lane.rpartition("_")[0] != route[index])
+
+    def driven(self, vehicle: str, lane: str | None = None) -> float:
+        """Distance that a vehicle has driven [m]; SUMO's own jumps where it overtakes on the oncoming lane.
+
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        lane : str or None
+            Id of the lane that it is on; None to read it.
+        """
+        distance = float(self._distance(vehicle))
+        lane = self._get.getLaneID(vehicle) if lane is None else lane
+        if self.is_against(vehicle, lane):
+            distance += float(self._length(lane)) - 2.0 * float(self._get.getLanePosition(vehicle))
+        return distance

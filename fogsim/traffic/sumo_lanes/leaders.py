@@ -1,0 +1,247 @@
+"""Whom a vehicle in SUMO follows: the next one ahead that goes the same way and overlaps its width.
+
+SUMO's own ``getLeader`` names the next vehicle in the lane, also one next to the follower where the sublane model lets
+two drive side by side, and one that comes toward it while it overtakes on the oncoming lane.
+"""
+
+import bisect
+import itertools
+from collections.abc import Iterator, Sequence
+from operator import attrgetter
+from typing import NamedTuple
+
+from fogsim.traffic.sumo.link import Api, Getter, getter, vehicle_getter
+from fogsim.traffic.sumo.vehicle_getters import vehicle_getters
+from fogsim.traffic.sumo_lanes.directions import LaneDirections
+from fogsim.values import Leader
+
+EGO_REACH = 500.0
+"""How far ahead a leader of the ego is searched [m]."""
+
+LONGEST = 25.0
+"""Vehicles that are longer than this may be missed where another is nearer by its front [m]."""
+
+
+class LaneSpots:
+    """Where vehicles are across their edge, in SUMO's measure of lanes.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    remote : bool
+        True where every call is a message to another process: what is asked often is subscribed to.
+
+    Attributes
+    ----------
+    is_divided : bool
+        Whether vehicles share lanes side by side (SUMO's sublane model).
+    """
+
+    def __init__(self, api: Api, remote: bool = False) -> None:
+        self.is_divided = float(api.simulation.getOption("lateral-resolution")) > 0.0
+        (self._lateral,) = vehicle_getters(api, remote and self.is_divided, ("getLateralLanePosition",))
+        self._width = getter(api, "lane", "getWidth")
+        self._middles: dict[str, float] = {}
+
+    def across(self, vehicle: str, lane: str) -> float:
+        """Offset of a vehicle's middle from the border of its edge next to lane 0 [m].
+
+        Parameters
+        ----------
+        vehicle, lane : str
+            Ids of the vehicle and of its lane.
+        """
+        return self.middle(lane) + float(self._lateral(vehicle))
+
+    def middle(self, lane: str) -> float:
+        """Offset of a lane's middle from the border of its edge next to lane 0 [m].
+
+        Parameters
+        ----------
+        lane : str
+            Its id.
+        """
+        known = self._middles.get(lane)
+        if known is None:
+            edge, _, number = lane.rpartition("_")
+            beside = sum(float(self._width(f"{edge}_{n}")) for n in range(int(number)))
+            known = self._middles[lane] = beside + 0.5 * float(self._width(lane))
+        return known
+
+
+class _Spot(NamedTuple):
+    """A vehicle on an edge: where along it in its own direction, and where across it [m]."""
+
+    vehicle: str
+    lane: str
+    is_against: bool
+    station: float
+    across: float
+    length: float
+    width: float
+
+
+class Leaders:
+    """Finds leaders.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    remote : bool
+        True where every call is a message to another process: what is asked often is subscribed to.
+    """
+
+    def __init__(self, api: Api, remote: bool = False) -> None:
+        self._api, self._remote = api, remote
+        self._spots, self._directions = LaneSpots(api, remote), LaneDirections(api)
+        self._lane, self._station = vehicle_getters(api, remote, ("getLaneID", "getLanePosition"))
+        self._now = getter(api, "simulation", "getTime")
+        self._on_edge = getter(api, "edge", "getLastStepVehicleIDs")
+        self._lane_length, self._links = getter(api, "lane", "getLength"), getter(api, "lane", "getLinks")
+        self._in_lane, self._speed = vehicle_getter(api, "getLeader"), vehicle_getter(api, "getSpeed")
+        self._minimum_gap = vehicle_getter(api, "getMinGap")
+        self._sizes: dict[str, tuple[float, float]] = {}
+        self._ways: dict[tuple[str, str], tuple[str, ...]] = {}
+        self._read: tuple[float, dict[str, list[_Spot]]] = (-1.0, {})
+
+    def within(self, reach: float) -> Getter:
+        """Getter like SUMO's ``getLeader``, to be called with the vehicle and this reach [m].
+
+        Where lanes are not shared it is SUMO's own.
+
+        Parameters
+        ----------
+        reach : float
+            How far ahead a leader is searched [m].
+        """
+        if self._spots.is_divided:
+            return self.find
+        (in_lane,) = vehicle_getters(self._api, self._remote, ("getLeader",), {"getLeader": ("d", reach)})
+        return in_lane
+
+    def of_ego(self, ego: str) -> Leader | None:
+        """The ego's leader.
+
+        Parameters
+        ----------
+        ego : str
+            Its id.
+        """
+        found = self.find(ego, EGO_REACH) if self._spots.is_divided else self._of_ego_in_lane(ego)
+        if not found or not found[0]:
+            return None
+        # SUMO's gap leaves out the follower's minimum gap.
+        return Leader(found[0], found[1] + self._minimum_gap(ego), self._speed(found[0]))
+
+    def _of_ego_in_lane(self, ego: str) -> tuple[str, float] | None:
+        is_against, lane = self._directions.is_against, self._lane
+        if is_against(ego, lane(ego)):
+            return self.find(ego, EGO_REACH)
+        found: tuple[str, float] | None = self._in_lane(ego, EGO_REACH)
+        return self.find(ego, EGO_REACH) if found and found[0] and is_against(found[0], lane(found[0])) else found
+
+    def find(self, vehicle: str, reach: float) -> tuple[str, float] | None:
+        """Leader of a vehicle, and the gap to it less the follower's minimum gap [m]; None if there is none.
+
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        reach : float
+            How far ahead a leader is searched [m].
+        """
+        lane = self._lane(vehicle)
+        if not lane:
+            return None
+        own = self._spot(vehicle, lane)
+        best, gap = "", reach
+        for begin, current in self._lanes_ahead(own, reach):
+            if begin - own.station - LONGEST > gap:
+                break
+            across = own.across - self._spots.middle(lane) + self._spots.middle(current)
+            least = own.station if begin == 0.0 else -1.0
+            for other in self._from(current.rpartition("_")[0], least):
+                if begin + other.station - own.station - LONGEST > gap:
+                    break
+                is_beside = abs(other.across - across) >= 0.5 * (other.width + own.width)
+                if is_beside or other.is_against != own.is_against or other.vehicle == vehicle:
+                    continue
+                apart = begin + other.station - other.length - own.station
+                if apart < gap:
+                    best, gap = other.vehicle, apart
+        return (best, gap - float(self._minimum_gap(vehicle))) if best else None
+
+    def _lanes_ahead(self, own: _Spot, reach: float) -> Iterator[tuple[float, str]]:
+        """Lanes on a vehicle's way, and where each begins, from the beginning of its own [m]."""
+        yield 0.0, own.lane
+        if own.is_against:
+            return
+        get, begin, lane = self._api.vehicle, float(self._lane_length(own.lane)), own.lane
+        route = iter(get.getRoute(own.vehicle)[max(int(get.getRouteIndex(own.vehicle)), 0) + 1 :])
+        following = next(route, "")
+        while following and begin - own.station < reach:
+            way = self._way(lane, following)
+            for lane in way:
+                yield begin, lane
+                begin += float(self._lane_length(lane))
+            if not way:
+                return
+            following = next(route, "")
+
+    def _way(self, lane: str, following: str) -> tuple[str, ...]:
+        """Lanes from one to the next edge, and that edge's; by a lane beside it where it does not lead there itself."""
+        known = self._ways.get((lane, following))
+        if known is None:
+            edge, _, number = lane.rpartition("_")
+            lanes = range(1 if edge.startswith(":") else int(self._api.edge.getLaneNumber(edge)))
+            nearest = sorted(lanes, key=lambda other: abs(other - int(number)))
+            candidates = [lane] if edge.startswith(":") else [f"{edge}_{other}" for other in nearest]
+            ways = (self._way_of(link) for one in candidates for link in self._links(one) if leads_to(link, following))
+            known = self._ways[lane, following] = next(ways, ())
+        return known
+
+    def _way_of(self, link: Sequence[str]) -> tuple[str, ...]:
+        inner: list[str] = []
+        lane = link[4]
+        while lane:
+            inner.append(lane)
+            lane = next((further[4] for further in self._links(lane)), "")
+        return (*inner, link[0])
+
+    def _from(self, edge: str, station: float) -> Iterator[_Spot]:
+        """Vehicles on an edge whose fronts are past a station [m], in their order."""
+        now, read = self._read
+        if now != self._now():
+            read = {}
+            self._read = self._now(), read
+        if edge not in read:
+            spots = [self._spot(v, lane) for v in self._on_edge(edge) if (lane := self._lane(v))]
+            read[edge] = sorted(spots, key=attrgetter("station"))
+        spots = read[edge]
+        return itertools.islice(spots, bisect.bisect_right(spots, station, key=attrgetter("station")), None)
+
+    def _spot(self, vehicle: str, lane: str) -> _Spot:
+        size = self._sizes.get(vehicle)
+        if size is None:
+            get = self._api.vehicle
+            size = self._sizes[vehicle] = float(get.getLength(vehicle)), float(get.getWidth(vehicle))
+        station, is_against = float(self._station(vehicle)), self._directions.is_against(vehicle, lane)
+        if is_against:
+            # SUMO counts from where the oncoming lane begins.
+            station = float(self._lane_length(lane)) - station
+        return _Spot(vehicle, lane, is_against, station, self._spots.across(vehicle, lane), *size)
+
+
+def leads_to(link: Sequence[str], edge: str) -> bool:
+    """Whether a link of a lane leads to an edge.
+
+    Parameters
+    ----------
+    link : sequence
+        One of SUMO's ``lane.getLinks``.
+    edge : str
+        The edge's id.
+    """
+    return link[0].rpartition("_")[0] == edge

@@ -1,0 +1,246 @@
+"""Positions and gaps along the routes of SUMO's vehicles, junctions included."""
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from fogsim.traffic.drivers.events import signed_gap
+from fogsim.traffic.sumo.link import Api, getter
+from fogsim.traffic.sumo_lanes.directions import LaneDirections
+
+MOVE_TOLERANCE = 5.0
+"""Driven and straight distance between two updates may differ by this much more than a bend explains [m]."""
+
+
+class RouteLengths:
+    """Lengths of edges, and of the ways across the junctions between them.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    """
+
+    def __init__(self, api: Api) -> None:
+        self._api = api
+
+    def of_edge(self, edge: str) -> float:
+        """Length of an edge [m]."""
+        return float(self._api.lane.getLength(f"{edge}_0"))
+
+    def across(self, edge: str, following: str) -> float:
+        """Length of the way across the junction between two edges [m]; 0 in a net without inner lanes."""
+        for target, inner in connections(self._api, edge):
+            if target == following:
+                return sum(float(self._api.lane.getLength(lane)) for lane in inner)
+        return 0.0
+
+    def starts(self, route: Sequence[str]) -> tuple[list[float], float]:
+        """Where each edge of a route starts, and where the last one ends [m]."""
+        steps = [self.of_edge(a) + self.across(a, b) for a, b in itertools.pairwise(route)]
+        starts = [0.0, *itertools.accumulate(steps)]
+        return starts, starts[-1] + self.of_edge(route[-1])
+
+
+class Place(NamedTuple):
+    """Where a front bumper is: on an edge of the vehicle's route, or past its end on the way across a junction.
+
+    Attributes
+    ----------
+    edge : str
+        The edge.
+    number : int
+        Its number in the route.
+    station, past_end : float
+        Way from the edge's beginning, at most to its end, and from its end on [m].
+    """
+
+    edge: str
+    number: int
+    station: float
+    past_end: float
+
+
+class RoutePlaces:
+    """Finds vehicles on their routes, also those that overtake on the oncoming lane.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    """
+
+    def __init__(self, api: Api) -> None:
+        self._api = api
+        self._lengths = RouteLengths(api)
+        self.directions = LaneDirections(api)
+
+    def find(self, vehicle: str) -> Place:
+        """Where a vehicle on the road is.
+
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        """
+        get = self._api.vehicle
+        lane, station = get.getLaneID(vehicle), float(get.getLanePosition(vehicle))
+        route, index = get.getRoute(vehicle), max(int(get.getRouteIndex(vehicle)), 0)
+        edge, is_inside = route[index], lane.startswith(":")
+        length = self._lengths.of_edge(edge)
+        if self.directions.is_against(vehicle, lane):
+            # SUMO counts from where the oncoming lane begins.
+            left = float(self._api.lane.getLength(lane)) - station
+            if not is_inside:
+                return Place(edge, index, min(left, length), 0.0)
+            return Place(edge, index, length, left)
+        if not is_inside:
+            return Place(get.getRoadID(vehicle), index, station, 0.0)
+        return Place(edge, index, length, self._passed(edge, lane) + station)
+
+    def _passed(self, edge: str, current: str) -> float:
+        """Length of the lanes inside a junction that lie between an edge and the current lane [m]."""
+        for _, inner in connections(self._api, edge):
+            passed = 0.0
+            for lane in inner:
+                if lane == current:
+                    return passed
+                passed += float(self._api.lane.getLength(lane))
+        return 0.0
+
+    def distance(self, vehicle: str, here: Place, there: Place) -> float | None:
+        """Distance along a vehicle's route from its own place to another [m]; None if its route does not lead there.
+
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        here, there : Place
+            Its place, and the other.
+        """
+        if here.edge == there.edge:
+            apart = there.station + there.past_end - here.station - here.past_end
+            if apart >= 0.0:
+                return apart
+        get = self._api.vehicle
+        if self.directions.is_against(vehicle, get.getLaneID(vehicle)):
+            return self._counted(get.getRoute(vehicle)[here.number :], here, there)
+        # SUMO measures from inside a junction, but only to places outside of it.
+        way = float(get.getDrivingDistance(vehicle, there.edge, there.station, 0))
+        return way + there.past_end if way >= 0.0 else None
+
+    def _counted(self, route: Sequence[str], here: Place, there: Place) -> float | None:
+        """Distance along the rest of a route, from the edge on."""
+        if there.edge not in route[1:]:
+            return None
+        starts, _ = self._lengths.starts(route[: route.index(there.edge, 1) + 1])
+        return starts[-1] + there.station + there.past_end - here.station - here.past_end
+
+
+class RoutePosition:
+    """Position of a vehicle along its route.
+
+    Follows a route that changes on the way, and a vehicle that is moved by hand, whose odometer SUMO sets anew.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    vehicle : str
+        Id of a vehicle that is on the road.
+    """
+
+    def __init__(self, api: Api, vehicle: str) -> None:
+        self._api = api
+        self._vehicle = vehicle
+        self._current_route = getter(api, "vehicle", "getRouteID")
+        self._lengths, self._places = RouteLengths(api), RoutePlaces(api)
+        self._last: tuple[float, float, float] | None = None
+        self._begin()
+
+    def _begin(self) -> None:
+        get, vehicle = self._api.vehicle, self._vehicle
+        self._route_id = get.getRouteID(vehicle)
+        starts, self._length = self._lengths.starts(get.getRoute(vehicle))
+        place = self._places.find(vehicle)
+        here = starts[place.number] + place.station + place.past_end
+        self._offset = here - self._places.directions.driven(vehicle)
+
+    def update(self, here: Sequence[float], lane: str) -> tuple[float, float]:
+        """Position of the front bumper along the route, and the route's length [m].
+
+        Parameters
+        ----------
+        here : sequence of float
+            Position of the front bumper [m].
+        lane : str
+            Id of the lane that it is on.
+        """
+        driven = self._places.directions.driven(self._vehicle, lane)
+        if self._current_route(self._vehicle) != self._route_id or self._has_jumped(driven, here):
+            self._begin()
+        return self._offset + driven, self._length
+
+    def _has_jumped(self, driven: float, here: Sequence[float]) -> bool:
+        """True if the vehicle cannot have driven to where it is since the last update."""
+        x, y = float(here[0]), float(here[1])
+        last, self._last = self._last, (driven, x, y)
+        if last is None:
+            return False
+        way, straight = driven - last[0], math.hypot(x - last[1], y - last[2])
+        return not straight - MOVE_TOLERANCE <= way <= 2.0 * straight + MOVE_TOLERANCE
+
+
+class GapToEgo:
+    """Measures gaps to an ego in SUMO along the routes of both, junctions included, whichever lanes they are on.
+
+    A vehicle is ahead if the ego's route leads to where it is, and behind if its own route leads to the ego.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    ego : str
+        Id of the ego.
+    """
+
+    def __init__(self, api: Api, ego: str) -> None:
+        self._places = RoutePlaces(api)
+        self._length = api.vehicle.getLength
+        self._ego = ego
+
+    def measure(self, vehicle: str) -> float | None:
+        """Gap of a vehicle [m], with the sign and the None of `signed_gap`; both must be on the road.
+
+        Parameters
+        ----------
+        vehicle : str
+            Its id.
+        """
+        find, distance, length = self._places.find, self._places.distance, self._length
+        own, other = find(self._ego), find(vehicle)
+        ahead, behind = distance(self._ego, own, other), distance(vehicle, other, own)
+        return signed_gap(ahead, behind, length(vehicle), length(self._ego))
+
+
+def connections(api: Api, edge: str) -> Iterator[tuple[str, Iterator[str]]]:
+    """Edges that the lanes of an edge lead to, each with the lanes inside the junction on the way there.
+
+    Parameters
+    ----------
+    api : Api
+        The simulation.
+    edge : str
+        The edge.
+    """
+    links = api.lane.getLinks
+
+    def inner(lane: str) -> Iterator[str]:
+        while lane:
+            yield lane
+            lane = next((link[4] for link in links(lane)), "")
+
+    for index in range(api.edge.getLaneNumber(edge)):
+        for link in links(f"{edge}_{index}"):
+            yield link[0].rpartition("_")[0], inner(link[4])

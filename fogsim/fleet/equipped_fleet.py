@@ -125,7 +125,7 @@ class EquippedFleet:
                 _leader(row, at, state),
             )
             for row in equipped
-            if at.on_way[row]
+            if at.on_way[row] and not state.off_lanes[row]
         ]
 
     def _is_equipped(self, name: str) -> bool:
@@ -165,7 +165,9 @@ def _speed_limit(place: float, places: RoutePlaces, roads: RoadNetwork, otherwis
 def _leader(row: int, at: Places, state: TrafficState) -> Leader | None:
     """The nearest vehicle ahead of one in its lane."""
     ahead = at.along - state.length - at.along[row]
-    ahead[~at.on_way | (np.abs(at.aside - at.aside[row]) > SAME_LANE) | (at.along <= at.along[row])] = np.inf
+    ahead[
+        ~at.on_way | state.off_lanes | (np.abs(at.aside - at.aside[row]) > SAME_LANE) | (at.along <= at.along[row])
+    ] = np.inf
     nearest = int(ahead.argmin())
     if not np.isfinite(ahead[nearest]):
         return None

@@ -99,7 +99,7 @@ class Curves:
         """
         self.time.append(step.time)
         self.speed.append(float(step.traffic.speed[step.ego]))
-        self.limit.append(step.speed_limit)
+        self.limit.append(finite_or_none(step.speed_limit))
         self.advice.append(finite_or_none(step.command.advice.speed))
         self.gap.append(None if step.leader is None else step.leader.gap)
         self.time_to_collision.append(derived["time_to_collision_s"])

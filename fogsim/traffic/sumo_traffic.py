@@ -24,7 +24,15 @@ from fogsim.traffic.sumo.command_line import command_line
 from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
 from fogsim.traffic.sumo.lane_keeping import LaneKeeping
 from fogsim.traffic.sumo.link import Api, SumoLink
-from fogsim.traffic.sumo.loaded_files import check_step_length, describe_seen, loaded_additional, loaded_net
+from fogsim.traffic.sumo.loaded_files import (
+    check_microscopic,
+    check_step_length,
+    describe_seen,
+    describe_warnings,
+    end_time,
+    loaded_additional,
+    loaded_net,
+)
 from fogsim.traffic.sumo.planned_way import planned_way
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.route_position import GapToEgo, RoutePosition
@@ -111,7 +119,7 @@ class SumoTraffic:
         self._fog: FogAccess | None = None
         self._seed = 0
         self._command = _NO_ADVICE
-        self._begun = 0.0
+        self._begun, self._end = 0.0, math.inf
         self._route: RoutePosition | None = None
         self._mark = 0
         self._teleported = False
@@ -169,9 +177,14 @@ class SumoTraffic:
         self._route, self._mark, self._teleported = None, 0, False
         try:
             check_step_length(api, setup.step_length)
+            check_microscopic(api)
+            self._end = end_time(api)
             self._warm_up(self._running)
-        except Exception:
+        except Exception as error:
             self.close()
+            warned = describe_warnings(self._link.warnings(), setup.ego)
+            if warned and isinstance(error, SimulationError):
+                raise SimulationError(f"{error}; {warned}") from error
             raise
 
     def _warm_up(self, run: _Run) -> None:
@@ -181,10 +194,12 @@ class SumoTraffic:
             self._step(run)
         while ego is not None and ego not in vehicle.getIDList():
             waited = simulation.getTime() - begun
-            if waited > self._setup.warm_up_limit or simulation.getMinExpectedNumber() == 0:
+            ended, limit = simulation.getTime() >= self._end, self._setup.warm_up_limit
+            if waited > limit or ended or simulation.getMinExpectedNumber() == 0:
+                until = f"the simulation's end is {self._end:g}" if ended else f"traffic.warm_up_limit_s is {limit:g}"
                 raise SimulationError(
-                    f"the ego {ego!r} did not appear within {waited:g} s of simulated time (traffic.warm_up_limit_s "
-                    f"is {self._setup.warm_up_limit:g}); {describe_seen(ego, seen)}"
+                    f"the ego {ego!r} did not appear within {waited:g} s of simulated time ({until}); "
+                    f"{describe_seen(ego, seen)}"
                 )
             self._step(run)
             seen.update(simulation.getDepartedIDList())
@@ -369,17 +384,19 @@ class SumoTraffic:
         self._route = RoutePosition(run.api, ego) if self._route is None or ego in new else self._route
         state = run.reader.state(self._command.lamps, self._heard(run), self._command.lamps_of)
         row = state.ids.index(ego)
-        route_position, route_length = self._route.update(state.position[row])
+        off_lanes = bool(state.off_lanes[row])
+        route_position, route_length = self._route.update(state.position[row], off_lanes)
         state = run.script.lamps.shown(run.lane_changes.smoothed(state), self._elapsed(run))
         return TrafficSnapshot(
             state=self._with_street(run, state, state.position[row]),
             ego=row,
             route_position=route_position,
             route_length=route_length,
-            speed_limit=run.api.lane.getMaxSpeed(state.lane[row]),
+            speed_limit=math.inf if off_lanes else run.api.lane.getMaxSpeed(state.lane[row]),
             leader=run.reader.leader(),
             collisions=run.collisions.take(),
             signal_ahead=run.reader.signal_ahead(),
+            is_ended=run.roster.time >= self._end,
         )
 
     @_translates_errors
@@ -388,7 +405,6 @@ class SumoTraffic:
         run = self._running
         run.roster.update()
         state = run.reader.state(self._command.lamps, self._heard(run))
-        # Who is between lanes is on none.
         limits = [float(run.api.lane.getMaxSpeed(lane)) for lane in {*state.lane} if lane]
         state = run.script.lamps.shown(run.lane_changes.smoothed(state), self._elapsed(run))
         return NetworkSnapshot(
@@ -397,6 +413,7 @@ class SumoTraffic:
             collisions=run.collisions.take(),
             is_over=run.api.simulation.getMinExpectedNumber() == 0,
             waiting=tuple(run.api.simulation.getPendingVehicles()),
+            is_ended=run.roster.time >= self._end,
         )
 
     def _with_street(self, run: _Run, state: TrafficState, here: NDArray[np.float64] | None) -> TrafficState:

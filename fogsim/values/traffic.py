@@ -107,7 +107,7 @@ class TrafficState:
     length, width, height : (n,) float64
         Size of the body [m].
     lane : tuple of str
-        Lane ids.
+        Lane ids; empty for vehicles off the lanes.
     lamps : (n,) int32
         Lit lamps, bits of `Lamp`; where one side of a kind is dark, with the bits of `fogsim.values.light.dark_on`.
     paint : (n, 3) float64
@@ -121,6 +121,10 @@ class TrafficState:
     advised_speed : (n,) float64
         Lowest speed in force that a driver has heard advised, whether they follow it or not, the ego its own [m/s];
         ``inf`` where they have heard none. Empty where nobody has.
+    off_lanes : (n,) bool
+        Whether a vehicle is off the lanes: parked beside the road (as a taxi that waits is), or put there by another
+        simulator. It has its position and its heading, but no limit, no leader and no acceleration. Left out, all
+        vehicles are on lanes.
     signals : SignalState
         Heads of traffic lights near the ego; none without an ego.
     persons : PersonState
@@ -143,13 +147,16 @@ class TrafficState:
     grade: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     free_speed: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     advised_speed: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    off_lanes: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
     signals: SignalState = NO_SIGNALS
     persons: PersonState = NO_PERSONS
 
     def __post_init__(self) -> None:
-        """Put everybody on the level where no grade is given."""
+        """Put everybody on the level where no grade is given, and on lanes where nothing else is."""
         if not len(self.grade):
             object.__setattr__(self, "grade", np.zeros(len(self.ids)))
+        if not len(self.off_lanes):
+            object.__setattr__(self, "off_lanes", np.zeros(len(self.ids), np.bool_))
 
     def row(self, vehicle_id: str) -> int | None:
         """Row of a vehicle, or None if it is not on the road now.
@@ -200,6 +207,7 @@ def with_persons(state: TrafficState) -> TrafficState:
         grade=np.append(state.grade, unknown),
         free_speed=np.append(state.free_speed, unknown) if len(state.free_speed) else state.free_speed,
         advised_speed=np.append(state.advised_speed, unknown) if len(state.advised_speed) else state.advised_speed,
+        off_lanes=np.append(state.off_lanes, np.zeros(count, np.bool_)),
     )
 
 
@@ -285,17 +293,19 @@ class TrafficSnapshot:
     ego : int
         Row of the ego.
     route_position : float
-        How far along its route the ego's front bumper is [m].
+        How far along its route the ego's front bumper is [m]; off the lanes, where it left them.
     route_length : float
         Length of the route [m].
     speed_limit : float
-        Speed limit where the ego is [m/s].
+        Speed limit where the ego is [m/s]; ``inf`` off the lanes.
     leader : Leader or None
         The vehicle ahead in its lane.
     collisions : tuple of Collision
         Collisions of any vehicles since the last snapshot, each pair once.
     signal_ahead : SignalAhead or None
         The next traffic light on its way.
+    is_ended : bool
+        True from the simulation's own end on, as its configuration sets it.
     """
 
     state: TrafficState
@@ -306,6 +316,7 @@ class TrafficSnapshot:
     leader: Leader | None
     collisions: tuple[Collision, ...]
     signal_ahead: SignalAhead | None = None
+    is_ended: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -324,6 +335,8 @@ class NetworkSnapshot:
         True if nobody is there, and nobody will come.
     waiting : tuple of str
         Ids of vehicles that are due and find no room to enter the road.
+    is_ended : bool
+        As of `TrafficSnapshot`.
     """
 
     state: TrafficState
@@ -331,3 +344,4 @@ class NetworkSnapshot:
     collisions: tuple[Collision, ...]
     is_over: bool
     waiting: tuple[str, ...] = ()
+    is_ended: bool = False

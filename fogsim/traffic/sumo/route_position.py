@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from fogsim.traffic.drivers.events import signed_gap
-from fogsim.traffic.sumo.link import Api, getter
+from fogsim.traffic.sumo.link import UNKNOWN, Api, getter, is_off_lanes
 
 MOVE_TOLERANCE = 5.0
 """Driven and straight distance between two updates may differ by this much more than a bend explains [m]."""
@@ -15,7 +15,8 @@ MOVE_TOLERANCE = 5.0
 class RoutePosition:
     """Position of a vehicle along its route.
 
-    Follows a route that changes on the way, and a vehicle that is moved by hand, whose odometer SUMO sets anew.
+    Follows a route that changes on the way, and a vehicle that is moved by hand, whose odometer SUMO sets anew. A vehicle
+    off the lanes stays where it left them.
 
     Parameters
     ----------
@@ -41,8 +42,11 @@ class RoutePosition:
         lane = get.getLaneID(vehicle)
         # On a junction, the edge is the one before it and the place on the lane counts from the junction's border.
         crossed = self._edge_length(get.getRoute(vehicle)[edge]) if lane.startswith(":") else 0.0
-        here = starts[edge] + crossed + get.getLanePosition(vehicle)
+        station = get.getLanePosition(vehicle)
+        here = starts[edge] + crossed + (0.0 if station == UNKNOWN else station)
         self._offset = here - get.getDistance(vehicle)
+        self._held = False
+        self._place = here, self._length
 
     def _edge_starts(self, route: Sequence[str]) -> tuple[list[float], float]:
         """Where each edge of a route starts, and where the last one ends [m]."""
@@ -63,18 +67,24 @@ class RoutePosition:
                 return length
         return 0.0
 
-    def update(self, here: Sequence[float]) -> tuple[float, float]:
+    def update(self, here: Sequence[float], off_lanes: bool = False) -> tuple[float, float]:
         """Position of the front bumper along the route, and the route's length [m].
 
         Parameters
         ----------
         here : sequence of float
             Position of the front bumper [m].
+        off_lanes : bool
+            Whether the vehicle is off the lanes now.
         """
+        if off_lanes:
+            self._held, self._last = True, None
+            return self._place
         driven = self._odometer(self._vehicle)
-        if self._current_route(self._vehicle) != self._route_id or self._has_jumped(driven, here):
+        if self._held or self._current_route(self._vehicle) != self._route_id or self._has_jumped(driven, here):
             self._begin()
-        return self._offset + driven, self._length
+        self._place = self._offset + driven, self._length
+        return self._place
 
     def _has_jumped(self, driven: float, here: Sequence[float]) -> bool:
         """True if the vehicle cannot have driven to where it is since the last update."""
@@ -112,13 +122,17 @@ class GapToEgo:
         self._ego = ego
 
     def measure(self, vehicle: str) -> float | None:
-        """Gap of a vehicle [m], with the sign and the None of `signed_gap`; both must be on the road.
+        """Gap of a vehicle [m], with the sign and the None of `signed_gap`; None if one of them is off the lanes.
+
+        Both must be on the road.
 
         Parameters
         ----------
         vehicle : str
             Its id.
         """
+        if is_off_lanes(self._api, self._ego) or is_off_lanes(self._api, vehicle):
+            return None
         own, other = self._place(self._ego), self._place(vehicle)
         length = self._api.vehicle.getLength
         ahead, behind = self._distance(self._ego, own, other), self._distance(vehicle, other, own)

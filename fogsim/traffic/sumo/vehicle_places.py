@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from fogsim.errors import InputError
 from fogsim.traffic.drivers.advice_hearing import check_edges, check_start
-from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
+from fogsim.traffic.sumo.link import Api, getter, is_off_lanes, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.route_position import connections
 from fogsim.values import Stretch
@@ -72,7 +72,7 @@ class SumoVehiclePlaces:
         present = self._roster.present
         if among is None:
             return ((v, piece) for piece in pieces for v in self._on_edge(piece.edge) if v in present)
-        edges = [(v, self._edge(v)) for v in among]
+        edges = [(v, self._edge(v)) for v in among if not is_off_lanes(self._api, v)]
         return ((v, piece) for piece in pieces for v, edge in edges if edge == piece.edge)
 
     def _ego_route(self) -> tuple[str, ...]:

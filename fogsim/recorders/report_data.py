@@ -73,7 +73,7 @@ class Curves:
 
     time: list[float] = field(default_factory=list)
     speed: list[float] = field(default_factory=list)
-    limit: list[float] = field(default_factory=list)
+    limit: list[float | None] = field(default_factory=list)
     advice: list[float | None] = field(default_factory=list)
     gap: list[float | None] = field(default_factory=list)
     time_to_collision: list[float | None] = field(default_factory=list)

@@ -317,7 +317,8 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
 
 def _limit(step: Step) -> float:
     """Speed limit where the ego is [m/s]; off the lanes, the speed that it drives there by itself."""
-    return min(step.speed_limit, *step.traffic.free_speed[step.ego : step.ego + 1].tolist(), math.inf)
+    free = step.traffic.free_speed
+    return float(free[step.ego]) if math.isinf(step.speed_limit) and len(free) else step.speed_limit
 
 
 def _route_length(step: Step) -> float:

@@ -15,8 +15,8 @@ MOVE_TOLERANCE = 5.0
 class RoutePosition:
     """Position of a vehicle along its route.
 
-    Follows a route that changes on the way, and a vehicle that is moved by hand, whose odometer SUMO sets anew. A vehicle
-    off the lanes stays where it left them.
+    Follows a route that changes on the way, and a vehicle that is moved by hand, whose odometer SUMO sets anew. Off the
+    lanes, a vehicle stays where it left them.
 
     Parameters
     ----------

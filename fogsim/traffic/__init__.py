@@ -12,7 +12,7 @@ from fogsim.traffic.protocol import AnyTraffic, NetworkTraffic, Traffic
 from fogsim.traffic.road.configuration import configured_files, ignored_options
 from fogsim.traffic.road.demand import Demand, VehicleRoute, read_configured_demand, read_demand
 from fogsim.traffic.road.net_edges import NetEdges, read_net_edges
-from fogsim.traffic.setup import AfterCollision, TrafficSetup
+from fogsim.traffic.setup import ANY_EGO, AfterCollision, TrafficSetup
 from fogsim.traffic.sumo.command_line import has_error_log, output_prefix
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.output_folder import OutputFolder
@@ -79,6 +79,7 @@ def traci_traffic(setup: TrafficSetup, link: TraciLink) -> Traffic:
 
 
 __all__ = [
+    "ANY_EGO",
     "COMPLIANCES",
     "FOLLOWING_MODELS",
     "SPEED_CHOICES",

@@ -2,6 +2,7 @@
 
 import functools
 import math
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Concatenate, ParamSpec, TypeVar
@@ -18,7 +19,7 @@ from fogsim.traffic.road.network import read_net, road_network
 from fogsim.traffic.road.road_map import RoadMap
 from fogsim.traffic.road.signs import sign_map
 from fogsim.traffic.road.structures import structures
-from fogsim.traffic.setup import TrafficSetup
+from fogsim.traffic.setup import ANY_EGO, TrafficSetup
 from fogsim.traffic.sumo.claims import LoadMark, new_session
 from fogsim.traffic.sumo.command_line import command_line
 from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
@@ -37,6 +38,7 @@ from fogsim.traffic.sumo.planned_way import planned_way
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.route_position import GapToEgo, RoutePosition
 from fogsim.traffic.sumo.vehicle_reader import SubscribedReader, VehicleReader
+from fogsim.traffic.sumo_behaviour.ego_choice import EgoChoice
 from fogsim.traffic.sumo_behaviour.ego_driving import EgoDriving
 from fogsim.traffic.sumo_behaviour.scripted_actions import ScriptedActions, has_lane
 from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl, SumoDesiredSpeeds
@@ -114,6 +116,7 @@ class SumoTraffic:
 
     def __init__(self, setup: TrafficSetup, link: SumoLink) -> None:
         self._setup = setup
+        self._any_ego = setup.ego == ANY_EGO
         self._link = link
         self._run: _Run | None = None
         self._fog: FogAccess | None = None
@@ -143,8 +146,15 @@ class SumoTraffic:
         seed : int
             SUMO's seed.
         """
+        arguments = command_line(self._setup, seed)
+        api = self._link.begin(arguments)
+        if self._any_ego:
+            try:
+                self._setup = replace(self._setup, ego=self._chosen_ego(api))
+            except SimulationError as error:
+                raise self._ended(error, None) from error
+            api = self._link.begin(arguments)
         setup = self._setup
-        api = self._link.begin(command_line(setup, seed))
         session = new_session(api)
         mark = LoadMark(api, session)
         roster = Roster(api, self._link.remote, mark)
@@ -180,12 +190,33 @@ class SumoTraffic:
             check_microscopic(api)
             self._end = end_time(api)
             self._warm_up(self._running)
-        except Exception as error:
+        except SimulationError as error:
+            raise self._ended(error, setup.ego) from error
+        except Exception:
             self.close()
-            warned = describe_warnings(self._link.warnings(), setup.ego)
-            if warned and isinstance(error, SimulationError):
-                raise SimulationError(f"{error}; {warned}") from error
             raise
+
+    def _ended(self, error: SimulationError, ego: str | None) -> SimulationError:
+        """An error that ends the simulation, with what SUMO has warned of."""
+        self.close()
+        return SimulationError("; ".join(filter(None, (str(error), describe_warnings(self._link.warnings(), ego)))))
+
+    def _chosen_ego(self, api: Api) -> str:
+        """Id of the first vehicle that suits as the ego, for which the simulation runs until it drives."""
+        if self._link.shared:
+            raise SimulationError(f"ego: {ANY_EGO}: FogSim can choose only in its own simulation; name a vehicle")
+        choice, simulation = EgoChoice(api), api.simulation
+        last = min(simulation.getTime() + self._setup.warm_up_limit, end_time(api))
+        while (found := choice.look()) is None:
+            if simulation.getTime() >= last or simulation.getMinExpectedNumber() == 0:
+                found = choice.best
+                break
+            self._link.step()
+        if found is None:
+            until = f"until {simulation.getTime():g} s"
+            raise SimulationError(f"ego: {ANY_EGO}: no car, van, truck or bus drives on a lane {until}")
+        warnings.warn(f"traffic.ego: {ANY_EGO}: the ego is {found!r}", stacklevel=2)
+        return found
 
     def _warm_up(self, run: _Run) -> None:
         simulation, vehicle, ego = run.api.simulation, run.api.vehicle, self._setup.ego

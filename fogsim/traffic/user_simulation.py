@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from fogsim.errors import InputError, SimulationError, shown
-from fogsim.traffic.setup import TrafficSetup
+from fogsim.traffic.setup import ANY_EGO, TrafficSetup
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.traffic.sumo.link import Api, translated_errors
 from fogsim.traffic.sumo.loaded_files import check_microscopic, describe_seen
@@ -94,6 +94,8 @@ class AttachedTraffic(SumoTraffic):
     def __init__(self, setup: TrafficSetup, api: Api) -> None:
         if setup.ego is None:
             raise InputError("attaching to a simulation needs an ego vehicle in it, and traffic.ego is none")
+        if setup.ego == ANY_EGO:
+            raise InputError(f"ego: {ANY_EGO}: FogSim can choose only in its own simulation; name a vehicle")
         self._attached = AttachedLink(api)
         self._api = api
         with self._attached.translated_errors():

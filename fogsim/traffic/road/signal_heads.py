@@ -30,8 +30,8 @@ _BESIDE = 0.6  # of posts, beyond the edge of the outermost lane [m]
 def signal_heads(lanes: Sequence[Any], side: float) -> Iterator[SignalHead]:
     """Heads at the end of an edge: one on a post for the outermost lane, one on its arm for each other lane.
 
-    `lanes` (sumolib) are those for vehicles, from the side that they keep to: left (1) or right (−1). A lane whose points
-    coincide, which SUMO reads as any other, has no direction to stand across, and no head.
+    `lanes` (sumolib) are those for vehicles, from the side that they keep to: left (1) or right (−1). A lane whose
+    points coincide, which SUMO reads as any other, has no direction to stand across, and no head.
     """
     lanes = [lane for lane in lanes if _steps(np.array(lane.getShape3D(), np.float64)).size]
     heads = [(lane, signal, links) for lane in lanes for signal, links in _signals(lane)]

@@ -8,7 +8,8 @@ LONG_WAY = 1000.0
 """The first vehicle with so much of its route ahead is chosen [m]."""
 
 PATIENCE = 600.0
-"""So long after the first vehicle that would do, the one with the longest way is chosen, without stops if any is [s]."""
+"""So long after the first vehicle that would do, the one with the longest way is chosen, if possible without stops [s].
+"""
 
 LOOK_PERIOD = 1.0
 """Time between two looks at those who have departed [s]."""

@@ -9,7 +9,7 @@ need), and, where it is installed, those of sumo-rl. Nothing of them is copied i
 runs a large scenario: a town by netgenerate (``--blocks`` 30: 10,000 lanes for cars and people) with routes by
 duarouter, parked cars, taxis and their passengers, people on foot and a railway in SUMO's sublane model; or one of your
 own (``--sumocfg``). First SUMO alone, then FogSim with an ego and its camera of 160 × 120 px once a second. Printed are
-the simulated time, seconds, and the memory that each process had at most.
+the simulated time, seconds of the clock and of the processor, and the memory that each process had at most.
 """
 
 import argparse
@@ -412,7 +412,7 @@ def _write(path: Path, root: str, rows: Iterable[str]) -> None:
 
 
 def _run(program: str, *arguments: object) -> None:
-    command = [HOME / "bin" / program, *map(str, arguments)]
+    command = [str(HOME / "bin" / program), *map(str, arguments)]
     done = subprocess.run(command, check=False, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     if done.returncode:
         sys.exit(f"{program} failed: {done.stderr}")
@@ -420,10 +420,15 @@ def _run(program: str, *arguments: object) -> None:
 
 def sumo_alone(config: Path, step: float) -> dict[str, object]:
     """Seconds and memory of SUMO itself."""
-    began = time.perf_counter()
+    began, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
     _run("sumo", "-c", config, "--step-length", step, "--no-step-log", "--no-warnings")
-    peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
-    return {"run": "SUMO alone", "seconds": round(time.perf_counter() - began, 1), "memory_mb": round(peak / 1024)}
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return {
+        "run": "SUMO alone",
+        "seconds": round(time.perf_counter() - began, 1),
+        "cpu_s": round(after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime, 1),
+        "memory_mb": round(after.ru_maxrss / 1024),  # of it, or of the program that has built the town
+    }
 
 
 def with_ego(config: Path, ego: str, overrides: Sequence[str]) -> dict[str, object]:
@@ -444,6 +449,7 @@ def with_ego(config: Path, ego: str, overrides: Sequence[str]) -> dict[str, obje
         "from_s": round(begun, 1),
         "ending": None if step.ending is None else step.ending.value,
         "seconds": round(time.perf_counter() - began, 1),
+        "cpu_s": round(time.process_time(), 1),
         "start_seconds": round(started, 1),
         "frames": count,
         "vehicles_near": len(seen),
@@ -489,8 +495,9 @@ def main() -> None:
 
 
 def sizes(folder: Path) -> dict[str, object]:
-    """Lanes of the town, and megabytes of its routes."""
-    lanes = sum(1 for _ in _root(folder / "town.net.xml").iterfind("edge/lane"))
+    """Lanes of the town but for those inside junctions, and megabytes of its routes."""
+    edges = _root(folder / "town.net.xml").iterfind("edge")
+    lanes = sum(len(edge.findall("lane")) for edge in edges if not edge.get("function"))
     routes = sum((folder / name).stat().st_size for name in ("town.rou.xml", "street.rou.xml"))
     return {"lanes": lanes, "routes_mb": round(routes / 1e6, 1)}
 

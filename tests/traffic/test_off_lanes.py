@@ -160,14 +160,14 @@ def test_an_ego_that_is_moved_beside_the_road_stays_where_it_is_put() -> None:
         library.close()
 
 
-def test_it_is_read_over_a_connection_too(sumo_process: Callable) -> None:
+def test_it_is_read_over_a_connection_too(sumo_process: Callable[..., Any]) -> None:
     with sumo_process(ARGUMENTS) as (port, _):
         connection = traci.connect(port, numRetries=100, host="127.0.0.1", waitBetweenRetries=0.1)
         check_moved(moved(connection, connection))
         connection.close()
 
 
-def test_others_that_are_moved_beside_the_road_are_read_over_a_connection(sumo_process: Callable) -> None:
+def test_others_that_are_moved_beside_the_road_are_read_over_a_connection(sumo_process: Callable[..., Any]) -> None:
     with sumo_process(ARGUMENTS) as (port, _):
         connection = traci.connect(port, numRetries=100, host="127.0.0.1", waitBetweenRetries=0.1)
         with fogsim.attach(connection, ego="ego", visibility=120.0, settings=BLIND[:2]) as session:

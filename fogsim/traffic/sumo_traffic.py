@@ -117,6 +117,7 @@ class SumoTraffic:
     def __init__(self, setup: TrafficSetup, link: SumoLink) -> None:
         self._setup = setup
         self._any_ego = setup.ego == ANY_EGO
+        self._ego_of_seed: int | None = None
         self._link = link
         self._run: _Run | None = None
         self._fog: FogAccess | None = None
@@ -148,11 +149,12 @@ class SumoTraffic:
         """
         arguments = command_line(self._setup, seed)
         api = self._link.begin(arguments)
-        if self._any_ego:
+        if self._any_ego and self._ego_of_seed != seed:
             try:
                 self._setup = replace(self._setup, ego=self._chosen_ego(api))
             except SimulationError as error:
                 raise self._ended(error, None) from error
+            self._ego_of_seed = seed
             api = self._link.begin(arguments)
         setup = self._setup
         session = new_session(api)

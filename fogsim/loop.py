@@ -387,7 +387,7 @@ class ClosedLoop:
             return Ending.COLLISION
         if snapshot.route_position >= snapshot.route_length - self._scenario.traffic.stop_before_end_m:
             return Ending.ARRIVED
-        return Ending.TIME if index >= self._periods.frames else None
+        return Ending.TIME if index >= self._periods.frames or snapshot.is_ended else None
 
     def close(self) -> None:
         """End the simulation and free the renderer; closing twice is allowed."""

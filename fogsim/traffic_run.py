@@ -263,7 +263,7 @@ class TrafficRun:
     def _ending(self, index: int, snapshot: NetworkSnapshot, cohort: Cohort | None) -> Ending | None:
         if cohort is not None and not cohort.unfinished and self._cohort.is_complete:
             return Ending.COHORT_LEFT
-        if index >= self._periods.frames:
+        if index >= self._periods.frames or snapshot.is_ended:
             return Ending.TIME
         return Ending.NOBODY_LEFT if snapshot.is_over else None
 

@@ -128,7 +128,9 @@ class Oracle(Unremembering):
         """Choose; see `Policy`."""
         truth, limit = info["truth"], info["speed_limit_mps"]
         speeds = [*(speed for speed in ADVISED_SPEEDS if speed < limit), limit]
-        best = min(speeds, key=lambda speed: self._cost(speed, truth["visibility_ahead_m"], limit))
+        # Off the lanes there is no limit, and no way to drive.
+        sight, moves = truth["visibility_ahead_m"], math.isfinite(limit)
+        best = min(speeds, key=lambda speed: self._cost(speed, sight, limit)) if moves else limit
         lamps = LAMP_MODES[0]
         if truth["visibility_m"] < FRONT_FOG_LAMP_VISIBILITY:
             lamps |= Lamp.FRONT_FOG

@@ -19,7 +19,10 @@ SCENARIO_HELP = "A scenario of the catalogue (fogsim list), a file or a folder."
 
 ScenarioName = Annotated[str | None, typer.Argument(help=SCENARIO_HELP)]
 SumoConfiguration = Annotated[Path | None, typer.Option(help="A SUMO configuration, in place of a scenario.")]
-EgoId = Annotated[str | None, typer.Option(help="Id of the vehicle that is the ego; none for traffic alone.")]
+EgoId = Annotated[
+    str | None,
+    typer.Option(help="Id of the vehicle that is the ego; any for the first that suits, none for traffic alone."),
+]
 HomogeneousVisibility = Annotated[
     float | None, typer.Option(help="Meteorological visibility of homogeneous fog in metres.", min=1.0, max=math.inf)
 ]

@@ -365,7 +365,7 @@ _OF_EGO = {
         needs=_EGO,
     ),
     "advice": _speed("advised speed in force: the ego's; without one, the lowest anywhere; inf for none", _advice),
-    "limit": _speed("speed limit where the ego is", _of_step(lambda s: s.speed_limit), needs=_EGO),
+    "limit": _speed("speed limit where the ego is; inf off the lanes", _of_step(lambda s: s.speed_limit), needs=_EGO),
     "lamps": Signal(
         "lamps of the ego that are lit", lambda m: _lamps(m, "ego"), Kind.WORDS, words=LAMP_WORDS, needs=_EGO
     ),

@@ -29,7 +29,7 @@ def frame_record(step: Step) -> dict[str, Any]:
         "visibility_ahead_m": finite_or_none(truth.visibility_ahead),
         "extinction_per_m": truth.extinction,
         "speed_mps": observation.speed,
-        "speed_limit_mps": step.speed_limit,
+        "speed_limit_mps": finite_or_none(step.speed_limit),
         "ego_id": step.traffic.ids[step.ego],
         "lead_distance_m": None if observation.lead is None else observation.lead.distance,
         "camera": {

@@ -122,7 +122,7 @@ class EquippedFleet:
                 _leader(row, at, state),
             )
             for row in equipped
-            if at.on_way[row]
+            if at.on_way[row] and not state.off_lanes[row]
         ]
 
     def _is_equipped(self, name: str) -> bool:
@@ -163,7 +163,7 @@ def _leader(row: int, at: Places, state: TrafficState) -> Leader | None:
     """The nearest vehicle ahead of one whose width overlaps."""
     ahead = at.along - state.length - at.along[row]
     is_beside = np.abs(at.aside - at.aside[row]) >= 0.5 * (state.width + state.width[row])
-    ahead[~at.on_way | is_beside | (at.along <= at.along[row])] = np.inf
+    ahead[~at.on_way | state.off_lanes | is_beside | (at.along <= at.along[row])] = np.inf
     nearest = int(ahead.argmin())
     if not np.isfinite(ahead[nearest]):
         return None

@@ -65,6 +65,10 @@ METRICS: Registry[MetricFactory] = Registry(
 """Every metric by name, in the order of the summary."""
 
 
+_OF_DRIVING = (Conflict, Sight, Compliance, Comfort, FogWarnings)
+"""Metrics of the ego that leave out steps in which it is off the lanes."""
+
+
 @dataclass(frozen=True, slots=True)
 class RunSummary:
     """What a run amounts to.
@@ -210,8 +214,10 @@ class RunMetrics(MetricsOfRun[Step]):
 
     def _take(self, step: Step, elapsed: float) -> None:
         sample = Sample(step, elapsed, self.derive(step))
+        off_lanes = bool(step.traffic.off_lanes[step.ego])
         for metric in self._of_ego:
-            metric.update(sample)
+            if not (off_lanes and isinstance(metric, _OF_DRIVING)):
+                metric.update(sample)
 
     def derive(self, step: Step) -> dict[str, float | None]:
         """Derive the safety of one instant, as `step_metrics` does.

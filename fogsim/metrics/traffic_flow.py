@@ -28,7 +28,8 @@ class SpeedsByNumber:
 
     def variance_between(self, group: Sequence[int] | None = None) -> float | None:
         """Variance of the mean speeds about that of their group, by time [m²/s²]; None without time."""
-        groups = np.zeros(len(self._time), np.intp) if group is None else np.array(group, dtype=np.intp)
+        # The last numbers may have no time.
+        groups = np.zeros(len(self._time), np.intp) if group is None else np.array(group, np.intp)[: len(self._time)]
         times, ways = np.bincount(groups, self._time)[groups], np.bincount(groups, self._way)[groups]
         been = self._time > 0.0
         time = self._time[been]

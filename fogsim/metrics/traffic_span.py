@@ -3,7 +3,7 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar, Protocol
 
@@ -17,6 +17,12 @@ from fogsim.values import Cohort, Collision, Step, TrafficState, TrafficStep
 MOST_ROWS = 4096
 """Rows that are gathered before the metrics get them."""
 
+_OF_ROWS = (
+    *("moment", "vehicle", "lane", "kind", "elapsed", "time", "position", "heading", "speed", "acceleration"),
+    *("length", "width", "free_speed", "advised_speed", "extinction", "course", "across"),
+)
+"""Fields of a span with a value for each row."""
+
 HOUR = 3600.0
 """Seconds in an hour."""
 
@@ -29,7 +35,7 @@ _FIRST_COURSE = 1 << 20
 
 @dataclass(frozen=True)
 class TrafficSpan:
-    """Some consecutive steps; row i is one vehicle in one of them.
+    """Some consecutive steps; row i is one vehicle on a lane in one of them.
 
     Attributes
     ----------
@@ -66,7 +72,7 @@ class TrafficSpan:
     cohort_waiting_time : float
         Time that the cohort's vehicles have waited to enter the road [s].
     ego : (k,) intp or None
-        Rows of the ego, one in each step; None without one.
+        Rows of the ego, one in each step in which it is on a lane; None without an ego.
     reading_radius : float
         As of `Step` [m]; ``inf`` without an ego.
     course : (n,) intp
@@ -266,11 +272,20 @@ class TrafficGathering:
         self._time = float(clock[-1])
         self._rows, self._states, self._numbers, self._collisions, self._egos = 0, [], [], [], []
         self._cohort_waiting_time = 0.0
-        return span
+        return _on_lanes(span, ~np.concatenate([state.off_lanes for state in states]))
 
     def _in_cohort(self) -> NDArray[np.bool_]:
         members = frozenset() if self._cohort is None else self._cohort.vehicles
         return np.fromiter((name in members for name in self._vehicles), np.bool_, len(self._vehicles))
+
+
+def _on_lanes(span: TrafficSpan, rows: NDArray[np.bool_]) -> TrafficSpan:
+    """Some of the rows (n,) of a span: those of vehicles on lanes."""
+    if rows.all():
+        return span
+    ego = span.ego if span.ego is None else (np.cumsum(rows) - 1)[span.ego[rows[span.ego]]]
+    columns = {name: column[rows] for name in _OF_ROWS if len(column := getattr(span, name))}
+    return replace(span, ego=ego, **columns)
 
 
 def _known(values: NDArray[np.float64], count: int, unknown: float) -> NDArray[np.float64]:

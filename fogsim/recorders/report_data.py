@@ -73,7 +73,7 @@ class Curves:
 
     time: list[float] = field(default_factory=list)
     speed: list[float] = field(default_factory=list)
-    limit: list[float] = field(default_factory=list)
+    limit: list[float | None] = field(default_factory=list)
     advice: list[float | None] = field(default_factory=list)
     gap: list[float | None] = field(default_factory=list)
     time_to_collision: list[float | None] = field(default_factory=list)
@@ -99,7 +99,7 @@ class Curves:
         """
         self.time.append(step.time)
         self.speed.append(float(step.traffic.speed[step.ego]))
-        self.limit.append(step.speed_limit)
+        self.limit.append(finite_or_none(step.speed_limit))
         self.advice.append(finite_or_none(step.command.advice.speed))
         self.gap.append(None if step.leader is None else step.leader.gap)
         self.time_to_collision.append(derived["time_to_collision_s"])

@@ -196,7 +196,18 @@ _EGO_COLUMNS: tuple[Column[Step], ...] = (
     Column("heading_rad", pa.float64(), "counterclockwise from east", _ego("heading")),
     Column("speed_mps", pa.float64(), "speed of the ego", _ego("speed")),
     Column("acceleration_mps2", pa.float64(), "acceleration of the ego", _ego("acceleration")),
-    Column("speed_limit_mps", pa.float64(), "speed limit", lambda step, _: step.speed_limit),
+    Column(
+        "speed_limit_mps",
+        pa.float64(),
+        "speed limit; null off the lanes",
+        lambda step, _: finite_or_none(step.speed_limit),
+    ),
+    Column(
+        "off_lanes",
+        pa.bool_(),
+        "whether the ego is off the lanes: parked beside them, or put there by another simulator",
+        lambda step, _: bool(step.traffic.off_lanes[step.ego]),
+    ),
     Column(
         "advised_speed_mps",
         pa.float64(),

@@ -36,7 +36,7 @@ TRAJECTORY_COLUMNS: Mapping[str, tuple[Any, str]] = {
     "vehicle_angle": (pa.float64(), "heading, clockwise from north [°]"),
     "vehicle_type": (pa.string(), "kind of body (car, van, truck, bus, motorcycle, pedestrian), not SUMO's vType"),
     "vehicle_speed": (pa.float64(), "speed [m/s]"),
-    "vehicle_lane": (pa.string(), "SUMO's lane; a change of lane is made at once here"),
+    "vehicle_lane": (pa.string(), "SUMO's lane, empty off the lanes; a change of lane is made at once here"),
     "vehicle_slope": (pa.float64(), "slope of the road, positive uphill [°]; null for pedestrians"),
     "vehicle_acceleration": (pa.float64(), "acceleration [m/s²]; null for pedestrians"),
     "visibility": (

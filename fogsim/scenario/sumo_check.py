@@ -16,6 +16,7 @@ from fogsim.scenario.timeline import departing_vehicles, pointless_triggers
 from fogsim.scenario.timeline import named_vehicles as scripted_vehicles
 from fogsim.scenario.traffic_schema import ChangeLane
 from fogsim.traffic import (
+    ANY_EGO,
     Demand,
     NetEdges,
     VehicleRoute,
@@ -105,7 +106,7 @@ def demand_mistakes(document: Document, scenario: Scenario, end: float) -> list[
 
 def _named_vehicles(scenario: Scenario) -> Iterator[tuple[KeyPath, str]]:
     traffic = scenario.traffic
-    if traffic.has_ego:
+    if traffic.has_ego and traffic.ego != ANY_EGO:
         yield ("traffic", "ego"), traffic.ego
     yield from ((("traffic", "equipped_vehicles", i), one) for i, one in enumerate(traffic.equipped_vehicles))
     yield from ((("traffic", "keep_lane", i), vehicle) for i, vehicle in enumerate(traffic.keep_lane))

@@ -146,7 +146,8 @@ class Traffic(Section):
     """SUMO additional files; POIs of type `fogsim.sign.KIND` in them are signs."""
 
     ego: Id = "ego"
-    """Id of the ego vehicle in the route files; `none` for traffic alone, without camera and estimators."""
+    """Id of the ego vehicle in the route files; `any` for the first car, van, truck or bus that drives with 1 km and no
+    stop ahead of it, or the best of the first 10 minutes; `none` for traffic alone, without camera and estimators."""
 
     equipped: Share = 0.0
     """Share of the other vehicles that have a camera, estimators, a belief and lighting policy like the ego's, and are

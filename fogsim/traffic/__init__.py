@@ -12,8 +12,8 @@ from fogsim.traffic.protocol import AnyTraffic, NetworkTraffic, Traffic
 from fogsim.traffic.road.configuration import configured_files, ignored_options
 from fogsim.traffic.road.demand import Demand, VehicleRoute, read_configured_demand, read_demand
 from fogsim.traffic.road.net_edges import NetEdges, read_net_edges
-from fogsim.traffic.setup import AfterCollision, TrafficSetup
-from fogsim.traffic.sumo.command_line import output_prefix
+from fogsim.traffic.setup import ANY_EGO, AfterCollision, TrafficSetup
+from fogsim.traffic.sumo.command_line import has_error_log, output_prefix
 from fogsim.traffic.sumo.libsumo_link import LibsumoLink
 from fogsim.traffic.sumo.output_folder import OutputFolder
 from fogsim.traffic.sumo.traci_link import TraciLink
@@ -62,7 +62,7 @@ def libsumo_network_traffic(setup: TrafficSetup, outputs: Path | None = None) ->
 def _libsumo(setup: TrafficSetup, outputs: Path | None) -> SumoTraffic:
     for option in ignored_options(setup.config) if setup.config else ():
         warnings.warn(f"{setup.config}: {option}", stacklevel=3)
-    return SumoTraffic(setup, LibsumoLink(OutputFolder(outputs, output_prefix(setup))))
+    return SumoTraffic(setup, LibsumoLink(OutputFolder(outputs, output_prefix(setup), not has_error_log(setup))))
 
 
 def traci_traffic(setup: TrafficSetup, link: TraciLink) -> Traffic:
@@ -79,6 +79,7 @@ def traci_traffic(setup: TrafficSetup, link: TraciLink) -> Traffic:
 
 
 __all__ = [
+    "ANY_EGO",
     "COMPLIANCES",
     "FOLLOWING_MODELS",
     "SPEED_CHOICES",

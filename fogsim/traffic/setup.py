@@ -12,6 +12,10 @@ UNTOUCHED = DriverSetup(speed_choice="unaffected", spread=0.0)
 """Drivers as the user's own simulation has them."""
 
 
+ANY_EGO = "any"
+"""In place of an ego's id: the first vehicle that suits."""
+
+
 class AfterCollision(StrEnum):
     """What becomes of vehicles that have collided: they stand and block the lane, or they vanish."""
 
@@ -30,7 +34,7 @@ class TrafficSetup:
     routes, additional : tuple of Path
         SUMO route and additional files.
     ego : str or None
-        Id of the ego vehicle; None for traffic alone.
+        Id of the ego vehicle, or `ANY_EGO`; None for traffic alone.
     step_length : float
         SUMO's step [s].
     keep_lane : tuple of str

@@ -2,6 +2,7 @@
 
 import functools
 import math
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Concatenate, ParamSpec, TypeVar
@@ -18,16 +19,25 @@ from fogsim.traffic.road.network import read_net, road_network
 from fogsim.traffic.road.road_map import RoadMap
 from fogsim.traffic.road.signs import sign_map
 from fogsim.traffic.road.structures import structures
-from fogsim.traffic.setup import TrafficSetup
+from fogsim.traffic.setup import ANY_EGO, TrafficSetup
 from fogsim.traffic.sumo.claims import LoadMark, new_session
 from fogsim.traffic.sumo.command_line import command_line
 from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
 from fogsim.traffic.sumo.lane_keeping import LaneKeeping
 from fogsim.traffic.sumo.link import Api, SumoLink
-from fogsim.traffic.sumo.loaded_files import check_step_length, describe_seen, loaded_additional, loaded_net
+from fogsim.traffic.sumo.loaded_files import (
+    check_microscopic,
+    check_step_length,
+    describe_seen,
+    describe_warnings,
+    end_time,
+    loaded_additional,
+    loaded_net,
+)
 from fogsim.traffic.sumo.planned_way import planned_way
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.vehicle_reader import SubscribedReader, VehicleReader
+from fogsim.traffic.sumo_behaviour.ego_choice import EgoChoice
 from fogsim.traffic.sumo_behaviour.ego_driving import EgoDriving
 from fogsim.traffic.sumo_behaviour.scripted_actions import ScriptedActions, has_lane
 from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl, SumoDesiredSpeeds
@@ -116,12 +126,14 @@ class SumoTraffic:
 
     def __init__(self, setup: TrafficSetup, link: SumoLink) -> None:
         self._setup = setup
+        self._any_ego = setup.ego == ANY_EGO
+        self._ego_of_seed: int | None = None
         self._link = link
         self._run: _Run | None = None
         self._fog: FogAccess | None = None
         self._seed = 0
         self._command = _NO_ADVICE
-        self._begun = 0.0
+        self._begun, self._end = 0.0, math.inf
         self._route: RoutePosition | None = None
         self._mark = 0
         self._teleported = False
@@ -145,8 +157,16 @@ class SumoTraffic:
         seed : int
             SUMO's seed.
         """
+        arguments = command_line(self._setup, seed)
+        api = self._link.begin(arguments)
+        if self._any_ego and self._ego_of_seed != seed:
+            try:
+                self._setup = replace(self._setup, ego=self._chosen_ego(api))
+            except SimulationError as error:
+                raise self._ended(error, None) from error
+            self._ego_of_seed = seed
+            api = self._link.begin(arguments)
         setup = self._setup
-        api = self._link.begin(command_line(setup, seed))
         session = new_session(api)
         mark = LoadMark(api, session)
         roster = Roster(api, self._link.remote, mark)
@@ -183,10 +203,36 @@ class SumoTraffic:
         self._route, self._mark, self._teleported = None, 0, False
         try:
             check_step_length(api, setup.step_length)
+            check_microscopic(api)
+            self._end = end_time(api)
             self._warm_up(self._running)
+        except SimulationError as error:
+            raise self._ended(error, setup.ego) from error
         except Exception:
             self.close()
             raise
+
+    def _ended(self, error: SimulationError, ego: str | None) -> SimulationError:
+        """An error that ends the simulation, with what SUMO has warned of."""
+        self.close()
+        return SimulationError("; ".join(filter(None, (str(error), describe_warnings(self._link.warnings(), ego)))))
+
+    def _chosen_ego(self, api: Api) -> str:
+        """Id of the first vehicle that suits as the ego, for which the simulation runs until it drives."""
+        if self._link.shared:
+            raise SimulationError(f"ego: {ANY_EGO}: FogSim can choose only in its own simulation; name a vehicle")
+        choice, simulation = EgoChoice(api), api.simulation
+        last = min(simulation.getTime() + self._setup.warm_up_limit, end_time(api))
+        while (found := choice.look()) is None:
+            if simulation.getTime() >= last or simulation.getMinExpectedNumber() == 0:
+                found = choice.best
+                break
+            self._link.step()
+        if found is None:
+            until = f"until {simulation.getTime():g} s"
+            raise SimulationError(f"ego: {ANY_EGO}: no car, van, truck or bus drives on a lane {until}")
+        warnings.warn(f"traffic.ego: {ANY_EGO}: the ego is {found!r}", stacklevel=2)
+        return found
 
     def _warm_up(self, run: _Run) -> None:
         simulation, vehicle, ego = run.api.simulation, run.api.vehicle, self._setup.ego
@@ -195,10 +241,12 @@ class SumoTraffic:
             self._step(run)
         while ego is not None and ego not in vehicle.getIDList():
             waited = simulation.getTime() - begun
-            if waited > self._setup.warm_up_limit or simulation.getMinExpectedNumber() == 0:
+            ended, limit = simulation.getTime() >= self._end, self._setup.warm_up_limit
+            if waited > limit or ended or simulation.getMinExpectedNumber() == 0:
+                until = f"the simulation's end is {self._end:g}" if ended else f"traffic.warm_up_limit_s is {limit:g}"
                 raise SimulationError(
-                    f"the ego {ego!r} did not appear within {waited:g} s of simulated time (traffic.warm_up_limit_s "
-                    f"is {self._setup.warm_up_limit:g}); {describe_seen(ego, seen)}"
+                    f"the ego {ego!r} did not appear within {waited:g} s of simulated time ({until}); "
+                    f"{describe_seen(ego, seen)}"
                 )
             self._step(run)
             seen.update(simulation.getDepartedIDList())
@@ -383,6 +431,7 @@ class SumoTraffic:
         self._route = RoutePosition(run.api, ego) if self._route is None or ego in new else self._route
         state = run.reader.state(self._command.lamps, self._heard(run), self._command.lamps_of)
         row = state.ids.index(ego)
+        off_lanes = bool(state.off_lanes[row])
         route_position, route_length = self._route.update(state.position[row], state.lane[row])
         state = self._shown(run, state)
         return TrafficSnapshot(
@@ -390,10 +439,11 @@ class SumoTraffic:
             ego=row,
             route_position=route_position,
             route_length=route_length,
-            speed_limit=run.api.lane.getMaxSpeed(state.lane[row]),
+            speed_limit=math.inf if off_lanes else run.api.lane.getMaxSpeed(state.lane[row]),
             leader=run.leaders.of_ego(ego),
             collisions=run.collisions.take(),
             signal_ahead=run.lights.shown_to(ego),
+            is_ended=run.roster.time >= self._end,
         )
 
     @_translates_errors
@@ -402,7 +452,6 @@ class SumoTraffic:
         run = self._running
         run.roster.update()
         state = run.reader.state(self._command.lamps, self._heard(run))
-        # Who is between lanes is on none.
         limits = [float(run.api.lane.getMaxSpeed(lane)) for lane in {*state.lane} if lane]
         state = self._shown(run, state)
         return NetworkSnapshot(
@@ -411,6 +460,7 @@ class SumoTraffic:
             collisions=run.collisions.take(),
             is_over=run.api.simulation.getMinExpectedNumber() == 0,
             waiting=tuple(run.api.simulation.getPendingVehicles()),
+            is_ended=run.roster.time >= self._end,
         )
 
     def _shown(self, run: _Run, state: TrafficState) -> TrafficState:

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from fogsim.errors import InputError, SimulationError, shown
-from fogsim.traffic.setup import TrafficSetup
+from fogsim.traffic.setup import ANY_EGO, TrafficSetup
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.traffic.sumo.link import Api, translated_errors
-from fogsim.traffic.sumo.loaded_files import describe_seen
+from fogsim.traffic.sumo.loaded_files import check_microscopic, describe_seen
 from fogsim.traffic.sumo.traci_link import load_traci
 from fogsim.traffic.sumo_traffic import SumoTraffic
 from fogsim.values import Command, Unplayed
@@ -59,6 +59,10 @@ class AttachedLink:
     def end(self) -> None:
         """Do nothing: the simulation is its owner's."""
 
+    def warnings(self) -> tuple[str, ...]:
+        """Nothing: the owner of the simulation reads them."""
+        return ()
+
     def translated_errors(self) -> contextlib.AbstractContextManager[None]:
         """Turn the loss of the simulation into an error of ours; see `SumoLink.translated_errors`."""
         return translated_errors(self._library, "to which FogSim is attached")
@@ -82,7 +86,7 @@ class AttachedTraffic(SumoTraffic):
     Raises
     ------
     SimulationError
-        If no simulation runs there.
+        If no simulation runs there, or a mesoscopic one.
     InputError
         If no ego is named.
     """
@@ -90,8 +94,12 @@ class AttachedTraffic(SumoTraffic):
     def __init__(self, setup: TrafficSetup, api: Api) -> None:
         if setup.ego is None:
             raise InputError("attaching to a simulation needs an ego vehicle in it, and traffic.ego is none")
+        if setup.ego == ANY_EGO:
+            raise InputError(f"ego: {ANY_EGO}: FogSim can choose only in its own simulation; name a vehicle")
         self._attached = AttachedLink(api)
         self._api = api
+        with self._attached.translated_errors():
+            check_microscopic(api)
         self.ego = setup.ego
         self._seen: set[str] = set()
         super().__init__(replace(setup, step_length=step_length(api)), self._attached)

@@ -247,9 +247,9 @@ class Step(TrafficStep):
     ego : int
         Row of the ego vehicle in `traffic`.
     route_position : float
-        How far the ego has driven along its route [m].
+        How far the ego has driven along its route [m]; off the lanes, where it left them.
     speed_limit : float
-        Speed limit where the ego is [m/s].
+        Speed limit where the ego is [m/s]; ``inf`` where it is off the lanes (`TrafficState.off_lanes`).
     leader : Leader or None
         The vehicle ahead.
     signal_ahead : SignalAhead or None

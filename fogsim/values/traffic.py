@@ -139,7 +139,7 @@ class TrafficState:
     length, width, height : (n,) float64
         Size of the body [m].
     lane : tuple of str
-        Lane ids.
+        Lane ids; empty for vehicles off the lanes.
     lamps : (n,) int32
         Lit lamps, bits of `Lamp`; where one side of a kind is dark, with the bits of `fogsim.values.light.dark_on`.
     paint : (n, 3) float64
@@ -153,6 +153,10 @@ class TrafficState:
     advised_speed : (n,) float64
         Lowest speed in force that a driver has heard advised, whether they follow it or not, the ego its own [m/s];
         ``inf`` where they have heard none. Empty where nobody has.
+    off_lanes : (n,) bool
+        Whether a vehicle is off the lanes: parked beside the road (as a taxi that waits is), or put there by another
+        simulator. It has its position and its heading, but no limit, no leader and no acceleration. Left out, all
+        vehicles are on lanes.
     signals : SignalState
         Heads of traffic lights near the ego; none without an ego.
     persons : PersonState
@@ -183,6 +187,7 @@ class TrafficState:
     grade: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     free_speed: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     advised_speed: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    off_lanes: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
     signals: SignalState = NO_SIGNALS
     persons: PersonState = NO_PERSONS
     course: tuple[str, ...] = ()
@@ -190,9 +195,11 @@ class TrafficState:
     pieces: BodyPieces = NO_PIECES
 
     def __post_init__(self) -> None:
-        """Put everybody on the level where no grade is given, and along lanes where no course is."""
+        """Put vehicles on the level, on lanes and along these where nothing else is given."""
         if not len(self.grade):
             object.__setattr__(self, "grade", np.zeros(len(self.ids)))
+        if not len(self.off_lanes):
+            object.__setattr__(self, "off_lanes", np.zeros(len(self.ids), np.bool_))
         if not self.course:
             object.__setattr__(self, "course", self.lane)
 
@@ -267,6 +274,7 @@ def with_persons(state: TrafficState) -> TrafficState:
         grade=np.append(state.grade, unknown),
         free_speed=np.append(state.free_speed, unknown) if len(state.free_speed) else state.free_speed,
         advised_speed=np.append(state.advised_speed, unknown) if len(state.advised_speed) else state.advised_speed,
+        off_lanes=np.append(state.off_lanes, np.zeros(count, np.bool_)),
     )
 
 
@@ -352,17 +360,19 @@ class TrafficSnapshot:
     ego : int
         Row of the ego.
     route_position : float
-        How far along its route the ego's front bumper is [m].
+        How far along its route the ego's front bumper is [m]; off the lanes, where it left them.
     route_length : float
         Length of the route [m].
     speed_limit : float
-        Speed limit where the ego is [m/s].
+        Speed limit where the ego is [m/s]; ``inf`` off the lanes.
     leader : Leader or None
         The next vehicle ahead that goes the same way and whose width overlaps.
     collisions : tuple of Collision
         Collisions of any vehicles since the last snapshot, each pair once.
     signal_ahead : SignalAhead or None
         The next traffic light on its way.
+    is_ended : bool
+        True from the simulation's own end on, as its configuration sets it.
     """
 
     state: TrafficState
@@ -373,6 +383,7 @@ class TrafficSnapshot:
     leader: Leader | None
     collisions: tuple[Collision, ...]
     signal_ahead: SignalAhead | None = None
+    is_ended: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -391,6 +402,8 @@ class NetworkSnapshot:
         True if nobody is there, and nobody will come.
     waiting : tuple of str
         Ids of vehicles that are due and find no room to enter the road.
+    is_ended : bool
+        As of `TrafficSnapshot`.
     """
 
     state: TrafficState
@@ -398,6 +411,7 @@ class NetworkSnapshot:
     collisions: tuple[Collision, ...]
     is_over: bool
     waiting: tuple[str, ...] = ()
+    is_ended: bool = False
 
 
 _AHEAD = Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.FRONT_FOG | Lamp.DAYTIME
@@ -455,6 +469,7 @@ def with_pieces(state: TrafficState, skip: int | None) -> tuple[TrafficState, ND
         width=state.width[body],
         height=state.height[body],
         paint=state.paint[body],
+        off_lanes=state.off_lanes[body],
         course=tuple(state.course[row] for row in body.tolist()),
     )
     return drawn, body

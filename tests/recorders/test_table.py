@@ -81,6 +81,7 @@ def test_a_step_becomes_a_row(tmp_path: Path) -> None:
         "measured_lead_relative_speed_mps": -5.1,
         "collisions": 1,
         "ending": "time",
+        "off_lanes": False,
         "sensor_faults": None,
         "warning": "fog_ahead",
         "joint_road_valid": True,

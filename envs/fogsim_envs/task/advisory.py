@@ -173,7 +173,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         self._standard = build.safety_standard(scenario)
         self._way_end = self._arrival(self._step, scenario)
         length = max(self._way_end - self._step.route_position, 1.0)
-        self._way = Way(length, max(self._step.speed_limit, 1.0), scenario.duration_s)
+        self._way = Way(length, max(_limit(self._step), 1.0), scenario.duration_s)
         self._own = self._built_in = Command()
         self._renderer.begin_episode()
         self._show()
@@ -324,6 +324,12 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         if self._simulation is not None:
             self._simulation.close()
         self._simulation, self._step, self._running = None, None, None
+
+
+def _limit(step: Step) -> float:
+    """Speed limit where the ego is [m/s]; off the lanes, the speed that it drives there by itself."""
+    free = step.traffic.free_speed
+    return float(free[step.ego]) if math.isinf(step.speed_limit) and len(free) else step.speed_limit
 
 
 def _route_length(step: Step) -> float:

@@ -79,6 +79,8 @@ def _when_read(span: TrafficSpan, sections: NDArray[np.float64]) -> tuple[NDArra
         return np.ones((steps, len(sections)), np.bool_), span.duration * len(sections)
     ego, elapsed = span.position[span.ego, None, :2], span.elapsed[span.ego, None]
     away = np.hypot(*np.moveaxis(ego - sections[:, :2], -1, 0))
+    # None is read while the ego is off the lanes.
+    read = np.zeros((int(np.ptp(span.moment)) + 1 if len(span.moment) else 0, len(sections)), np.bool_)
     # Who passes was read at the step before, too.
-    read = away <= span.reading_radius - _FASTEST * elapsed
-    return read, float((read * elapsed).sum())
+    near = read[span.moment[span.ego] - span.moment[:1]] = away <= span.reading_radius - _FASTEST * elapsed
+    return read, float((near * elapsed).sum())

@@ -207,7 +207,8 @@ def _draw_speeds(draw: ImageDraw.ImageDraw, step: Step) -> None:
         _draw_number(draw, _ADVICE_X, f"{_kmh(advised):.0f}", ADVICE)
     else:
         draw.text((_ADVICE_X, 92), "none", fill=MUTED, font=font(26), anchor="ls")
-    _draw_limit(draw, _kmh(step.speed_limit))
+    if math.isfinite(step.speed_limit):
+        _draw_limit(draw, _kmh(step.speed_limit))
 
 
 def _draw_number(draw: ImageDraw.ImageDraw, x: int, number: str, colour: Colour) -> None:

@@ -20,6 +20,10 @@ _FIRST_ELEMENTS: Mapping[str, tuple[str, ...]] = {
 _OTHER_FILES = {*itertools.chain(*_FIRST_ELEMENTS.values()), "OpenSCENARIO", "gpx", "kml", "osm", "html", "svg"}
 """First elements of files of other types."""
 
+NO_LANES = "vehicles of a mesoscopic simulation have no positions in lanes, so no camera can see them; leave it out"
+"""Why a mesoscopic simulation is refused."""
+
+_TRUE = ("true", "1", "yes", "on", "x", "t")  # SUMO's words
 _NET = ("net-file", "net", "n")
 _ADDITIONAL = ("additional-files", "additional", "a")
 _ROUTES = ("route-files", "routes", "r")
@@ -61,10 +65,12 @@ def check_sumo_file(kind: str, path: Path) -> None:
 def check_configured_files(config: Path) -> None:
     """Check the network, route and additional files of a SUMO configuration with `check_sumo_file`.
 
-    Names with variables, or with separators that only SUMO knows, are not checked.
+    A mesoscopic simulation is refused. Names with variables, or with separators that only SUMO knows, are not checked.
     """
     configured_files(config)
     root = _root(config)
+    if any(value.lower() in _TRUE for value in _values(root, ("mesosim",))):
+        raise InputError(f"{config}: mesosim: {NO_LANES}")
     for kind, options in (("net", _NET), ("routes", _ROUTES), ("additional", _ADDITIONAL)):
         for path in _named(config, root, options):
             if not set(str(path).removeprefix(str(config.parent))).intersection("$; "):
@@ -117,6 +123,11 @@ def ignored_options(config: Path) -> tuple[str, ...]:
 def configured_prefix(config: Path) -> str:
     """Prefix of the names of a SUMO configuration's outputs."""
     return next(_values(_root(config), ("output-prefix",)), "")
+
+
+def is_configured(config: Path, option: str) -> bool:
+    """Whether a SUMO configuration sets an option."""
+    return any(_values(_root(config), (option,)))
 
 
 def input_files(config: Path) -> tuple[Path, ...]:

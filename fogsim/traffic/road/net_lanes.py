@@ -48,8 +48,7 @@ def _heads(edge: Any, side: float) -> Iterator[SignalHead]:
     function = edge.getFunction()
     if function:
         return crossing_heads(edge.getLanes()[0], side) if function == "crossing" else iter(())
-    lanes = [lane for lane in edge.getLanes() if _kind(lane) is LaneKind.CARRIAGEWAY and len(lane.getShape()) > 1]
-    return signal_heads(lanes, side)
+    return signal_heads([lane for lane in edge.getLanes() if _kind(lane) is LaneKind.CARRIAGEWAY], side)
 
 
 def _location(net: Any) -> tuple[str, str] | None:

@@ -30,8 +30,10 @@ _BESIDE = 0.6  # of posts, beyond the edge of the outermost lane [m]
 def signal_heads(lanes: Sequence[Any], side: float) -> Iterator[SignalHead]:
     """Heads at the end of an edge: one on a post for the outermost lane, one on its arm for each other lane.
 
-    `lanes` (sumolib) are those for vehicles, from the side that they keep to: left (1) or right (−1).
+    `lanes` (sumolib) are those for vehicles, from the side that they keep to: left (1) or right (−1). A lane whose
+    points coincide, which SUMO reads as any other, has no direction to stand across, and no head.
     """
+    lanes = [lane for lane in lanes if _steps(np.array(lane.getShape3D(), np.float64)).size]
     heads = [(lane, signal, links) for lane in lanes for signal, links in _signals(lane)]
     if not heads:
         return
@@ -64,7 +66,7 @@ def crossing_heads(crossing: Any, side: float) -> Iterator[SignalHead]:
     edge = crossing.getEdge()
     ways = [way for source in edge.getIncoming() for way in source.getConnections(edge) if way.getTLSID()]
     line = np.array(crossing.getShape3D(), np.float64)
-    if not ways or len(line) < 2:
+    if not ways or not _steps(line).size:
         return
     for name, there in ((crossing.getID(), line), (edge.getID(), line[::-1])):
         heading = _heading(there)
@@ -91,9 +93,14 @@ def _signals(lane: Any) -> list[tuple[str, tuple[int, ...]]]:
     return [(ways[0][0], tuple(sorted(link for signal, link in ways if signal == ways[0][0])))] if ways else []
 
 
+def _steps(line: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Horizontal steps (n, 2) [m] along a polyline between points that do not coincide."""
+    steps = np.diff(line.reshape(-1, 3)[:, :2], axis=0)
+    return steps[np.hypot(steps[:, 0], steps[:, 1]) > 1e-3]
+
+
 def _heading(line: NDArray[np.float64]) -> float:
-    steps = np.diff(line[:, :2], axis=0)
-    x, y = steps[np.hypot(steps[:, 0], steps[:, 1]) > 1e-3][-1].tolist()
+    x, y = _steps(line)[-1].tolist()
     return math.atan2(y, x)
 
 

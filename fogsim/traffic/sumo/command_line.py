@@ -1,11 +1,12 @@
 """SUMO's command line, of what a traffic simulation needs to know."""
 
-from fogsim.traffic.road.configuration import OVERRIDES, configured_prefix
+from fogsim.traffic.road.configuration import OVERRIDES, configured_prefix, is_configured
 from fogsim.traffic.road.opendrive import is_opendrive
 from fogsim.traffic.setup import AfterCollision, TrafficSetup
 
 _FOR_EVER = "1e6"
 _PREFIX = "output-prefix"
+_LOG = "error-log"
 
 
 def command_line(setup: TrafficSetup, seed: int) -> list[str]:
@@ -46,6 +47,11 @@ def _usual(setup: TrafficSetup) -> dict[str, str]:
     if setup.after_collision is AfterCollision.STOP:
         return {**quiet, **own, "collision.action": "warn", "collision.stoptime": _FOR_EVER}
     return {**quiet, **own, "collision.action": "remove"}
+
+
+def has_error_log(setup: TrafficSetup) -> bool:
+    """Whether the scenario or its configuration asks for SUMO's own log of warnings and errors."""
+    return _LOG in dict(setup.sumo_options) or (setup.config is not None and is_configured(setup.config, _LOG))
 
 
 def output_prefix(setup: TrafficSetup) -> str:

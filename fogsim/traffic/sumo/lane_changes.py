@@ -128,11 +128,11 @@ class LaneChangeSmoothing:
 
 
 def _lane_changed(last: TrafficState, state: TrafficState) -> list[str]:
-    """Vehicles of both states whose lane is another, be it only the next along the road."""
+    """Vehicles on lanes in both states whose lane is another, be it only the next along the road."""
     if state.lane == last.lane and state.ids == last.ids:
         return []
     before = dict(zip(last.ids, last.lane, strict=True))
-    return [v for v, lane in zip(state.ids, state.lane, strict=True) if before.get(v, lane) != lane]
+    return [v for v, lane in zip(state.ids, state.lane, strict=True) if lane and (before.get(v) or lane) != lane]
 
 
 def _sideways_jumps(last: TrafficState, state: TrafficState, vehicles: Sequence[str]) -> NDArray[np.float64]:

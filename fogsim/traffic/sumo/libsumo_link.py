@@ -127,6 +127,10 @@ class LibsumoLink:
         if self._outputs is not None:
             self._outputs.close()
 
+    def warnings(self) -> Sequence[str]:
+        """What SUMO has warned of until its `end`; see `SumoLink.warnings`."""
+        return () if self._outputs is None else self._outputs.warnings
+
     def translated_errors(self) -> contextlib.AbstractContextManager[None]:
         """Turn what libsumo refuses into an error of ours; see `SumoLink.translated_errors`."""
         return translated_errors(self._sumo or load_libsumo(), "in this process")

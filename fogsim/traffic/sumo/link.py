@@ -54,6 +54,9 @@ class SumoLink(Protocol):
     def end(self) -> None:
         """End the simulation, or leave it; ending twice is allowed."""
 
+    def warnings(self) -> Sequence[str]:
+        """What SUMO has warned of until its `end`; empty where its owner reads that."""
+
     def translated_errors(self) -> contextlib.AbstractContextManager[None]:
         """Block in which a simulation that is lost or refuses a call becomes a `SimulationError`."""
 
@@ -78,6 +81,9 @@ def translated_errors(library: ModuleType, where: str) -> Iterator[None]:
     except library.TraCIException as error:
         raise SimulationError(f"SUMO {where} refused: {error}") from error
 
+
+UNKNOWN = -(2.0**30)
+"""SUMO's answer where there is none: the place on a lane, slope and allowed speed of a vehicle off the lanes."""
 
 Getter = Callable[..., Any]
 """From a vehicle's id, and what else SUMO asks for, to the answer."""
@@ -114,6 +120,11 @@ def vehicle_getter(api: Api, name: str) -> Getter:
         Name of the getter.
     """
     return getter(api, "vehicle", name)
+
+
+def is_off_lanes(api: Api, vehicle: str) -> bool:
+    """Whether a vehicle on the road is on no lane: parked beside it, or put there; see `TrafficState.off_lanes`."""
+    return not api.vehicle.getLaneID(vehicle)
 
 
 def subscribed(api: Api, names: Mapping[str, int]) -> tuple[Getter, ...]:

@@ -1,10 +1,12 @@
 """What a running simulation says of itself."""
 
 import difflib
-from collections.abc import Collection
+import math
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 from fogsim.errors import SimulationError
+from fogsim.traffic.road.configuration import NO_LANES
 from fogsim.traffic.sumo.link import Api
 
 CLOCK_TICK = 1e-3
@@ -12,6 +14,9 @@ CLOCK_TICK = 1e-3
 
 SHOWN = 8
 """Vehicles that a message names."""
+
+MOST_WARNINGS = 3
+"""Warnings of SUMO's that a message repeats."""
 
 
 def describe_seen(ego: str, seen: Collection[str]) -> str:
@@ -30,6 +35,26 @@ def describe_seen(ego: str, seen: Collection[str]) -> str:
     some = [*near, *sorted(set(seen).difference(near))[: SHOWN - len(near)]]
     others = f" and {len(seen) - len(some)} more" if len(seen) > len(some) else ""
     return f"those that did: {', '.join(some)}{others}"
+
+
+def describe_warnings(warnings: Sequence[str], ego: str | None) -> str:
+    """What SUMO has warned of, in one line: of the ego if it is named, otherwise of all; empty without warnings."""
+    distinct = list(dict.fromkeys(warnings))
+    told = [one for one in distinct if ego is not None and f"'{ego}'" in one] or distinct
+    more = f" and {len(told) - MOST_WARNINGS} more" if len(told) > MOST_WARNINGS else ""
+    return f"SUMO warned: {' '.join(told[:MOST_WARNINGS])}{more}" if told else ""
+
+
+def end_time(api: Api) -> float:
+    """Time at which a simulation ends by its own options [s]; ``inf`` if they do not say."""
+    end = float(api.simulation.getEndTime())
+    return end if end >= 0.0 else math.inf
+
+
+def check_microscopic(api: Api) -> None:
+    """Raise SimulationError if a simulation is mesoscopic."""
+    if api.simulation.getOption("mesosim") == "true":
+        raise SimulationError(f"SUMO runs with mesosim: {NO_LANES}")
 
 
 def check_step_length(api: Api, step_length: float) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from fogsim.errors import MissingDependencyError, nearest, shown
 from fogsim.files.xml_reader import read_tree
+from fogsim.traffic.road.configuration import NO_LANES
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 
 OptionValue = bool | int | float | str
@@ -31,6 +32,7 @@ OWN_OPTIONS: Mapping[str, str] = {
     "load-state": "give it in a SUMO configuration (traffic.config)",
     "step-length": "give clocks.traffic_step_s",
     "end": "give duration_s, which counts from the ego's appearance",
+    "mesosim": NO_LANES,
     "collision.action": "give traffic.after_collision",
     "collision.stoptime": "give traffic.after_collision",
     "seed": _SEED,

@@ -15,6 +15,9 @@ _TO_THE_ROOT = "../" * 40
 
 _TOKEN = "TIME"  # noqa: S105 - what SUMO puts the time for, in a prefix
 _END_OF_XML = 200
+_LOG_NAME = ".fogsim-warnings"
+_WARNING = "Warning:"
+_LOG = ("--error-log", _LOG_NAME, "--aggregate-warnings", "20")  # so many of a type, or the log of a day would be long
 _OPEN_FILES = Path("/proc/self/fd")
 MOST_NAMED = 6
 """Files that a message names."""
@@ -34,11 +37,20 @@ class OutputFolder:
         in it.
     prefix : str
         What the names of files begin with.
+    collects_warnings : bool
+        Whether to read SUMO's warnings on `close`, from a log that is removed.
+
+    Attributes
+    ----------
+    warnings : tuple of str
+        What SUMO had warned of at the last `close`.
     """
 
-    def __init__(self, folder: Path | None, prefix: str = "") -> None:
+    def __init__(self, folder: Path | None, prefix: str = "", collects_warnings: bool = False) -> None:
         self._folder = folder
         self._prefix = prefix
+        self._log = _LOG if collects_warnings else ()
+        self.warnings: tuple[str, ...] = ()
         self._own: Path | None = None
         self._way = ""
         self._told: set[str] = set()
@@ -51,13 +63,14 @@ class OutputFolder:
         InputError
             If it cannot be made, or not be written.
         """
+        self.warnings = ()
         if self._own is None and (self._folder is None or not _can_be_named(self._folder)):
             self._own = Path(tempfile.mkdtemp(prefix="fogsim-"))
             # Also where nobody closes it.
             self._removal = weakref.finalize(self, shutil.rmtree, self._own, ignore_errors=True)
         leads = self._writable() if self._own is None or self._folder is None else self._link(self._own)
         self._way = f"{_TO_THE_ROOT}{str(leads)[1:]}/{self._prefix}"
-        return ["--output-prefix", self._way]
+        return ["--output-prefix", self._way, *self._log]
 
     @property
     def _place(self) -> Path:
@@ -133,6 +146,7 @@ class OutputFolder:
             If SUMO, which does not tell, could not write all of a file, or outputs were lost of which nobody knew.
         """
         try:
+            self._take_warnings()
             self.tell_lost()
             if self._folder is not None:
                 self._tell_cut_off(self._folder)
@@ -142,6 +156,14 @@ class OutputFolder:
             if self._own is not None:
                 self._removal()
                 self._own = None
+
+    def _take_warnings(self) -> None:
+        place = self._folder or self._own
+        log = None if place is None else place / f"{self._prefix}{_LOG_NAME}"
+        if self._log and log is not None and log.is_file():
+            lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
+            self.warnings = tuple(line.removeprefix(_WARNING).strip() for line in lines if line.startswith(_WARNING))
+            log.unlink()
 
     def _tell_cut_off(self, folder: Path) -> None:
         cut = [name for name in _names(folder) if name.endswith(".xml") and not _is_whole(folder / name)]
@@ -167,7 +189,8 @@ def _can_be_named(folder: Path) -> bool:
 
 
 def _names(folder: Path) -> list[str]:
-    return sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
+    there = folder.iterdir() if folder.is_dir() else ()
+    return sorted(path.name for path in there if not path.name.endswith(_LOG_NAME))
 
 
 def _is_whole(path: Path) -> bool:

@@ -153,6 +153,10 @@ class TraciLink:
         if connection is not None:
             _close(connection)
 
+    def warnings(self) -> tuple[str, ...]:
+        """Nothing: the owner of the simulation reads them."""
+        return ()
+
     def translated_errors(self) -> contextlib.AbstractContextManager[None]:
         """Turn the loss of the connection into an error of ours; see `SumoLink.translated_errors`."""
         return translated_errors(load_traci(), self._where)

@@ -16,7 +16,7 @@ from fogsim.traffic.appearance import (
     paint,
 )
 from fogsim.traffic.sumo.claims import SPEED_FACTOR, TOP_SPEED, Claims
-from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
+from fogsim.traffic.sumo.link import UNKNOWN, Api, getter, vehicle_getter
 from fogsim.traffic.sumo.nearby_vehicles import AllVehicles, NearbyVehicles
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.values import Collision, Lamp, TrafficState
@@ -34,7 +34,15 @@ _ACCELERATION = 0x72
 _LANE = 0x51
 _SIGNALS = 0x5B
 _SLOPE = 0x36
-_MOVING = (_POSITION_3D, _ANGLE, _SPEED, _ACCELERATION, _LANE, _SIGNALS, _SLOPE)
+_MOVING = {
+    _POSITION_3D: "getPosition3D",
+    _ANGLE: "getAngle",
+    _SPEED: "getSpeed",
+    _ACCELERATION: "getAcceleration",
+    _LANE: "getLaneID",
+    _SIGNALS: "getSignals",
+    _SLOPE: "getSlope",
+}
 
 _MARGIN = 50.0
 """SUMO gathers vehicles by the lanes near the ego; this much more radius leaves none out [m]."""
@@ -56,7 +64,7 @@ class DynamicState(NamedTuple):
     speed, acceleration : (n,) float64
         Speed [m/s] and acceleration [m/s²].
     lane : tuple of str
-        Lane ids.
+        Lane ids; empty off the lanes.
     signals : sequence of int
         SUMO's signal bits.
     slope : (n,) float64
@@ -176,7 +184,7 @@ class VehicleReader:
         self._level = math.nan
         self._hits = getter(api, "simulation", "getCollisions")
         self._lane_limit = getter(api, "lane", "getMaxSpeed")
-        # Who is between lanes is limited by nothing but the vehicle.
+        # A vehicle off the lanes is limited by nothing but itself.
         self._lane_limits = {"": math.inf}
         self._mark = 0
         self._constants: _Constants | None = None
@@ -203,6 +211,7 @@ class VehicleReader:
         new, self._mark = self._roster.entered_since(self._mark)
         self._bodies.forget(new)
         now = self._dynamic_state()
+        off_lanes = _off_lanes(now)
         constants = self._constants_of(now.ids)
         ego = constants.ego
         lamps = self._lamps(now.signals)
@@ -227,6 +236,7 @@ class VehicleReader:
             grade=np.radians(now.slope),
             free_speed=np.minimum(self._limits(now.lane) * constants.speed_factor, constants.top_speed),
             advised_speed=advised_speeds(now.ids, heard or {}),
+            off_lanes=off_lanes,
         )
 
     def _limits(self, lanes: Sequence[str]) -> NDArray[np.float64]:
@@ -291,6 +301,16 @@ class VehicleReader:
         return math.hypot(hit.colliderSpeed - hit.victimSpeed * math.cos(turn), hit.victimSpeed * math.sin(turn))
 
 
+def _off_lanes(now: DynamicState) -> NDArray[np.bool_]:
+    """Who is off the lanes (n,); without the acceleration and slope that SUMO reports of these. Empty if none is."""
+    if "" not in now.lane:
+        return np.zeros(0, np.bool_)
+    off_lanes = np.array([not lane for lane in now.lane])
+    now.acceleration[off_lanes] = 0.0
+    now.slope[now.slope == UNKNOWN] = 0.0
+    return off_lanes
+
+
 class SubscribedReader(VehicleReader):
     """Reads vehicles by subscribing to the surroundings of an ego, which SUMO sends at once.
 
@@ -298,6 +318,8 @@ class SubscribedReader(VehicleReader):
     clients may take the ego away before the next step. The interface and the result are those of
     `VehicleReader`, whose getters cost a message each over a connection.
     """
+
+    _read: tuple[str, ...] = ()
 
     def _dynamic_state(self) -> DynamicState:
         if self._ego is None:
@@ -307,7 +329,7 @@ class SubscribedReader(VehicleReader):
         listed = sorted(vehicle for vehicle, row in rows.items() if all(v in row for v in _MOVING))
         position = np.array([rows[v][_POSITION_3D] for v in listed])
         near = self._is_near(listed, position)
-        ids = tuple(v for v, is_near in zip(listed, near, strict=True) if is_near)
+        ids = self._read = tuple(v for v, is_near in zip(listed, near, strict=True) if is_near)
         return DynamicState(
             ids=ids,
             position=position[near],
@@ -321,6 +343,10 @@ class SubscribedReader(VehicleReader):
 
     def _surroundings(self) -> Mapping[str, Mapping[int, Any]]:
         vehicle = self._api.vehicle
-        vehicle.subscribeContext(self._ego, _VEHICLES, self._radius + _MARGIN, _MOVING, end=self._roster.time)
-        rows: Mapping[str, Mapping[int, Any]] = vehicle.getContextSubscriptionResults(self._ego)
+        reach = self._radius + _MARGIN
+        vehicle.subscribeContext(self._ego, _VEHICLES, reach, tuple(_MOVING), end=self._roster.time)
+        rows: dict[str, Mapping[int, Any]] = dict(vehicle.getContextSubscriptionResults(self._ego))
+        # SUMO sends nothing of vehicles that another simulator has put off the lanes.
+        for missing in self._roster.present.intersection((self._ego, *self._read)).difference(rows):
+            rows[missing] = {number: getattr(vehicle, name)(missing) for number, name in _MOVING.items()}
         return rows

@@ -3,7 +3,7 @@
 import itertools
 from collections.abc import Collection, Sequence
 
-from fogsim.traffic.sumo.link import Api
+from fogsim.traffic.sumo.link import Api, is_off_lanes
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
 from fogsim.traffic.sumo_lanes.route_position import RoutePlaces
 from fogsim.traffic.templates.vehicle_types import VEHICLE_KINDS
@@ -28,10 +28,10 @@ def depart(api: Api, action: Depart, present: Collection[str]) -> bool:
     Returns
     -------
     bool
-        False if there is such a vehicle already, the other one is not there, or the place is off its way.
+        False if there is such a vehicle already, the other one is not on a lane, or the place is off its way.
     """
     get, like = api.vehicle, action.like
-    if action.vehicle in present or like not in present:
+    if action.vehicle in present or like not in present or is_off_lanes(api, like):
         return False
     kind = _type(api, action.vehicle, action.kind) if action.kind else get.getTypeID(like)
     length = float(get.getLength(like)) if action.gap < 0.0 else -float(api.vehicletype.getLength(kind))

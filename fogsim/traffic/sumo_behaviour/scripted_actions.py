@@ -5,7 +5,7 @@ from collections.abc import Collection, Sequence
 from fogsim.traffic.drivers.playing import Lamps, Motion, Playing
 from fogsim.traffic.sumo.claims import LANE_CHANGE_MODE, Claims
 from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
-from fogsim.traffic.sumo.link import Api
+from fogsim.traffic.sumo.link import Api, is_off_lanes
 from fogsim.traffic.sumo_behaviour.departures import depart, enter
 from fogsim.traffic.sumo_behaviour.signal_control import SignalControl
 from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl
@@ -168,6 +168,8 @@ def has_lane(api: Api, vehicle: str, lanes: int) -> bool:
     lanes : int
         How many.
     """
+    if is_off_lanes(api, vehicle):
+        return False
     edge, lane = str(api.vehicle.getRoadID(vehicle)), int(api.vehicle.getLaneIndex(vehicle)) + lanes
     # Lanes of a junction tell nothing of those behind it, where SUMO makes the change.
     return lane >= 0 and (edge.startswith(":") or lane < int(api.edge.getLaneNumber(edge)))

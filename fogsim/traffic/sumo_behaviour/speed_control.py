@@ -15,7 +15,7 @@ from fogsim.traffic.drivers.events import Order
 from fogsim.traffic.drivers.sight import FogAccess
 from fogsim.traffic.drivers.speed_choice import CHOICE_PERIOD, speed_by_compliance
 from fogsim.traffic.setup import TrafficSetup
-from fogsim.traffic.sumo.link import Api, vehicle_getter
+from fogsim.traffic.sumo.link import UNKNOWN, Api, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
 from fogsim.traffic.sumo_behaviour.fog_choices import FogChoices
@@ -143,11 +143,13 @@ class SpeedControl:
 
     def _hold(self, vehicle: str, target: float, deceleration: float) -> None:
         self._held.add(vehicle)
-        if self._brakes_hard(vehicle):
+        limit = float(self._vehicles.getAllowedSpeed(vehicle))
+        # Off the lanes there is nothing to be held to.
+        if limit == UNKNOWN or self._brakes_hard(vehicle):
             self._vehicles.setSpeed(vehicle, _SUMO_DRIVES)
             return
         # Advice does not make a driver faster than the road and the vehicle allow.
-        allowed = min(target, self._vehicles.getAllowedSpeed(vehicle))
+        allowed = min(target, limit)
         speed = self._vehicles.getSpeed(vehicle)
         self._vehicles.setSpeed(vehicle, decelerated_speed(speed, allowed, deceleration, self._step_length))
 
@@ -343,9 +345,14 @@ class SumoDesiredSpeeds:
         return speed_by_compliance(compliance, min(own, self._allowed(vehicle)), advised, visibility)
 
     def _allowed(self, vehicle: str) -> float:
-        """What the road allows a driver [m/s], whatever the top speed that the vehicle has been given."""
+        """What the road allows a driver [m/s], whatever the top speed that the vehicle has been given.
+
+        Off the lanes it is ``inf``.
+        """
         get = self._api.vehicle
         allowed = float(get.getAllowedSpeed(vehicle))
+        if allowed == UNKNOWN:
+            return math.inf
         if allowed < get.getMaxSpeed(vehicle):
             return allowed
         # The top speed is the lower one, and SUMO gives only that.

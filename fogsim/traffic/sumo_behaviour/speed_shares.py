@@ -9,7 +9,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.traffic.sumo.link import Api, vehicle_getter
+from fogsim.traffic.sumo.link import UNKNOWN, Api, vehicle_getter
 from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
 from fogsim.traffic.sumo_behaviour.top_speeds import MAX_INTERVAL
 
@@ -82,7 +82,7 @@ class SpeedShareControl:
             self._table.values[row, Column.SHARE_DESIRED] = desired[i]
             self._set(vehicle, row, float(desired[i]))
             allowed = float(self._allowed(vehicle))
-            if allowed < self._speed(vehicle):
+            if UNKNOWN < allowed < self._speed(vehicle):
                 # It has not braked for that: its acceleration is 0.
                 self._vehicles.setPreviousSpeed(vehicle, allowed, 0.0)
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from fogsim.traffic.drivers.events import signed_gap
-from fogsim.traffic.sumo.link import Api, getter
+from fogsim.traffic.sumo.link import UNKNOWN, Api, getter, is_off_lanes
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
 
 MOVE_TOLERANCE = 5.0
@@ -86,6 +86,7 @@ class RoutePlaces:
         """
         get = self._api.vehicle
         lane, station = get.getLaneID(vehicle), float(get.getLanePosition(vehicle))
+        station = 0.0 if station == UNKNOWN else station
         route, index = get.getRoute(vehicle), max(int(get.getRouteIndex(vehicle)), 0)
         edge, is_inside = route[index], lane.startswith(":")
         length = self._lengths.of_edge(edge)
@@ -141,7 +142,8 @@ class RoutePlaces:
 class RoutePosition:
     """Position of a vehicle along its route.
 
-    Follows a route that changes on the way, and a vehicle that is moved by hand, whose odometer SUMO sets anew.
+    Follows a route that changes on the way, and a vehicle that is moved by hand, whose odometer SUMO sets anew. Off the
+    lanes, a vehicle stays where it left them.
 
     Parameters
     ----------
@@ -166,6 +168,8 @@ class RoutePosition:
         place = self._places.find(vehicle)
         here = starts[place.number] + place.station + place.past_end
         self._offset = here - self._places.directions.driven(vehicle)
+        self._held = False
+        self._place = here, self._length
 
     def update(self, here: Sequence[float], lane: str) -> tuple[float, float]:
         """Position of the front bumper along the route, and the route's length [m].
@@ -175,12 +179,17 @@ class RoutePosition:
         here : sequence of float
             Position of the front bumper [m].
         lane : str
-            Id of the lane that it is on.
+            Id of the lane that it is on; empty off the lanes.
         """
+        if not lane:
+            self._held, self._last = True, None
+            return self._place
         driven = self._places.directions.driven(self._vehicle, lane)
-        if self._current_route(self._vehicle) != self._route_id or self._has_jumped(driven, here):
+        is_known = not self._held and self._current_route(self._vehicle) == self._route_id
+        if not is_known or self._has_jumped(driven, here):
             self._begin()
-        return self._offset + driven, self._length
+        self._place = self._offset + driven, self._length
+        return self._place
 
     def _has_jumped(self, driven: float, here: Sequence[float]) -> bool:
         """True if the vehicle cannot have driven to where it is since the last update."""
@@ -206,18 +215,22 @@ class GapToEgo:
     """
 
     def __init__(self, api: Api, ego: str) -> None:
-        self._places = RoutePlaces(api)
+        self._api, self._places = api, RoutePlaces(api)
         self._length = api.vehicle.getLength
         self._ego = ego
 
     def measure(self, vehicle: str) -> float | None:
-        """Gap of a vehicle [m], with the sign and the None of `signed_gap`; both must be on the road.
+        """Gap of a vehicle [m], with the sign and the None of `signed_gap`; None if one of them is off the lanes.
+
+        Both must be on the road.
 
         Parameters
         ----------
         vehicle : str
             Its id.
         """
+        if is_off_lanes(self._api, self._ego) or is_off_lanes(self._api, vehicle):
+            return None
         find, distance, length = self._places.find, self._places.distance, self._length
         own, other = find(self._ego), find(vehicle)
         ahead, behind = distance(self._ego, own, other), distance(vehicle, other, own)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from fogsim.errors import InputError
 from fogsim.traffic.drivers.advice_hearing import check_edges, check_start
-from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
+from fogsim.traffic.sumo.link import Api, getter, is_off_lanes, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_lanes.directions import LaneDirections, OppositeEdges
 from fogsim.traffic.sumo_lanes.route_position import connections
@@ -94,7 +94,8 @@ class SumoVehiclePlaces:
     def _sorted_by_edge(self, vehicles: Iterable[str]) -> Callable[[str], Iterable[str]]:
         there: dict[str, list[str]] = {}
         for vehicle in vehicles:
-            there.setdefault(self._edge(vehicle), []).append(vehicle)
+            if not is_off_lanes(self._api, vehicle):
+                there.setdefault(self._edge(vehicle), []).append(vehicle)
         return lambda edge: there.get(edge, ())
 
     def _is_against(self, vehicle: str) -> bool:

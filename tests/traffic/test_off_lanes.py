@@ -1,0 +1,234 @@
+"""Vehicles off the lanes: parked, waiting as taxis, or moved beside the road by another simulator."""
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+import traci
+
+import fogsim
+from fogsim.atmosphere import FieldAccess
+from fogsim.errors import InputError, SimulationError
+from fogsim.metrics.run_metrics import RunMetrics
+from fogsim.recording import record_run
+from fogsim.scenario import Scenario, build, scenario_from_config
+from fogsim.traffic import libsumo_traffic
+from fogsim.traffic.sumo.libsumo_link import load_libsumo
+from fogsim.units import extinction_from_visibility
+from fogsim.values import Command, FogField, SpeedAdvice, Step
+from fogsim.values.script import ChangeLane, Depart
+
+DATA = Path(__file__).resolve().parents[1] / "data" / "off_lanes"
+BLIND = ("renderer=none", "estimators=[]", "fog.visibility_m=120")
+LANE, BAY, VERGE = -1.6, -4.8, -9.0  # north of the lane, of the places beside it, and of where the ego is put [m]
+LIMIT = 22.0
+
+
+def scenario(name: str, ego: str, duration: float = 60.0, *settings: str) -> Scenario:
+    return scenario_from_config(DATA / f"{name}.sumocfg", ego, [*BLIND, f"duration_s={duration}", *settings])
+
+
+@pytest.fixture(scope="module")
+def parked() -> list[Step]:
+    return list(fogsim.run(scenario("park", "ego")))
+
+
+def off(step: Step) -> bool:
+    return bool(step.traffic.off_lanes[step.ego])
+
+
+def spells(steps: Sequence[Step]) -> list[tuple[bool, list[Step]]]:
+    """Steps on and off the lanes in turn."""
+    return [(is_off, list(some)) for is_off, some in itertools.groupby(steps, off)]
+
+
+def test_a_parked_ego_keeps_its_place_without_limit_and_leader_and_drives_on(parked: list[Step]) -> None:
+    (_, before), (is_off, there), (_, after) = spells(parked)
+    assert is_off
+    assert len(there) == 149  # of 15 s
+    assert {step.route_position for step in there} == {before[-1].route_position}
+    assert {step.speed_limit for step in there} == {math.inf}
+    assert {step.leader for step in there} == {None}
+    assert {float(step.traffic.acceleration[step.ego]) for step in there} == {0.0}
+    assert {round(float(step.traffic.position[step.ego, 1]), 6) for step in there} == {BAY}
+    assert {step.speed_limit for step in before + after} == {LIMIT}
+    positions = np.array([step.route_position for step in parked])
+    assert (np.diff(positions) >= 0.0).all()
+    # From place to place as far as it drives, to the very end.
+    assert after[-1].route_position == pytest.approx(after[-1].traffic.position[after[-1].ego, 0], abs=0.2)
+    assert len(parked) == 601
+
+
+def test_others_are_flagged_where_they_park(parked: list[Step]) -> None:
+    last = parked[-1].traffic
+    flags = dict(zip(last.ids, last.off_lanes.tolist(), strict=True))
+    assert flags == {"behind": False, "ego": False, "parked1": True, "parked2": True}
+    assert [lane == "" for lane in last.lane] == last.off_lanes.tolist()
+
+
+def test_metrics_leave_parked_vehicles_out(tmp_path: Path) -> None:
+    # The others park elsewhere, so that the ego has the same place with and without them.
+    text = (DATA / "park.rou.xml").read_text(encoding="utf-8").replace('"pa" duration="1000"', '"pb" duration="1000"')
+    additional = (DATA / "park.add.xml").read_text(encoding="utf-8")
+    area = '<parkingArea id="pb" lane="we1_0" startPos="300" endPos="360" roadsideCapacity="6"/></additional>'
+    (tmp_path / "park.add.xml").write_text(additional.replace("</additional>", area), encoding="utf-8")
+    found = []
+    for name, left_out in (("all", None), ("alone", "parked")):
+        routes = tmp_path / f"{name}.rou.xml"
+        rows = [row for row in text.splitlines() if left_out is None or left_out not in row]
+        routes.write_text("\n".join(rows), encoding="utf-8")
+        config = tmp_path / "park.sumocfg"
+        files = f'<net-file value="{DATA / "a.net.xml"}"/><route-files value="{routes}"/>'
+        more = '<additional-files value="park.add.xml"/>'
+        config.write_text(f"<configuration><input>{files}{more}</input></configuration>", encoding="utf-8")
+        metrics = RunMetrics()
+        for step in fogsim.run(scenario_from_config(config, "ego", [*BLIND, "duration_s=60"])):
+            metrics.update(step)
+        found.append(metrics.summary().values)
+    with_parked, without = found
+    assert with_parked["traffic_mean_vehicles"] == pytest.approx((45.0 + 56.0) / 60.0, rel=0.02)
+    assert with_parked == without
+
+
+def test_the_table_has_the_flag_and_no_limit(tmp_path: Path) -> None:
+    record_run(scenario("park", "ego", 20.0), 0, tmp_path / "run", recorders=["table"])
+    rows = pq.read_table(tmp_path / "run" / "steps.parquet", columns=["off_lanes", "speed_limit_mps"]).to_pylist()
+    assert {(row["off_lanes"], row["speed_limit_mps"]) for row in rows} == {(False, LIMIT), (True, None)}
+
+
+def test_parked_vehicles_have_no_equipment(tmp_path: Path) -> None:
+    equipped = scenario("park", "ego", 8.0, "traffic.equipped=1.0")
+    steps = list(fogsim.run(equipped))
+    assert {one.vehicle_id for step in steps for one in step.equipped} == {"behind"}
+
+
+def test_a_taxi_waits_takes_a_passenger_and_waits_again() -> None:
+    steps = list(fogsim.run(scenario("taxi", "cab", 80.0)))
+    assert len(steps) == 801
+    # It waits off the lanes, for the call and for whoever gets in and out.
+    assert [is_off for is_off, _ in spells(steps)] == [False, True] * 3
+    coming, carrying, arrived = (some for _, some in spells(steps)[2::2] + spells(steps)[5:])
+    assert {step.traffic.persons.ids for step in coming} == {("p0",)}  # at the roadside, on no lane either
+    assert {step.traffic.persons.ids for step in carrying} == {()}
+    assert coming[-1].route_position == pytest.approx(300.0, abs=1.0)
+    assert carrying[-1].route_position == pytest.approx(700.0, abs=1.0)
+    assert {step.route_position for step in arrived} == {carrying[-1].route_position}
+
+
+def moved(api: Any, attached_to: Any) -> list[Step]:
+    """Steps of an ego that an outer simulator drives, from 5 s to 10 s beside the road."""
+    steps = []
+    with fogsim.attach(attached_to, ego="ego", visibility=120.0, settings=BLIND[:2]) as session:
+        for number in range(150):
+            if "ego" in api.vehicle.getIDList():
+                y = VERGE if 50 <= number < 100 else LANE
+                api.vehicle.moveToXY("ego", "", -1, 20.0 + 1.2 * number, y, 90.0, 2)
+            api.simulationStep()
+            step = session.observe()
+            if step is not None:
+                session.advise(step, Command(advice=SpeedAdvice(9.0), advised_speeds={"lorry": 5.0}))
+                steps.append(step)
+    return steps
+
+
+def check_moved(steps: list[Step]) -> None:
+    (_, before), (is_off, there), (_, after) = spells(steps)
+    assert is_off
+    assert len(there) == 50
+    assert {step.route_position for step in there} == {before[-1].route_position}
+    assert {(step.speed_limit, step.leader) for step in there} == {(math.inf, None)}
+    own = [(step.traffic.position[step.ego, :2].tolist(), float(step.traffic.grade[step.ego])) for step in there]
+    assert own == [([pytest.approx(20.0 + 1.2 * number), VERGE], 0.0) for number in range(50, 100)]
+    assert all(step.traffic.ids == ("ego", "lorry") for step in there)
+    assert after[0].route_position == pytest.approx(20.0 + 1.2 * 100)
+
+
+ARGUMENTS = ("-c", str(DATA / "two.sumocfg"), "--step-length", "0.1", "--no-step-log", "--end", "100")
+
+
+def test_an_ego_that_is_moved_beside_the_road_stays_where_it_is_put() -> None:
+    library = load_libsumo()
+    library.start(["sumo", *ARGUMENTS])
+    try:
+        check_moved(moved(library, library))
+    finally:
+        library.close()
+
+
+def test_it_is_read_over_a_connection_too(sumo_process: Callable[..., Any]) -> None:
+    with sumo_process(ARGUMENTS) as (port, _):
+        connection = traci.connect(port, numRetries=100, host="127.0.0.1", waitBetweenRetries=0.1)
+        check_moved(moved(connection, connection))
+        connection.close()
+
+
+def test_others_that_are_moved_beside_the_road_are_read_over_a_connection(sumo_process: Callable[..., Any]) -> None:
+    with sumo_process(ARGUMENTS) as (port, _):
+        connection = traci.connect(port, numRetries=100, host="127.0.0.1", waitBetweenRetries=0.1)
+        with fogsim.attach(connection, ego="ego", visibility=120.0, settings=BLIND[:2]) as session:
+            for number in range(40):
+                if number >= 20:
+                    connection.vehicle.moveToXY("lorry", "", -1, 90.0, VERGE, 90.0, 2)
+                connection.simulationStep()
+                step = session.observe()
+        connection.close()
+    assert step is not None
+    assert step.traffic.ids == ("ego", "lorry")
+    assert step.traffic.off_lanes.tolist() == [False, True]
+    assert step.traffic.position[1, :2].tolist() == [90.0, VERGE]
+    assert step.leader is None
+
+
+def test_advice_waits_until_a_vehicle_is_back_on_a_lane() -> None:
+    command = Command(advice=SpeedAdvice(6.0), advised_speeds={"parked1": 6.0}, advice_reach=math.inf)
+    traffic = libsumo_traffic(build.traffic_setup(scenario("park", "ego")))
+    traffic.enter_fog(FieldAccess(FogField(extinction_from_visibility(60.0), (3000.0, 3000.0, 3000.0))))
+    traffic.start(0)
+    try:
+        speeds = []
+        for _ in range(600):
+            traffic.advance(command)
+            snapshot = traffic.observe()
+            assert snapshot is not None
+            speeds.append(float(snapshot.state.speed[snapshot.ego]))
+        get = load_libsumo().vehicle
+        assert 0.0 < get.getMaxSpeed("parked1") <= get.getMaxSpeed("behind") <= 60.0
+    finally:
+        traffic.close()
+    assert speeds[400] == pytest.approx(0.0)
+    assert speeds[-1] == pytest.approx(6.0, abs=0.1)
+
+
+def test_a_script_changes_no_lane_and_departs_no_vehicle_beside_a_parked_one() -> None:
+    traffic = libsumo_traffic(build.traffic_setup(scenario("park", "ego")))
+    traffic.start(0)
+    try:
+        change = ChangeLane("parked1", 1)
+        joins = Depart("new", like="parked1", gap=30.0, speed=5.0)
+        assert traffic.begin([change, joins]) == (change, joins)
+    finally:
+        traffic.close()
+
+
+def test_mesoscopic_simulations_are_refused_in_one_line(tmp_path: Path) -> None:
+    config = tmp_path / "meso.sumocfg"
+    files = f'<net-file value="{DATA / "a.net.xml"}"/><route-files value="{DATA / "two.rou.xml"}"/>'
+    meso = '<mesoscopic><mesosim value="on"/></mesoscopic>'
+    config.write_text(f"<configuration><input>{files}</input>{meso}</configuration>", encoding="utf-8")
+    told = r"mesosim: vehicles of a mesoscopic simulation have no positions in lanes[^\n]*$"
+    with pytest.raises(InputError, match=told):
+        scenario_from_config(config, "ego", BLIND)
+    with pytest.raises(InputError, match=told.removeprefix("mesosim: ")):
+        scenario("two", "ego", 60.0, "traffic.sumo_options.mesosim=true")
+    library = load_libsumo()
+    library.start(["sumo", *ARGUMENTS, "--mesosim"])
+    try:
+        with pytest.raises(SimulationError, match=told):
+            fogsim.attach(library, ego="ego", visibility=120.0)
+    finally:
+        library.close()

@@ -1,0 +1,138 @@
+"""What a user's own SUMO configuration says: who could be the ego, when it ends, what SUMO warns of; odd networks."""
+
+from pathlib import Path
+
+import pytest
+
+import fogsim
+from fogsim.errors import InputError, SimulationError
+from fogsim.scenario import Scenario, override, scenario_from_config
+from fogsim.traffic.road.network import read_net
+from fogsim.traffic.sumo.libsumo_link import load_libsumo
+from fogsim.traffic_run import run_traffic
+from fogsim.values import Ending
+
+DATA = Path(__file__).resolve().parents[1] / "data" / "off_lanes"
+BLIND = ("renderer=none", "estimators=[]", "fog.visibility_m=5000")
+CAR = '<vType id="car" vClass="passenger" sigma="0" speedDev="0"/>'
+
+
+def configuration(folder: Path, vehicles: str, *, net: str = "a.net.xml", options: str = "") -> Path:
+    (folder / "mine.rou.xml").write_text(f"<routes>{CAR}{vehicles}</routes>", encoding="utf-8")
+    config = folder / "mine.sumocfg"
+    files = f'<net-file value="{DATA / net}"/><route-files value="mine.rou.xml"/>'
+    more = f'<additional-files value="{DATA / "park.add.xml"}"/>' if net == "a.net.xml" else ""
+    text = f"<configuration><input>{files}{more}</input>{options}</configuration>"
+    config.write_text(text, encoding="utf-8")
+    return config
+
+
+def vehicle(name: str, depart: float, edges: str, kind: str = "car", inner: str = "") -> str:
+    return f'<vehicle id="{name}" type="{kind}" depart="{depart}"><route edges="{edges}"/>{inner}</vehicle>'
+
+
+def loaded(config: Path, ego: str = "ego", *settings: str) -> Scenario:
+    return scenario_from_config(config, ego, [*BLIND, *settings], others_add_vehicles=True)
+
+
+UNSORTED = vehicle("other", 20.0, "we1 we2") + vehicle("ego", 1.0, "we1 we2")
+
+
+def test_sumos_warning_that_explains_the_missing_ego_is_told(tmp_path: Path) -> None:
+    told = r"those that did: other; SUMO warned: Route file should be sorted by departure time, ignoring 'ego'!$"
+    with pytest.raises(SimulationError, match=told):
+        next(fogsim.run(loaded(configuration(tmp_path, UNSORTED)), sumo_outputs=tmp_path / "outputs"))
+    assert not (tmp_path / "outputs").exists()
+
+
+def test_warnings_of_others_are_told_if_there_is_none_of_the_ego(tmp_path: Path) -> None:
+    rows = [vehicle("first", 20.0, "we1 we2"), *(vehicle(f"late{number}", 1.0, "we1 we2") for number in range(5))]
+    config = configuration(tmp_path, "".join(rows))
+    with pytest.raises(SimulationError, match=r"SUMO warned: .*'late0'! .*'late1'! .*'late2'! and 2 more$"):
+        next(fogsim.run(loaded(config, "nobody")))
+
+
+def test_a_log_of_the_users_own_is_kept(tmp_path: Path) -> None:
+    config = configuration(tmp_path, UNSORTED, options='<report><error-log value="mine.log"/></report>')
+    with pytest.raises(SimulationError) as error:
+        next(fogsim.run(loaded(config), sumo_outputs=tmp_path / "outputs"))
+    assert "SUMO warned" not in str(error.value)
+    assert [path.name for path in (tmp_path / "outputs").iterdir()] == ["mine.log"]
+    assert "ignoring 'ego'" in (tmp_path / "outputs" / "mine.log").read_text(encoding="utf-8")
+
+
+def test_a_run_ends_when_the_configuration_does(tmp_path: Path) -> None:
+    steps = list(fogsim.run(loaded(DATA / "two.sumocfg")))
+    assert steps[-1].ending is Ending.TIME
+    assert steps[-1].traffic.time == pytest.approx(12.0)
+    shorter = list(fogsim.run(loaded(DATA / "two.sumocfg", "ego", "duration_s=5")))
+    assert shorter[-1].time == pytest.approx(5.0)
+    alone = list(run_traffic(loaded(DATA / "two.sumocfg", "none")))
+    assert alone[-1].ending is Ending.TIME
+    assert alone[-1].traffic.time == pytest.approx(12.0)
+    config = configuration(tmp_path, vehicle("ego", 30.0, "we1 we2"), options='<time><end value="12"/></time>')
+    with pytest.raises(SimulationError, match=r"'ego' did not appear within 12 s .*the simulation's end is 12\)"):
+        next(fogsim.run(loaded(config)))
+
+
+def chosen(scenario: Scenario) -> str:
+    with pytest.warns(UserWarning, match="ego: any: the ego is"):
+        step = next(fogsim.run(scenario))
+    return step.traffic.ids[step.ego]
+
+
+TYPES = '<vType id="bike" vClass="bicycle"/><vType id="train" vClass="rail"/>'
+PARKS = '<stop parkingArea="pa" duration="1000"/>'
+
+
+def test_any_ego_is_the_first_vehicle_that_drives_far(tmp_path: Path) -> None:
+    vehicles = (
+        TYPES
+        + vehicle("cyclist", 0.0, "we1 we2", "bike")
+        + vehicle("parks", 5.0, "we1 we2", inner=PARKS)
+        + vehicle("short", 10.0, "ew1")
+        + vehicle("far", 15.0, "we1 we2")
+        + vehicle("later", 20.0, "we1 we2")
+    )
+    scenario = loaded(configuration(tmp_path, vehicles), "any")
+    assert chosen(scenario) == "far"
+    # Where the files name all vehicles, `any` is not missed among them.
+    assert chosen(override(scenario, ["duration_s=2"])) == "far"
+
+
+def test_any_ego_is_the_one_with_the_longest_way_where_none_drives_far(tmp_path: Path) -> None:
+    vehicles = vehicle("parks", 0.0, "we1 we2", inner=PARKS) + vehicle("short", 5.0, "ew1")
+    assert chosen(loaded(configuration(tmp_path, vehicles), "any")) == "short"
+    alone = tmp_path / "alone"
+    alone.mkdir()
+    assert chosen(loaded(configuration(alone, vehicle("parks", 0.0, "we1 we2", inner=PARKS)), "any")) == "parks"
+
+
+def test_a_vehicle_called_any_is_meant(tmp_path: Path) -> None:
+    vehicles = vehicle("far", 0.0, "we1 we2") + vehicle("any", 0.5, "ew1")
+    assert chosen(loaded(configuration(tmp_path, vehicles), "any")) == "any"
+
+
+def test_where_nobody_suits_any_ego_is_refused(tmp_path: Path) -> None:
+    config = configuration(tmp_path, TYPES + vehicle("cyclist", 0.0, "we1", "bike"))
+    with pytest.raises(SimulationError, match="ego: any: no car, van, truck or bus drives on a lane until"):
+        next(fogsim.run(loaded(config, "any")))
+
+
+def test_an_ego_of_an_outer_simulation_must_be_named() -> None:
+    library = load_libsumo()
+    library.start(["sumo", "-c", str(DATA / "two.sumocfg"), "--no-step-log"])
+    try:
+        with pytest.raises(InputError, match="ego: any: FogSim can choose only in its own simulation; name a vehicle"):
+            fogsim.attach(library, ego="any", visibility=120.0)
+    finally:
+        library.close()
+
+
+def test_a_lane_of_no_length_before_a_light_is_read_and_driven_on(tmp_path: Path) -> None:
+    assert read_net(DATA / "stub_edge.net.xml").signal_heads == ()
+    config = configuration(tmp_path, vehicle("ego", 0.0, "in stub out"), net="stub_edge.net.xml")
+    drawn = ("renderer=cpu", "estimators=[lead_contrast]", "camera.width=64", "camera.height=48")
+    steps = list(fogsim.run(loaded(config, "ego", *drawn)))
+    assert steps[-1].ending is Ending.ARRIVED
+    assert steps[-1].traffic.position[0, 0] > 130.0

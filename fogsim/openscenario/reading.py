@@ -5,6 +5,7 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -49,8 +50,8 @@ def is_openscenario(path: Path) -> bool:
     return path.suffix.lower() == ".xosc"
 
 
-def read_openscenario(path: Path) -> ScenarioData:
-    """Read an OpenSCENARIO XML 1.x file as the data of a scenario file.
+def read_openscenario(path: Path, values: Mapping[str, str] = MappingProxyType({})) -> ScenarioData:
+    """Read an OpenSCENARIO XML 1.x file as the data of a scenario file; `values` replace those of its parameters.
 
     The network and the route file go to the user's cache directory. InputError has a line for each element that FogSim
     cannot do; MissingDependencyError if netconvert is missing.
@@ -59,6 +60,9 @@ def read_openscenario(path: Path) -> ScenarioData:
     if root.tag != "OpenSCENARIO":
         raise InputError(f"{path}:{root.line}: expected <OpenSCENARIO> at its top, got <{root.tag}>")
     _check_version(root)
+    for block in root.all("ParameterDeclarations"):
+        for one in block.children:
+            one.attributes["value"] = values.get(one.attributes.get("name", ""), one.attributes.get("value", ""))
     put_parameters(root, {}, findings)
     catalogs = Catalogs(path.parent, root.one("CatalogLocations"), findings)
     entities, storyboard = root.one("Entities"), root.one("Storyboard")

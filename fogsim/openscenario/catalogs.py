@@ -11,6 +11,8 @@ from fogsim.openscenario.xml_tree import Node, read_xml
 
 LOCATIONS = {
     "VehicleCatalog": "Vehicle",
+    "PedestrianCatalog": "Pedestrian",
+    "MiscObjectCatalog": "MiscObject",
     "EnvironmentCatalog": "Environment",
     "ControllerCatalog": "Controller",
     "ManeuverCatalog": "Maneuver",

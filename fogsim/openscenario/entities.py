@@ -1,10 +1,10 @@
 """Entities of a file: vehicles with SUMO's class, size and performance."""
 
-import re
 from dataclasses import dataclass
 
 from fogsim.openscenario.catalogs import Catalogs
-from fogsim.openscenario.xml_tree import Node
+from fogsim.openscenario.xml_tree import Node, sumo_name
+from fogsim.values.traffic import BOX, PEDESTRIAN
 
 CLASSES = {
     "car": "passenger",
@@ -18,7 +18,7 @@ CLASSES = {
 }
 """SUMO's class of each vehicle category that is read."""
 
-_NAME = re.compile(r"[\w.:#@\-]+")
+_RUNNER = 10.0  # Top speed of persons and obstacles, and their acceleration [m/s, m/s²]
 _TAKEN = ("fog", "light")
 _EGO_NAMES = ("ego", "hero", "ego_vehicle", "egovehicle")
 
@@ -27,7 +27,8 @@ _EGO_NAMES = ("ego", "hero", "ego_vehicle", "egovehicle")
 class Vehicle:
     """A vehicle: its size [m] and limits [m/s, m/s²].
 
-    `front` is the distance from its reference point, the middle of the rear axle, to the front bumper [m].
+    `front` is the distance from its reference point, the middle of the rear axle, to the front bumper [m]. Persons and
+    obstacles have a `body`, and no lamps.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Vehicle:
     top_speed: float
     acceleration: float
     deceleration: float
+    body: str = ""
 
     @property
     def rear(self) -> float:
@@ -51,9 +53,9 @@ def read_vehicles(entities: Node, catalogs: Catalogs) -> dict[str, Vehicle]:
     """Vehicles by name; other entities become findings."""
     found: dict[str, Vehicle] = {}
     for entity in entities.all("ScenarioObject"):
-        name = entity.get("name")
-        if not _NAME.fullmatch(name) or name in _TAKEN or name in found:
-            told = f"expected a name of its own of letters, digits and _ . : # @ -, which is not {' or '.join(_TAKEN)}"
+        name = sumo_name(entity.get("name"))
+        if not name or name in _TAKEN or name in found:
+            told = f"expected a name of its own, which is not {' or '.join(_TAKEN)}"
             catalogs.findings.refuse(entity, f"{told}; got {name!r}")
             continue
         for controller in entity.all("ObjectController"):
@@ -63,12 +65,9 @@ def read_vehicles(entities: Node, catalogs: Catalogs) -> dict[str, Vehicle]:
         node = catalogs.entry(reference) if reference else entity.one("Vehicle", "Pedestrian", "MiscObject")
         if node is None:
             if reference is None:
-                catalogs.findings.refuse(entity, "expected a Vehicle or a CatalogReference to one")
+                catalogs.findings.refuse(entity, "expected a Vehicle, Pedestrian, MiscObject or reference to one")
             continue
-        if node.tag != "Vehicle":
-            catalogs.findings.refuse(entity, f"{name} is a {node.tag}; vehicles are read, and nothing else")
-            continue
-        found[name] = _vehicle(name, node, catalogs)
+        found[name] = (_vehicle if node.tag == "Vehicle" else _other)(name, node, catalogs)
         if reference:
             catalogs.findings.look_for_unread(node)
     return found
@@ -107,6 +106,24 @@ def _vehicle(name: str, node: Node, catalogs: Catalogs) -> Vehicle:
     )
 
 
+def _other(name: str, node: Node, catalogs: Catalogs) -> Vehicle:
+    """A person, or an obstacle, which FogSim draws as a box; either is on a lane and no faster than a runner."""
+    findings, box = catalogs.findings, node.one("BoundingBox")
+    kind = node.get("pedestrianCategory" if node.tag == "Pedestrian" else "miscObjectCategory")
+    centre, size = (box.one("Center"), box.one("Dimensions")) if box else (None, None)
+    if centre is None or size is None:
+        findings.refuse(node, f"a {node.tag} needs a BoundingBox with Center and Dimensions")
+        return Vehicle(name, node, kind, 1.0, 1.0, 1.0, 0.5, _RUNNER, _RUNNER, _RUNNER, BOX)
+    for key in "yz":
+        centre.get(key)
+    length, width, height = (max(findings.number(size, key), 0.2) for key in ("length", "width", "height"))
+    front = findings.number(centre, "x") + 0.5 * length
+    # Wheelchairs and animals have no figure.
+    body = PEDESTRIAN if kind == "pedestrian" else BOX
+    return Vehicle(name, node, kind, length, width, height, front, _RUNNER, _RUNNER, _RUNNER, body)
+
+
 def ego_of(vehicles: dict[str, Vehicle]) -> str:
     """Name of the ego: a vehicle with a usual name (``Ego``, ``hero``), otherwise the first."""
-    return next((name for name in vehicles if name.lower() in _EGO_NAMES), next(iter(vehicles), "ego"))
+    driven = [name for name, vehicle in vehicles.items() if not vehicle.body]
+    return next((name for name in driven if name.lower() in _EGO_NAMES), next(iter(driven), "ego"))

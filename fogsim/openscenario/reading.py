@@ -126,6 +126,9 @@ class _Reader:
         self.findings.look_for_unread(self.root)
         self.findings.close(self.path)
         begin_at_once(entries, begin, ego)
+        for name, vehicle in self.vehicles.items():
+            if vehicle.body:
+                begin.effect.add(name, lamps={"all": "off"})
         data = self._data(ego, begin, route)
         if begin.environment.box is not None and not data["fog"]["banks"]:
             told = f"{self.path}: the BoundingBox of the fog lies beside the ego's way: the air is clear there"

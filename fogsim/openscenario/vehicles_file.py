@@ -4,8 +4,9 @@ from collections.abc import Mapping
 
 from fogsim.openscenario.entities import CLASSES, Vehicle
 from fogsim.openscenario.initial import Beginning
+from fogsim.traffic.appearance import BODY_PARAMETER
 from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, Spot
-from fogsim.traffic.templates.xml_text import element
+from fogsim.traffic.templates.xml_text import element, opening
 
 STANDS = 0.1
 """Speed below which a vehicle has no desired speed to keep [m/s]."""
@@ -26,7 +27,7 @@ def vehicles_text(vehicles: Mapping[str, Vehicle], begin: Beginning, lanes: Open
             "  " + element("vType", id=f"type.{name}", **_type(vehicle, speed, front.lane.limit)),
             "  " + element("route", id=f"route.{name}", edges=" ".join(lanes.route(front.lane.edge))),
             "  "
-            + element(
+            + opening(
                 "vehicle",
                 id=name,
                 type=f"type.{name}",
@@ -38,6 +39,8 @@ def vehicles_text(vehicles: Mapping[str, Vehicle], begin: Beginning, lanes: Open
                 # Exactly where the file has it, however near to the next vehicle.
                 insertionChecks="collision",
             ),
+            *([f'    <param key="{BODY_PARAMETER}" value="{vehicle.body}"/>'] if vehicle.body else ()),
+            "  </vehicle>",
         ]
     return '<?xml version="1.0" encoding="UTF-8"?>\n<routes>\n' + "\n".join(lines) + "\n</routes>\n"
 
@@ -45,7 +48,8 @@ def vehicles_text(vehicles: Mapping[str, Vehicle], begin: Beginning, lanes: Open
 def _type(vehicle: Vehicle, speed: float, limit: float) -> dict[str, object]:
     """Attributes of a separate type; its driver's desired speed is the initial one."""
     return {
-        "vClass": CLASSES[vehicle.category],
+        # Persons and obstacles are on lanes of vehicles as well as on footways.
+        "vClass": "ignoring" if vehicle.body else CLASSES[vehicle.category],
         "length": f"{vehicle.length:g}",
         "width": f"{vehicle.width:g}",
         "height": f"{vehicle.height:g}",

@@ -4,6 +4,7 @@ import re
 from dataclasses import dataclass
 
 from fogsim.openscenario.catalogs import Catalogs
+from fogsim.openscenario.elements import HARMLESS
 from fogsim.openscenario.xml_tree import Node
 
 CLASSES = {
@@ -19,6 +20,7 @@ CLASSES = {
 """SUMO's class of each vehicle category that is read."""
 
 _NAME = re.compile(r"[\w.:#@\-]+")
+_ASIDE = 0.1  # Distance between the middles of axle and body that is none [m]
 _TAKEN = ("fog", "light")
 _EGO_NAMES = ("ego", "hero", "ego_vehicle", "egovehicle")
 
@@ -58,7 +60,7 @@ def read_vehicles(entities: Node, catalogs: Catalogs) -> dict[str, Vehicle]:
             continue
         for controller in entity.all("ObjectController"):
             if controller.children or controller.attributes:
-                catalogs.findings.leave_out(controller, _CONTROLLER)
+                catalogs.findings.leave_out(controller, HARMLESS["ObjectController"])
         reference = entity.one("CatalogReference")
         node = catalogs.entry(reference) if reference else entity.one("Vehicle", "Pedestrian", "MiscObject")
         if node is None:
@@ -74,24 +76,21 @@ def read_vehicles(entities: Node, catalogs: Catalogs) -> dict[str, Vehicle]:
     return found
 
 
-_CONTROLLER = "controllers of files are programs of other simulators; FogSim's drivers and its adviser drive"
-
-
 def _vehicle(name: str, node: Node, catalogs: Catalogs) -> Vehicle:
     findings = catalogs.findings
     category = findings.word(node, "vehicleCategory", tuple(CLASSES), "car")
-    for trailer in node.all("Trailer", "TrailerHitch", "TrailerCoupler"):
-        findings.refuse(trailer, "vehicles have no trailers; describe the whole as one vehicle")
+    for trailer in node.all("Trailer"):
+        if any(one.tag != "TrailerRef" or one.get("entityRef") for one in trailer.all()):
+            findings.refuse(trailer, "vehicles have no trailers; describe the whole as one vehicle")
     box, performance = node.one("BoundingBox"), node.one("Performance")
     centre, size = (box.one("Center"), box.one("Dimensions")) if box else (None, None)
     if performance is None or centre is None or size is None:
         findings.refuse(node, "a vehicle needs a BoundingBox with Center and Dimensions, and a Performance")
         return Vehicle(name, node, category, 4.6, 1.85, 1.5, 3.7, 55.0, 3.0, 9.0)
     length, width, height = (findings.number(size, key) for key in ("length", "width", "height"))
-    for key in "yz":
-        centre.get(key)
-    for key in ("maxAccelerationRate", "maxDecelerationRate"):
-        performance.get(key)
+    centre.get("z")  # A vehicle stands on the road.
+    if abs(findings.number(centre, "y")) > _ASIDE:
+        findings.refuse(centre, "y: a body lies about its reference point to the left and right alike; write 0")
     speed, up, down = (findings.number(performance, f"max{key}") for key in ("Speed", "Acceleration", "Deceleration"))
     return Vehicle(
         name,

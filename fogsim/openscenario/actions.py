@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fogsim.openscenario.catalogs import Catalogs
+from fogsim.openscenario.elements import HARMLESS, REFUSED
 from fogsim.openscenario.entities import Vehicle
 from fogsim.openscenario.environment import environment_of
 from fogsim.openscenario.findings import Findings
@@ -68,14 +69,18 @@ class Actions:
     def take(self, action: Node, actors: list[str], effect: Effect) -> None:
         """Add an action (``PrivateAction``, ``GlobalAction``, or their parent) of some actors to an effect."""
         for one in action.all():
-            if one.tag in ("PrivateAction", "GlobalAction", "LongitudinalAction", "LateralAction", "AppearanceAction"):
+            if one.tag in _GROUPS:
                 self.take(one, actors, effect)
             elif one.tag == "EnvironmentAction":
                 self._environment(one, effect)
-            elif one.tag in _CONTROL:
-                self.findings.leave_out(one, "FogSim's own drivers and its adviser drive")
+            elif one.tag == "OverrideControllerValueAction":
+                if any(input_.get("active") == "true" for input_ in one.all()):
+                    self.findings.refuse(one, "speeds and lanes are ordered, not pedals; write active=false")
+            elif one.tag in HARMLESS:
+                self.findings.leave_out(one, HARMLESS[one.tag])
             elif one.tag not in _PRIVATE:
-                self.findings.refuse(one, f"FogSim has no such action; it has {', '.join(ACTIONS)}")
+                told = REFUSED.get(one.tag, "FogSim does not know this element here")
+                self.findings.refuse(one, f"{told}; actions are {', '.join(ACTIONS)}")
             else:
                 if not actors:
                     self.findings.refuse(one, "nobody does it: the Actors of the maneuver group name no entity")
@@ -125,7 +130,6 @@ class Actions:
         shape = SHAPES[self.findings.word(dynamics, "dynamicsShape", tuple(SHAPES))]
         value = abs(self.findings.number(dynamics, "value", 0.0, is_finite=False))
         by = self.findings.word(dynamics, "dynamicsDimension", ("time", "rate", "distance"))
-        dynamics.get("followingMode")
         if shape == "step" or value == 0.0 or math.isinf(value):
             return {"shape": "step"}
         if by == "distance":
@@ -184,13 +188,11 @@ class Actions:
             self.findings.refuse(action, "expected a LightType with a VehicleLight, and a LightState")
             return
         mode = self.findings.word(state, "mode", ("on", "off", "flashing"))
-        for key in ("luminousIntensity", "flashingOnDuration", "flashingOffDuration"):
-            # Lamps shine as their type does, and indicators flash as the law requires.
-            state.get(key)
-        for colour in state.all("Color"):
-            self.findings.leave_out(colour, "lamps have the colour of their kind")
-        action.get("transitionTime")
+        if self.findings.number(action, "transitionTime", 0.0):
+            self.findings.refuse(action, "transitionTime: lamps are lit at once; write 0")
         kind = light.get("vehicleLightType")
+        if mode == "flashing" and not all("indicator" in one for one in LAMPS.get(kind, ())):
+            self.findings.refuse(state, "mode: indicators flash, and no other lamp does")
         if kind in _UNLIT:
             self.findings.leave_out(light, f"vehicles have no {kind}")
             return
@@ -205,10 +207,9 @@ class Actions:
         if not headway or self.findings.word(action, "freespace", ("true", "false")) != "true":
             self.findings.refuse(action, "a distance is kept by a timeGap with freespace=true")
             return
-        for key in ("continuous", "coordinateSystem", "displacement"):
-            action.get(key)
-        for limits in action.all("DynamicConstraints"):
-            self.findings.leave_out(limits, "FogSim's law of following has limits of its own")
+        self.findings.word(action, "coordinateSystem", ("entity", "lane", "road"), "entity")
+        self.findings.word(action, "displacement", ("any", "trailingReferencedEntity"), "any")
+        action.get("continuous")
         effect.add(actor, follow={"vehicle": self.called(action.get("entityRef")).strip('"'), "headway_s": headway})
 
 
@@ -218,7 +219,10 @@ _PRIVATE: Mapping[str, Callable[[Actions, Node, str, Effect], None]] = {
     "LightStateAction": Actions._lights,
     "LongitudinalDistanceAction": Actions._keep_distance,
 }
-_CONTROL = ("ControllerAction", "ActivateControllerAction", "AssignControllerAction", "OverrideControllerValueAction")
+_GROUPS = (
+    *("PrivateAction", "GlobalAction", "ControllerAction"),
+    *("LongitudinalAction", "LateralAction", "AppearanceAction"),
+)
 ACTIONS: Mapping[str, str] = {
     "EnvironmentAction": "`fog` and `light`.",
     **{tag: inspect.getdoc(action) or "" for tag, action in _PRIVATE.items()},

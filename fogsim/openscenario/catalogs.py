@@ -9,15 +9,16 @@ from fogsim.openscenario.findings import Findings
 from fogsim.openscenario.parameters import declared, put_parameters
 from fogsim.openscenario.xml_tree import Node, read_xml
 
-LOCATIONS = {
-    "VehicleCatalog": "Vehicle",
-    "PedestrianCatalog": "Pedestrian",
-    "MiscObjectCatalog": "MiscObject",
-    "EnvironmentCatalog": "Environment",
-    "ControllerCatalog": "Controller",
-    "ManeuverCatalog": "Maneuver",
-}
-"""Types of catalogs that are read, and their elements."""
+LOCATIONS = (
+    "VehicleCatalog",
+    "PedestrianCatalog",
+    "MiscObjectCatalog",
+    "EnvironmentCatalog",
+    "ControllerCatalog",
+    "ManeuverCatalog",
+    "RouteCatalog",
+)
+"""Types of catalogs that are read."""
 
 
 @dataclass
@@ -28,12 +29,17 @@ class Catalogs:
     locations: Node | None
     findings: Findings
     _read: dict[Path, Node] = field(default_factory=dict)
+    _places: list[Path] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        for kind in self.locations.all(*LOCATIONS) if self.locations else ():
+            self._places += [self.folder / place.get("path") for place in kind.all("Directory")]
 
     def entry(self, reference: Node) -> Node | None:
         """The element that a ``CatalogReference`` refers to, with its parameters; None, and a finding, if missing."""
         catalog, name = reference.get("catalogName"), reference.get("entryName")
         given = {
-            one.get("parameterRef"): one.get("value")
+            one.get("parameterRef").removeprefix("$"): one.get("value")
             for block in reference.all("ParameterAssignments")
             for one in block.all("ParameterAssignment")
         }
@@ -69,8 +75,5 @@ class Catalogs:
             )
 
     def _files(self) -> Iterator[Path]:
-        for kind in self.locations.children if self.locations else ():
-            for place in kind.children:
-                path = self.folder / place.attributes.get("path", "")
-                if kind.tag in LOCATIONS:
-                    yield from sorted(path.glob("*.xosc")) if path.is_dir() else ([path] if path.is_file() else [])
+        for path in self._places:
+            yield from sorted(path.glob("*.xosc")) if path.is_dir() else ([path] if path.is_file() else [])

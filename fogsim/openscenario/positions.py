@@ -5,9 +5,13 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from fogsim.openscenario.elements import REFUSED
 from fogsim.openscenario.findings import Findings
 from fogsim.openscenario.xml_tree import Node
 from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, Spot
+
+_ALONG = math.cos(0.3)
+"""Cosine of the angle to a lane at which a vehicle still stands along it."""
 
 
 @dataclass
@@ -20,37 +24,49 @@ class Positions:
 
     def refers_to(self, position: Node) -> str | None:
         """Entity to which a ``Position`` is relative; None for an absolute one."""
-        return next((one.attributes.get("entityRef") for one in position.children), None)
+        return next((one.get("entityRef") or None for one in position.children), None)
 
     def spot(self, position: Node) -> Spot | None:
         """Place of a ``Position``; None, and a finding, if it cannot be placed."""
         one = next(iter(position.all()), None)
         if one is None or one.tag not in _KINDS:
-            told = f"positions are read of {', '.join(_KINDS)}"
-            self.findings.refuse(one or position, told)
+            told = REFUSED.get(one.tag, "") if one else "expected a position"
+            self.findings.refuse(one or position, f"{told}; positions are {', '.join(_KINDS)}")
             return None
         reference = one.get("entityRef") if one.tag.startswith("Relative") else None
         if reference is not None and reference not in self.entities:
             self.findings.refuse(one, f"there is no entity {reference!r} that has a place already")
             return None
-        for orientation in one.all("Orientation"):
-            if any(self.findings.number(orientation, key, 0.0) for key in ("h", "p", "r")):
-                self.findings.leave_out(orientation, "vehicles stand along their lanes")
-            orientation.get("type")
         try:
-            return _KINDS[one.tag](self, one)
+            found = _KINDS[one.tag](self, one)
+            return self._turned(one, found)
         except ValueError as error:
             self.findings.refuse(one, str(error))
             return None
+
+    def _turned(self, node: Node, spot: Spot) -> Spot:
+        """Check an ``Orientation``, whose pitch and roll are the road's; ValueError unless the lane leads there."""
+        orientation = node.one("Orientation")
+        if orientation is None or not orientation.attributes.get("h"):
+            return spot
+        for key in "pr":
+            orientation.get(key)
+        turn, lane = self.findings.number(orientation, "h"), spot.world[2]
+        if self.findings.word(orientation, "type", ("relative", "absolute"), "absolute") == "relative":
+            if node.tag == "RoadPosition" and turn:
+                turn += self.lanes.across(node.get("roadId"), self.findings.number(node, "s"), 0.0)[2]
+            else:
+                turn += self.entities[node.get("entityRef")].world[2] if node.get("entityRef") else lane
+        _check_heading(turn, lane)
+        return spot
 
     def world(self, node: Node) -> Spot:
         """The nearest lane that leads there (by `h`, where it stands); the vehicle is in the lane's middle."""
         x, y = self._numbers(node, "x", "y")
         heading = self.findings.number(node, "h") if "h" in node.attributes else None
-        for key in ("z", "p", "r"):
-            # On a road these follow from it.
-            node.get(key)
-        return self.lanes.at(x, y, heading)
+        spot = self.lanes.at(x, y, heading)
+        _check_heading(heading, spot.world[2])
+        return spot
 
     def lane(self, node: Node) -> Spot:
         """That lane at s."""
@@ -73,14 +89,12 @@ class Positions:
         """The lane that is so far from an entity, along x and y."""
         x, y, heading = self.entities[node.get("entityRef")].world
         dx, dy = self._numbers(node, "dx", "dy")
-        node.get("dz")
         return self.lanes.at(x + dx, y + dy, heading)
 
     def relative_object(self, node: Node) -> Spot:
         """The lane that is so far from an entity, along its own axes."""
         x, y, heading = self.entities[node.get("entityRef")].world
         dx, dy = self._numbers(node, "dx", "dy")
-        node.get("dz")
         cosine, sine = math.cos(heading), math.sin(heading)
         return self.lanes.at(x + dx * cosine - dy * sine, y + dx * sine + dy * cosine, heading)
 
@@ -91,6 +105,13 @@ class Positions:
     def _no_offset(self, node: Node) -> None:
         if self.findings.number(node, "offset", 0.0):
             self.findings.refuse(node, "offset: vehicles are in the middle of their lanes; write 0")
+
+
+def _check_heading(heading: float | None, lane: float) -> None:
+    """ValueError if a heading is not that of its lane."""
+    if heading is not None and math.cos(heading - lane) < _ALONG:
+        told = f"{math.degrees(heading - lane) % 360.0:.0f} degrees to the left of the direction of its lane"
+        raise ValueError(f"h: vehicles stand, and drive, along their lanes; it stands {told}")
 
 
 _KINDS: Mapping[str, Callable[[Positions, Node], Spot]] = {

@@ -85,6 +85,8 @@ def _check_version(root: Node) -> None:
 
 
 def _opendrive(root: Node, path: Path) -> Path:
+    for network in root.all("RoadNetwork"):
+        network.all("TrafficSignals")
     file = root.within("RoadNetwork", "LogicFile")
     if file is None:
         raise InputError(f"{path}: RoadNetwork: a LogicFile (OpenDRIVE, .xodr) is needed, for vehicles drive on roads")
@@ -123,13 +125,15 @@ class _Reader:
         story.triggers = triggers = Triggers(self.vehicles, ego, positions, along, story.state)
         entries = story.timeline()
         stop = triggers.trigger(self.storyboard.one("StopTrigger"))
+        header = self.root.one("FileHeader")
+        description = header.get("description") if header else ""
         self.findings.look_for_unread(self.root)
         self.findings.close(self.path)
         begin_at_once(entries, begin, ego)
         for name, vehicle in self.vehicles.items():
             if vehicle.body:
                 begin.effect.add(name, lamps={"all": "off"})
-        data = self._data(ego, begin, route)
+        data = {"description": description, **self._data(ego, begin, route)}
         if begin.environment.box is not None and not data["fog"]["banks"]:
             told = f"{self.path}: the BoundingBox of the fog lies beside the ego's way: the air is clear there"
             warnings.warn(told, LeftOutWarning, stacklevel=2)
@@ -156,12 +160,10 @@ class _Reader:
         return ScenarioData(data, lines)
 
     def _data(self, ego: str, begin: Beginning, route: tuple[str, ...]) -> dict[str, Any]:
-        header = self.root.one("FileHeader")
         way = [one for edge in route for one in self.lanes.lanes if one.edge == edge and one.index == 0]
         light = begin.environment.illuminance
         return {
             "name": re.sub(r"[^A-Za-z0-9_.-]", "_", self.path.stem)[:100],
-            "description": header.get("description") if header else "",
             "traffic": {"ego": ego, "keep_lane": list(self.vehicles), "stop_before_end_m": NEAR_THE_END},
             "fog": fog_block(
                 begin.environment, np.concatenate([one.shape for one in way]), min(one.lowest for one in way)

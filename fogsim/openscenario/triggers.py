@@ -20,6 +20,7 @@ RULES = {
 }
 """Operators of rules."""
 
+_DISTANCES = ("longitudinal", "cartesianDistance", "euclidianDistance")
 _EDGES = ("none", "rising", "falling", "risingOrFalling")
 _WORD = re.compile(r"[A-Za-z_][\w:#@\-]*")
 _STILL = 0.1  # Speed below which a vehicle counts as stopped [m/s]
@@ -120,7 +121,7 @@ class Triggers:
     def _by_value(self, node: Node, edge: str, delay: float) -> Trigger:
         if node.tag == "SimulationTimeCondition":
             value = self.findings.number(node, "value")
-            rule = self.findings.word(node, "rule", tuple(RULES))
+            rule = self.findings.word(node, "rule", tuple(rule for rule in RULES if rule != "notEqualTo"))
             if rule in ("lessThan", "lessOrEqual"):
                 test = _Test(f"time {RULES[rule]} {value:g} s", "time", RULES[rule], f"{value:g} s")
                 return Trigger(self._edged(test, edge, node), delay)
@@ -183,27 +184,28 @@ class Triggers:
             self.findings.refuse(node, "rule: quantities of traffic are never exactly equal; take less or greater")
         return _Test(f"{signal} {rule} {value:.9g} {unit}", signal, rule, f"{value:.9g} {unit}")
 
+    def _along(self, node: Node, signal: str, unit: str) -> _Test:
+        self.findings.word(node, "direction", ("longitudinal",), "longitudinal")
+        return self._compared(node, signal, unit)
+
+    def _is_less(self, node: Node) -> bool:
+        """Whether a distance shall be less than its value."""
+        return self.findings.word(node, "rule", ("lessThan", "lessOrEqual", "greaterThan", "greaterOrEqual"))[0] == "l"
+
     def _speed(self, node: Node, name: str) -> _Test:
         """`X.speed`."""
-        if node.get("direction") not in ("", "longitudinal"):
-            self.findings.refuse(node, "direction: speeds are read along the road")
-        return self._compared(node, f"{self.called(name)}.speed", "m/s")
+        return self._along(node, f"{self.called(name)}.speed", "m/s")
 
     def _acceleration(self, node: Node, name: str) -> _Test:
         """`X.acceleration`."""
-        node.get("direction")
-        return self._compared(node, f"{self.called(name)}.acceleration", "m/s²")
+        return self._along(node, f"{self.called(name)}.acceleration", "m/s²")
 
     def _relative_speed(self, node: Node, name: str) -> _Test | None:
         """`speed_difference(X, Y)`."""
-        node.get("direction")
         other = node.get("entityRef")
-        known = self._is_known(node, other)
-        return (
-            self._compared(node, f"speed_difference({self.called(name)}, {self.called(other)})", "m/s")
-            if known
-            else None
-        )
+        if not self._is_known(node, other):
+            return None
+        return self._along(node, f"speed_difference({self.called(name)}, {self.called(other)})", "m/s")
 
     def _stands(self, node: Node, name: str) -> _Test:
         """`X.speed < 0.1 m/s for` its duration."""
@@ -225,18 +227,21 @@ class Triggers:
 
     def _relative_distance(self, node: Node, name: str) -> _Test | None:
         """`gap(X, Y)`, ahead or behind, without `freespace` between rear axles; or straight: `distance(X, Y)`."""
-        other, kind = node.get("entityRef"), node.get("relativeDistanceType")
-        node.get("coordinateSystem")
+        other = node.get("entityRef")
         if not self._is_known(node, other):
             return None
-        if kind in ("cartesianDistance", "euclidianDistance", "euclideanDistance"):
-            if self._is_free(node):
-                self.findings.leave_out(node, "straight distances are between front bumpers")
-            return self._compared(node, f"distance({self.called(name)}, {self.called(other)})", "m")
-        if kind != "longitudinal":
-            self.findings.refuse(node, f"distances are longitudinal or cartesianDistance; got {kind!r}")
-            return None
-        return self._along_the_road(node, name, other)
+        if self._is_along(node):
+            return self._along_the_road(node, name, other)
+        if self._is_free(node):
+            self.findings.refuse(
+                node, "freespace: straight distances are from front bumper to front bumper; write false"
+            )
+        return self._compared(node, f"distance({self.called(name)}, {self.called(other)})", "m")
+
+    def _is_along(self, node: Node, default: str = "euclidianDistance") -> bool:
+        """Whether a distance is along the road, not straight; entities' own axes are taken as along the road."""
+        self.findings.word(node, "coordinateSystem", ("entity", "lane", "road"), "entity")
+        return self.findings.word(node, "relativeDistanceType", _DISTANCES, default) == "longitudinal"
 
     def _along_the_road(self, node: Node, name: str, other: str) -> _Test:
         one, far = self.vehicles[name], self.vehicles[other]
@@ -245,7 +250,7 @@ class Triggers:
         behind = 0.0 if free else one.rear + far.front
         value = self.findings.number(node, "value")
         gap, near = f"gap({self.called(name)}, {self.called(other)})", (value - ahead, behind - value)
-        if self.findings.word(node, "rule", tuple(RULES)).startswith("less"):
+        if self._is_less(node):
             return _Test(f"{gap} < {near[0]:.9g} m and {gap} > {near[1]:.9g} m")
         return _Test(f"{gap} > {near[0]:.9g} m or {gap} < {near[1]:.9g} m")
 
@@ -253,16 +258,15 @@ class Triggers:
         return self.findings.word(node, "freespace", ("true", "false")) == "true"
 
     def _distance(self, node: Node, name: str) -> _Test | None:
-        """`X.position` about a position on the ego's route."""
-        for key in ("alongRoute", "coordinateSystem", "relativeDistanceType", "freespace"):
-            node.get(key)
-        place = self._place_along(node)
+        """`X.position` about a position on the ego's route, without `freespace` of the rear axle."""
+        self._is_along(node)
+        place, free, vehicle = self._place_along(node), self._is_free(node), self.vehicles[name]
         if place is None:
             return None
         value, signal = self.findings.number(node, "value"), f"{self.called(name)}.position"
-        place += self.vehicles[name].front
-        near, far = place - value, place + value
-        if self.findings.word(node, "rule", tuple(RULES)).startswith("less"):
+        near = place - value + (0.0 if free else vehicle.front)
+        far = place + value + (vehicle.length if free else vehicle.front)
+        if self._is_less(node):
             return _Test(f"{signal} > {near:.3f} m and {signal} < {far:.3f} m")
         return _Test(f"{signal} < {near:.3f} m or {signal} > {far:.3f} m")
 
@@ -294,8 +298,7 @@ class Triggers:
         return self._between(node, name, target.get("entityRef"), "ttc")
 
     def _between(self, node: Node, name: str, other: str, signal: str) -> _Test | None:
-        node.get("alongRoute"), node.get("coordinateSystem")
-        if node.get("relativeDistanceType") not in ("", "longitudinal"):
+        if not self._is_along(node, "longitudinal"):
             self.findings.refuse(node, "relativeDistanceType: times are of distances along the road (longitudinal)")
         if not self._is_known(node, other):
             return None
@@ -303,10 +306,13 @@ class Triggers:
         return self._compared(node, f"{signal}({self.called(name)}, {self.called(other)}, {further:g} m)", "s")
 
     def _collides(self, node: Node, name: str) -> _Test:
-        """`X.collision`, with anybody."""
-        if node.children:
-            self.findings.leave_out(node, "a collision with anybody counts")
-        return _Test(f"{self.called(name)}.collision")
+        """`X.collision`, with anybody or a vehicle: `X.collision and Y.collision`."""
+        for kind in node.all("ByType"):
+            self.findings.word(kind, "type", ("vehicle",))
+        told = [self.called(name)]
+        for other in node.all("EntityRef"):
+            told += [self.called(other.get("entityRef"))] if self._is_known(other, other.get("entityRef")) else []
+        return _Test(" and ".join(f"{one}.collision" for one in told))
 
 
 _TESTS: Mapping[str, Callable[[Triggers, Node, str], _Test | None]] = {

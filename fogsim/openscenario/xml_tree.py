@@ -20,7 +20,7 @@ def sumo_name(name: str) -> str:
 class Node:
     """An element, with its file and line; `label` is its tag with its name in brackets.
 
-    `is_read` and `read` record whether the element and which of its attributes were used.
+    `is_read` and `read` record whether the element and which of its attributes were used; a name always is, in `label`.
     """
 
     tag: str
@@ -31,7 +31,7 @@ class Node:
     above: "Node | None" = field(default=None, repr=False, compare=False)
     children: list["Node"] = field(default_factory=list)
     is_read: bool = False
-    read: set[str] = field(default_factory=set)
+    read: set[str] = field(default_factory=lambda: {"name"})
 
     @property
     def path(self) -> str:

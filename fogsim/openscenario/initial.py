@@ -102,7 +102,12 @@ Along = Callable[[str | Node], float | None]
 def along_route(route: tuple[str, ...], begin: Beginning, vehicles: Mapping[str, Vehicle], actions: Actions) -> Along:
     """Position along the ego's route: of a vehicle's front bumper at the beginning, or of a position."""
     lengths = {lane.edge: lane.length for lane in actions.positions.lanes.lanes}
-    starts = {edge: sum(lengths[before] for before in route[:number]) for number, edge in enumerate(route)}
+    starts: dict[str, float] = {}
+    length = 0.0
+    for edge in route:
+        # On a closed road, the first time counts.
+        starts.setdefault(edge, length)
+        length += lengths[edge]
 
     def position(what: str | Node) -> float | None:
         if isinstance(what, str):

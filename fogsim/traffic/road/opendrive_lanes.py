@@ -13,8 +13,8 @@ from fogsim.errors import InputError
 from fogsim.traffic.road.opendrive import read_opendrive
 from fogsim.traffic.road.plan_view import PlanView, plan_view
 
-FARTHEST_ROUTE = 50_000.0
-"""Length at which an endless route is cut off [m]."""
+FARTHEST_ROUTE, LONGEST_LAPS = 50_000.0, 10_000.0
+"""Lengths at which an endless route, and one that goes round and round, is cut off [m]."""
 
 _TURNS = {"s": 0, "r": 1, "R": 1, "l": 2, "L": 2}
 """Directions of connections, in order of preference."""
@@ -126,12 +126,11 @@ class OpenDriveLanes:
         return (position - lane.length if ahead else position + other.length), other
 
     def route(self, edge: str) -> tuple[str, ...]:
-        """Edges from one on, straight ahead where there is a choice, until the road ends or repeats."""
+        """Edges from one on, straight ahead where there is a choice, until the road ends; a closed one is repeated."""
         lengths = {one.edge: one.length for one in self.lanes}
-        found, length = [edge], lengths[edge]
-        while length < FARTHEST_ROUTE and (following := self.followers.get(found[-1])):
-            if following[0] in found:
-                break
+        found, length, most = [edge], lengths[edge], FARTHEST_ROUTE
+        while length < most and (following := self.followers.get(found[-1])):
+            most = LONGEST_LAPS if following[0] in found else most
             found.append(following[0])
             length += lengths[found[-1]]
         return tuple(found)

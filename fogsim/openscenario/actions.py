@@ -39,11 +39,15 @@ _NEAR = 0.05  # Difference at which a speed has been reached [m/s]
 
 @dataclass
 class Effect:
-    """What an event does: timeline blocks by subject, their known duration [s], and conditions that end the rest."""
+    """What an event does: timeline blocks by subject, their known duration [s], and conditions that end the rest.
+
+    `routes` are edges through the waypoints of a vehicle's route.
+    """
 
     do: dict[str, dict[str, Any]] = field(default_factory=dict)
     lasts: float = 0.0
     ends: list[str] = field(default_factory=list)
+    routes: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     def add(self, subject: str, **blocks: Any) -> None:
         """Add an action of a subject."""
@@ -212,16 +216,40 @@ class Actions:
         action.get("continuous")
         effect.add(actor, follow={"vehicle": self.called(action.get("entityRef")).strip('"'), "headway_s": headway})
 
+    def _assign_route(self, action: Node, actor: str, effect: Effect) -> None:
+        """In `Init`: the way through the waypoints, with changes of lane that it needs, and then straight on."""
+        self._drive(action, actor, effect, lambda: self.positions.route(action)[1])
+
+    def _acquire(self, action: Node, actor: str, effect: Effect) -> None:
+        """In `Init`: the shortest way there, and then straight on."""
+
+        def edges() -> tuple[str, ...]:
+            position, begins = action.one("Position"), self.positions.entities.get(actor)
+            spot = None if position is None else self.positions.spot(position)
+            if begins is None or spot is None:
+                raise ValueError("expected a Position, and a vehicle that has one")
+            return self.positions.lanes.way(begins.lane.edge, spot.lane.edge)
+
+        self._drive(action, actor, effect, edges)
+
+    def _drive(self, action: Node, actor: str, effect: Effect, edges: Callable[[], tuple[str, ...]]) -> None:
+        try:
+            effect.routes[actor] = edges()
+        except ValueError as error:
+            self.findings.refuse(action, str(error))
+
 
 _PRIVATE: Mapping[str, Callable[[Actions, Node, str, Effect], None]] = {
     "SpeedAction": Actions._speed,
     "LaneChangeAction": Actions._lane_change,
     "LightStateAction": Actions._lights,
     "LongitudinalDistanceAction": Actions._keep_distance,
+    "AssignRouteAction": Actions._assign_route,
+    "AcquirePositionAction": Actions._acquire,
 }
 _GROUPS = (
     *("PrivateAction", "GlobalAction", "ControllerAction"),
-    *("LongitudinalAction", "LateralAction", "AppearanceAction"),
+    *("LongitudinalAction", "LateralAction", "AppearanceAction", "RoutingAction"),
 )
 ACTIONS: Mapping[str, str] = {
     "EnvironmentAction": "`fog` and `light`.",

@@ -46,6 +46,8 @@ DistanceCondition@coordinateSystem,freespace,relativeDistanceType,rule,value Rea
 TimeHeadwayCondition@coordinateSystem,entityRef,freespace,relativeDistanceType,rule,value
 TimeToCollisionCondition@coordinateSystem,freespace,relativeDistanceType,rule,value TimeToCollisionConditionTarget
 CollisionCondition ByType@type
+RoutingAction AssignRouteAction AcquirePositionAction Route@closed,name Waypoint@routeStrategy RouteCatalog RouteRef
+RoutePosition InRoutePosition FromCurrentEntity@entityRef FromLaneCoordinates@laneId,laneOffset,pathS
 Pedestrian@name,pedestrianCategory MiscObject@miscObjectCategory,name PedestrianCatalog MiscObjectCatalog
 ParameterValueDistribution ScenarioFile@filepath Deterministic DeterministicMultiParameterDistribution
 DeterministicSingleParameterDistribution@parameterName DistributionRange@stepWidth DistributionSet
@@ -73,7 +75,7 @@ HARMLESS: Mapping[str, str] = _by_name(
         "Pedestrian@mass Pedestrian@model Pedestrian@model3d MiscObject@mass MiscObject@model3d": "persons have "
         "figures of FogSim's, and everything else is a box",
         "ParameterDeclaration@parameterType": "a value is checked where it is used",
-        "RouteCatalog TrajectoryCatalog": "a folder; its entries may not be used",
+        "TrajectoryCatalog": "a folder; its entries may not be used",
         "VariableDeclarations VariableDeclaration MonitorDeclarations MonitorDeclaration": "nothing may use them",
         "UsedArea": "the whole network is there",
         "Condition@name": "a label",
@@ -104,8 +106,8 @@ REFUSED: Mapping[str, str] = _by_name(
         "ExternalObjectReference EntitySelection Members AddEntityAction "
         "DeleteEntityAction EntityAction ScenarioObjectTemplate EntityDistribution EntityDistributionEntry": "entities "
         "are vehicles that are there from beginning to end",
-        "AcquirePositionAction AssignRouteAction RandomRouteAction RoutingAction Route Waypoint RouteRef RoutePosition "
-        "InRoutePosition FromCurrentEntity FromLaneCoordinates FromRoadCoordinates": "everybody goes straight on",
+        "RandomRouteAction": "who has no route goes straight on",
+        "FromRoadCoordinates": "a place on a route has a lane; write FromLaneCoordinates",
         "FollowTrajectoryAction Trajectory TrajectoryRef TrajectoryFollowingMode TrajectoryPosition Shape Polyline "
         "Vertex Clothoid ClothoidSpline ClothoidSplineSegment PositionStart Nurbs ControlPoint Knot TimeReference None "
         "Timing": "vehicles keep to their lanes; there are no trajectories",

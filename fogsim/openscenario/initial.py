@@ -7,14 +7,19 @@ from fogsim.openscenario.actions import Actions, Effect
 from fogsim.openscenario.entities import Vehicle
 from fogsim.openscenario.environment import Environment, environment_of
 from fogsim.openscenario.xml_tree import Node
-from fogsim.traffic.road.opendrive_lanes import Spot
+from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, Spot
 
 
 @dataclass
 class Beginning:
-    """Initial state: reference points and speeds [m/s] of vehicles, fog and light, and further effects."""
+    """Initial state: reference points and speeds [m/s] of vehicles, fog and light, and further effects.
+
+    `fronts` are the places of front bumpers, and `ways` the edges from there on.
+    """
 
     spots: dict[str, Spot] = field(default_factory=dict)
+    fronts: dict[str, Spot] = field(default_factory=dict)
+    ways: dict[str, tuple[str, ...]] = field(default_factory=dict)
     speeds: dict[str, float] = field(default_factory=dict)
     environment: Environment = field(default_factory=Environment)
     effect: Effect = field(default_factory=Effect)
@@ -38,11 +43,21 @@ def read_beginning(init: Node | None, vehicles: Mapping[str, Vehicle], actions: 
                 actions.findings.refuse(vehicle.node, f"{name} has no place: Init needs a TeleportAction of it")
             continue
         try:
-            actions.positions.lanes.along(begin.spots[name], vehicle.front)
+            wanted = begin.effect.routes.get(name, ())
+            begin.fronts[name] = actions.positions.lanes.along(begin.spots[name], vehicle.front, wanted)
+            begin.ways[name] = _way(begin.fronts[name].lane.edge, wanted, actions.positions.lanes)
         except ValueError as error:
-            actions.findings.refuse(vehicle.node, f"the front bumper of {name} is not on the road: {error}")
+            actions.findings.refuse(vehicle.node, f"{name} cannot begin where it is to: {error}")
             del begin.spots[name]
     return begin
+
+
+def _way(edge: str, wanted: tuple[str, ...], lanes: OpenDriveLanes) -> tuple[str, ...]:
+    """Edges from one on through a route, or to it and through it, and straight on."""
+    if not wanted:
+        return lanes.route(edge)
+    joined = wanted[wanted.index(edge) :] if edge in wanted else (*lanes.way(edge, wanted[0]), *wanted[1:])
+    return (*joined, *lanes.route(joined[-1])[1:])
 
 
 def _take_global(action: Node, begin: Beginning, actions: Actions) -> None:
@@ -80,6 +95,7 @@ def _take_private(action: Node, name: str, begin: Beginning, actions: Actions) -
         return
     effect = Effect()
     actions.take(action, [name], effect)
+    begin.effect.routes.update(effect.routes)
     done = effect.do.get(name, {})
     speed = done.pop("speed", None)
     if speed is not None:
@@ -101,13 +117,10 @@ Along = Callable[[str | Node], float | None]
 
 def along_route(route: tuple[str, ...], begin: Beginning, vehicles: Mapping[str, Vehicle], actions: Actions) -> Along:
     """Position along the ego's route: of a vehicle's front bumper at the beginning, or of a position."""
-    lengths = {lane.edge: lane.length for lane in actions.positions.lanes.lanes}
     starts: dict[str, float] = {}
-    length = 0.0
-    for edge in route:
+    for edge, start in zip(route, actions.positions.lanes.starts(route), strict=False):
         # On a closed road, the first time counts.
-        starts.setdefault(edge, length)
-        length += lengths[edge]
+        starts.setdefault(edge, start)
 
     def position(what: str | Node) -> float | None:
         if isinstance(what, str):

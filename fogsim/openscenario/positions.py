@@ -1,10 +1,12 @@
 """Positions of a file on the lanes of the network."""
 
 import inspect
+import itertools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from fogsim.openscenario.catalogs import Catalogs
 from fogsim.openscenario.elements import REFUSED
 from fogsim.openscenario.findings import Findings
 from fogsim.openscenario.xml_tree import Node
@@ -19,8 +21,13 @@ class Positions:
     """Finds positions; relative ones refer to the known initial positions `entities`."""
 
     lanes: OpenDriveLanes
-    findings: Findings
+    catalogs: Catalogs
     entities: dict[str, Spot] = field(default_factory=dict)
+
+    @property
+    def findings(self) -> Findings:
+        """Receives what has no place."""
+        return self.catalogs.findings
 
     def refers_to(self, position: Node) -> str | None:
         """Entity to which a ``Position`` is relative; None for an absolute one."""
@@ -98,13 +105,53 @@ class Positions:
         cosine, sine = math.cos(heading), math.sin(heading)
         return self.lanes.at(x + dx * cosine - dy * sine, y + dx * sine + dy * cosine, heading)
 
+    def on_route(self, node: Node) -> Spot:
+        """So far along a route from its first waypoint, on the lane of `laneId`; or where an entity is."""
+        reference, place = node.one("RouteRef"), node.one("InRoutePosition")
+        inner = place.one("FromLaneCoordinates", "FromCurrentEntity") if place else None
+        if reference is None or inner is None:
+            raise ValueError("expected a RouteRef, and an InRoutePosition from lane coordinates or an entity")
+        if inner.tag == "FromCurrentEntity":
+            if (entity := inner.get("entityRef")) not in self.entities:
+                raise ValueError(f"there is no entity {entity!r} that has a place already")
+            return self.entities[entity]
+        first, edges = self.route(reference)
+        spot, lane = self.lanes.along(first, self.findings.number(inner, "pathS"), edges), inner.get("laneId")
+        self._no_offset(inner, "laneOffset")
+        for one in self.lanes.lanes:
+            if one.edge == spot.lane.edge and any(origin.endswith(f"_{lane}") for origin in one.origins):
+                return Spot(one, spot.position * one.length / spot.lane.length)
+        raise ValueError(f"there is no lane {lane!r} to drive on there")
+
+    def route(self, holder: Node) -> tuple[Spot, tuple[str, ...]]:
+        """First waypoint, and edges through all waypoints, of a ``Route`` or a reference to one; ValueError if none."""
+        reference = holder.one("CatalogReference")
+        node = self.catalogs.entry(reference) if reference else holder.one("Route")
+        points = node.all("Waypoint") if node else []
+        spots = [self.spot(position) for point in points for position in point.all("Position")]
+        known = [spot for spot in spots if spot is not None]
+        if node is None or not known or len(known) != len(points):
+            raise ValueError("expected a Route of Waypoints that have a Position")
+        if node.get("closed") == "true":
+            self.findings.refuse(node, "closed: write the waypoints of each lap")
+        edges: tuple[str, ...] = (known[0].lane.edge,)
+        for point, (before, after) in zip(points, itertools.pairwise(known), strict=False):
+            if before.lane.edge == after.lane.edge and after.position < before.position:
+                raise ValueError("a waypoint lies behind the one before")
+            by = self.findings.word(point, "routeStrategy", ("shortest", "fastest"))
+            edges += self.lanes.way(edges[-1], after.lane.edge, is_fastest=by == "fastest")[1:]
+        points[-1].get("routeStrategy")
+        if reference:
+            self.findings.look_for_unread(node)
+        return known[0], edges
+
     def _numbers(self, node: Node, *keys: str) -> tuple[float, float]:
         first, second = (self.findings.number(node, key) for key in keys)
         return first, second
 
-    def _no_offset(self, node: Node) -> None:
-        if self.findings.number(node, "offset", 0.0):
-            self.findings.refuse(node, "offset: vehicles are in the middle of their lanes; write 0")
+    def _no_offset(self, node: Node, key: str = "offset") -> None:
+        if self.findings.number(node, key, 0.0):
+            self.findings.refuse(node, f"{key}: vehicles are in the middle of their lanes; write 0")
 
 
 def _check_heading(heading: float | None, lane: float) -> None:
@@ -121,6 +168,7 @@ _KINDS: Mapping[str, Callable[[Positions, Node], Spot]] = {
     "RelativeLanePosition": Positions.relative_lane,
     "RelativeWorldPosition": Positions.relative_world,
     "RelativeObjectPosition": Positions.relative_object,
+    "RoutePosition": Positions.on_route,
 }
 
 POSITIONS: Mapping[str, str] = {tag: inspect.getdoc(kind) or "" for tag, kind in _KINDS.items()}

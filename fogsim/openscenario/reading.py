@@ -22,7 +22,7 @@ from fogsim.openscenario.parameters import put_parameters
 from fogsim.openscenario.positions import Positions
 from fogsim.openscenario.storyboard import Storyboard
 from fogsim.openscenario.triggers import Trigger, Triggers
-from fogsim.openscenario.vehicles_file import STANDS, front_spot, vehicles_text
+from fogsim.openscenario.vehicles_file import STANDS, vehicles_text
 from fogsim.openscenario.xml_tree import Node, read_xml
 from fogsim.traffic.road.netconvert import netconvert_recipe, opendrive_net
 from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, read_opendrive_lanes
@@ -109,7 +109,7 @@ class _Reader:
 
     def scenario(self, catalogs: Catalogs, net: str, opendrive: Path) -> ScenarioData:
         ego = ego_of(dict(self.vehicles))
-        positions = Positions(self.lanes, self.findings)
+        positions = Positions(self.lanes, catalogs)
         story = Storyboard(catalogs, Actions(self.vehicles, catalogs, positions, lambda name: _called(name, ego)))
         actions = story.actions
         begin = read_beginning(self.storyboard.one("Init"), self.vehicles, actions)
@@ -120,7 +120,7 @@ class _Reader:
             )
             self.findings.close(self.path)
         story.find_events(self.storyboard)
-        route = self.lanes.route(front_spot(self.vehicles[ego], begin.spots[ego], self.lanes).lane.edge)
+        route = begin.ways[ego]
         along = along_route(route, begin, self.vehicles, actions)
         story.triggers = triggers = Triggers(self.vehicles, ego, positions, along, story.state)
         entries = story.timeline()
@@ -150,7 +150,7 @@ class _Reader:
         data |= _ending(stop, data["timeline"])
         data["expect"] = {block["name"]: {"happened": block["name"]} for _, block in entries}
         files = write_generated(
-            "openscenario", {"road.net.xml": net, "road.rou.xml": vehicles_text(self.vehicles, begin, self.lanes)}
+            "openscenario", {"road.net.xml": net, "road.rou.xml": vehicles_text(self.vehicles, begin)}
         )
         data["traffic"] |= {
             "net": str(files / "road.net.xml"),
@@ -164,7 +164,11 @@ class _Reader:
         light = begin.environment.illuminance
         return {
             "name": re.sub(r"[^A-Za-z0-9_.-]", "_", self.path.stem)[:100],
-            "traffic": {"ego": ego, "keep_lane": list(self.vehicles), "stop_before_end_m": NEAR_THE_END},
+            "traffic": {
+                "ego": ego,
+                "keep_lane": [name for name in self.vehicles if name not in begin.effect.routes],
+                "stop_before_end_m": NEAR_THE_END,
+            },
             "fog": fog_block(
                 begin.environment, np.concatenate([one.shape for one in way]), min(one.lowest for one in way)
             ),

@@ -5,27 +5,25 @@ from collections.abc import Mapping
 from fogsim.openscenario.entities import CLASSES, Vehicle
 from fogsim.openscenario.initial import Beginning
 from fogsim.traffic.appearance import BODY_PARAMETER
-from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, Spot
 from fogsim.traffic.templates.xml_text import element, opening
 
 STANDS = 0.1
 """Speed below which a vehicle has no desired speed to keep [m/s]."""
 
 
-def front_spot(vehicle: Vehicle, spot: Spot, lanes: OpenDriveLanes) -> Spot:
-    """Place of a vehicle's front bumper from its reference point; ValueError if the road ends before it."""
-    return lanes.along(spot, vehicle.front)
+_FOR_THE_ROUTE_ALONE = {"lcSpeedGain": 0, "lcKeepRight": 0, "lcCooperative": 0}
+"""Attributes of drivers who change lane where their route needs it, and for nothing else."""
 
 
-def vehicles_text(vehicles: Mapping[str, Vehicle], begin: Beginning, lanes: OpenDriveLanes) -> str:
+def vehicles_text(vehicles: Mapping[str, Vehicle], begin: Beginning) -> str:
     """Text of the route file: every vehicle is present from the start, with its initial position and speed."""
     lines = []
     for name, vehicle in vehicles.items():
-        front = front_spot(vehicle, begin.spots[name], lanes)
-        speed = begin.speeds.get(name, 0.0)
+        front, speed = begin.fronts[name], begin.speeds.get(name, 0.0)
+        own = _FOR_THE_ROUTE_ALONE if name in begin.effect.routes else {}
         lines += [
-            "  " + element("vType", id=f"type.{name}", **_type(vehicle, speed, front.lane.limit)),
-            "  " + element("route", id=f"route.{name}", edges=" ".join(lanes.route(front.lane.edge))),
+            "  " + element("vType", id=f"type.{name}", **_type(vehicle, speed, front.lane.limit), **own),
+            "  " + element("route", id=f"route.{name}", edges=" ".join(begin.ways[name])),
             "  "
             + opening(
                 "vehicle",

@@ -69,6 +69,8 @@ def opendrive_net(path: Path) -> str:
         command = [program, "--opendrive-files", str(roads), "-o", str(net), "-t", str(types)]
         command += ["--output.original-names", "--offset.disable-normalization", "--opendrive.curve-resolution", "1"]
         command += ["--no-turnarounds", "--precision", "3", "--xml-validation", "never"]
+        # Speeds in bends are the file's.
+        command += ["--junctions.limit-turn-speed", "-1"]
         reported = _run(command, path, Path(folder))
         if reported or not net.is_file():
             raise InputError(

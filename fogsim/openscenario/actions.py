@@ -41,13 +41,14 @@ _NEAR = 0.05  # Difference at which a speed has been reached [m/s]
 class Effect:
     """What an event does: timeline blocks by subject, their known duration [s], and conditions that end the rest.
 
-    `routes` are edges through the waypoints of a vehicle's route.
+    `routes` are edges through the waypoints of a vehicle's route; `ends_itself` if only the run shows its duration.
     """
 
     do: dict[str, dict[str, Any]] = field(default_factory=dict)
     lasts: float = 0.0
     ends: list[str] = field(default_factory=list)
     routes: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    ends_itself: bool = False
 
     def add(self, subject: str, **blocks: Any) -> None:
         """Add an action of a subject."""
@@ -144,7 +145,7 @@ class Actions:
         return {"shape": shape, "over_s" if by == "time" else "rate_mps2": value}
 
     def _lane_change(self, action: Node, actor: str, effect: Effect) -> None:
-        """`change_lane`: absolute, or relative to a vehicle; by time."""
+        """`change_lane`: absolute, or relative to a vehicle; by time or distance."""
         dynamics, target = action.one("LaneChangeActionDynamics"), action.one("LaneChangeTarget")
         if self.findings.number(action, "targetLaneOffset", 0.0):
             self.findings.refuse(action, "targetLaneOffset: vehicles are in the middle of their lanes; write 0")
@@ -153,19 +154,20 @@ class Actions:
             return
         change: dict[str, Any] = {**lanes, "stay_s": _STAY}
         if dynamics is not None:
-            change["duration_s"] = self._duration(dynamics)
-            effect.lasts = max(effect.lasts, change["duration_s"])
+            change |= self._duration(dynamics)
+            effect.lasts = max(effect.lasts, change.get("duration_s", 0.0))
+            effect.ends_itself = "distance_m" in change
         effect.add(actor, change_lane=change)
 
-    def _duration(self, dynamics: Node) -> float:
+    def _duration(self, dynamics: Node) -> dict[str, float]:
         shape = self.findings.word(dynamics, "dynamicsShape", tuple(SHAPES))
         value = abs(self.findings.number(dynamics, "value", 0.0, is_finite=False))
         by = self.findings.word(dynamics, "dynamicsDimension", ("time", "rate", "distance"))
-        if shape == "step":
-            return 0.0
-        if by != "time":
-            self.findings.refuse(dynamics, "dynamicsDimension: changes of lane take a time")
-        return min(value, 60.0)
+        if shape == "step" or value == 0.0:
+            return {"duration_s": 0.0}
+        if by == "rate":
+            self.findings.refuse(dynamics, "dynamicsDimension: changes of lane take a time or a distance")
+        return {"distance_m": value} if by == "distance" else {"duration_s": min(value, 60.0)}
 
     def _lanes(self, target: Node, actor: str) -> dict[str, Any] | None:
         absolute, relative = target.one("AbsoluteTargetLane"), target.one("RelativeTargetLane")

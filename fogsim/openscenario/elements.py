@@ -45,7 +45,7 @@ RelativeDistanceCondition@coordinateSystem,entityRef,freespace,relativeDistanceT
 DistanceCondition@coordinateSystem,freespace,relativeDistanceType,rule,value ReachPositionCondition@tolerance
 TimeHeadwayCondition@coordinateSystem,entityRef,freespace,relativeDistanceType,rule,value
 TimeToCollisionCondition@coordinateSystem,freespace,relativeDistanceType,rule,value TimeToCollisionConditionTarget
-CollisionCondition ByType@type
+CollisionCondition ByType@type EndOfRoadCondition@duration
 RoutingAction AssignRouteAction AcquirePositionAction Route@closed,name Waypoint@routeStrategy RouteCatalog RouteRef
 RoutePosition InRoutePosition FromCurrentEntity@entityRef FromLaneCoordinates@laneId,laneOffset,pathS
 Pedestrian@name,pedestrianCategory MiscObject@miscObjectCategory,name PedestrianCatalog MiscObjectCatalog
@@ -135,7 +135,7 @@ REFUSED: Mapping[str, str] = _by_name(
         "UserDefinedAction CustomCommandAction UserDefinedValueCondition UserDefinedDistribution": "its meaning is "
         "another simulator's",
         "GeoPosition RelativeRoadPosition": "places are by lane, by road, in the map's metres, or by an entity",
-        "EndOfRoadCondition OffroadCondition AngleCondition RelativeAngleCondition RelativeClearanceCondition "
+        "OffroadCondition AngleCondition RelativeAngleCondition RelativeClearanceCondition "
         "RelativeLaneRange TimeOfDayCondition": "FogSim has no such condition",
         "DistanceCondition@routingAlgorithm RelativeDistanceCondition@routingAlgorithm "
         "TimeHeadwayCondition@routingAlgorithm TimeToCollisionCondition@routingAlgorithm": "distances are along the "

@@ -1,5 +1,6 @@
 """An OpenSCENARIO file as the plain data of a scenario file, with its SUMO files."""
 
+import math
 import re
 import warnings
 from collections.abc import Mapping
@@ -122,7 +123,8 @@ class _Reader:
         story.find_events(self.storyboard)
         route = begin.ways[ego]
         along = along_route(route, begin, self.vehicles, actions)
-        story.triggers = triggers = Triggers(self.vehicles, ego, positions, along, story.state)
+        end = math.inf if self.lanes.followers.get(route[-1]) else self.lanes.starts(route)[-1] - NEAR_THE_END
+        story.triggers = triggers = Triggers(self.vehicles, ego, positions, along, story.state, end)
         entries = story.timeline()
         stop = triggers.trigger(self.storyboard.one("StopTrigger"))
         header = self.root.one("FileHeader")
@@ -148,7 +150,7 @@ class _Reader:
         if not timeline[0]:
             lines = {("timeline", int(place) - 1): line for (_, place), line in lines.items()}
         data |= _ending(stop, data["timeline"])
-        data["expect"] = {block["name"]: {"happened": block["name"]} for _, block in entries}
+        data["expect"] = {entry.names[0]: {"happened": entry.names[0]} for entry in story.entries.values()}
         files = write_generated(
             "openscenario", {"road.net.xml": net, "road.rou.xml": vehicles_text(self.vehicles, begin)}
         )

@@ -1,9 +1,10 @@
 """Triggers as conditions of FogSim's language."""
 
 import inspect
+import math
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from fogsim.openscenario.entities import Vehicle
 from fogsim.openscenario.findings import Findings
@@ -30,12 +31,13 @@ _STILL = 0.1  # Speed below which a vehicle counts as stopped [m/s]
 class Trigger:
     """When something begins: a condition in FogSim's language ("" for never), and a delay after it [s].
 
-    `at` is the time if the condition is only a time [s]; below zero for the start.
+    `at` is the time if the condition is only a time [s], below zero for the start. `stays` if it stays true.
     """
 
     condition: str
     delay: float = 0.0
     at: float | None = None
+    stays: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +69,8 @@ class Triggers:
     """Reads triggers.
 
     `along` is the position of an entity or position along the ego's route [m], None off the route; `states` gives the
-    trigger of a storyboard state condition; `marks` become timeline entries without action.
+    trigger of a storyboard state condition; `end` is where the ego's road ends [m]; `marks` become timeline entries
+    without action.
     """
 
     vehicles: Mapping[str, Vehicle]
@@ -75,6 +78,7 @@ class Triggers:
     positions: Positions
     along: Callable[[str | Node], float | None]
     states: Callable[[Node], Trigger]
+    end: float = math.inf
     marks: list[Mark] = field(default_factory=list)
 
     @property
@@ -87,25 +91,36 @@ class Triggers:
         if node is None:
             return None
         groups = [self._group(group) for group in node.all("ConditionGroup")]
-        if len(groups) < 2:
-            return groups[0] if groups else NEVER
+        times = [group.at for group in groups if group.at is not None]
+        if len(times) == len(groups):
+            return at_time(min(times)) if times else NEVER
         if len({group.delay for group in groups}) > 1:
-            self.findings.refuse(node, "groups of conditions of one trigger must have the same delay")
-        return Trigger(" or ".join(f"({group.condition})" for group in groups), groups[0].delay)
+            groups = [self._marked(group, node) if group.delay else group for group in groups]
+        told = groups[0].condition if len(groups) == 1 else " or ".join(f"({group.condition})" for group in groups)
+        return Trigger(told, groups[0].delay)
 
     def _group(self, group: Node) -> Trigger:
-        conditions = group.all("Condition")
-        read = [self._condition(one) for one in conditions]
-        delays = [trigger.delay for trigger in read]
-        if len({*delays}) > 1:
-            self.findings.refuse(group, f"conditions of one group must have the same delay, got {delays}")
-        times = [trigger.at for trigger in read if trigger.at is not None]
-        others = list(dict.fromkeys(trigger.condition for trigger in read if trigger.at is None))
+        read = [self._condition(one) for one in group.all("Condition")]
+        latest = max((trigger.at for trigger in read if trigger.at is not None), default=-1.0)
+        others = [trigger for trigger in read if trigger.at is None]
         if not others:
-            latest = max(times, default=-1.0)
-            return at_time(latest + delays[0] if delays else latest)
-        told = [f"time >= {max(times):g} s"] if times and max(times) > 0.0 else []
-        return Trigger(" and ".join([*told, *(_bracketed(one, len(others) + len(told)) for one in others)]), delays[0])
+            return at_time(latest)
+        if len({trigger.delay for trigger in others}) > 1:
+            others = [self._marked(one, group) if one.stays and one.delay else one for one in others]
+            if any(one.delay for one in others):
+                delays = [trigger.delay for trigger in read]
+                why = "of conditions with different delays, those that may become false again must have none"
+                self.findings.refuse(group, f"{why}; got {delays}")
+        delay = others[0].delay
+        told = [f"time >= {latest - delay:g} s"] if latest > delay else []
+        parts = list(dict.fromkeys(one.condition for one in others))
+        return Trigger(" and ".join([*told, *(_bracketed(one, len(parts) + len(told)) for one in parts)]), delay)
+
+    def _marked(self, trigger: Trigger, node: Node) -> Trigger:
+        """A trigger with its delay as a mark that has begun."""
+        name = f"delayed_{len(self.marks)}"
+        self.mark(name, trigger, node)
+        return Trigger(f"happened({name})", stays=True)
 
     def _condition(self, node: Node) -> Trigger:
         delay = self.findings.number(node, "delay", 0.0)
@@ -114,7 +129,10 @@ class Triggers:
             for one in kind.all():
                 return self._by_value(one, edge, delay)
         for kind in node.all("ByEntityCondition"):
-            return Trigger(self._by_entities(kind, edge), delay)
+            # Who is at the end of the road stays there.
+            ends = [one for each in kind.all("EntityCondition") for one in each.all("EndOfRoadCondition")]
+            stays = sum(self.findings.number(one, "duration") for one in ends)
+            return Trigger(self._by_entities(kind, edge), delay + stays)
         self.findings.refuse(node, "expected a ByValueCondition or a ByEntityCondition")
         return NEVER
 
@@ -125,10 +143,12 @@ class Triggers:
             if rule in ("lessThan", "lessOrEqual"):
                 test = _Test(f"time {RULES[rule]} {value:g} s", "time", RULES[rule], f"{value:g} s")
                 return Trigger(self._edged(test, edge, node), delay)
-            return Trigger(f"time >= {value:g} s", delay, at=value if delay == 0.0 else None)
+            return Trigger(f"time >= {value + delay:g} s", at=value + delay)
         if node.tag == "StoryboardElementStateCondition":
             found = self.states(node)
-            return found if found.at is not None and not delay else Trigger(found.condition, found.delay + delay)
+            if found.at is not None:
+                return at_time(max(found.at, 0.0) + delay) if delay else found
+            return replace(found, delay=found.delay + delay)
         self.findings.refuse(node, "FogSim has no such condition")
         return NEVER
 
@@ -216,6 +236,12 @@ class Triggers:
     def _traveled(self, node: Node, name: str) -> _Test | None:
         """`X.position`, from where the vehicle begins; it must begin on the ego's route."""
         return self._at_or_beyond(node, name, self.along(name))
+
+    def _ends(self, node: Node, name: str) -> _Test | None:
+        """`X.position` at the end of the ego's road, or of its route."""
+        if not math.isfinite(self.end):
+            self.findings.refuse(node, "the ego's road has no end")
+        return _Test(f"{self.called(name)}.position >= {self.end:.3f} m")
 
     def _at_or_beyond(self, node: Node, name: str, begin: float | None) -> _Test | None:
         if begin is None:
@@ -321,6 +347,7 @@ _TESTS: Mapping[str, Callable[[Triggers, Node, str], _Test | None]] = {
     "RelativeSpeedCondition": Triggers._relative_speed,
     "StandStillCondition": Triggers._stands,
     "TraveledDistanceCondition": Triggers._traveled,
+    "EndOfRoadCondition": Triggers._ends,
     "RelativeDistanceCondition": Triggers._relative_distance,
     "DistanceCondition": Triggers._distance,
     "ReachPositionCondition": Triggers._reaches,

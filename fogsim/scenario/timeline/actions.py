@@ -8,6 +8,7 @@ from typing import Protocol
 from fogsim.scenario.sensors.faults import fault_of
 from fogsim.scenario.timeline.lamps import lamp_switches
 from fogsim.scenario.timeline.schema import (
+    LONGEST_CHANGE,
     DepartAction,
     Doing,
     FogActions,
@@ -40,6 +41,7 @@ from fogsim.values.script import (
 )
 
 _HAZARD = Lamp.INDICATOR_LEFT | Lamp.INDICATOR_RIGHT
+_SLOWEST = 0.01  # Speed at which a change of lane over any distance takes as long as it may [m/s]
 _STATES = {"red": "r", "yellow": "y", "green": "G", "off": "O"}
 
 
@@ -192,7 +194,7 @@ def _of_vehicle(subject: str, doing: VehicleActions, now: Situation) -> list[Tra
     if doing.stop:
         moves.append(_stopping(vehicle, doing.stop, now.position(subject)))
     if doing.change_lane:
-        moves.append(_lane_change(vehicle, doing.change_lane, subject, now))
+        moves.append(_lane_change(vehicle, doing.change_lane, subject, speed, now))
     moves += _switches(vehicle, doing)
     whole = [move for move in moves if move is not None]
     return whole if len(whole) == len(moves) else None
@@ -257,7 +259,7 @@ def _stopping(vehicle: str, action: StopAction, now: float | None) -> Stop | Non
     return Stop(vehicle, max(action.position_m - now, 0.0), action.deceleration_mps2, stand)
 
 
-def _lane_change(vehicle: str, action: LaneAction, subject: str, now: Situation) -> ChangeLane | None:
+def _lane_change(vehicle: str, action: LaneAction, subject: str, speed: float, now: Situation) -> ChangeLane | None:
     lanes, wanted = action.lanes or 0, action.to
     if action.to_lane_of is not None:
         other = now.lane(action.to_lane_of)
@@ -267,7 +269,10 @@ def _lane_change(vehicle: str, action: LaneAction, subject: str, now: Situation)
         if own is None or wanted is None:
             return None
         lanes = wanted - own
-    return ChangeLane(vehicle, lanes, action.stay_s, action.duration_s, action.indicator_s)
+    duration = action.duration_s
+    if action.distance_m is not None:
+        duration = min(action.distance_m / max(speed, _SLOWEST), LONGEST_CHANGE)
+    return ChangeLane(vehicle, lanes, action.stay_s, duration, action.indicator_s)
 
 
 def _density(action: FogActions, reference: float) -> float:

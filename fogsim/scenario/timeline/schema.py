@@ -23,6 +23,7 @@ from fogsim.scenario.section import (
     Distance,
     Flag,
     Id,
+    Length,
     Number,
     Period,
     Place,
@@ -136,6 +137,10 @@ class StopAction(Section):
         return self
 
 
+LONGEST_CHANGE = 60.0
+"""Longest time of a change of lane [s]."""
+
+
 class LaneAction(Section):
     """A vehicle changes lane, whoever is there, as far as it does not hit anybody."""
 
@@ -145,8 +150,11 @@ class LaneAction(Section):
     to: Annotated[Whole, Field(ge=0, le=20)] | None = None
     """Or the lane to go to: its number from the right, from 0."""
 
-    duration_s: Annotated[Time, Field(le=60)] | None = None
+    duration_s: Annotated[Time, Field(le=LONGEST_CHANGE)] | None = None
     """Time that the way over takes in pictures and positions; 3 s a lane if not given. For SUMO it changes at once."""
+
+    distance_m: Length | None = None
+    """Or the distance that it drives meanwhile, at the speed with which it begins; for at most 60 s."""
 
     indicator_s: Annotated[Time, Field(le=60)] = 0.0
     """Time for which it indicates before; it does until it is over. 0 for not at all."""
@@ -159,6 +167,8 @@ class LaneAction(Section):
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
+        if self.duration_s is not None and self.distance_m is not None:
+            raise ValueError("takes either duration or distance")
         is_told = self.lanes is not None or self.to_lane_of is not None
         if is_told == (self.to is not None):
             raise ValueError(

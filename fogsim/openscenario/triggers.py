@@ -83,12 +83,10 @@ class Triggers:
         return self.positions.findings
 
     def trigger(self, node: Node | None) -> Trigger | None:
-        """Trigger of a ``StartTrigger`` or ``StopTrigger``; None without one, never without groups."""
-        if node is None:
-            return None
-        groups = [self._group(group) for group in node.all("ConditionGroup")]
-        if len(groups) < 2:
-            return groups[0] if groups else NEVER
+        """Trigger of a ``StartTrigger`` or ``StopTrigger``; None without one, or for one without groups."""
+        groups = [self._group(group) for group in node.all("ConditionGroup")] if node else []
+        if node is None or len(groups) < 2:
+            return groups[0] if groups else None
         if len({group.delay for group in groups}) > 1:
             self.findings.refuse(node, "groups of conditions of one trigger must have the same delay")
         return Trigger(" or ".join(f"({group.condition})" for group in groups), groups[0].delay)

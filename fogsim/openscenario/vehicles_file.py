@@ -21,7 +21,7 @@ def vehicles_text(vehicles: Mapping[str, Vehicle], begin: Beginning, lanes: Open
     lines = []
     for name, vehicle in vehicles.items():
         front = front_spot(vehicle, begin.spots[name], lanes)
-        speed = begin.speeds.get(name, 0.0)
+        speed = begin.speed(name)
         lines += [
             "  " + element("vType", id=f"type.{name}", **_type(vehicle, speed, front.lane.limit)),
             "  " + element("route", id=f"route.{name}", edges=" ".join(lanes.route(front.lane.edge))),

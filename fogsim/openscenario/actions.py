@@ -87,10 +87,15 @@ class Actions:
                 told = REFUSED.get(one.tag, "FogSim does not know this element here")
                 self.findings.refuse(one, f"{told}; actions are {', '.join(ACTIONS)}")
             else:
-                if not actors:
-                    self.findings.refuse(one, "nobody does it: the Actors of the maneuver group name no entity")
-                for actor in actors:
-                    _PRIVATE[one.tag](self, one, actor, effect)
+                self._private(one, _ORDERS.get(action.tag, set()), actors, effect)
+
+    def _private(self, action: Node, orders: set[str], actors: list[str], effect: Effect) -> None:
+        if not actors:
+            self.findings.refuse(action, "nobody does it: the Actors of the maneuver group name no entity")
+        for actor in actors:
+            if effect.do.get(actor, {}).keys() & orders:
+                self.findings.refuse(action, f"another action of this event orders the motion of {actor} as well")
+            _PRIVATE[action.tag](self, action, actor, effect)
 
     def _environment(self, action: Node, effect: Effect) -> None:
         read = environment_of(action, self.catalogs, self.positions.lanes)
@@ -125,11 +130,10 @@ class Actions:
         other, value = relative.get("entityRef"), self.findings.number(relative, "value")
         if other not in self.vehicles:
             self.findings.refuse(relative, f"there is no vehicle {other!r}")
-        if relative.get("continuous", "false") == "true":
-            self.findings.leave_out(relative, "continuous: the speed is taken once, when the action begins")
         how = self.findings.word(relative, "speedTargetValueType", ("delta", "factor"))
         share = {"factor": value} if how == "factor" else {"plus_kmh": value * KMH_PER_MPS}
-        return {"like": self.called(other).strip('"'), **share}
+        follows = {"continuous": True} if relative.get("continuous") == "true" else {}
+        return {"like": self.called(other).strip('"'), **share, **follows}
 
     def _pace(self, dynamics: Node, effect: Effect) -> dict[str, Any]:
         shape = SHAPES[self.findings.word(dynamics, "dynamicsShape", tuple(SHAPES))]
@@ -215,7 +219,8 @@ class Actions:
             return
         self.findings.word(action, "coordinateSystem", ("entity", "lane", "road"), "entity")
         self.findings.word(action, "displacement", ("any", "trailingReferencedEntity"), "any")
-        action.get("continuous")
+        if action.get("continuous") != "true":
+            self.findings.refuse(action, "continuous: a distance, once reached, is kept; write true")
         effect.add(actor, follow={"vehicle": self.called(action.get("entityRef")).strip('"'), "headway_s": headway})
 
     def _assign_route(self, action: Node, actor: str, effect: Effect) -> None:
@@ -249,6 +254,7 @@ _PRIVATE: Mapping[str, Callable[[Actions, Node, str, Effect], None]] = {
     "AssignRouteAction": Actions._assign_route,
     "AcquirePositionAction": Actions._acquire,
 }
+_ORDERS = {"LongitudinalAction": {"speed", "follow"}, "LateralAction": {"change_lane"}}
 _GROUPS = (
     *("PrivateAction", "GlobalAction", "ControllerAction"),
     *("LongitudinalAction", "LateralAction", "AppearanceAction", "RoutingAction"),

@@ -33,7 +33,7 @@ AbsoluteTargetLane@value RelativeTargetLane@entityRef,value
 LightStateAction@transitionTime LightType VehicleLight@vehicleLightType LightState@mode
 ControllerAction OverrideControllerValueAction Throttle@active Brake@active Clutch@active ParkingBrake@active
 SteeringWheel@active Gear@active
-WorldPosition@h,x,y LanePosition@laneId,offset,roadId,s RoadPosition@roadId,s,t Orientation@h,p,r,type
+WorldPosition@h,x,y LanePosition@laneId,offset,roadId,s RoadPosition@roadId,s,t Orientation@h,type
 RelativeLanePosition@dLane,ds,dsLane,entityRef,offset RelativeWorldPosition@dx,dy,entityRef
 RelativeObjectPosition@dx,dy,entityRef
 StartTrigger StopTrigger ConditionGroup Condition@conditionEdge,delay ByValueCondition ByEntityCondition EntityCondition
@@ -88,8 +88,8 @@ HARMLESS: Mapping[str, str] = _by_name(
         "Sun@azimuth": "daylight is the illuminance of the ground, without shadows",
         "Wind": "even fog does not drift, and boxes of fog stand still",
         "Weather@atmosphericPressure Weather@temperature": "FogSim's light and fog do not depend on them",
-        "WorldPosition@z WorldPosition@p WorldPosition@r RelativeWorldPosition@dz RelativeObjectPosition@dz": "these "
-        "follow from the road",
+        "WorldPosition@z WorldPosition@p WorldPosition@r RelativeWorldPosition@dz RelativeObjectPosition@dz "
+        "Orientation@p Orientation@r": "these follow from the road",
         "SpeedActionDynamics@followingMode LaneChangeActionDynamics@followingMode": "dynamics are followed exactly",
         "DynamicConstraints": "FogSim's law of following has limits of its own",
         "Color ColorRgb ColorCmyk": "lamps have the colours that the law requires",

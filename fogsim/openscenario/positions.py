@@ -54,12 +54,13 @@ class Positions:
     def _turned(self, node: Node, spot: Spot) -> Spot:
         """Check an ``Orientation``, whose pitch and roll are the road's; ValueError unless the lane leads there."""
         orientation = node.one("Orientation")
-        if orientation is None or not orientation.attributes.get("h"):
+        if orientation is None:
             return spot
-        for key in "pr":
-            orientation.get(key)
+        kind = self.findings.word(orientation, "type", ("relative", "absolute"), "absolute")
+        if not orientation.get("h"):
+            return spot
         turn, lane = self.findings.number(orientation, "h"), spot.world[2]
-        if self.findings.word(orientation, "type", ("relative", "absolute"), "absolute") == "relative":
+        if kind == "relative":
             if node.tag == "RoadPosition" and turn:
                 turn += self.lanes.across(node.get("roadId"), self.findings.number(node, "s"), 0.0)[2]
             else:

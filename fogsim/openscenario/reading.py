@@ -131,7 +131,7 @@ class _Reader:
         description = header.get("description") if header else ""
         self.findings.look_for_unread(self.root)
         self.findings.close(self.path)
-        begin_at_once(entries, begin, ego)
+        begin_at_once(entries, begin)
         for name, vehicle in self.vehicles.items():
             if vehicle.body:
                 begin.effect.add(name, lamps={"all": "off"})
@@ -182,28 +182,21 @@ def _called(name: str, ego: str) -> str:
     return "ego" if name == ego else name
 
 
-def begin_at_once(entries: list[tuple[Node, dict[str, Any]]], begin: Beginning, ego: str) -> None:
+def begin_at_once(entries: list[tuple[Node, dict[str, Any]]], begin: Beginning) -> None:
     """Move speeds that are ordered for the very beginning from the timeline to the initial state."""
     for _, block in entries:
         for vehicle, done in block["do"].items() if block["when"] == "time >= 0 s" and "delay_s" not in block else ():
             speed = done.get("speed") if isinstance(done, dict) else None
-            if speed is None or speed.get("shape") != "step" or vehicle in begin.speeds:
-                continue
-            if "to_kmh" in speed:
-                begin.speeds[vehicle] = speed["to_kmh"] / KMH_PER_MPS
-            else:
-                other = ego if speed["like"] == "ego" else speed["like"]
-                now = begin.speeds.get(other, 0.0)
-                begin.speeds[vehicle] = max(
-                    now * speed.get("factor", 1.0) + speed.get("plus_kmh", 0.0) / KMH_PER_MPS, 0.0
-                )
+            if speed is not None and speed.get("shape") == "step":
+                begin.orders.setdefault(vehicle, speed)
 
 
 def _initial(begin: Beginning, ego: str) -> dict[str, Any]:
     """Entry of the timeline for the initial state: the speeds of all vehicles but the ego, and lamps."""
     for name in begin.spots:
-        speed = begin.speeds.get(name, 0.0)
-        if name != ego or speed <= STANDS:
+        speed = begin.speed(name)
+        moves = begin.effect.do.get(name, {}).keys() & {"speed", "follow"}
+        if not moves and (name != ego or speed <= STANDS):
             begin.effect.add(name, speed={"to_kmh": speed * KMH_PER_MPS, "shape": "step"})
     return {"name": "Init", "when": "time >= 0 s", "do": begin.effect.do} if begin.effect.do else {}
 

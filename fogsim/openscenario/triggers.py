@@ -87,13 +87,11 @@ class Triggers:
         return self.positions.findings
 
     def trigger(self, node: Node | None) -> Trigger | None:
-        """Trigger of a ``StartTrigger`` or ``StopTrigger``; None without one, never without groups."""
-        if node is None:
-            return None
-        groups = [self._group(group) for group in node.all("ConditionGroup")]
+        """Trigger of a ``StartTrigger`` or ``StopTrigger``; None without one, or for one without groups."""
+        groups = [self._group(group) for group in node.all("ConditionGroup")] if node else []
         times = [group.at for group in groups if group.at is not None]
-        if len(times) == len(groups):
-            return at_time(min(times)) if times else NEVER
+        if node is None or len(times) == len(groups):
+            return at_time(min(times)) if times else None
         if len({group.delay for group in groups}) > 1:
             groups = [self._marked(group, node) if group.delay else group for group in groups]
         told = groups[0].condition if len(groups) == 1 else " or ".join(f"({group.condition})" for group in groups)

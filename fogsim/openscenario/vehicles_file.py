@@ -19,7 +19,7 @@ def vehicles_text(vehicles: Mapping[str, Vehicle], begin: Beginning) -> str:
     """Text of the route file: every vehicle is present from the start, with its initial position and speed."""
     lines = []
     for name, vehicle in vehicles.items():
-        front, speed = begin.fronts[name], begin.speeds.get(name, 0.0)
+        front, speed = begin.fronts[name], begin.speed(name)
         own = _FOR_THE_ROUTE_ALONE if name in begin.effect.routes else {}
         lines += [
             "  " + element("vType", id=f"type.{name}", **_type(vehicle, speed, front.lane.limit), **own),

@@ -63,6 +63,9 @@ class ChangeSpeed:
         How.
     hold : float
         Time from the beginning until the driver drives by himself again [s].
+    like : str
+        Another vehicle, whose speed, times `factor`, plus `plus` [m/s], it comes to at each moment while that one is on
+        the road; "" for `speed`.
     """
 
     vehicle: str
@@ -70,6 +73,9 @@ class ChangeSpeed:
     duration: float = 0.0
     shape: Shape = Shape.LINEAR
     hold: float = math.inf
+    like: str = ""
+    factor: float = 1.0
+    plus: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

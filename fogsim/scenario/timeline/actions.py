@@ -230,7 +230,11 @@ def _speed_change(vehicle: str, action: SpeedAction, begin: float, now: Situatio
     else:
         return None
     duration = abs(speed - begin) / action.rate_mps2 if action.rate_mps2 else action.over_s or 0.0
-    return ChangeSpeed(vehicle, speed, duration, action.shape, _endless(action.for_s))
+    change = ChangeSpeed(vehicle, speed, duration, action.shape, _endless(action.for_s))
+    if not action.continuous or action.like is None:
+        return change
+    plus = action.plus_kmh / KMH_PER_MPS
+    return dataclasses.replace(change, like=now.vehicle_id(action.like), factor=action.factor, plus=plus)
 
 
 def _braking(vehicle: str, now: float, speed: float, deceleration: float, hold: float | None) -> ChangeSpeed:

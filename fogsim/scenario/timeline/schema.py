@@ -54,6 +54,9 @@ class SpeedAction(Section):
     plus_kmh: Annotated[Number, Field(ge=-500, le=500)] = 0.0
     """What is added to it."""
 
+    continuous: Flag = False
+    """Whether it comes to the speed that the other vehicle has at each moment, not only at the beginning."""
+
     over_s: Time | None = None
     """Time that this takes, as far as its type can speed up; without it and the next, as fast as it can."""
 
@@ -70,6 +73,8 @@ class SpeedAction(Section):
     def _one_pace(self) -> Self:
         if (self.to_kmh is None) == (self.like is None):
             raise ValueError("say which speed: to_kmh or like (another vehicle), and not both")
+        if self.continuous and self.like is None:
+            raise ValueError("continuous goes with like, the vehicle whose speed it follows")
         given = [key for key in ("over_s", "rate_mps2") if getattr(self, key) is not None]
         if len(given) > 1 or (given and self.shape is Shape.STEP):
             raise ValueError("give over_s, rate_mps2 or shape: step, not two of them")

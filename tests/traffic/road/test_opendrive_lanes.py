@@ -88,9 +88,10 @@ def test_a_closed_road_is_driven_round_and_round(tmp_path: Path) -> None:
         f'<predecessor elementType="road" elementId="{(i - 1) % 3 + 1}" contactPoint="end"/>'
         f'<successor elementType="road" elementId="{(i + 1) % 3 + 1}" contactPoint="start"/></link><planView>'
         f'<geometry s="0" x="{100 * math.cos(i * length / 100):.6f}" y="{100 * math.sin(i * length / 100):.6f}" '
-        f'hdg="{i * length / 100 + math.pi / 2:.9f}" length="{length:.6f}"><arc curvature="0.01"/></geometry></planView>'
-        '<lanes><laneSection s="0"><center><lane id="0" type="none"/></center><right><lane id="-1" type="driving"><link>'
-        '<predecessor id="-1"/><successor id="-1"/></link><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane></right>'
+        f'hdg="{i * length / 100 + math.pi / 2:.9f}" length="{length:.6f}"><arc curvature="0.01"/></geometry>'
+        '</planView><lanes><laneSection s="0"><center><lane id="0" type="none"/></center><right>'
+        '<lane id="-1" type="driving"><link><predecessor id="-1"/><successor id="-1"/></link>'
+        '<width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane></right>'
         "</laneSection></lanes></road>"
         for i in range(3)
     ]

@@ -189,7 +189,12 @@ class Actions:
         if not found:
             self.findings.refuse(absolute, f"road {road!r}, where {actor} begins, has no lane {wanted!r} to drive on")
             return None
-        return {"to": found[0].index}
+        if wanted.startswith("-") == begins.lane.origins[0].partition("_")[2].startswith("-"):
+            return {"to": found[0].index}
+        if wanted.lstrip("-") != "1":
+            self.findings.refuse(absolute, "of the oncoming lanes, vehicles drive on the nearest; write 1 or -1")
+        self.positions.with_oncoming = True
+        return {"to": "oncoming"}
 
     def _lights(self, action: Node, actor: str, effect: Effect) -> None:
         """`lamps`; a flashing lamp is an indicator, or on."""

@@ -18,10 +18,14 @@ _ALONG = math.cos(0.3)
 
 @dataclass
 class Positions:
-    """Finds positions; relative ones refer to the known initial positions `entities`."""
+    """Finds positions; relative ones refer to the known initial positions `entities`.
+
+    `with_oncoming` if vehicles drive on the oncoming lane.
+    """
 
     lanes: OpenDriveLanes
     catalogs: Catalogs
+    with_oncoming: bool = False
     entities: dict[str, Spot] = field(default_factory=dict)
 
     @property

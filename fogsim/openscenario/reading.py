@@ -51,9 +51,12 @@ def is_openscenario(path: Path) -> bool:
     return path.suffix.lower() == ".xosc"
 
 
-def read_openscenario(path: Path, values: Mapping[str, str] = MappingProxyType({})) -> ScenarioData:
+def read_openscenario(
+    path: Path, values: Mapping[str, str] = MappingProxyType({}), *, with_oncoming: bool = False
+) -> ScenarioData:
     """Read an OpenSCENARIO XML 1.x file as the data of a scenario file; `values` replace those of its parameters.
 
+    A file whose vehicles drive on the oncoming lane is read again on a network `with_oncoming` lanes.
     The network and the route file go to the user's cache directory. InputError has a line for each element that FogSim
     cannot do; MissingDependencyError if netconvert is missing.
     """
@@ -70,10 +73,12 @@ def read_openscenario(path: Path, values: Mapping[str, str] = MappingProxyType({
     if entities is None or storyboard is None:
         raise InputError(f"{path}: expected Entities and a Storyboard; catalogs and parameter files cannot be run")
     opendrive = _opendrive(root, path)
-    net = kept_text("opendrive", opendrive, netconvert_recipe(), lambda: opendrive_net(opendrive))
+    recipe = netconvert_recipe(with_oncoming=with_oncoming)
+    net = kept_text("opendrive", opendrive, recipe, lambda: opendrive_net(opendrive, with_oncoming=with_oncoming))
     lanes = read_opendrive_lanes(net, opendrive)
     vehicles = read_vehicles(entities, catalogs)
-    return _Reader(path, root, findings, lanes, vehicles, storyboard).scenario(catalogs, net, opendrive)
+    reader = _Reader(path, root, findings, lanes, vehicles, storyboard, with_oncoming)
+    return reader.scenario(catalogs, net, opendrive) or read_openscenario(path, values, with_oncoming=True)
 
 
 def _check_version(root: Node) -> None:
@@ -107,8 +112,10 @@ class _Reader:
     lanes: OpenDriveLanes
     vehicles: Mapping[str, Vehicle]
     storyboard: Node
+    with_oncoming: bool
 
-    def scenario(self, catalogs: Catalogs, net: str, opendrive: Path) -> ScenarioData:
+    def scenario(self, catalogs: Catalogs, net: str, opendrive: Path) -> ScenarioData | None:
+        """None if vehicles drive on the oncoming lane, and the network has no way to it."""
         ego = ego_of(dict(self.vehicles))
         positions = Positions(self.lanes, catalogs)
         story = Storyboard(catalogs, Actions(self.vehicles, catalogs, positions, lambda name: _called(name, ego)))
@@ -121,6 +128,8 @@ class _Reader:
             )
             self.findings.close(self.path)
         story.find_events(self.storyboard)
+        if positions.with_oncoming and not self.with_oncoming:
+            return None
         route = begin.ways[ego]
         along = along_route(route, begin, self.vehicles, actions)
         end = math.inf if self.lanes.followers.get(route[-1]) else self.lanes.starts(route)[-1] - NEAR_THE_END

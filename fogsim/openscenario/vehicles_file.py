@@ -11,7 +11,7 @@ STANDS = 0.1
 """Speed below which a vehicle has no desired speed to keep [m/s]."""
 
 
-_FOR_THE_ROUTE_ALONE = {"lcSpeedGain": 0, "lcKeepRight": 0, "lcCooperative": 0}
+_FOR_THE_ROUTE_ALONE = {"lcSpeedGain": 0, "lcKeepRight": 0, "lcCooperative": 0, "lcOpposite": 0}
 """Attributes of drivers who change lane where their route needs it, and for nothing else."""
 
 

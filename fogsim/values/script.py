@@ -136,6 +136,8 @@ class ChangeLane:
         Time that the way over takes [s]; None for the usual one.
     indicator : float
         Time for which it indicates before [s]; the lamp goes out when it is over. 0 for no indicating.
+    oncoming : bool
+        Whether it goes to the lane beyond the left one, whose traffic comes towards it, whatever `lanes` is.
     """
 
     vehicle: str
@@ -143,6 +145,7 @@ class ChangeLane:
     stay: float = 60.0
     duration: float | None = None
     indicator: float = 0.0
+    oncoming: bool = False
 
 
 @dataclass(frozen=True, slots=True)

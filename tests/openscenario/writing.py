@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-ROAD = Path(__file__).parents[1] / "data" / "openscenario" / "country_road.xodr"
+ROAD = Path(__file__).parents[1] / "data" / "openscenario" / "cases" / "road.xodr"
 
 CAR = (
     '<Vehicle name="car" vehicleCategory="car"><BoundingBox><Center x="1.4" y="0" z="0.75"/>'

@@ -264,11 +264,12 @@ def _stopping(vehicle: str, action: StopAction, now: float | None) -> Stop | Non
 
 
 def _lane_change(vehicle: str, action: LaneAction, subject: str, speed: float, now: Situation) -> ChangeLane | None:
-    lanes, wanted = action.lanes or 0, action.to
+    oncoming = action.to == "oncoming"
+    lanes, wanted = action.lanes or int(oncoming), None if action.to == "oncoming" else action.to
     if action.to_lane_of is not None:
         other = now.lane(action.to_lane_of)
         wanted = None if other is None else other + lanes
-    if action.to is not None or action.to_lane_of is not None:
+    if not oncoming and (action.to is not None or action.to_lane_of is not None):
         own = now.lane(subject)
         if own is None or wanted is None:
             return None
@@ -276,7 +277,7 @@ def _lane_change(vehicle: str, action: LaneAction, subject: str, speed: float, n
     duration = action.duration_s
     if action.distance_m is not None:
         duration = min(action.distance_m / max(speed, _SLOWEST), LONGEST_CHANGE)
-    return ChangeLane(vehicle, lanes, action.stay_s, duration, action.indicator_s)
+    return ChangeLane(vehicle, lanes, action.stay_s, duration, action.indicator_s, oncoming)
 
 
 def _density(action: FogActions, reference: float) -> float:

@@ -152,8 +152,9 @@ class LaneAction(Section):
     lanes: Annotated[Whole, Field(ge=-4, le=4)] | None = None
     """How many lanes to the left; negative to the right."""
 
-    to: Annotated[Whole, Field(ge=0, le=20)] | None = None
-    """Or the lane to go to: its number from the right, from 0."""
+    to: Annotated[Whole, Field(ge=0, le=20)] | Literal["oncoming"] | None = None
+    """Or the lane to go to: its number from the right, from 0; or `oncoming`, the one beyond the left lane, where the
+    network lets vehicles overtake there (SUMO's `neigh`). Any other change leads back from it to the left lane."""
 
     duration_s: Annotated[Time, Field(le=LONGEST_CHANGE)] | None = None
     """Time that the way over takes in pictures and positions; 3 s a lane if not given. For SUMO it changes at once."""

@@ -43,16 +43,17 @@ def netconvert_program() -> str:
     return found
 
 
-def netconvert_recipe() -> bytes:
+def netconvert_recipe(*, with_oncoming: bool = False) -> bytes:
     """What a network depends on in addition to its OpenDRIVE file: the program and its arguments."""
     program = Path(netconvert_program())
-    return f"{program}\0{program.stat().st_mtime_ns}\0".encode() + Path(__file__).read_bytes()
+    return f"{program}\0{program.stat().st_mtime_ns}\0{with_oncoming}\0".encode() + Path(__file__).read_bytes()
 
 
-def opendrive_net(path: Path) -> str:
+def opendrive_net(path: Path, *, with_oncoming: bool = False) -> str:
     """Text of the SUMO network of an OpenDRIVE file, in the file's coordinates.
 
-    Its lanes have the parameter ``origId``, OpenDRIVE's road and lane.
+    Its lanes have the parameter ``origId``, OpenDRIVE's road and lane. In a network `with_oncoming` lanes to overtake
+    on, both directions of a road count its length alike, also in bends.
     """
     program = netconvert_program()
     source = read_opendrive(path)
@@ -71,6 +72,7 @@ def opendrive_net(path: Path) -> str:
         command += ["--no-turnarounds", "--precision", "3", "--xml-validation", "never"]
         # Speeds in bends are the file's.
         command += ["--junctions.limit-turn-speed", "-1"]
+        command += ["--opposites.guess", "true"] if with_oncoming else []
         reported = _run(command, path, Path(folder))
         if reported or not net.is_file():
             raise InputError(

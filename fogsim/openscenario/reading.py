@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from fogsim.errors import InputError, LeftOutWarning
-from fogsim.files.generated_files import kept_text, write_generated
+from fogsim.files.generated_files import write_generated
+from fogsim.files.maps import find_map
 from fogsim.openscenario.actions import Actions
 from fogsim.openscenario.catalogs import Catalogs
 from fogsim.openscenario.entities import Vehicle, ego_of, read_vehicles
@@ -25,7 +26,8 @@ from fogsim.openscenario.storyboard import Storyboard
 from fogsim.openscenario.triggers import Trigger, Triggers
 from fogsim.openscenario.vehicles_file import STANDS, vehicles_text
 from fogsim.openscenario.xml_tree import Node, read_xml
-from fogsim.traffic.road.netconvert import netconvert_recipe, opendrive_net
+from fogsim.traffic.road.netconvert import map_net
+from fogsim.traffic.road.opendrive import is_opendrive
 from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, read_opendrive_lanes
 from fogsim.units import KMH_PER_MPS
 
@@ -73,8 +75,7 @@ def read_openscenario(
     if entities is None or storyboard is None:
         raise InputError(f"{path}: expected Entities and a Storyboard; catalogs and parameter files cannot be run")
     opendrive = _opendrive(root, path)
-    recipe = netconvert_recipe(with_oncoming=with_oncoming)
-    net = kept_text("opendrive", opendrive, recipe, lambda: opendrive_net(opendrive, with_oncoming=with_oncoming))
+    net = map_net(opendrive, with_oncoming=with_oncoming)
     lanes = read_opendrive_lanes(net, opendrive)
     vehicles = read_vehicles(entities, catalogs)
     reader = _Reader(path, root, findings, lanes, vehicles, storyboard, with_oncoming)
@@ -96,12 +97,10 @@ def _opendrive(root: Node, path: Path) -> Path:
     file = root.within("RoadNetwork", "LogicFile")
     if file is None:
         raise InputError(f"{path}: RoadNetwork: a LogicFile (OpenDRIVE, .xodr) is needed, for vehicles drive on roads")
-    opendrive = path.parent / file.get("filepath")
-    if opendrive.suffix.lower() != ".xodr" or not opendrive.is_file():
-        raise InputError(
-            f"{file.where}: expected an OpenDRIVE file (.xodr) that is there, got {file.get('filepath')!r}"
-        )
-    return opendrive
+    try:
+        return find_map(file.get("filepath"), path.parent)
+    except InputError as error:
+        raise InputError(f"{file.where}: {error}") from error
 
 
 @dataclass
@@ -166,7 +165,7 @@ class _Reader:
         data["traffic"] |= {
             "net": str(files / "road.net.xml"),
             "routes": [str(files / "road.rou.xml")],
-            "additional": [str(opendrive.resolve())],
+            "additional": [str(opendrive.resolve())] if is_opendrive(opendrive) else [],
         }
         return ScenarioData(data, lines)
 

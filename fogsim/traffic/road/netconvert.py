@@ -11,8 +11,9 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, ElementTree
 
 from fogsim.errors import InputError, MissingDependencyError, shown
+from fogsim.files.generated_files import kept_text
 from fogsim.files.readers import read_text
-from fogsim.traffic.road.opendrive import read_opendrive
+from fogsim.traffic.road.opendrive import is_opendrive, read_opendrive
 
 USUAL_LIMIT = 130.0 / 3.6
 """Speed limit of lanes without one in the OpenDRIVE file [m/s]."""
@@ -47,6 +48,14 @@ def netconvert_recipe(*, with_oncoming: bool = False) -> bytes:
     """What a network depends on in addition to its OpenDRIVE file: the program and its arguments."""
     program = Path(netconvert_program())
     return f"{program}\0{program.stat().st_mtime_ns}\0{with_oncoming}\0".encode() + Path(__file__).read_bytes()
+
+
+def map_net(path: Path, *, with_oncoming: bool) -> str:
+    """Text of the SUMO network of a map; see `opendrive_net`."""
+    if not is_opendrive(path):
+        return read_text(path, _MOST_BYTES)
+    recipe = netconvert_recipe(with_oncoming=with_oncoming)
+    return kept_text("opendrive", path, recipe, lambda: opendrive_net(path, with_oncoming=with_oncoming))
 
 
 def opendrive_net(path: Path, *, with_oncoming: bool = False) -> str:

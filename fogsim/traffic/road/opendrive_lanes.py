@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
-from fogsim.traffic.road.opendrive import read_opendrive
+from fogsim.files.xml_reader import read_tree
+from fogsim.traffic.road.opendrive import is_opendrive, read_opendrive
 from fogsim.traffic.road.plan_view import PlanView, plan_view
 
 FARTHEST_ROUTE, LONGEST_LAPS = 50_000.0, 10_000.0
@@ -181,6 +182,8 @@ class OpenDriveLanes:
         return f"lanes {', '.join(origin for one in self.lanes if one.edge == edge for origin in one.origins) or edge}"
 
     def _reference(self, road: str, s: float) -> tuple[float, float, float]:
+        if not self.roads:
+            raise ValueError("a map that is a SUMO network has no roads; write a WorldPosition, or take an .xodr")
         if road not in self.roads:
             raise ValueError(f"there is no road {road!r}; there are {', '.join(sorted(self.roads))}")
         return self.roads[road].at(s)
@@ -199,11 +202,18 @@ def _foot(lane: RoadLane, x: float, y: float) -> tuple[float, Spot]:
 
 
 def read_opendrive_lanes(net: str, opendrive: Path) -> OpenDriveLanes:
-    """Lanes of a network that `opendrive_net` made from an OpenDRIVE file; InputError if it has none for vehicles."""
-    root = fromstring(net)  # noqa: S314 - netconvert's own output
+    """Lanes of a network from `map_net`, and roads of its OpenDRIVE file; InputError if it has no lanes for vehicles.
+
+    A map that is a SUMO network has no roads; its coordinates are those before netconvert's offset.
+    """
+    # Text that netconvert wrote just now is no data from outside.
+    root = fromstring(net) if is_opendrive(opendrive) else read_tree(opendrive, "net")  # noqa: S314
     lanes = tuple(_lanes(root))
     if not lanes:
         raise InputError(f"{opendrive}: there is no lane to drive on")
+    followers = _followers(root, {lane.edge for lane in lanes})
+    if not is_opendrive(opendrive):
+        return OpenDriveLanes(lanes, followers, {}, None, None, _crossings(root))
     source = read_opendrive(opendrive)
     roads = {}
     for road in source.iter("road"):
@@ -212,13 +222,17 @@ def read_opendrive_lanes(net: str, opendrive: Path) -> OpenDriveLanes:
         except ValueError as error:
             raise InputError(f"{opendrive}: road {road.get('id')!r}: {error}") from None
     latitude, longitude = _origin(source.findtext("header/geoReference", ""))
-    followers = _followers(root, {lane.edge for lane in lanes})
     return OpenDriveLanes(lanes, followers, roads, latitude, longitude, _crossings(root))
 
 
 def _lanes(root: Element) -> Iterator[RoadLane]:
+    location = root.find("location")
+    offset = "0,0" if location is None else location.get("netOffset", "0,0")
+    moved = np.array([float(part) for part in offset.split(",")])
     for edge in root.iter("edge"):
         for lane in edge.iter("lane") if edge.get("function") is None else ():
+            if not _is_for_cars(lane):
+                continue
             origins = next((p.get("value", "") for p in lane.iter("param") if p.get("key") == "origId"), "")
             points = [tuple(map(float, point.split(","))) for point in lane.attrib["shape"].split()]
             length, width = float(lane.attrib["length"]), float(lane.get("width", "3.2"))
@@ -228,10 +242,15 @@ def _lanes(root: Element) -> Iterator[RoadLane]:
                 length,
                 width,
                 float(lane.attrib["speed"]),
-                np.array([point[:2] for point in points], dtype=np.float64),
+                np.array([point[:2] for point in points], dtype=np.float64) - moved,
                 min(math.fsum(point[2:]) for point in points),
                 tuple(origins.split()),
             )
+
+
+def _is_for_cars(lane: Element) -> bool:
+    refused, allowed = lane.get("disallow", "").split(), lane.get("allow", "all").split()
+    return not {"all", "passenger"} & {*refused} and bool({"all", "passenger"} & {*allowed})
 
 
 def _followers(root: Element, edges: set[str]) -> dict[str, list[str]]:

@@ -1,5 +1,6 @@
 """Maps by name in a folder of the user's: OpenDRIVE files and SUMO networks."""
 
+import re
 import shutil
 from pathlib import Path
 
@@ -39,9 +40,8 @@ def test_a_map_is_found_by_its_name(tmp_path: Path, maps: Path, written: str) ->
 
 
 def test_a_sumo_network_has_places_by_coordinates_alone(tmp_path: Path, maps: Path) -> None:
-    moved = (
-        opendrive_net(ROAD).replace('netOffset="0.00,0.00"', 'netOffset="0.00,-20.00"').replace(",-1.750", ",-21.750")
-    )
+    net = re.sub(r'netOffset="[^"]*"', 'netOffset="0.00,-20.00"', opendrive_net(ROAD))
+    moved = re.sub(r",(-?1\.750)", lambda y: f",{float(y[1]) - 20.0:.3f}", net)
     (maps / "Village.net.xml").write_text(moved, encoding="utf-8")
     here = '<Position><WorldPosition x="30" y="-1.75" h="0"/></Position>'
     assert _begins(write(tmp_path, {"Ego": CAR}, {"Ego": here}, road=Path("Village"))) == pytest.approx((33.7, -21.75))

@@ -3,7 +3,8 @@
 python tools/validate_xosc.py runs/demo/scenario.xosc    one file, or several
 python tools/validate_xosc.py --run FOLDER               all files below a folder; each is run for 3 s without rendering
 
-Catalogs are passed over. Schemas come with the package scenariogeneration (pip install lxml scenariogeneration). The exit code is 1 if a file ends in anything but a run or a refusal, or does not fit its schema.
+Catalogs are passed over. Schemas come with the package scenariogeneration (pip install lxml scenariogeneration). The
+exit code is 1 if a file ends in anything but a run or a refusal, or does not fit its schema.
 """
 
 import argparse

@@ -1,13 +1,16 @@
 """Every element and attribute of the format is honoured, harmless or refused, and files are held to it."""
 
 import re
+import shutil
 from pathlib import Path
+from xml.sax.saxutils import quoteattr
 
 import pytest
 
 from fogsim.errors import InputError
 from fogsim.openscenario import read_openscenario
 from fogsim.openscenario.elements import HARMLESS, HONOURED, REFUSED
+from fogsim.openscenario.xml_tree import Node, read_xml
 
 DATA = Path(__file__).parents[1] / "data"
 SCHEMA = {
@@ -61,3 +64,65 @@ def test_unknown_and_refused_attributes_are_refused_on_every_element(tmp_path: P
     for name in set(re.findall(r"<(\w+)", text)) - set(HARMLESS):
         for key in ("whatever", *refused[name]):
             assert re.search(rf":\d+: /.*{name}(\[[^]]*\])?: {key}='1': \w", told), (name, key)
+
+
+def _written(root: Node) -> str:
+    inner = "".join(_written(child) for child in root.children)
+    attributes = "".join(f" {key}={quoteattr(text)}" for key, text in root.attributes.items())
+    return f"<{root.tag}{attributes}>{inner}</{root.tag}>"
+
+
+def _read(folder: Path, name: str, root: Node) -> object:
+    """What a changed file is read as: the data of its scenario, or None if it is refused."""
+    (folder / name).write_text(_written(root), encoding="utf-8")
+    try:
+        return read_openscenario(folder / (name if "/" not in name else "everything.xosc")).data
+    except InputError:
+        return None
+
+
+def _others(text: str) -> list[str]:
+    """Values that differ from one: more and less, the other truth, another name."""
+    try:
+        return [f"{float(text) + more:g}" for more in (3.0, -3.0)]
+    except ValueError:
+        return ["true" if text == "false" else "false" if text == "true" else "another"]
+
+
+@pytest.fixture
+def corpus(tmp_path: Path) -> dict[str, Node]:
+    """Elements of the files whose attributes are changed one at a time, by their names in a folder of copies."""
+    shutil.copytree(DATA / "openscenario", tmp_path, dirs_exist_ok=True)
+    names = (
+        "everything.xosc",
+        "slow_lead.xosc",
+        *(f"catalogs/{kind}.xosc" for kind in ("vehicles", "environments", "maneuvers")),
+    )
+    return {name: read_xml(tmp_path / name) for name in names}
+
+
+def test_every_attribute_that_is_honoured_changes_the_scenario(tmp_path: Path, corpus: dict[str, Node]) -> None:
+    unshown = {(name, key) for name, keys in HONOURED.items() for key in keys}
+    for name, root in corpus.items():
+        plain = _read(tmp_path, name, root)
+        for node in root.walk():
+            for key in [key for key in node.attributes if (node.tag, key) in unshown]:
+                kept = node.attributes[key]
+                for node.attributes[key] in _others(kept):
+                    if _read(tmp_path, name, root) != plain:
+                        unshown.discard((node.tag, key))
+                node.attributes[key] = kept
+        assert plain == _read(tmp_path, name, root) is not None
+    assert unshown == set()
+
+
+def test_what_is_harmless_changes_nothing(tmp_path: Path, corpus: dict[str, Node]) -> None:
+    name, root = next(iter(corpus.items()))
+    plain = read_openscenario(tmp_path / name).data
+    for node in root.walk():
+        for one in HARMLESS:
+            if one.startswith(f"{node.tag}@"):
+                node.attributes[one.partition("@")[2]] = "0.5"
+    init = next(node for node in root.walk() if node.tag == "Actions")
+    init.children += [Node(one, {"whatever": "1"}, tmp_path, 1) for one in HARMLESS if "@" not in one]
+    assert _read(tmp_path, name, root) == plain

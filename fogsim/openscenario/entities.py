@@ -22,6 +22,22 @@ CLASSES = {
 
 _ASIDE = 0.1  # Distance between the middles of axle and body that is none [m]
 _RUNNER = 10.0  # Top speed of persons and obstacles, and their acceleration [m/s, m/s²]
+_ON_FOOT = ("pedestrian", "wheelchair", "animal")
+_UPRIGHT = tuple(
+    [
+        "none",
+        "obstacle",
+        "barrier",
+        "railing",
+        "soundBarrier",
+        "trafficIsland",
+        "pole",
+        "streetLamp",
+        "tree",
+        "vegetation",
+        "building",
+    ]
+)
 _TAKEN = ("fog", "light")
 _EGO_NAMES = ("ego", "hero", "ego_vehicle", "egovehicle")
 
@@ -107,7 +123,8 @@ def _size(node: Node, findings: Findings) -> tuple[float, float, float, float]:
 
 def _other(name: str, node: Node, catalogs: Catalogs) -> Vehicle:
     """A person, or an obstacle, which FogSim draws as a box; either is on a lane and no faster than a runner."""
-    kind = node.get("pedestrianCategory" if node.tag == "Pedestrian" else "miscObjectCategory")
+    key, known = ("pedestrianCategory", _ON_FOOT) if node.tag == "Pedestrian" else ("miscObjectCategory", _UPRIGHT)
+    kind = catalogs.findings.word(node, key, known)
     # Wheelchairs and animals have no figure.
     body = PEDESTRIAN if kind == "pedestrian" else BOX
     return Vehicle(name, node, kind, *_size(node, catalogs.findings), _RUNNER, _RUNNER, _RUNNER, body)

@@ -116,11 +116,11 @@ class Positions:
         inner = place.one("FromLaneCoordinates", "FromCurrentEntity") if place else None
         if reference is None or inner is None:
             raise ValueError("expected a RouteRef, and an InRoutePosition from lane coordinates or an entity")
+        first, edges = self.route(reference)
         if inner.tag == "FromCurrentEntity":
             if (entity := inner.get("entityRef")) not in self.entities:
                 raise ValueError(f"there is no entity {entity!r} that has a place already")
             return self.entities[entity]
-        first, edges = self.route(reference)
         spot, lane = self.lanes.along(first, self.findings.number(inner, "pathS"), edges), inner.get("laneId")
         self._no_offset(inner, "laneOffset")
         for one in self.lanes.lanes:

@@ -8,7 +8,7 @@ from xml.sax.saxutils import quoteattr
 import pytest
 
 from fogsim.errors import InputError
-from fogsim.openscenario import read_openscenario
+from fogsim.openscenario import read_openscenario, read_parameter_cases
 from fogsim.openscenario.elements import HARMLESS, HONOURED, REFUSED
 from fogsim.openscenario.xml_tree import Node, read_xml
 
@@ -66,6 +66,12 @@ def test_unknown_and_refused_attributes_are_refused_on_every_element(tmp_path: P
             assert re.search(rf":\d+: /.*{name}(\[[^]]*\])?: {key}='1': \w", told), (name, key)
 
 
+USES = {f"catalogs/{kind}.xosc": "everything.xosc" for kind in ("vehicles", "environments", "maneuvers")} | {
+    f"catalogs/{kind}.xosc": "on_foot_and_on_routes.xosc" for kind in ("persons", "things", "routes")
+}
+"""Catalogs, and files that use them."""
+
+
 def _written(root: Node) -> str:
     inner = "".join(_written(child) for child in root.children)
     attributes = "".join(f" {key}={quoteattr(text)}" for key, text in root.attributes.items())
@@ -73,10 +79,10 @@ def _written(root: Node) -> str:
 
 
 def _read(folder: Path, name: str, root: Node) -> object:
-    """What a changed file is read as: the data of its scenario, or None if it is refused."""
+    """What a changed file is read as: the data of its scenario, or its cases; None if it is refused."""
     (folder / name).write_text(_written(root), encoding="utf-8")
     try:
-        return read_openscenario(folder / (name if "/" not in name else "everything.xosc")).data
+        return read_parameter_cases(folder / name) or read_openscenario(folder / USES.get(name, name)).data
     except InputError:
         return None
 
@@ -93,11 +99,8 @@ def _others(text: str) -> list[str]:
 def corpus(tmp_path: Path) -> dict[str, Node]:
     """Elements of the files whose attributes are changed one at a time, by their names in a folder of copies."""
     shutil.copytree(DATA / "openscenario", tmp_path, dirs_exist_ok=True)
-    names = (
-        "everything.xosc",
-        "slow_lead.xosc",
-        *(f"catalogs/{kind}.xosc" for kind in ("vehicles", "environments", "maneuvers")),
-    )
+    turns = ("speeds_in_turn.xosc", "speeds_at_random.xosc", "counts_at_random.xosc")
+    names = ("everything.xosc", "slow_lead.xosc", "on_foot_and_on_routes.xosc", *turns, *USES)
     return {name: read_xml(tmp_path / name) for name in names}
 
 

@@ -23,20 +23,9 @@ CLASSES = {
 _ASIDE = 0.1  # Distance between the middles of axle and body that is none [m]
 _RUNNER = 10.0  # Top speed of persons and obstacles, and their acceleration [m/s, m/s²]
 _ON_FOOT = ("pedestrian", "wheelchair", "animal")
-_UPRIGHT = tuple(
-    [
-        "none",
-        "obstacle",
-        "barrier",
-        "railing",
-        "soundBarrier",
-        "trafficIsland",
-        "pole",
-        "streetLamp",
-        "tree",
-        "vegetation",
-        "building",
-    ]
+_UPRIGHT = (
+    *("none", "obstacle", "barrier", "railing", "soundBarrier", "trafficIsland"),
+    *("pole", "streetLamp", "tree", "vegetation", "building"),
 )
 _TAKEN = ("fog", "light")
 _EGO_NAMES = ("ego", "hero", "ego_vehicle", "egovehicle")

@@ -119,7 +119,11 @@ class Actions:
     def _target(self, target: Node) -> dict[str, Any]:
         absolute, relative = target.one("AbsoluteTargetSpeed"), target.one("RelativeTargetSpeed")
         if absolute is not None:
-            return {"to_kmh": max(self.findings.number(absolute, "value"), 0.0) * KMH_PER_MPS}
+            if (speed := self.findings.number(absolute, "value")) < 0.0:
+                self.findings.refuse(
+                    absolute, f"value: expected 0 or more, got {speed:g}: vehicles do not drive backwards"
+                )
+            return {"to_kmh": max(speed, 0.0) * KMH_PER_MPS}
         if relative is None:
             return {}
         other, value = relative.get("entityRef"), self.findings.number(relative, "value")

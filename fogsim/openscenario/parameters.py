@@ -81,14 +81,18 @@ def put_parameters(node: Node, known: Parameters, findings: Findings) -> None:
             put_parameters(child, inside, findings)
 
 
-def declared(node: Node, known: Parameters, findings: Findings) -> Parameters:
-    """Parameters known in an element: those around it, and those that it declares, each by those before it."""
+def declared(node: Node, known: Parameters, findings: Findings, given: Parameters | None = None) -> Parameters:
+    """Parameters known in an element: those around it, and those that it declares, each by those before it.
+
+    Values that are `given` take the place of those in the declarations.
+    """
     inside = dict(known)
     for block in (child for child in node.children if child.tag == "ParameterDeclarations"):
         for one in block.all("ParameterDeclaration"):
             name = one.get("name")
             if name.startswith("$"):
                 findings.remark(one, f"a declaration has its name without $; read as {name[1:]!r}")
+            one.attributes["value"] = (given or {}).get(name.removeprefix("$"), one.get("value"))
             put_parameters(one, inside, findings)
             inside[name.removeprefix("$")] = one.get("value")
             _check_constraints(one, findings)

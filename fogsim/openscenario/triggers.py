@@ -117,6 +117,8 @@ class Triggers:
         return NEVER
 
     def _by_value(self, node: Node, edge: str, delay: float) -> Trigger:
+        if edge == "falling" and node.get("rule") not in ("lessThan", "lessOrEqual"):
+            self.findings.refuse(node, "conditionEdge: what has begun does not end again; write rising")
         if node.tag == "SimulationTimeCondition":
             value = self.findings.number(node, "value")
             rule = self.findings.word(node, "rule", tuple(rule for rule in RULES if rule != "notEqualTo"))

@@ -102,7 +102,7 @@ class Actions:
             effect.add("light", illuminance_lx=float(f"{read.illuminance:.4g}"))
 
     def _speed(self, action: Node, actor: str, effect: Effect) -> None:
-        """`speed`: absolute, or relative to a vehicle at that moment; by time or rate."""
+        """`speed`: absolute, or relative to a vehicle at that moment, or continuously; by time or rate."""
         dynamics, target = action.one("SpeedActionDynamics"), action.one("SpeedActionTarget")
         told = {} if target is None else self._target(target)
         if not told:
@@ -210,7 +210,7 @@ class Actions:
         effect.add(actor, lamps=dict.fromkeys(LAMPS[kind], "off" if mode == "off" else "on"))
 
     def _keep_distance(self, action: Node, actor: str, effect: Effect) -> None:
-        """`follow`, by `timeGap` with `freespace`."""
+        """`follow`, by `timeGap` with `freespace` and `continuous`, of a vehicle ahead."""
         headway = self.findings.number(action, "timeGap", 0.0)
         if not headway or self.findings.word(action, "freespace", ("true", "false")) != "true":
             self.findings.refuse(action, "a distance is kept by a timeGap with freespace=true")

@@ -229,10 +229,7 @@ _PRIVATE: Mapping[str, Callable[[Actions, Node, str, Effect], None]] = {
     "LongitudinalDistanceAction": Actions._keep_distance,
 }
 _ORDERS = {"LongitudinalAction": {"speed", "follow"}, "LateralAction": {"change_lane"}}
-_GROUPS = (
-    *("PrivateAction", "GlobalAction", "ControllerAction"),
-    *("LongitudinalAction", "LateralAction", "AppearanceAction"),
-)
+_GROUPS = [f"{kind}Action" for kind in ("Private", "Global", "Controller", "Longitudinal", "Lateral", "Appearance")]
 ACTIONS: Mapping[str, str] = {
     "EnvironmentAction": "`fog` and `light`.",
     **{tag: inspect.getdoc(action) or "" for tag, action in _PRIVATE.items()},

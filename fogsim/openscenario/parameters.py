@@ -5,7 +5,6 @@ import math
 import operator
 import re
 from collections.abc import Callable, Mapping
-from typing import Any
 
 from fogsim.errors import nearest
 from fogsim.openscenario.findings import Findings
@@ -51,15 +50,15 @@ _FUNCTIONS: Mapping[str, Callable[..., float]] = {
 _CONSTANTS = {"pi": repr(math.pi), "true": "True", "false": "False"}
 _CONSTANT = re.compile(r"\b(pi|true|false)\b")
 
-RULES: Mapping[str, Callable[[Any, Any], bool]] = {
-    "greaterThan": operator.gt,
-    "greaterOrEqual": operator.ge,
-    "lessThan": operator.lt,
-    "lessOrEqual": operator.le,
-    "equalTo": operator.eq,
-    "notEqualTo": operator.ne,
+RULES = {
+    "greaterThan": ">",
+    "greaterOrEqual": ">=",
+    "lessThan": "<",
+    "lessOrEqual": "<=",
+    "equalTo": "==",
+    "notEqualTo": "!=",
 }
-"""Comparisons of rules."""
+"""Operators of rules."""
 
 Parameters = Mapping[str, str]
 """Values of parameters by name."""
@@ -110,11 +109,11 @@ def _check_constraints(declaration: Node, findings: Findings) -> None:
 
 
 def _fits(value: str, constraint: Node, findings: Findings) -> bool:
-    compare = RULES[findings.word(constraint, "rule", tuple(RULES))]
+    rule, limit = RULES[findings.word(constraint, "rule", tuple(RULES))], constraint.get("value")
     try:
-        return compare(float(value), float(constraint.get("value")))
+        return _result(f"{float(value)} {rule} {float(limit)}", {}) == "true"
     except ValueError:
-        return compare in (operator.eq, operator.ne) and compare(value, constraint.get("value"))
+        return {"==": value == limit, "!=": value != limit}.get(rule, False)
 
 
 def evaluated(text: str, known: Parameters) -> str:

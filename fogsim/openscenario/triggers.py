@@ -7,18 +7,9 @@ from dataclasses import dataclass, field
 
 from fogsim.openscenario.entities import Vehicle
 from fogsim.openscenario.findings import Findings
+from fogsim.openscenario.parameters import RULES
 from fogsim.openscenario.positions import Positions
 from fogsim.openscenario.xml_tree import Node
-
-RULES = {
-    "greaterThan": ">",
-    "greaterOrEqual": ">=",
-    "lessThan": "<",
-    "lessOrEqual": "<=",
-    "equalTo": "==",
-    "notEqualTo": "!=",
-}
-"""Operators of rules."""
 
 _DISTANCES = ("longitudinal", "cartesianDistance", "euclidianDistance")
 _EDGES = ("none", "rising", "falling", "risingOrFalling")

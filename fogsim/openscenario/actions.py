@@ -107,7 +107,7 @@ class Actions:
             effect.add("light", illuminance_lx=float(f"{read.illuminance:.4g}"))
 
     def _speed(self, action: Node, actor: str, effect: Effect) -> None:
-        """`speed`: absolute, or relative to a vehicle at that moment; by time or rate."""
+        """`speed`: absolute, or relative to a vehicle at that moment, or continuously; by time or rate."""
         dynamics, target = action.one("SpeedActionDynamics"), action.one("SpeedActionTarget")
         told = {} if target is None else self._target(target)
         if not told:
@@ -124,7 +124,11 @@ class Actions:
     def _target(self, target: Node) -> dict[str, Any]:
         absolute, relative = target.one("AbsoluteTargetSpeed"), target.one("RelativeTargetSpeed")
         if absolute is not None:
-            return {"to_kmh": max(self.findings.number(absolute, "value"), 0.0) * KMH_PER_MPS}
+            if (speed := self.findings.number(absolute, "value")) < 0.0:
+                self.findings.refuse(
+                    absolute, f"value: expected 0 or more, got {speed:g}: vehicles do not drive backwards"
+                )
+            return {"to_kmh": max(speed, 0.0) * KMH_PER_MPS}
         if relative is None:
             return {}
         other, value = relative.get("entityRef"), self.findings.number(relative, "value")
@@ -217,7 +221,7 @@ class Actions:
         effect.add(actor, lamps=dict.fromkeys(LAMPS[kind], "off" if mode == "off" else "on"))
 
     def _keep_distance(self, action: Node, actor: str, effect: Effect) -> None:
-        """`follow`, by `timeGap` with `freespace`."""
+        """`follow`, by `timeGap` with `freespace` and `continuous`, of a vehicle ahead."""
         headway = self.findings.number(action, "timeGap", 0.0)
         if not headway or self.findings.word(action, "freespace", ("true", "false")) != "true":
             self.findings.refuse(action, "a distance is kept by a timeGap with freespace=true")
@@ -260,10 +264,9 @@ _PRIVATE: Mapping[str, Callable[[Actions, Node, str, Effect], None]] = {
     "AcquirePositionAction": Actions._acquire,
 }
 _ORDERS = {"LongitudinalAction": {"speed", "follow"}, "LateralAction": {"change_lane"}}
-_GROUPS = (
-    *("PrivateAction", "GlobalAction", "ControllerAction"),
-    *("LongitudinalAction", "LateralAction", "AppearanceAction", "RoutingAction"),
-)
+_GROUPS = [
+    f"{kind}Action" for kind in ("Private", "Global", "Controller", "Longitudinal", "Lateral", "Appearance", "Routing")
+]
 ACTIONS: Mapping[str, str] = {
     "EnvironmentAction": "`fog` and `light`.",
     **{tag: inspect.getdoc(action) or "" for tag, action in _PRIVATE.items()},

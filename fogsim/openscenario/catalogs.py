@@ -49,8 +49,7 @@ class Catalogs:
             for one in found.children:
                 if one.attributes.get("name") == name:
                     whole = one.copy()
-                    own = declared(whole, {}, self.findings)
-                    # Values of the reference take precedence over those of the entry.
+                    own = declared(whole, {}, self.findings, given)
                     whole.children = [child for child in whole.children if child.tag != "ParameterDeclarations"]
                     put_parameters(whole, {**own, **given}, self.findings)
                     whole.is_read = True

@@ -5,7 +5,6 @@ import math
 import operator
 import re
 from collections.abc import Callable, Mapping
-from typing import Any
 
 from fogsim.errors import nearest
 from fogsim.openscenario.findings import Findings
@@ -51,15 +50,15 @@ _FUNCTIONS: Mapping[str, Callable[..., float]] = {
 _CONSTANTS = {"pi": repr(math.pi), "true": "True", "false": "False"}
 _CONSTANT = re.compile(r"\b(pi|true|false)\b")
 
-RULES: Mapping[str, Callable[[Any, Any], bool]] = {
-    "greaterThan": operator.gt,
-    "greaterOrEqual": operator.ge,
-    "lessThan": operator.lt,
-    "lessOrEqual": operator.le,
-    "equalTo": operator.eq,
-    "notEqualTo": operator.ne,
+RULES = {
+    "greaterThan": ">",
+    "greaterOrEqual": ">=",
+    "lessThan": "<",
+    "lessOrEqual": "<=",
+    "equalTo": "==",
+    "notEqualTo": "!=",
 }
-"""Comparisons of rules."""
+"""Operators of rules."""
 
 Parameters = Mapping[str, str]
 """Values of parameters by name."""
@@ -81,14 +80,18 @@ def put_parameters(node: Node, known: Parameters, findings: Findings) -> None:
             put_parameters(child, inside, findings)
 
 
-def declared(node: Node, known: Parameters, findings: Findings) -> Parameters:
-    """Parameters known in an element: those around it, and those that it declares, each by those before it."""
+def declared(node: Node, known: Parameters, findings: Findings, given: Parameters | None = None) -> Parameters:
+    """Parameters known in an element: those around it, and those that it declares, each by those before it.
+
+    Values that are `given` take the place of those in the declarations.
+    """
     inside = dict(known)
     for block in (child for child in node.children if child.tag == "ParameterDeclarations"):
         for one in block.all("ParameterDeclaration"):
             name = one.get("name")
             if name.startswith("$"):
                 findings.remark(one, f"a declaration has its name without $; read as {name[1:]!r}")
+            one.attributes["value"] = (given or {}).get(name.removeprefix("$"), one.get("value"))
             put_parameters(one, inside, findings)
             inside[name.removeprefix("$")] = one.get("value")
             _check_constraints(one, findings)
@@ -106,11 +109,11 @@ def _check_constraints(declaration: Node, findings: Findings) -> None:
 
 
 def _fits(value: str, constraint: Node, findings: Findings) -> bool:
-    compare = RULES[findings.word(constraint, "rule", tuple(RULES))]
+    rule, limit = RULES[findings.word(constraint, "rule", tuple(RULES))], constraint.get("value")
     try:
-        return compare(float(value), float(constraint.get("value")))
+        return _result(f"{float(value)} {rule} {float(limit)}", {}) == "true"
     except ValueError:
-        return compare in (operator.eq, operator.ne) and compare(value, constraint.get("value"))
+        return {"==": value == limit, "!=": value != limit}.get(rule, False)
 
 
 def evaluated(text: str, known: Parameters) -> str:

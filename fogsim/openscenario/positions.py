@@ -91,11 +91,15 @@ class Positions:
         return self.lanes.at(*self.lanes.across(node.get("roadId"), s, t))
 
     def relative_lane(self, node: Node) -> Spot:
-        """So many lanes to the left of an entity, and so far ahead along the lane."""
+        """The lane by an entity's number and `dLane`, so far along the road (`ds`), or ahead of it (`dsLane`)."""
         self._no_offset(node)
-        away = self.findings.number(node, "dsLane" if "dsLane" in node.attributes else "ds")
-        beside = self.lanes.beside(self.entities[node.get("entityRef")], int(self.findings.number(node, "dLane")))
-        return self.lanes.along(beside, away)
+        spot = self.entities[node.get("entityRef")]
+        # Numbers of lanes grow to the left of the road, on whose left side vehicles drive against it.
+        sense = 1.0 if all("_-" in one for one in spot.lane.origins) else -1.0
+        beside = self.lanes.beside(spot, int(sense * self.findings.number(node, "dLane")))
+        if "dsLane" in node.attributes:
+            return self.lanes.along(beside, self.findings.number(node, "dsLane"))
+        return self.lanes.along(beside, sense * self.findings.number(node, "ds"))
 
     def relative_world(self, node: Node) -> Spot:
         """The lane that is so far from an entity, along x and y."""

@@ -8,18 +8,9 @@ from dataclasses import dataclass, field, replace
 
 from fogsim.openscenario.entities import Vehicle
 from fogsim.openscenario.findings import Findings
+from fogsim.openscenario.parameters import RULES
 from fogsim.openscenario.positions import Positions
 from fogsim.openscenario.xml_tree import Node
-
-RULES = {
-    "greaterThan": ">",
-    "greaterOrEqual": ">=",
-    "lessThan": "<",
-    "lessOrEqual": "<=",
-    "equalTo": "==",
-    "notEqualTo": "!=",
-}
-"""Operators of rules."""
 
 _DISTANCES = ("longitudinal", "cartesianDistance", "euclidianDistance")
 _EDGES = ("none", "rising", "falling", "risingOrFalling")
@@ -135,6 +126,8 @@ class Triggers:
         return NEVER
 
     def _by_value(self, node: Node, edge: str, delay: float) -> Trigger:
+        if edge == "falling" and node.get("rule") not in ("lessThan", "lessOrEqual"):
+            self.findings.refuse(node, "conditionEdge: what has begun does not end again; write rising")
         if node.tag == "SimulationTimeCondition":
             value = self.findings.number(node, "value")
             rule = self.findings.word(node, "rule", tuple(rule for rule in RULES if rule != "notEqualTo"))

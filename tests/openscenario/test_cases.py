@@ -1,6 +1,7 @@
 """Small files of other people's kinds: each runs as it is meant, or is refused with the reason and the line."""
 
 import re
+import shutil
 import warnings
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from typer.testing import CliRunner
 import fogsim
 from fogsim.cli.app import app
 from fogsim.errors import InputError, LeftOutWarning
+from fogsim.openscenario import read_openscenario
 from fogsim.scenario.schema import Scenario
 from fogsim.values import Step
 
@@ -224,3 +226,66 @@ def test_fog_thickens_in_steps() -> None:
     changes = [(steps[i].time, seen[i]) for i in range(1, len(steps)) if not np.isclose(seen[i], seen[i - 1])]
     assert [visibility for _, visibility in changes] == pytest.approx([1000.0, 500.0, 250.0, 100.0])
     assert [time for time, _ in changes] == pytest.approx([1.0, 3.0, 5.0, 7.0], abs=0.21)
+
+
+@pytest.mark.parametrize(
+    ("position", "x"),
+    [
+        # s = 500 m on the lane that leads back, 3.7 m before the front bumper.
+        ('<RelativeLanePosition entityRef="Ego" dLane="0" ds="20"/>', 520.0 - 3.7),
+        ('<RelativeLanePosition entityRef="Ego" dLane="0" dsLane="20"/>', 480.0 - 3.7),
+    ],
+)
+def test_ds_goes_by_the_road_and_ds_lane_by_the_entity(tmp_path: Path, position: str, x: float) -> None:
+    file = _changed(
+        tmp_path,
+        "hitch_without_trailer",
+        (
+            '<LanePosition roadId="7" laneId="-1" s="30">\n</LanePosition>',
+            '<LanePosition roadId="7" laneId="1" s="500"/>',
+        ),
+        ('<LanePosition roadId="7" laneId="-1" s="90">\n</LanePosition>', position),
+    )
+    assert _x_and_speed(_run(file, 0.1)[0], "Lead")[0] == pytest.approx(x, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('<AbsoluteTargetSpeed value="2"/>', '<AbsoluteTargetSpeed value="-2"/>', "vehicles do not drive backwards"),
+        (
+            'conditionEdge="none">\n<ByValueCondition>\n<SimulationTimeCondition value="3"',
+            'conditionEdge="falling">\n<ByValueCondition>\n<SimulationTimeCondition value="3"',
+            "what has begun does not end again",
+        ),
+        ('value="3" rule="greaterThan"', 'value="3" rule="notEqualTo"', "rule: FogSim has no 'notEqualTo' here"),
+        ('frictionScaleFactor="1"', 'frictionScaleFactor="0.5"', "RoadCondition: roads are dry"),
+        (
+            '<Fog visualRange="200"/>',
+            '<Precipitation precipitationType="rain" intensity="0.3"/>',
+            "rain and snow are not",
+        ),
+        ('<Center x="1.4" y="0"', '<Center x="1.4" y="0.5"', "Center: y: a body lies about its reference point"),
+    ],
+)
+def test_values_that_mean_something_else_are_refused(tmp_path: Path, old: str, new: str, told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        _loaded(_changed(tmp_path, "chain_of_parameters", (old, new)))
+
+
+def test_constraints_hold_for_the_values_that_a_catalog_is_given(tmp_path: Path) -> None:
+    shutil.copytree(CASES.parent, tmp_path, dirs_exist_ok=True)
+    catalog = tmp_path / "catalogs" / "vehicles.xosc"
+    old = '<ParameterDeclaration name="top_speed" parameterType="double" value="60"/>'
+    constraint = '<ConstraintGroup><ValueConstraint rule="greaterThan" value="{}"/></ConstraintGroup>'
+    text = catalog.read_text(encoding="utf-8")
+    for least, is_held in ((30, True), (50, False)):
+        declared = f"{old.removesuffix('/>')}>{constraint.format(least)}</ParameterDeclaration>"
+        catalog.write_text(text.replace(old, declared), encoding="utf-8")
+        if is_held:
+            read_openscenario(tmp_path / "everything.xosc")
+        else:
+            with pytest.raises(
+                InputError, match=r"vehicles\.xosc:7: \S+: value: its ConstraintGroup wants .* got '40'"
+            ):
+                read_openscenario(tmp_path / "everything.xosc")

@@ -69,7 +69,7 @@ def read_parameter_cases(path: Path) -> ParameterCases | None:
 def _base(whole: Node) -> tuple[Path, list[Node]]:
     """The file that is varied, and the declarations of its parameters."""
     file = whole.one("ScenarioFile")
-    path = whole.file.parent / (file.get("filepath") if file else "")
+    path = whole.file.parent / (file.get("filepath").replace("\\", "/") if file else "")
     if file is None or not path.is_file():
         there = sorted(one.name for one in path.parent.glob("*.xosc")) if path.parent.is_dir() else []
         told = suggest(path.name, there) if there else f"the folder {path.parent} has no .xosc file"

@@ -12,6 +12,7 @@ import numpy as np
 from fogsim.errors import InputError, LeftOutWarning
 from fogsim.files.generated_files import kept_text, write_generated
 from fogsim.openscenario.actions import Actions
+from fogsim.openscenario.carla import to_standard
 from fogsim.openscenario.catalogs import Catalogs
 from fogsim.openscenario.entities import Vehicle, ego_of, read_vehicles
 from fogsim.openscenario.environment import fog_block
@@ -60,6 +61,7 @@ def read_openscenario(path: Path) -> ScenarioData:
         raise InputError(f"{path}:{root.line}: expected <OpenSCENARIO> at its top, got <{root.tag}>")
     _check_version(root)
     put_parameters(root, {}, findings)
+    to_standard(root)
     catalogs = Catalogs(path.parent, root.one("CatalogLocations"), findings)
     entities, storyboard = root.one("Entities"), root.one("Storyboard")
     if entities is None or storyboard is None:

@@ -273,6 +273,12 @@ def test_ds_goes_by_the_road_and_ds_lane_by_the_entity(tmp_path: Path, position:
     [
         ('<AbsoluteTargetSpeed value="2"/>', '<AbsoluteTargetSpeed value="-2"/>', "vehicles do not drive backwards"),
         (
+            '<SpeedAction>\n<SpeedActionDynamics dynamicsShape="linear"',
+            '<LongitudinalDistanceAction entityRef="Led" timeGap="2" freespace="true" continuous="true"/>'
+            '<SpeedAction><SpeedActionDynamics dynamicsShape="linear"',
+            r"LongitudinalDistanceAction\[Led\]: there is no vehicle 'Led'",
+        ),
+        (
             'conditionEdge="none">\n<ByValueCondition>\n<SimulationTimeCondition value="3"',
             'conditionEdge="falling">\n<ByValueCondition>\n<SimulationTimeCondition value="3"',
             "what has begun does not end again",

@@ -131,13 +131,18 @@ class Actions:
             return {"to_kmh": max(speed, 0.0) * KMH_PER_MPS}
         if relative is None:
             return {}
-        other, value = relative.get("entityRef"), self.findings.number(relative, "value")
-        if other not in self.vehicles:
-            self.findings.refuse(relative, f"there is no vehicle {other!r}")
+        value = self.findings.number(relative, "value")
         how = self.findings.word(relative, "speedTargetValueType", ("delta", "factor"))
         share = {"factor": value} if how == "factor" else {"plus_kmh": value * KMH_PER_MPS}
         follows = {"continuous": True} if relative.get("continuous") == "true" else {}
-        return {"like": self.called(other).strip('"'), **share, **follows}
+        return {"like": self._other(relative), **share, **follows}
+
+    def _other(self, node: Node) -> str:
+        """The vehicle that an element refers to, as the timeline names it."""
+        name = node.get("entityRef")
+        if name not in self.vehicles:
+            self.findings.refuse(node, f"there is no vehicle {name!r}")
+        return self.called(name).strip('"')
 
     def _pace(self, dynamics: Node, effect: Effect) -> dict[str, Any]:
         shape = SHAPES[self.findings.word(dynamics, "dynamicsShape", tuple(SHAPES))]
@@ -180,10 +185,8 @@ class Actions:
     def _lanes(self, target: Node, actor: str) -> dict[str, Any] | None:
         absolute, relative = target.one("AbsoluteTargetLane"), target.one("RelativeTargetLane")
         if relative is not None:
-            other, lanes = relative.get("entityRef"), int(self.findings.number(relative, "value"))
-            if other == actor:
-                return {"lanes": lanes}
-            return {"to_lane_of": self.called(other).strip('"'), "lanes": lanes}
+            other, lanes = self._other(relative), int(self.findings.number(relative, "value"))
+            return {"lanes": lanes} if relative.get("entityRef") == actor else {"to_lane_of": other, "lanes": lanes}
         begins = self.positions.entities.get(actor)
         if absolute is None or begins is None:
             self.findings.refuse(target, "expected an AbsoluteTargetLane or RelativeTargetLane")
@@ -230,7 +233,7 @@ class Actions:
         self.findings.word(action, "displacement", ("any", "trailingReferencedEntity"), "any")
         if action.get("continuous") != "true":
             self.findings.refuse(action, "continuous: a distance, once reached, is kept; write true")
-        effect.add(actor, follow={"vehicle": self.called(action.get("entityRef")).strip('"'), "headway_s": headway})
+        effect.add(actor, follow={"vehicle": self._other(action), "headway_s": headway})
 
     def _assign_route(self, action: Node, actor: str, effect: Effect) -> None:
         """In `Init`: the way through the waypoints, with changes of lane that it needs, and then straight on."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fogsim.errors import InputError, shown, suggest
+from fogsim.openscenario.carla import to_standard
 from fogsim.openscenario.findings import Findings
 from fogsim.openscenario.parameters import declared, put_parameters
 from fogsim.openscenario.xml_tree import Node, read_xml
@@ -63,6 +64,7 @@ class Catalogs:
             if file not in self._read:
                 try:
                     self._read[file] = read_xml(file)
+                    to_standard(self._read[file])
                 except InputError as error:
                     self.findings.refused.append(str(error))
                     self._read[file] = Node("", {}, file, 1)

@@ -15,6 +15,7 @@ from fogsim.errors import InputError, LeftOutWarning
 from fogsim.files.generated_files import write_generated
 from fogsim.files.maps import find_map
 from fogsim.openscenario.actions import Actions
+from fogsim.openscenario.carla import to_standard
 from fogsim.openscenario.catalogs import Catalogs
 from fogsim.openscenario.entities import Vehicle, ego_of, read_vehicles
 from fogsim.openscenario.environment import fog_block
@@ -70,6 +71,7 @@ def read_openscenario(
         for one in block.children:
             one.attributes["value"] = values.get(one.attributes.get("name", ""), one.attributes.get("value", ""))
     put_parameters(root, {}, findings)
+    to_standard(root)
     catalogs = Catalogs(path.parent, root.one("CatalogLocations"), findings)
     entities, storyboard = root.one("Entities"), root.one("Storyboard")
     if entities is None or storyboard is None:

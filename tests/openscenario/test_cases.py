@@ -182,6 +182,25 @@ def test_the_sun_is_in_lux(tmp_path: Path, sun: str, lux: float | None) -> None:
             _loaded(file)
 
 
+def test_files_of_carla_have_their_own_axes_and_sun(tmp_path: Path) -> None:
+    texts = (
+        (
+            '<LanePosition roadId="7" laneId="-1" s="30">\n</LanePosition>',
+            '<WorldPosition x="30" y="1.7" z="0.5" h="0"/>',
+        ),
+        (
+            '<LanePosition roadId="7" laneId="-1" s="90">\n</LanePosition>',
+            '<RelativeWorldPosition entityRef="Ego" dx="40" dy="-0.4"/>',
+        ),
+    )
+    for intensity, lux in ((1.0, 90_164.0), (0.5, 90_164.0 * (1.0 - 0.75 * 0.5**3.4))):
+        sun = ('intensity="0.85"', f'intensity="{intensity}"')
+        file = _changed(tmp_path, "sun_between_0_and_1", ('description="', 'description="CARLA:'), sun, *texts)
+        step = _run(file, 0.1)[0]
+        assert [float(step.traffic.position[row, 1]) for row in range(2)] == pytest.approx([-1.75, -1.75], abs=0.1)
+        assert _loaded(file).light.illuminance_lx == pytest.approx(lux, rel=1e-3)
+
+
 def test_an_initial_speed_and_a_distance_go_together(tmp_path: Path) -> None:
     action = '<LongitudinalDistanceAction entityRef="Ego" timeGap="2" freespace="true" continuous="false"/>'
     file = _changed(
@@ -253,6 +272,12 @@ def test_ds_goes_by_the_road_and_ds_lane_by_the_entity(tmp_path: Path, position:
     ("old", "new", "told"),
     [
         ('<AbsoluteTargetSpeed value="2"/>', '<AbsoluteTargetSpeed value="-2"/>', "vehicles do not drive backwards"),
+        (
+            '<SpeedAction>\n<SpeedActionDynamics dynamicsShape="linear"',
+            '<LongitudinalDistanceAction entityRef="Led" timeGap="2" freespace="true" continuous="true"/>'
+            '<SpeedAction><SpeedActionDynamics dynamicsShape="linear"',
+            r"LongitudinalDistanceAction\[Led\]: there is no vehicle 'Led'",
+        ),
         (
             'conditionEdge="none">\n<ByValueCondition>\n<SimulationTimeCondition value="3"',
             'conditionEdge="falling">\n<ByValueCondition>\n<SimulationTimeCondition value="3"',

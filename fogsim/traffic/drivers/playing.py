@@ -68,7 +68,7 @@ class _SpeedCourse:
         action = self.action
         if motion.time - self.begun >= action.hold - 1e-9:
             return None
-        if action.like in motion.present:
+        if action.like and action.like in motion.present:
             speed = max(motion.speed(action.like) * action.factor + action.plus, 0.0)
             self.action = action = replace(action, speed=speed)
         return speed_on_the_way(action, self.first, passed)

@@ -95,7 +95,10 @@ class Actions:
         for actor in actors:
             if effect.do.get(actor, {}).keys() & orders:
                 self.findings.refuse(action, f"another action of this event orders the motion of {actor} as well")
-            _PRIVATE[action.tag](self, action, actor, effect)
+            try:
+                _PRIVATE[action.tag](self, action, actor, effect)
+            except ValueError as error:
+                self.findings.refuse(action, str(error))
 
     def _environment(self, action: Node, effect: Effect) -> None:
         read = environment_of(action, self.catalogs, self.positions.lanes)
@@ -237,25 +240,15 @@ class Actions:
 
     def _assign_route(self, action: Node, actor: str, effect: Effect) -> None:
         """In `Init`: the way through the waypoints, with changes of lane that it needs, and then straight on."""
-        self._drive(action, actor, effect, lambda: self.positions.route(action)[1])
+        effect.routes[actor] = self.positions.route(action)[1]
 
     def _acquire(self, action: Node, actor: str, effect: Effect) -> None:
         """In `Init`: the shortest way there, and then straight on."""
-
-        def edges() -> tuple[str, ...]:
-            position, begins = action.one("Position"), self.positions.entities.get(actor)
-            spot = None if position is None else self.positions.spot(position)
-            if begins is None or spot is None:
-                raise ValueError("expected a Position, and a vehicle that has one")
-            return self.positions.lanes.way(begins.lane.edge, spot.lane.edge)
-
-        self._drive(action, actor, effect, edges)
-
-    def _drive(self, action: Node, actor: str, effect: Effect, edges: Callable[[], tuple[str, ...]]) -> None:
-        try:
-            effect.routes[actor] = edges()
-        except ValueError as error:
-            self.findings.refuse(action, str(error))
+        position, begins = action.one("Position"), self.positions.entities.get(actor)
+        spot = None if position is None else self.positions.spot(position)
+        if begins is None or spot is None:
+            raise ValueError("expected a Position, and a vehicle that has one")
+        effect.routes[actor] = self.positions.lanes.way(begins.lane.edge, spot.lane.edge)
 
 
 _PRIVATE: Mapping[str, Callable[[Actions, Node, str, Effect], None]] = {

@@ -18,12 +18,8 @@ MOST_CASES = 100_000
 """Maximum number of cases of a file."""
 
 _DRAWN = (
-    "ProbabilityDistributionSet",
-    "Histogram",
-    "UniformDistribution",
-    "NormalDistribution",
-    "LogNormalDistribution",
-    "PoissonDistribution",
+    *("ProbabilityDistributionSet", "Histogram", "UniformDistribution"),
+    *("NormalDistribution", "LogNormalDistribution", "PoissonDistribution"),
 )
 _MOST_ROUNDS = 1_000  # Draws for all test runs before limits that hardly any draw meets are refused
 
@@ -84,17 +80,12 @@ def _grid(block: Node, findings: Findings) -> list[Assignment]:
     """All combinations of deterministic distributions, the last one fastest; those that are the same once."""
     axes: list[list[Assignment]] = []
     for one in block.all("DeterministicSingleParameterDistribution", "DeterministicMultiParameterDistribution"):
-        if one.tag == "DeterministicSingleParameterDistribution":
-            name = one.get("parameterName")
-            axes.append([{name: value} for value in _values(one, findings)])
-        else:
-            sets = one.one("ValueSetDistribution")
-            axes.append(
-                [
-                    {each.get("parameterRef"): each.get("value") for each in values.all("ParameterAssignment")}
-                    for values in (sets.all("ParameterValueSet") if sets else ())
-                ]
-            )
+        name, sets = one.get("parameterName"), one.one("ValueSetDistribution")
+        listed = [each.all("ParameterAssignment") for each in (sets.all("ParameterValueSet") if sets else ())]
+        together: list[Assignment] = [
+            {each.get("parameterRef"): each.get("value") for each in values} for values in listed
+        ]
+        axes.append(together or [{name: value} for value in _values(one, findings)])
         if not axes[-1]:
             findings.refuse(one, "expected a DistributionSet, DistributionRange or ValueSetDistribution with values")
         if {name for case in axes[-1] for name in case} & {name for axis in axes[:-1] for c in axis for name in c}:

@@ -9,7 +9,7 @@ from fogsim.openscenario.actions import Actions, Effect
 from fogsim.openscenario.entities import Vehicle
 from fogsim.openscenario.environment import Environment, environment_of
 from fogsim.openscenario.xml_tree import Node
-from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, Spot
+from fogsim.traffic.road.opendrive_lanes import Spot
 from fogsim.units import KMH_PER_MPS
 
 
@@ -60,19 +60,11 @@ def read_beginning(init: Node | None, vehicles: Mapping[str, Vehicle], actions: 
         try:
             wanted = begin.effect.routes.get(name, ())
             begin.fronts[name] = actions.positions.lanes.along(begin.spots[name], vehicle.front, wanted)
-            begin.ways[name] = _way(begin.fronts[name].lane.edge, wanted, actions.positions.lanes)
+            begin.ways[name] = actions.positions.lanes.route(begin.fronts[name].lane.edge, wanted)
         except ValueError as error:
             actions.findings.refuse(vehicle.node, f"{name} cannot begin where it is to: {error}")
             del begin.spots[name]
     return begin
-
-
-def _way(edge: str, wanted: tuple[str, ...], lanes: OpenDriveLanes) -> tuple[str, ...]:
-    """Edges from one on through a route, or to it and through it, and straight on."""
-    if not wanted:
-        return lanes.route(edge)
-    joined = wanted[wanted.index(edge) :] if edge in wanted else (*lanes.way(edge, wanted[0]), *wanted[1:])
-    return (*joined, *lanes.route(joined[-1])[1:])
 
 
 def _take_global(action: Node, begin: Beginning, actions: Actions) -> None:
@@ -137,10 +129,8 @@ Along = Callable[[str | Node], float | None]
 
 def along_route(route: tuple[str, ...], begin: Beginning, vehicles: Mapping[str, Vehicle], actions: Actions) -> Along:
     """Position along the ego's route: of a vehicle's front bumper at the beginning, or of a position."""
-    starts: dict[str, float] = {}
-    for edge, start in zip(route, actions.positions.lanes.starts(route), strict=False):
-        # On a closed road, the first time counts.
-        starts.setdefault(edge, start)
+    # On a closed road, the first time counts.
+    starts = dict(reversed([*zip(route, actions.positions.lanes.starts(route), strict=False)]))
 
     def position(what: str | Node) -> float | None:
         if isinstance(what, str):

@@ -144,8 +144,15 @@ class OpenDriveLanes:
         other = min(lanes, key=lambda one: abs(one.index - lane.index))
         return other, self.crossings.get((lane.edge, edge) if ahead else (edge, lane.edge), 0.0)
 
-    def route(self, edge: str) -> tuple[str, ...]:
-        """Edges from one on, straight ahead where there is a choice, until the road ends; a closed one is repeated."""
+    def route(self, edge: str, wanted: Sequence[str] = ()) -> tuple[str, ...]:
+        """Edges from one on through the `wanted`, and straight ahead until the road ends; ValueError without a way.
+
+        A closed road is repeated.
+        """
+        if wanted:
+            before = () if edge in wanted else self.way(edge, wanted[0])[:-1]
+            joined = (*before, *(wanted if before else wanted[list(wanted).index(edge) :]))
+            return (*joined, *self.route(joined[-1])[1:])
         lengths = {one.edge: one.length for one in self.lanes}
         found, length, most = [edge], lengths[edge], FARTHEST_ROUTE
         while length < most and (following := self.followers.get(found[-1])):

@@ -3,7 +3,7 @@
 import inspect
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import astuple, fields
 from functools import partial
 from pathlib import Path
@@ -26,8 +26,8 @@ from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.lighting.legal import LAWS
 from fogsim.metrics import metric_definitions
 from fogsim.openscenario.actions import ACTIONS, LAMPS
+from fogsim.openscenario.elements import HARMLESS, HONOURED, REFUSED
 from fogsim.openscenario.entities import CLASSES
-from fogsim.openscenario.findings import ATTRIBUTES_PASSED_OVER, PASSED_OVER
 from fogsim.openscenario.positions import POSITIONS
 from fogsim.openscenario.triggers import CONDITIONS
 from fogsim.parameters import accepted_parameters, mismatch
@@ -271,10 +271,16 @@ def openscenario_elements() -> list[tuple[str, ...]]:
     return [(f"`{element}`", told) for table in tables for element, told in table.items()]
 
 
-def openscenario_passed_over() -> list[tuple[str, ...]]:
-    """Elements and attributes of OpenSCENARIO files that change nothing."""
-    attributes = [(f"`{name}`", "attribute") for name in sorted(ATTRIBUTES_PASSED_OVER)]
-    return [*((f"`{name}`", told) for name, told in PASSED_OVER.items()), *attributes]
+def openscenario_honoured() -> list[tuple[str, ...]]:
+    """Elements of OpenSCENARIO files that are honoured, with their attributes that are."""
+    rows = [(f"`{name}`", ", ".join(f"`{one}`" for one in told)) for name, told in sorted(HONOURED.items()) if told]
+    return [*rows, (", ".join(f"`{name}`" for name, told in sorted(HONOURED.items()) if not told), "none")]
+
+
+def openscenario_reasons(decided: Mapping[str, str]) -> list[tuple[str, ...]]:
+    """Elements and attributes of OpenSCENARIO files by the reason why they are harmless or refused."""
+    reasons = dict.fromkeys(decided.values())
+    return [(", ".join(f"`{name}`" for name, told in decided.items() if told == why), why) for why in reasons]
 
 
 TABLES = {
@@ -302,7 +308,9 @@ TABLES = {
     },
     "how_to/openscenario.md": {
         "supported": (("element", "what becomes of it"), openscenario_elements),
-        "passed_over": (("element", "what it is"), openscenario_passed_over),
+        "honoured": (("element", "attributes"), openscenario_honoured),
+        "harmless": (("elements and attributes", "why"), partial(openscenario_reasons, HARMLESS)),
+        "refused": (("elements and attributes", "why"), partial(openscenario_reasons, REFUSED)),
     },
     "reference/tests.md": {
         "signals": (("signal", "unit or kind", "meaning", "needs"), signals),

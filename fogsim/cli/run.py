@@ -17,6 +17,7 @@ from fogsim.cli.scenario_options import (
     CaseValues,
     EgoId,
     HomogeneousVisibility,
+    Maps,
     MethodTimeout,
     ScenarioName,
     Settings,
@@ -103,6 +104,7 @@ def run_command(
         ),
     ] = None,
     method_timeout: MethodTimeout = None,
+    maps: Maps = None,  # noqa: ARG001 - its callback does it
 ) -> None:
     """Run a scenario and write manifest.json, steps.parquet, metrics.json, video.mp4 and report.html."""
     settings = with_timeout(settings, method_timeout)

@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,6 +11,7 @@ import typer
 
 from fogsim.cli.printing import print_remarks
 from fogsim.errors import InputError
+from fogsim.files.maps import MAPS
 
 if TYPE_CHECKING:
     from fogsim.scenario import Scenario
@@ -32,6 +34,26 @@ Settings = Annotated[
 
 CaseValues = Annotated[
     str, typer.Option("--case", metavar="NAME=VALUE,…", help="Only cases of a file that varies with these values.")
+]
+
+
+def _use_maps(folder: Path | None) -> Path | None:
+    """Let readers, also those of other processes, find maps in a folder."""
+    if folder is not None:
+        os.environ[MAPS] = str(folder.resolve())
+    return folder
+
+
+Maps = Annotated[
+    Path | None,
+    typer.Option(
+        "--maps",
+        envvar=MAPS,
+        callback=_use_maps,
+        exists=True,
+        file_okay=False,
+        help="Folder with the maps that OpenSCENARIO files name: Town01.xodr or Town01.net.xml for Town01.",
+    ),
 ]
 
 MethodTimeout = Annotated[

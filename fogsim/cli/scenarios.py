@@ -7,7 +7,7 @@ import typer
 from rich.table import Table
 
 from fogsim.cli.printing import BAD_INPUT, escape, print_error, stdout
-from fogsim.cli.scenario_options import SCENARIO_HELP, CodeNotice, Settings
+from fogsim.cli.scenario_options import SCENARIO_HELP, CodeNotice, Maps, Settings
 from fogsim.errors import FogSimError
 
 
@@ -42,6 +42,7 @@ def validate_command(
     allow_code: Annotated[
         bool, typer.Option("--allow-code", help="Import Python files next to a scenario, to check parameters too.")
     ] = False,
+    maps: Maps = None,  # noqa: ARG001 - its callback does it
 ) -> None:
     """Check scenario files; every mistake is named with file, line, key, value and what is allowed."""
     from fogsim.registry.user_code import import_nothing

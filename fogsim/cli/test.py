@@ -10,7 +10,7 @@ import typer
 
 from fogsim.cli.printing import FAILED, INTERRUPTED, escape, stderr, stdout
 from fogsim.cli.progress import STARTING, counting_bar, progress_bar
-from fogsim.cli.scenario_options import CaseValues, CodeNotice, MethodTimeout, Settings, with_timeout
+from fogsim.cli.scenario_options import CaseValues, CodeNotice, Maps, MethodTimeout, Settings, with_timeout
 
 if TYPE_CHECKING:
     from fogsim.testing import FileOutcome, FogTest
@@ -42,6 +42,7 @@ def check_command(
     evidence: Annotated[bool, typer.Option(help="Keep a video and plots of what did not pass.")] = True,
     settings: Settings = None,
     method_timeout: MethodTimeout = None,
+    maps: Maps = None,  # noqa: ARG001 - its callback does it
 ) -> None:
     """Run scenario files with `expect:`, and exit with 0 (passed), 1 (not), 2 (bad input) or 5 (no tests)."""
     from fogsim.testing import find_files

@@ -11,12 +11,12 @@ EGO = "ego"
 
 
 class Moment:
-    """One step of a run, with the collided pairs and begun script entries so far; positions count along `route`."""
+    """One step of a run, with the collided pairs and begun and ended entries so far; positions count along `route`."""
 
     def __init__(
-        self, step: TrafficStep, collisions: set[tuple[str, str]], begun: set[str], route: Route | None
+        self, step: TrafficStep, collisions: set[tuple[str, str]], begun: set[str], ended: set[str], route: Route | None
     ) -> None:
-        self.step, self.collisions, self.begun = step, collisions, begun
+        self.step, self.collisions, self.begun, self.ended = step, collisions, begun, ended
         self._route = route
         self._places: dict[str, RoutePlace | None] = {}
         self._by_row: dict[int, RoutePlace | None] = {}
@@ -86,14 +86,15 @@ class History:
     def __init__(self) -> None:
         self._collisions: set[tuple[str, str]] = set()
         self._begun: set[str] = set()
+        self._ended: set[str] = set()
         self._route: Route | None = None
 
     def moment(self, step: TrafficStep) -> Moment:
         """Add the next step and return its moment."""
         self._collisions |= {(hit.collider, hit.victim) for hit in step.collisions}
-        begun = [one for one in step.begun if not one.is_over]
-        self._begun |= {name for one in begun for name in (one.name, one.key)}
+        for one in step.begun:
+            (self._ended if one.is_over else self._begun).update((one.name, one.key))
         points = step.truth.route
         if points is not None and len(points) > 1 and (self._route is None or self._route.points is not points):
             self._route = Route(points)
-        return Moment(step, self._collisions, self._begun, self._route)
+        return Moment(step, self._collisions, self._begun, self._ended, self._route)

@@ -228,6 +228,12 @@ _OF_RUN = {
         Kind.FLAG,
         places=(Place.EVENT,),
     ),
+    "over(EVENT)": Signal(
+        "whether what an entry of the timeline has begun is over; false where it lasts no time, or no known one",
+        lambda m, name: name in m.ended,
+        Kind.FLAG,
+        places=(Place.EVENT,),
+    ),
 }
 
 _OF_VEHICLES = {

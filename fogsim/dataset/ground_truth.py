@@ -14,6 +14,7 @@ from fogsim.values import Step, Truth, View
 from fogsim.values.observation import sign_map_values
 from fogsim.values.pinhole import ray_from_pixel
 from fogsim.values.scene import Instance
+from fogsim.values.traffic import PEDESTRIAN
 
 
 class SemanticClass(IntEnum):
@@ -43,7 +44,7 @@ _OF_TYPE = {
         SemanticClass.BUS,
         SemanticClass.MOTORCYCLE,
     )
-}
+} | {PEDESTRIAN: SemanticClass.PERSON}
 
 
 def vehicle_class(body: str) -> SemanticClass:

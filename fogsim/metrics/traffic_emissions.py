@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fogsim.linear_algebra import matrix_product
 from fogsim.metrics.metric import Definition, JsonValue, definitions_of
 from fogsim.metrics.traffic_span import Exposure, TrafficMetric, TrafficSpan
+from fogsim.values.traffic import BOX, PEDESTRIAN
 
 _KINDS = ("car", "van", "truck", "bus", "motorcycle")
 
@@ -66,7 +67,9 @@ class TrafficEmissions(TrafficMetric):
         names = np.array([_KINDS.index(name) if name in _KINDS else 0 for name in span.kind_names], dtype=np.intp)
         kind, speed, acceleration = names[span.kind], span.speed, span.acceleration
         square = speed**2
+        has_engine = np.array([name not in (BOX, PEDESTRIAN) for name in span.kind_names], dtype=np.bool_)[span.kind]
         burning = (-acceleration < _COASTING[kind, 0] + _COASTING[kind, 1] * square) | (speed <= _CREEPING)
+        burning &= has_engine
         powers = np.ones(len(speed)), speed, square, square * speed
         terms = np.stack((*powers, acceleration, acceleration * speed, acceleration * square))
         for number in np.unique(names):

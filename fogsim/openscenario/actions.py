@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fogsim.openscenario.catalogs import Catalogs
+from fogsim.openscenario.elements import HARMLESS, REFUSED
 from fogsim.openscenario.entities import Vehicle
 from fogsim.openscenario.environment import environment_of
 from fogsim.openscenario.findings import Findings
@@ -38,11 +39,16 @@ _NEAR = 0.05  # Difference at which a speed has been reached [m/s]
 
 @dataclass
 class Effect:
-    """What an event does: timeline blocks by subject, their known duration [s], and conditions that end the rest."""
+    """What an event does: timeline blocks by subject, their known duration [s], and conditions that end the rest.
+
+    `routes` are edges through the waypoints of a vehicle's route; `ends_itself` if only the run shows its duration.
+    """
 
     do: dict[str, dict[str, Any]] = field(default_factory=dict)
     lasts: float = 0.0
     ends: list[str] = field(default_factory=list)
+    routes: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    ends_itself: bool = False
 
     def add(self, subject: str, **blocks: Any) -> None:
         """Add an action of a subject."""
@@ -68,19 +74,31 @@ class Actions:
     def take(self, action: Node, actors: list[str], effect: Effect) -> None:
         """Add an action (``PrivateAction``, ``GlobalAction``, or their parent) of some actors to an effect."""
         for one in action.all():
-            if one.tag in ("PrivateAction", "GlobalAction", "LongitudinalAction", "LateralAction", "AppearanceAction"):
+            if one.tag in _GROUPS:
                 self.take(one, actors, effect)
             elif one.tag == "EnvironmentAction":
                 self._environment(one, effect)
-            elif one.tag in _CONTROL:
-                self.findings.leave_out(one, "FogSim's own drivers and its adviser drive")
+            elif one.tag == "OverrideControllerValueAction":
+                if any(input_.get("active") == "true" for input_ in one.all()):
+                    self.findings.refuse(one, "speeds and lanes are ordered, not pedals; write active=false")
+            elif one.tag in HARMLESS:
+                self.findings.leave_out(one, HARMLESS[one.tag])
             elif one.tag not in _PRIVATE:
-                self.findings.refuse(one, f"FogSim has no such action; it has {', '.join(ACTIONS)}")
+                told = REFUSED.get(one.tag, "FogSim does not know this element here")
+                self.findings.refuse(one, f"{told}; actions are {', '.join(ACTIONS)}")
             else:
-                if not actors:
-                    self.findings.refuse(one, "nobody does it: the Actors of the maneuver group name no entity")
-                for actor in actors:
-                    _PRIVATE[one.tag](self, one, actor, effect)
+                self._private(one, _ORDERS.get(action.tag, set()), actors, effect)
+
+    def _private(self, action: Node, orders: set[str], actors: list[str], effect: Effect) -> None:
+        if not actors:
+            self.findings.refuse(action, "nobody does it: the Actors of the maneuver group name no entity")
+        for actor in actors:
+            if effect.do.get(actor, {}).keys() & orders:
+                self.findings.refuse(action, f"another action of this event orders the motion of {actor} as well")
+            try:
+                _PRIVATE[action.tag](self, action, actor, effect)
+            except ValueError as error:
+                self.findings.refuse(action, str(error))
 
     def _environment(self, action: Node, effect: Effect) -> None:
         read = environment_of(action, self.catalogs, self.positions.lanes)
@@ -92,7 +110,7 @@ class Actions:
             effect.add("light", illuminance_lx=float(f"{read.illuminance:.4g}"))
 
     def _speed(self, action: Node, actor: str, effect: Effect) -> None:
-        """`speed`: absolute, or relative to a vehicle at that moment; by time or rate."""
+        """`speed`: absolute, or relative to a vehicle at that moment, or continuously; by time or rate."""
         dynamics, target = action.one("SpeedActionDynamics"), action.one("SpeedActionTarget")
         told = {} if target is None else self._target(target)
         if not told:
@@ -109,23 +127,30 @@ class Actions:
     def _target(self, target: Node) -> dict[str, Any]:
         absolute, relative = target.one("AbsoluteTargetSpeed"), target.one("RelativeTargetSpeed")
         if absolute is not None:
-            return {"to_kmh": max(self.findings.number(absolute, "value"), 0.0) * KMH_PER_MPS}
+            if (speed := self.findings.number(absolute, "value")) < 0.0:
+                self.findings.refuse(
+                    absolute, f"value: expected 0 or more, got {speed:g}: vehicles do not drive backwards"
+                )
+            return {"to_kmh": max(speed, 0.0) * KMH_PER_MPS}
         if relative is None:
             return {}
-        other, value = relative.get("entityRef"), self.findings.number(relative, "value")
-        if other not in self.vehicles:
-            self.findings.refuse(relative, f"there is no vehicle {other!r}")
-        if relative.get("continuous", "false") == "true":
-            self.findings.leave_out(relative, "continuous: the speed is taken once, when the action begins")
+        value = self.findings.number(relative, "value")
         how = self.findings.word(relative, "speedTargetValueType", ("delta", "factor"))
         share = {"factor": value} if how == "factor" else {"plus_kmh": value * KMH_PER_MPS}
-        return {"like": self.called(other).strip('"'), **share}
+        follows = {"continuous": True} if relative.get("continuous") == "true" else {}
+        return {"like": self._other(relative), **share, **follows}
+
+    def _other(self, node: Node) -> str:
+        """The vehicle that an element refers to, as the timeline names it."""
+        name = node.get("entityRef")
+        if name not in self.vehicles:
+            self.findings.refuse(node, f"there is no vehicle {name!r}")
+        return self.called(name).strip('"')
 
     def _pace(self, dynamics: Node, effect: Effect) -> dict[str, Any]:
         shape = SHAPES[self.findings.word(dynamics, "dynamicsShape", tuple(SHAPES))]
         value = abs(self.findings.number(dynamics, "value", 0.0, is_finite=False))
         by = self.findings.word(dynamics, "dynamicsDimension", ("time", "rate", "distance"))
-        dynamics.get("followingMode")
         if shape == "step" or value == 0.0 or math.isinf(value):
             return {"shape": "step"}
         if by == "distance":
@@ -136,7 +161,7 @@ class Actions:
         return {"shape": shape, "over_s" if by == "time" else "rate_mps2": value}
 
     def _lane_change(self, action: Node, actor: str, effect: Effect) -> None:
-        """`change_lane`: absolute, or relative to a vehicle; by time."""
+        """`change_lane`: absolute, or relative to a vehicle; by time or distance."""
         dynamics, target = action.one("LaneChangeActionDynamics"), action.one("LaneChangeTarget")
         if self.findings.number(action, "targetLaneOffset", 0.0):
             self.findings.refuse(action, "targetLaneOffset: vehicles are in the middle of their lanes; write 0")
@@ -145,27 +170,26 @@ class Actions:
             return
         change: dict[str, Any] = {**lanes, "stay_s": _STAY}
         if dynamics is not None:
-            change["duration_s"] = self._duration(dynamics)
-            effect.lasts = max(effect.lasts, change["duration_s"])
+            change |= self._duration(dynamics)
+            effect.lasts = max(effect.lasts, change.get("duration_s", 0.0))
+            effect.ends_itself = "distance_m" in change
         effect.add(actor, change_lane=change)
 
-    def _duration(self, dynamics: Node) -> float:
+    def _duration(self, dynamics: Node) -> dict[str, float]:
         shape = self.findings.word(dynamics, "dynamicsShape", tuple(SHAPES))
         value = abs(self.findings.number(dynamics, "value", 0.0, is_finite=False))
         by = self.findings.word(dynamics, "dynamicsDimension", ("time", "rate", "distance"))
-        if shape == "step":
-            return 0.0
-        if by != "time":
-            self.findings.refuse(dynamics, "dynamicsDimension: changes of lane take a time")
-        return min(value, 60.0)
+        if shape == "step" or value == 0.0:
+            return {"duration_s": 0.0}
+        if by == "rate":
+            self.findings.refuse(dynamics, "dynamicsDimension: changes of lane take a time or a distance")
+        return {"distance_m": value} if by == "distance" else {"duration_s": min(value, 60.0)}
 
     def _lanes(self, target: Node, actor: str) -> dict[str, Any] | None:
         absolute, relative = target.one("AbsoluteTargetLane"), target.one("RelativeTargetLane")
         if relative is not None:
-            other, lanes = relative.get("entityRef"), int(self.findings.number(relative, "value"))
-            if other == actor:
-                return {"lanes": lanes}
-            return {"to_lane_of": self.called(other).strip('"'), "lanes": lanes}
+            other, lanes = self._other(relative), int(self.findings.number(relative, "value"))
+            return {"lanes": lanes} if relative.get("entityRef") == actor else {"to_lane_of": other, "lanes": lanes}
         begins = self.positions.entities.get(actor)
         if absolute is None or begins is None:
             self.findings.refuse(target, "expected an AbsoluteTargetLane or RelativeTargetLane")
@@ -175,7 +199,12 @@ class Actions:
         if not found:
             self.findings.refuse(absolute, f"road {road!r}, where {actor} begins, has no lane {wanted!r} to drive on")
             return None
-        return {"to": found[0].index}
+        if wanted.startswith("-") == begins.lane.origins[0].partition("_")[2].startswith("-"):
+            return {"to": found[0].index}
+        if wanted.lstrip("-") != "1":
+            self.findings.refuse(absolute, "of the oncoming lanes, vehicles drive on the nearest; write 1 or -1")
+        self.positions.with_oncoming = True
+        return {"to": "oncoming"}
 
     def _lights(self, action: Node, actor: str, effect: Effect) -> None:
         """`lamps`; a flashing lamp is an indicator, or on."""
@@ -184,13 +213,11 @@ class Actions:
             self.findings.refuse(action, "expected a LightType with a VehicleLight, and a LightState")
             return
         mode = self.findings.word(state, "mode", ("on", "off", "flashing"))
-        for key in ("luminousIntensity", "flashingOnDuration", "flashingOffDuration"):
-            # Lamps shine as their type does, and indicators flash as the law requires.
-            state.get(key)
-        for colour in state.all("Color"):
-            self.findings.leave_out(colour, "lamps have the colour of their kind")
-        action.get("transitionTime")
+        if self.findings.number(action, "transitionTime", 0.0):
+            self.findings.refuse(action, "transitionTime: lamps are lit at once; write 0")
         kind = light.get("vehicleLightType")
+        if mode == "flashing" and not all("indicator" in one for one in LAMPS.get(kind, ())):
+            self.findings.refuse(state, "mode: indicators flash, and no other lamp does")
         if kind in _UNLIT:
             self.findings.leave_out(light, f"vehicles have no {kind}")
             return
@@ -200,16 +227,28 @@ class Actions:
         effect.add(actor, lamps=dict.fromkeys(LAMPS[kind], "off" if mode == "off" else "on"))
 
     def _keep_distance(self, action: Node, actor: str, effect: Effect) -> None:
-        """`follow`, by `timeGap` with `freespace`."""
+        """`follow`, by `timeGap` with `freespace` and `continuous`, of a vehicle ahead."""
         headway = self.findings.number(action, "timeGap", 0.0)
         if not headway or self.findings.word(action, "freespace", ("true", "false")) != "true":
             self.findings.refuse(action, "a distance is kept by a timeGap with freespace=true")
             return
-        for key in ("continuous", "coordinateSystem", "displacement"):
-            action.get(key)
-        for limits in action.all("DynamicConstraints"):
-            self.findings.leave_out(limits, "FogSim's law of following has limits of its own")
-        effect.add(actor, follow={"vehicle": self.called(action.get("entityRef")).strip('"'), "headway_s": headway})
+        self.findings.word(action, "coordinateSystem", ("entity", "lane", "road"), "entity")
+        self.findings.word(action, "displacement", ("any", "trailingReferencedEntity"), "any")
+        if action.get("continuous") != "true":
+            self.findings.refuse(action, "continuous: a distance, once reached, is kept; write true")
+        effect.add(actor, follow={"vehicle": self._other(action), "headway_s": headway})
+
+    def _assign_route(self, action: Node, actor: str, effect: Effect) -> None:
+        """In `Init`: the way through the waypoints, with changes of lane that it needs, and then straight on."""
+        effect.routes[actor] = self.positions.route(action)[1]
+
+    def _acquire(self, action: Node, actor: str, effect: Effect) -> None:
+        """In `Init`: the shortest way there, and then straight on."""
+        position, begins = action.one("Position"), self.positions.entities.get(actor)
+        spot = None if position is None else self.positions.spot(position)
+        if begins is None or spot is None:
+            raise ValueError("expected a Position, and a vehicle that has one")
+        effect.routes[actor] = self.positions.lanes.way(begins.lane.edge, spot.lane.edge)
 
 
 _PRIVATE: Mapping[str, Callable[[Actions, Node, str, Effect], None]] = {
@@ -217,8 +256,13 @@ _PRIVATE: Mapping[str, Callable[[Actions, Node, str, Effect], None]] = {
     "LaneChangeAction": Actions._lane_change,
     "LightStateAction": Actions._lights,
     "LongitudinalDistanceAction": Actions._keep_distance,
+    "AssignRouteAction": Actions._assign_route,
+    "AcquirePositionAction": Actions._acquire,
 }
-_CONTROL = ("ControllerAction", "ActivateControllerAction", "AssignControllerAction", "OverrideControllerValueAction")
+_ORDERS = {"LongitudinalAction": {"speed", "follow"}, "LateralAction": {"change_lane"}}
+_GROUPS = [
+    f"{kind}Action" for kind in ("Private", "Global", "Controller", "Longitudinal", "Lateral", "Appearance", "Routing")
+]
 ACTIONS: Mapping[str, str] = {
     "EnvironmentAction": "`fog` and `light`.",
     **{tag: inspect.getdoc(action) or "" for tag, action in _PRIVATE.items()},

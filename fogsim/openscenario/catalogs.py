@@ -5,17 +5,21 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fogsim.errors import InputError, shown, suggest
+from fogsim.openscenario.carla import to_standard
 from fogsim.openscenario.findings import Findings
 from fogsim.openscenario.parameters import declared, put_parameters
 from fogsim.openscenario.xml_tree import Node, read_xml
 
-LOCATIONS = {
-    "VehicleCatalog": "Vehicle",
-    "EnvironmentCatalog": "Environment",
-    "ControllerCatalog": "Controller",
-    "ManeuverCatalog": "Maneuver",
-}
-"""Types of catalogs that are read, and their elements."""
+LOCATIONS = (
+    "VehicleCatalog",
+    "PedestrianCatalog",
+    "MiscObjectCatalog",
+    "EnvironmentCatalog",
+    "ControllerCatalog",
+    "ManeuverCatalog",
+    "RouteCatalog",
+)
+"""Types of catalogs that are read."""
 
 
 @dataclass
@@ -26,12 +30,17 @@ class Catalogs:
     locations: Node | None
     findings: Findings
     _read: dict[Path, Node] = field(default_factory=dict)
+    _places: list[Path] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        for kind in self.locations.all(*LOCATIONS) if self.locations else ():
+            self._places += [self.folder / place.get("path") for place in kind.all("Directory")]
 
     def entry(self, reference: Node) -> Node | None:
         """The element that a ``CatalogReference`` refers to, with its parameters; None, and a finding, if missing."""
         catalog, name = reference.get("catalogName"), reference.get("entryName")
         given = {
-            one.get("parameterRef"): one.get("value")
+            one.get("parameterRef").removeprefix("$"): one.get("value")
             for block in reference.all("ParameterAssignments")
             for one in block.all("ParameterAssignment")
         }
@@ -41,8 +50,7 @@ class Catalogs:
             for one in found.children:
                 if one.attributes.get("name") == name:
                     whole = one.copy()
-                    own = declared(whole, {}, self.findings)
-                    # Values of the reference take precedence over those of the entry.
+                    own = declared(whole, {}, self.findings, given)
                     whole.children = [child for child in whole.children if child.tag != "ParameterDeclarations"]
                     put_parameters(whole, {**own, **given}, self.findings)
                     whole.is_read = True
@@ -56,6 +64,7 @@ class Catalogs:
             if file not in self._read:
                 try:
                     self._read[file] = read_xml(file)
+                    to_standard(self._read[file])
                 except InputError as error:
                     self.findings.refused.append(str(error))
                     self._read[file] = Node("", {}, file, 1)
@@ -67,8 +76,5 @@ class Catalogs:
             )
 
     def _files(self) -> Iterator[Path]:
-        for kind in self.locations.children if self.locations else ():
-            for place in kind.children:
-                path = self.folder / place.attributes.get("path", "")
-                if kind.tag in LOCATIONS:
-                    yield from sorted(path.glob("*.xosc")) if path.is_dir() else ([path] if path.is_file() else [])
+        for path in self._places:
+            yield from sorted(path.glob("*.xosc")) if path.is_dir() else ([path] if path.is_file() else [])

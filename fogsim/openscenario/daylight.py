@@ -51,7 +51,7 @@ def clear_sky_illuminance(elevation: float) -> float:
     Seidelmann (ed.), Explanatory Supplement to the Astronomical Almanac, 1992, p. 491: cubics in elevation [rad] / 90°
     of log10 lx, from −18° on; below, starlight is as bright as there.
     """
-    degrees = min(max(math.degrees(elevation), _BRANCHES[-1][0]), 90.0)
+    degrees = min(90.0, max(_BRANCHES[-1][0], math.degrees(elevation)))
     coefficients = next(one for lowest, one in _BRANCHES if degrees >= lowest)
     logarithm: float = float(polynomial.polyval(degrees / 90.0, coefficients))
     return math.pow(10.0, logarithm)

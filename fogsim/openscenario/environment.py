@@ -18,6 +18,7 @@ _OLD_CLOUDS = {"free": 0.0, "cloudy": 4.0, "overcast": 8.0, "rainy": 8.0, "skyOf
 """Oktas of the words for the sky in OpenSCENARIO 1.0."""
 
 BRIGHTEST = 200_000.0
+_DARKEST = 0.001  # Of a clear day, under any clouds
 _STEP = 1.0  # along a route, in the search for the start of a box [m]
 _EDGE = 1.0  # of a box of fog, whose border is sharp [m]
 
@@ -64,10 +65,14 @@ def environment_of(action: Node, catalogs: Catalogs, lanes: OpenDriveLanes) -> E
         _illuminance(node, weather, lanes, findings),
     )
     if weather is not None:
-        _leave_out_weather(weather, findings)
+        _check_precipitation(weather, findings)
     condition = node.one("RoadCondition")
-    if condition and findings.number(condition, "frictionScaleFactor", 1.0) != 1.0:
-        findings.leave_out(condition, "friction of the road; advice has it as advice.parameters.friction")
+    if condition and (
+        findings.number(condition, "frictionScaleFactor", 1.0) != 1.0 or condition.get("wetness", "dry") != "dry"
+    ):
+        findings.refuse(
+            condition, "roads are dry: write frictionScaleFactor=1; advice.parameters.friction is for advice"
+        )
     if reference:
         findings.look_for_unread(node)
     return read
@@ -94,20 +99,23 @@ def _box(node: Node, findings: Findings) -> Box:
 def _illuminance(node: Node, weather: Node | None, lanes: OpenDriveLanes, findings: Findings) -> float | None:
     clouds = _oktas(weather, findings) if weather else None
     sun, time = (weather.one("Sun") if weather else None), node.one("TimeOfDay")
-    told = next((key for key in ("illuminance", "intensity") if sun and sun.get(key)), None)
+    given = [key for key in ("illuminance", "intensity") if sun and sun.get(key)]
     moment = None if time is None else _moment(time, findings)
-    if sun is not None:
-        # In fog the direction does not matter.
-        sun.get("azimuth")
-        elevation = findings.number(sun, "elevation", math.nan) if sun.get("elevation") else None
-        if told:
-            return min(max(findings.number(sun, told), 0.0), BRIGHTEST)
-        if elevation is not None:
-            return through_clouds(clear_sky_illuminance(elevation), clouds or 0.0)
-    if moment is None:
-        return None
-    elevation = sun_elevation(moment, lanes.latitude, lanes.longitude)
-    return through_clouds(clear_sky_illuminance(elevation), clouds or 0.0)
+    elevation = findings.number(sun, "elevation") if sun and sun.get("elevation") else None
+    if elevation is None and moment is not None:
+        elevation = sun_elevation(moment, lanes.latitude, lanes.longitude)
+    clear = None if elevation is None else clear_sky_illuminance(elevation)
+    if sun and given:
+        lux = findings.number(sun, given[0])
+        if elevation and clear and 0.0 < lux < _DARKEST * clear and elevation > 0.0:
+            told = (
+                f"{given[0]}: expected lux, which would be some {clear:.0f} at a sun of {math.degrees(elevation):.0f}°"
+            )
+            findings.refuse(
+                sun, f"{told}; got {lux:g}: night if these are lux, day if they are a share of 1 as in CARLA"
+            )
+        return min(max(lux, 0.0), BRIGHTEST)
+    return None if clear is None else through_clouds(clear, clouds or 0.0)
 
 
 def _oktas(weather: Node, findings: Findings) -> float | None:
@@ -130,13 +138,11 @@ def _moment(time: Node, findings: Findings) -> dt.datetime | None:
         return None
 
 
-def _leave_out_weather(weather: Node, findings: Findings) -> None:
-    for one in weather.all("Precipitation", "Wind", "DomeImage"):
+def _check_precipitation(weather: Node, findings: Findings) -> None:
+    for one in weather.all("Precipitation"):
         falls = findings.number(one, "precipitationIntensity", findings.number(one, "intensity", 0.0))
-        if one.tag == "Precipitation" and not falls and one.get("precipitationType") in ("", "dry"):
-            continue
-        told = {"Precipitation": "rain and snow are not drawn", "Wind": "fog that is even everywhere does not drift"}
-        findings.leave_out(one, told.get(one.tag, "the sky is FogSim's"))
+        if one.get("precipitationType") != "dry" and falls > 0.0:
+            findings.refuse(one, "rain and snow are not drawn: write precipitationType=dry, or an intensity of 0")
 
 
 def fog_block(environment: Environment, route: Any, lowest: float) -> dict[str, Any]:

@@ -6,28 +6,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fogsim.errors import InputError, LeftOutWarning, shown, suggest
+from fogsim.openscenario.elements import HARMLESS, REFUSED
 from fogsim.openscenario.xml_tree import Node
 
-PASSED_OVER = {
-    "FileHeader": "who wrote the file, and when",
-    "SceneGraphFile": "a 3D model of the surroundings: FogSim draws its own",
-    "Properties": "free-form properties",
-    "Property": "free-form properties",
-    "File": "files of free-form properties",
-    "CustomContent": "free-form properties",
-    "Axles": "places of the axles",
-    "UserDefinedProperties": "free-form properties",
-    "ParameterDeclarations": "read with the parameters",
-    "CatalogLocations": "read with the catalogs",
-    "UsedArea": "part of the map that is used",
-    "ConstraintGroup": "limits of parameters",
-}
-"""Elements without effect in FogSim, and what they are."""
-
-ATTRIBUTES_PASSED_OVER = frozenset(
-    {"name", "model3d", "mass", "role", "animation", "maximumExecutionCount", "atmosphericPressure", "temperature"}
-)
-"""Attributes without effect in FogSim."""
+_NAMESPACES = ("xmlns", "xml:", "xsi:")
 
 
 @dataclass
@@ -35,7 +17,7 @@ class Findings:
     """Collects lines about what FogSim cannot do and what it leaves out."""
 
     refused: list[str] = field(default_factory=list)
-    left_out: list[str] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
 
     def refuse(self, node: Node, told: str) -> None:
         """Record an element that FogSim cannot do, and why."""
@@ -45,7 +27,11 @@ class Findings:
     def leave_out(self, node: Node, told: str) -> None:
         """Record an element that FogSim leaves out, and what that means."""
         _seen(node)
-        self._add(self.left_out, f"{node.where}: {told}")
+        self.remark(node, told)
+
+    def remark(self, node: Node, told: str) -> None:
+        """Record how an element is read, where a user might expect something else."""
+        self._add(self.remarks, f"{node.where}: {told}")
 
     def number(self, node: Node, key: str, default: float | None = None, *, is_finite: bool = True) -> float:
         """Number of an attribute; an invalid one, or a missing one without default, becomes a finding."""
@@ -65,20 +51,22 @@ class Findings:
         """Word of an attribute; one that is not allowed becomes a finding."""
         text = node.get(key) or default
         if text not in allowed:
-            self._add(self.refused, f"{node.where}: {key}: unknown value {shown(text)}; {suggest(text, allowed)}")
+            self._add(self.refused, f"{node.where}: {key}: FogSim has no {shown(text)} here; {suggest(text, allowed)}")
             return allowed[0]
         return text
 
     def look_for_unread(self, root: Node) -> None:
-        """Record elements and attributes that were not read."""
-        if root.tag in PASSED_OVER:
+        """Refuse elements and attributes that were not read, unless they are harmless."""
+        if root.tag in HARMLESS:
             return
         if not root.is_read:
-            self.refuse(root, "FogSim does not know this element here")
+            self.refuse(root, REFUSED.get(root.tag, "FogSim does not know this element here"))
             return
-        unread = root.attributes.keys() - root.read - ATTRIBUTES_PASSED_OVER
-        for key in sorted(unread) if root.read else ():
-            self._add(self.left_out, f"{root.where}: {key}={shown(root.attributes[key])} has no effect")
+        for key in sorted(root.attributes.keys() - root.read):
+            name = f"{root.tag}@{key}"
+            if name not in HARMLESS and not key.startswith(_NAMESPACES):
+                told = REFUSED.get(name, "FogSim does not know this attribute here")
+                self._add(self.refused, f"{root.where}: {key}={shown(root.attributes[key])}: {told}")
         for child in root.children:
             self.look_for_unread(child)
 
@@ -86,9 +74,9 @@ class Findings:
         """Report all findings; InputError if FogSim cannot do something."""
         if self.refused:
             raise InputError("\n".join(self.refused))
-        if self.left_out:
-            told = "\n".join(f"  {line.removeprefix(f'{path}:')}" for line in self.left_out)
-            warnings.warn(f"{path}: left out, for FogSim has none of it:\n{told}", LeftOutWarning, stacklevel=2)
+        if self.remarks:
+            told = "\n".join(f"  {line.removeprefix(f'{path}:')}" for line in self.remarks)
+            warnings.warn(f"{path}: left out, or read otherwise than written:\n{told}", LeftOutWarning, stacklevel=2)
 
     def _add(self, lines: list[str], line: str) -> None:
         if line not in lines:

@@ -1,28 +1,48 @@
 """The initial state: positions, speeds and lamps of vehicles, fog and light."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from fogsim.openscenario.actions import Actions, Effect
 from fogsim.openscenario.entities import Vehicle
 from fogsim.openscenario.environment import Environment, environment_of
 from fogsim.openscenario.xml_tree import Node
 from fogsim.traffic.road.opendrive_lanes import Spot
+from fogsim.units import KMH_PER_MPS
 
 
 @dataclass
 class Beginning:
-    """Initial state: reference points and speeds [m/s] of vehicles, fog and light, and further effects."""
+    """Initial state: reference points and ordered speeds of vehicles, fog and light, and further effects.
 
-    spots: dict[str, Spot] = field(default_factory=dict)
-    speeds: dict[str, float] = field(default_factory=dict)
+    `names` are the vehicles by their names in the timeline, `fronts` the places of front bumpers, and `ways` the edges
+    from there on.
+    """
+
+    spots: dict[str, Spot]
+    names: Mapping[str, str]
+    fronts: dict[str, Spot] = field(default_factory=dict)
+    ways: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    orders: dict[str, Mapping[str, Any]] = field(default_factory=dict)
     environment: Environment = field(default_factory=Environment)
     effect: Effect = field(default_factory=Effect)
+
+    def speed(self, vehicle: str, *asked: str) -> float:
+        """Initial speed of a vehicle [m/s]; one that is relative follows from another's."""
+        order = self.orders.get(vehicle)
+        if order is None or vehicle in asked:
+            return 0.0
+        if "to_kmh" in order:
+            return float(order["to_kmh"]) / KMH_PER_MPS
+        other = self.speed(self.names[order["like"]], *asked, vehicle)
+        return max(other * float(order.get("factor", 1.0)) + float(order.get("plus_kmh", 0.0)) / KMH_PER_MPS, 0.0)
 
 
 def read_beginning(init: Node | None, vehicles: Mapping[str, Vehicle], actions: Actions) -> Beginning:
     """Initial state from the element ``Init``."""
-    begin = Beginning(actions.positions.entities)
+    begin = Beginning(actions.positions.entities, {actions.called(name).strip('"'): name for name in vehicles})
     blocks = init.all("Actions") if init else []
     for block in blocks:
         for action in block.all("GlobalAction"):
@@ -38,9 +58,11 @@ def read_beginning(init: Node | None, vehicles: Mapping[str, Vehicle], actions: 
                 actions.findings.refuse(vehicle.node, f"{name} has no place: Init needs a TeleportAction of it")
             continue
         try:
-            actions.positions.lanes.along(begin.spots[name], vehicle.front)
+            wanted = begin.effect.routes.get(name, ())
+            begin.fronts[name] = actions.positions.lanes.along(begin.spots[name], vehicle.front, wanted)
+            begin.ways[name] = actions.positions.lanes.route(begin.fronts[name].lane.edge, wanted)
         except ValueError as error:
-            actions.findings.refuse(vehicle.node, f"the front bumper of {name} is not on the road: {error}")
+            actions.findings.refuse(vehicle.node, f"{name} cannot begin where it is to: {error}")
             del begin.spots[name]
     return begin
 
@@ -80,20 +102,26 @@ def _take_private(action: Node, name: str, begin: Beginning, actions: Actions) -
         return
     effect = Effect()
     actions.take(action, [name], effect)
+    begin.effect.routes.update(effect.routes)
     done = effect.do.get(name, {})
-    speed = done.pop("speed", None)
+    speed, leader = done.pop("speed", None), begin.names.get(done.get("follow", {}).get("vehicle", ""))
     if speed is not None:
         # At the start there is no earlier speed to change from.
-        begin.speeds[name] = _speed(speed, begin.speeds)
+        begin.orders[name] = speed
+        if speed.get("continuous"):
+            begin.effect.add(name, speed={**speed, "shape": "step"})
+    if leader is not None and not _is_ahead(begin.spots.get(leader), begin.spots.get(name)):
+        actions.findings.refuse(action, f"FogSim keeps a distance to a vehicle ahead; {leader} is not ahead of {name}")
     if done:
         begin.effect.add(name, **done)
 
 
-def _speed(block: Mapping[str, float | str], known: Mapping[str, float]) -> float:
-    if "to_kmh" in block:
-        return float(block["to_kmh"]) / 3.6
-    other = known.get(str(block["like"]), 0.0)
-    return max(other * float(block.get("factor", 1.0)) + float(block.get("plus_kmh", 0.0)) / 3.6, 0.0)
+def _is_ahead(one: Spot | None, other: Spot | None) -> bool:
+    """Whether a place lies ahead of another one, seen from there."""
+    if one is None or other is None:
+        return True
+    (x, y, _), (from_x, from_y, heading) = one.world, other.world
+    return (x - from_x) * math.cos(heading) + (y - from_y) * math.sin(heading) > 0.0
 
 
 Along = Callable[[str | Node], float | None]
@@ -101,8 +129,8 @@ Along = Callable[[str | Node], float | None]
 
 def along_route(route: tuple[str, ...], begin: Beginning, vehicles: Mapping[str, Vehicle], actions: Actions) -> Along:
     """Position along the ego's route: of a vehicle's front bumper at the beginning, or of a position."""
-    lengths = {lane.edge: lane.length for lane in actions.positions.lanes.lanes}
-    starts = {edge: sum(lengths[before] for before in route[:number]) for number, edge in enumerate(route)}
+    # On a closed road, the first time counts.
+    starts = dict(reversed([*zip(route, actions.positions.lanes.starts(route), strict=False)]))
 
     def position(what: str | Node) -> float | None:
         if isinstance(what, str):

@@ -47,6 +47,18 @@ _FUNCTIONS: Mapping[str, Callable[..., float]] = {
     "min": min,
     "max": max,
 }
+_CONSTANTS = {"pi": repr(math.pi), "true": "True", "false": "False"}
+_CONSTANT = re.compile(r"\b(pi|true|false)\b")
+
+RULES = {
+    "greaterThan": ">",
+    "greaterOrEqual": ">=",
+    "lessThan": "<",
+    "lessOrEqual": "<=",
+    "equalTo": "==",
+    "notEqualTo": "!=",
+}
+"""Operators of rules."""
 
 Parameters = Mapping[str, str]
 """Values of parameters by name."""
@@ -55,7 +67,7 @@ Parameters = Mapping[str, str]
 def put_parameters(node: Node, known: Parameters, findings: Findings) -> None:
     """Replace parameters by values in an element and its children, which may declare more."""
     for key, text in node.attributes.items():
-        if "$" not in text:
+        if "$" not in text or (node.tag, key) == ("ParameterDeclaration", "name"):
             continue
         try:
             node.attributes[key] = evaluated(text, known)
@@ -68,23 +80,40 @@ def put_parameters(node: Node, known: Parameters, findings: Findings) -> None:
             put_parameters(child, inside, findings)
 
 
-def declared(node: Node, known: Parameters, findings: Findings) -> Parameters:
-    """Parameters known in an element: those around it, and those that it declares."""
+def declared(node: Node, known: Parameters, findings: Findings, given: Parameters | None = None) -> Parameters:
+    """Parameters known in an element: those around it, and those that it declares, each by those before it.
+
+    Values that are `given` take the place of those in the declarations.
+    """
     inside = dict(known)
     for block in (child for child in node.children if child.tag == "ParameterDeclarations"):
-        put_parameters(block, known, findings)
-        for one in block.children:
-            one.attributes["value"] = _value_of(one, inside, findings)
-            inside[one.attributes.get("name", "")] = one.attributes["value"]
+        for one in block.all("ParameterDeclaration"):
+            name = one.get("name")
+            if name.startswith("$"):
+                findings.remark(one, f"a declaration has its name without $; read as {name[1:]!r}")
+            one.attributes["value"] = (given or {}).get(name.removeprefix("$"), one.get("value"))
+            put_parameters(one, inside, findings)
+            inside[name.removeprefix("$")] = one.get("value")
+            _check_constraints(one, findings)
     return inside
 
 
-def _value_of(declaration: Node, known: Parameters, findings: Findings) -> str:
+def _check_constraints(declaration: Node, findings: Findings) -> None:
+    """Refuse a value that fits none of its groups of constraints; it fits a group by fitting all of it."""
+    groups = [group.all("ValueConstraint") for group in declaration.all("ConstraintGroup")]
+    value = declaration.get("value")
+    broken = [next((one for one in group if not _fits(value, one, findings)), None) for group in groups]
+    if broken and all(broken):
+        told = " or ".join(f"{one.get('rule')} {one.get('value')}" for one in broken if one)
+        findings.refuse(declaration, f"value: its ConstraintGroup wants {told}, got {value!r}")
+
+
+def _fits(value: str, constraint: Node, findings: Findings) -> bool:
+    rule, limit = RULES[findings.word(constraint, "rule", tuple(RULES))], constraint.get("value")
     try:
-        return evaluated(declaration.attributes.get("value", ""), known)
-    except ValueError as error:
-        findings.refuse(declaration, f"value: {error}")
-        return ""
+        return _result(f"{float(value)} {rule} {float(limit)}", {}) == "true"
+    except ValueError:
+        return {"==": value == limit, "!=": value != limit}.get(rule, False)
 
 
 def evaluated(text: str, known: Parameters) -> str:
@@ -106,7 +135,7 @@ def _result(expression: str, known: Parameters) -> str:
         raise ValueError(f"an expression has at most {_LONGEST} characters")
     plain = _NAME.sub(lambda match: f" {_as_number(_parameter(match[1], known))} ", expression)
     try:
-        value = _value(ast.parse(plain.strip(), mode="eval").body)
+        value = _value(ast.parse(_CONSTANT.sub(lambda match: _CONSTANTS[match[0]], plain).strip(), mode="eval").body)
     except (SyntaxError, ArithmeticError, TypeError, RecursionError) as error:
         raise ValueError(f"cannot evaluate ${{{expression}}}: {error}") from None
     if isinstance(value, bool):

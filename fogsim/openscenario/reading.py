@@ -1,17 +1,21 @@
 """An OpenSCENARIO file as the plain data of a scenario file, with its SUMO files."""
 
+import math
 import re
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from fogsim.errors import InputError, LeftOutWarning
-from fogsim.files.generated_files import kept_text, write_generated
+from fogsim.files.generated_files import write_generated
+from fogsim.files.maps import find_map
 from fogsim.openscenario.actions import Actions
+from fogsim.openscenario.carla import to_standard
 from fogsim.openscenario.catalogs import Catalogs
 from fogsim.openscenario.entities import Vehicle, ego_of, read_vehicles
 from fogsim.openscenario.environment import fog_block
@@ -21,9 +25,10 @@ from fogsim.openscenario.parameters import put_parameters
 from fogsim.openscenario.positions import Positions
 from fogsim.openscenario.storyboard import Storyboard
 from fogsim.openscenario.triggers import Trigger, Triggers
-from fogsim.openscenario.vehicles_file import STANDS, front_spot, vehicles_text
+from fogsim.openscenario.vehicles_file import STANDS, vehicles_text
 from fogsim.openscenario.xml_tree import Node, read_xml
-from fogsim.traffic.road.netconvert import netconvert_recipe, opendrive_net
+from fogsim.traffic.road.netconvert import map_net
+from fogsim.traffic.road.opendrive import is_opendrive
 from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, read_opendrive_lanes
 from fogsim.units import KMH_PER_MPS
 
@@ -49,9 +54,12 @@ def is_openscenario(path: Path) -> bool:
     return path.suffix.lower() == ".xosc"
 
 
-def read_openscenario(path: Path) -> ScenarioData:
-    """Read an OpenSCENARIO XML 1.x file as the data of a scenario file.
+def read_openscenario(
+    path: Path, values: Mapping[str, str] = MappingProxyType({}), *, with_oncoming: bool = False
+) -> ScenarioData:
+    """Read an OpenSCENARIO XML 1.x file as the data of a scenario file; `values` replace those of its parameters.
 
+    A file whose vehicles drive on the oncoming lane is read again on a network `with_oncoming` lanes.
     The network and the route file go to the user's cache directory. InputError has a line for each element that FogSim
     cannot do; MissingDependencyError if netconvert is missing.
     """
@@ -59,16 +67,21 @@ def read_openscenario(path: Path) -> ScenarioData:
     if root.tag != "OpenSCENARIO":
         raise InputError(f"{path}:{root.line}: expected <OpenSCENARIO> at its top, got <{root.tag}>")
     _check_version(root)
+    for block in root.all("ParameterDeclarations"):
+        for one in block.children:
+            one.attributes["value"] = values.get(one.attributes.get("name", ""), one.attributes.get("value", ""))
     put_parameters(root, {}, findings)
+    to_standard(root)
     catalogs = Catalogs(path.parent, root.one("CatalogLocations"), findings)
     entities, storyboard = root.one("Entities"), root.one("Storyboard")
     if entities is None or storyboard is None:
         raise InputError(f"{path}: expected Entities and a Storyboard; catalogs and parameter files cannot be run")
     opendrive = _opendrive(root, path)
-    net = kept_text("opendrive", opendrive, netconvert_recipe(), lambda: opendrive_net(opendrive))
+    net = map_net(opendrive, with_oncoming=with_oncoming)
     lanes = read_opendrive_lanes(net, opendrive)
     vehicles = read_vehicles(entities, catalogs)
-    return _Reader(path, root, findings, lanes, vehicles, storyboard).scenario(catalogs, net, opendrive)
+    reader = _Reader(path, root, findings, lanes, vehicles, storyboard, with_oncoming)
+    return reader.scenario(catalogs, net, opendrive) or read_openscenario(path, values, with_oncoming=True)
 
 
 def _check_version(root: Node) -> None:
@@ -81,15 +94,15 @@ def _check_version(root: Node) -> None:
 
 
 def _opendrive(root: Node, path: Path) -> Path:
+    for network in root.all("RoadNetwork"):
+        network.all("TrafficSignals")
     file = root.within("RoadNetwork", "LogicFile")
     if file is None:
         raise InputError(f"{path}: RoadNetwork: a LogicFile (OpenDRIVE, .xodr) is needed, for vehicles drive on roads")
-    opendrive = path.parent / file.get("filepath")
-    if opendrive.suffix.lower() != ".xodr" or not opendrive.is_file():
-        raise InputError(
-            f"{file.where}: expected an OpenDRIVE file (.xodr) that is there, got {file.get('filepath')!r}"
-        )
-    return opendrive
+    try:
+        return find_map(file.get("filepath"), path.parent)
+    except InputError as error:
+        raise InputError(f"{file.where}: {error}") from error
 
 
 @dataclass
@@ -100,10 +113,12 @@ class _Reader:
     lanes: OpenDriveLanes
     vehicles: Mapping[str, Vehicle]
     storyboard: Node
+    with_oncoming: bool
 
-    def scenario(self, catalogs: Catalogs, net: str, opendrive: Path) -> ScenarioData:
+    def scenario(self, catalogs: Catalogs, net: str, opendrive: Path) -> ScenarioData | None:
+        """None if vehicles drive on the oncoming lane, and the network has no way to it."""
         ego = ego_of(dict(self.vehicles))
-        positions = Positions(self.lanes, self.findings)
+        positions = Positions(self.lanes, catalogs)
         story = Storyboard(catalogs, Actions(self.vehicles, catalogs, positions, lambda name: _called(name, ego)))
         actions = story.actions
         begin = read_beginning(self.storyboard.one("Init"), self.vehicles, actions)
@@ -114,15 +129,23 @@ class _Reader:
             )
             self.findings.close(self.path)
         story.find_events(self.storyboard)
-        route = self.lanes.route(front_spot(self.vehicles[ego], begin.spots[ego], self.lanes).lane.edge)
+        if positions.with_oncoming and not self.with_oncoming:
+            return None
+        route = begin.ways[ego]
         along = along_route(route, begin, self.vehicles, actions)
-        story.triggers = triggers = Triggers(self.vehicles, ego, positions, along, story.state)
+        end = math.inf if self.lanes.followers.get(route[-1]) else self.lanes.starts(route)[-1] - NEAR_THE_END
+        story.triggers = triggers = Triggers(self.vehicles, ego, positions, along, story.state, end)
         entries = story.timeline()
         stop = triggers.trigger(self.storyboard.one("StopTrigger"))
+        header = self.root.one("FileHeader")
+        description = header.get("description") if header else ""
         self.findings.look_for_unread(self.root)
         self.findings.close(self.path)
-        begin_at_once(entries, begin, ego)
-        data = self._data(ego, begin, route)
+        begin_at_once(entries, begin)
+        for name, vehicle in self.vehicles.items():
+            if vehicle.body:
+                begin.effect.add(name, lamps={"all": "off"})
+        data = {"description": description, **self._data(ego, begin, route)}
         if begin.environment.box is not None and not data["fog"]["banks"]:
             told = f"{self.path}: the BoundingBox of the fog lies beside the ego's way: the air is clear there"
             warnings.warn(told, LeftOutWarning, stacklevel=2)
@@ -137,25 +160,27 @@ class _Reader:
         if not timeline[0]:
             lines = {("timeline", int(place) - 1): line for (_, place), line in lines.items()}
         data |= _ending(stop, data["timeline"])
-        data["expect"] = {block["name"]: {"happened": block["name"]} for _, block in entries}
+        data["expect"] = {entry.names[0]: {"happened": entry.names[0]} for entry in story.entries.values()}
         files = write_generated(
-            "openscenario", {"road.net.xml": net, "road.rou.xml": vehicles_text(self.vehicles, begin, self.lanes)}
+            "openscenario", {"road.net.xml": net, "road.rou.xml": vehicles_text(self.vehicles, begin)}
         )
         data["traffic"] |= {
             "net": str(files / "road.net.xml"),
             "routes": [str(files / "road.rou.xml")],
-            "additional": [str(opendrive.resolve())],
+            "additional": [str(opendrive.resolve())] if is_opendrive(opendrive) else [],
         }
         return ScenarioData(data, lines)
 
     def _data(self, ego: str, begin: Beginning, route: tuple[str, ...]) -> dict[str, Any]:
-        header = self.root.one("FileHeader")
         way = [one for edge in route for one in self.lanes.lanes if one.edge == edge and one.index == 0]
         light = begin.environment.illuminance
         return {
             "name": re.sub(r"[^A-Za-z0-9_.-]", "_", self.path.stem)[:100],
-            "description": header.get("description") if header else "",
-            "traffic": {"ego": ego, "keep_lane": list(self.vehicles), "stop_before_end_m": NEAR_THE_END},
+            "traffic": {
+                "ego": ego,
+                "keep_lane": [name for name in self.vehicles if name not in begin.effect.routes],
+                "stop_before_end_m": NEAR_THE_END,
+            },
             "fog": fog_block(
                 begin.environment, np.concatenate([one.shape for one in way]), min(one.lowest for one in way)
             ),
@@ -167,28 +192,21 @@ def _called(name: str, ego: str) -> str:
     return "ego" if name == ego else name
 
 
-def begin_at_once(entries: list[tuple[Node, dict[str, Any]]], begin: Beginning, ego: str) -> None:
+def begin_at_once(entries: list[tuple[Node, dict[str, Any]]], begin: Beginning) -> None:
     """Move speeds that are ordered for the very beginning from the timeline to the initial state."""
     for _, block in entries:
         for vehicle, done in block["do"].items() if block["when"] == "time >= 0 s" and "delay_s" not in block else ():
             speed = done.get("speed") if isinstance(done, dict) else None
-            if speed is None or speed.get("shape") != "step" or vehicle in begin.speeds:
-                continue
-            if "to_kmh" in speed:
-                begin.speeds[vehicle] = speed["to_kmh"] / KMH_PER_MPS
-            else:
-                other = ego if speed["like"] == "ego" else speed["like"]
-                now = begin.speeds.get(other, 0.0)
-                begin.speeds[vehicle] = max(
-                    now * speed.get("factor", 1.0) + speed.get("plus_kmh", 0.0) / KMH_PER_MPS, 0.0
-                )
+            if speed is not None and speed.get("shape") == "step":
+                begin.orders.setdefault(vehicle, speed)
 
 
 def _initial(begin: Beginning, ego: str) -> dict[str, Any]:
     """Entry of the timeline for the initial state: the speeds of all vehicles but the ego, and lamps."""
     for name in begin.spots:
-        speed = begin.speeds.get(name, 0.0)
-        if name != ego or speed <= STANDS:
+        speed = begin.speed(name)
+        moves = begin.effect.do.get(name, {}).keys() & {"speed", "follow"}
+        if not moves and (name != ego or speed <= STANDS):
             begin.effect.add(name, speed={"to_kmh": speed * KMH_PER_MPS, "shape": "step"})
     return {"name": "Init", "when": "time >= 0 s", "do": begin.effect.do} if begin.effect.do else {}
 

@@ -12,14 +12,15 @@ from fogsim.openscenario.triggers import AT_ONCE, NEVER, Trigger, Triggers, both
 from fogsim.openscenario.xml_tree import Node
 
 _BEGUN, _OVER = ("startTransition", "runningState"), ("endTransition", "completeState")
+_MOST_TIMES = 100
 _PARTS = ("Story", "Act", "ManeuverGroup", "Maneuver", "Event", "Action")
 
 
 @dataclass
 class Entry:
-    """An event as an entry of the timeline; its trigger is `NEVER` until it is known."""
+    """An event as entries of the timeline, one for each execution; its trigger is `NEVER` until it is known."""
 
-    name: str
+    names: list[str]
     node: Node
     actors: list[str]
     effect: Effect = field(default_factory=Effect)
@@ -54,32 +55,40 @@ class Storyboard:
             for one in names:
                 if one not in self.actions.vehicles:
                     self.findings.refuse(actors or group, f"there is no vehicle {one!r}")
-            self._executions(group)
+            times = self._executions(group)
             for reference in group.all("CatalogReference"):
                 entry = self.catalogs.entry(reference)
                 group.children += [entry] if entry else []
             for maneuver in group.all("Maneuver"):
                 for event in maneuver.all("Event"):
-                    self._find(event, names)
+                    self._find(event, names, times)
+            if times > 1 and len(events := [e for m in group.all("Maneuver") for e in m.all("Event")]) > 1:
+                self.findings.refuse(group, f"maximumExecutionCount: {len(events)} events are played once; write 1")
 
     def _groups(self) -> Iterator[Node]:
         for story in self._stories:
             for act in story.all("Act"):
                 yield from act.all("ManeuverGroup")
 
-    def _executions(self, node: Node) -> None:
-        if node.get("maximumExecutionCount") not in ("", "1"):
-            self.findings.refuse(node, "maximumExecutionCount: everything is played once; write 1")
+    def _executions(self, node: Node) -> int:
+        times = self.findings.number(node, "maximumExecutionCount", 1.0)
+        if not (times.is_integer() and 1.0 <= times <= _MOST_TIMES):
+            self.findings.refuse(node, f"maximumExecutionCount: expected 1 … {_MOST_TIMES}, got {times:g}")
+        return min(max(int(times), 1), _MOST_TIMES)
 
-    def _find(self, event: Node, actors: list[str]) -> None:
-        self._executions(event)
+    def _find(self, event: Node, actors: list[str], times: int) -> None:
         priority = event.get("priority")
         if priority not in ("overwrite", "override", "parallel"):
             self.findings.refuse(event, f"priority: expected override, overwrite or parallel, got {priority!r}")
-        entry = Entry(_free_name(event.get("name"), {one.name for one in self.entries.values()}), event, actors)
+        entry = Entry([], event, actors)
+        for _ in range(min(times * self._executions(event), _MOST_TIMES)):
+            taken = {name for one in self.entries.values() for name in one.names}
+            entry.names.append(_free_name(event.get("name"), {*taken, *entry.names}))
         self.entries[id(event)] = entry
         for action in event.all("Action"):
             self.actions.take(action, actors, entry.effect)
+            if entry.effect.routes:
+                self.findings.refuse(action, "routes are known from the beginning; move this into Init")
 
     def timeline(self) -> list[tuple[Node, dict[str, Any]]]:
         """Entries of the timeline, each with its element."""
@@ -94,7 +103,11 @@ class Storyboard:
                 for event in _events(act):
                     entry = self.entries[id(event)]
                     entry.trigger = self._begins(entry, act)
-                    written.append((event, _written(entry, _until(stop, triggers, event))))
+                    until, trigger = _until(stop, triggers, event), entry.trigger
+                    for name in entry.names:
+                        written.append((event, _written(entry, name, trigger, until)))
+                        # It is played again once it is over and its own trigger holds.
+                        trigger = both(self._played(entry, name), entry.trigger)
         return written
 
     def _need_triggers(self) -> Triggers:
@@ -109,7 +122,7 @@ class Storyboard:
             return begins
         name = _free_name(f"act_{act.get('name')}", {mark.name for mark in triggers.marks})
         triggers.mark(name, begins, act)
-        return Trigger(f"happened({name})")
+        return Trigger(f"happened({name})", stays=True)
 
     def _begins(self, entry: Entry, act: Node) -> Trigger:
         own = self._need_triggers().trigger(entry.node.one("StartTrigger")) or AT_ONCE
@@ -138,7 +151,7 @@ class Storyboard:
 
     def _begun(self, part: Node) -> Trigger:
         if part.tag in ("Event", "Action"):
-            return Trigger(f"happened({self._entry(part).name})")
+            return Trigger(f"happened({self._entry(part).names[0]})", stays=True)
         act = next((one for one in self._all_acts() if any(inner is part for inner in one.walk())), None)
         if act is None:
             # A story begins with the run.
@@ -154,13 +167,23 @@ class Storyboard:
             events = [self._entry(part).node]
         else:
             events = [event for key, event in inner.items() if any(one is event for one in part.walk())]
-        told = []
-        for event in events:
-            entry = self.entries[id(event)]
-            begun = f"happened({entry.name})"
-            told.append(f"{begun} for {entry.effect.lasts:g} s" if entry.effect.lasts > 0.0 else begun)
-            told += [f"({end})" for end in entry.effect.ends]
-        return Trigger(" and ".join(told)) if told else AT_ONCE
+        played = [self._played(entry, entry.names[-1]) for entry in (self.entries[id(event)] for event in events)]
+        if not played:
+            return AT_ONCE
+        return Trigger(" and ".join(one.condition for one in played), stays=all(one.stays for one in played))
+
+    def _played(self, entry: Entry, name: str) -> Trigger:
+        """When an execution of an event is over."""
+        effect, told = entry.effect, f"happened({name})"
+        if effect.ends_itself:
+            if any({"speed", "follow"} & done.keys() for done in effect.do.values()):
+                self.findings.refuse(
+                    entry.node, "together with a speed, the end of a change of lane by distance is not known"
+                )
+            told = f"over({name})"
+        elif effect.lasts > 0.0:
+            told = f"{told} for {effect.lasts:g} s"
+        return Trigger(" and ".join([told, *(f"({end})" for end in effect.ends)]), stays=not effect.ends)
 
     def _entry(self, part: Node) -> Entry:
         return next(one for one in self.entries.values() if any(inner is part for inner in one.node.walk()))
@@ -201,13 +224,13 @@ def _until(stop: Trigger | None, triggers: Triggers, node: Node) -> str:
     return f"not happened({name})"
 
 
-def _written(entry: Entry, until: str) -> dict[str, Any]:
-    condition = entry.trigger.condition
+def _written(entry: Entry, name: str, trigger: Trigger, until: str) -> dict[str, Any]:
+    condition = trigger.condition
     if until:
         condition = f"({condition}) and {until}"
     return {
-        "name": entry.name,
+        "name": name,
         "when": condition,
-        **({"delay_s": entry.trigger.delay} if entry.trigger.delay else {}),
+        **({"delay_s": trigger.delay} if trigger.delay else {}),
         "do": entry.effect.do,
     }

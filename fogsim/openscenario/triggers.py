@@ -1,25 +1,18 @@
 """Triggers as conditions of FogSim's language."""
 
 import inspect
+import math
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from fogsim.openscenario.entities import Vehicle
 from fogsim.openscenario.findings import Findings
+from fogsim.openscenario.parameters import RULES
 from fogsim.openscenario.positions import Positions
 from fogsim.openscenario.xml_tree import Node
 
-RULES = {
-    "greaterThan": ">",
-    "greaterOrEqual": ">=",
-    "lessThan": "<",
-    "lessOrEqual": "<=",
-    "equalTo": "==",
-    "notEqualTo": "!=",
-}
-"""Operators of rules."""
-
+_DISTANCES = ("longitudinal", "cartesianDistance", "euclidianDistance")
 _EDGES = ("none", "rising", "falling", "risingOrFalling")
 _WORD = re.compile(r"[A-Za-z_][\w:#@\-]*")
 _STILL = 0.1  # Speed below which a vehicle counts as stopped [m/s]
@@ -29,12 +22,13 @@ _STILL = 0.1  # Speed below which a vehicle counts as stopped [m/s]
 class Trigger:
     """When something begins: a condition in FogSim's language ("" for never), and a delay after it [s].
 
-    `at` is the time if the condition is only a time [s]; below zero for the start.
+    `at` is the time if the condition is only a time [s], below zero for the start. `stays` if it stays true.
     """
 
     condition: str
     delay: float = 0.0
     at: float | None = None
+    stays: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +60,8 @@ class Triggers:
     """Reads triggers.
 
     `along` is the position of an entity or position along the ego's route [m], None off the route; `states` gives the
-    trigger of a storyboard state condition; `marks` become timeline entries without action.
+    trigger of a storyboard state condition; `end` is where the ego's road ends [m]; `marks` become timeline entries
+    without action.
     """
 
     vehicles: Mapping[str, Vehicle]
@@ -74,6 +69,7 @@ class Triggers:
     positions: Positions
     along: Callable[[str | Node], float | None]
     states: Callable[[Node], Trigger]
+    end: float = math.inf
     marks: list[Mark] = field(default_factory=list)
 
     @property
@@ -82,29 +78,38 @@ class Triggers:
         return self.positions.findings
 
     def trigger(self, node: Node | None) -> Trigger | None:
-        """Trigger of a ``StartTrigger`` or ``StopTrigger``; None without one, never without groups."""
-        if node is None:
-            return None
-        groups = [self._group(group) for group in node.all("ConditionGroup")]
-        if len(groups) < 2:
-            return groups[0] if groups else NEVER
+        """Trigger of a ``StartTrigger`` or ``StopTrigger``; None without one, or for one without groups."""
+        groups = [self._group(group) for group in node.all("ConditionGroup")] if node else []
+        times = [group.at for group in groups if group.at is not None]
+        if node is None or len(times) == len(groups):
+            return at_time(min(times)) if times else None
         if len({group.delay for group in groups}) > 1:
-            self.findings.refuse(node, "groups of conditions of one trigger must have the same delay")
-        return Trigger(" or ".join(f"({group.condition})" for group in groups), groups[0].delay)
+            groups = [self._marked(group, node) if group.delay else group for group in groups]
+        told = groups[0].condition if len(groups) == 1 else " or ".join(f"({group.condition})" for group in groups)
+        return Trigger(told, groups[0].delay)
 
     def _group(self, group: Node) -> Trigger:
-        conditions = group.all("Condition")
-        read = [self._condition(one) for one in conditions]
-        delays = [trigger.delay for trigger in read]
-        if len({*delays}) > 1:
-            self.findings.refuse(group, f"conditions of one group must have the same delay, got {delays}")
-        times = [trigger.at for trigger in read if trigger.at is not None]
-        others = list(dict.fromkeys(trigger.condition for trigger in read if trigger.at is None))
+        read = [self._condition(one) for one in group.all("Condition")]
+        latest = max((trigger.at for trigger in read if trigger.at is not None), default=-1.0)
+        others = [trigger for trigger in read if trigger.at is None]
         if not others:
-            latest = max(times, default=-1.0)
-            return at_time(latest + delays[0] if delays else latest)
-        told = [f"time >= {max(times):g} s"] if times and max(times) > 0.0 else []
-        return Trigger(" and ".join([*told, *(_bracketed(one, len(others) + len(told)) for one in others)]), delays[0])
+            return at_time(latest)
+        if len({trigger.delay for trigger in others}) > 1:
+            others = [self._marked(one, group) if one.stays and one.delay else one for one in others]
+            if any(one.delay for one in others):
+                delays = [trigger.delay for trigger in read]
+                why = "of conditions with different delays, those that may become false again must have none"
+                self.findings.refuse(group, f"{why}; got {delays}")
+        delay = others[0].delay
+        told = [f"time >= {latest - delay:g} s"] if latest > delay else []
+        parts = list(dict.fromkeys(one.condition for one in others))
+        return Trigger(" and ".join([*told, *(_bracketed(one, len(parts) + len(told)) for one in parts)]), delay)
+
+    def _marked(self, trigger: Trigger, node: Node) -> Trigger:
+        """A trigger with its delay as a mark that has begun."""
+        name = f"delayed_{len(self.marks)}"
+        self.mark(name, trigger, node)
+        return Trigger(f"happened({name})", stays=True)
 
     def _condition(self, node: Node) -> Trigger:
         delay = self.findings.number(node, "delay", 0.0)
@@ -113,21 +118,28 @@ class Triggers:
             for one in kind.all():
                 return self._by_value(one, edge, delay)
         for kind in node.all("ByEntityCondition"):
-            return Trigger(self._by_entities(kind, edge), delay)
+            # Who is at the end of the road stays there.
+            ends = [one for each in kind.all("EntityCondition") for one in each.all("EndOfRoadCondition")]
+            stays = sum(self.findings.number(one, "duration") for one in ends)
+            return Trigger(self._by_entities(kind, edge), delay + stays)
         self.findings.refuse(node, "expected a ByValueCondition or a ByEntityCondition")
         return NEVER
 
     def _by_value(self, node: Node, edge: str, delay: float) -> Trigger:
+        if edge == "falling" and node.get("rule") not in ("lessThan", "lessOrEqual"):
+            self.findings.refuse(node, "conditionEdge: what has begun does not end again; write rising")
         if node.tag == "SimulationTimeCondition":
             value = self.findings.number(node, "value")
-            rule = self.findings.word(node, "rule", tuple(RULES))
+            rule = self.findings.word(node, "rule", tuple(rule for rule in RULES if rule != "notEqualTo"))
             if rule in ("lessThan", "lessOrEqual"):
                 test = _Test(f"time {RULES[rule]} {value:g} s", "time", RULES[rule], f"{value:g} s")
                 return Trigger(self._edged(test, edge, node), delay)
-            return Trigger(f"time >= {value:g} s", delay, at=value if delay == 0.0 else None)
+            return Trigger(f"time >= {value + delay:g} s", at=value + delay)
         if node.tag == "StoryboardElementStateCondition":
             found = self.states(node)
-            return found if found.at is not None and not delay else Trigger(found.condition, found.delay + delay)
+            if found.at is not None:
+                return at_time(max(found.at, 0.0) + delay) if delay else found
+            return replace(found, delay=found.delay + delay)
         self.findings.refuse(node, "FogSim has no such condition")
         return NEVER
 
@@ -183,27 +195,28 @@ class Triggers:
             self.findings.refuse(node, "rule: quantities of traffic are never exactly equal; take less or greater")
         return _Test(f"{signal} {rule} {value:.9g} {unit}", signal, rule, f"{value:.9g} {unit}")
 
+    def _along(self, node: Node, signal: str, unit: str) -> _Test:
+        self.findings.word(node, "direction", ("longitudinal",), "longitudinal")
+        return self._compared(node, signal, unit)
+
+    def _is_less(self, node: Node) -> bool:
+        """Whether a distance shall be less than its value."""
+        return self.findings.word(node, "rule", ("lessThan", "lessOrEqual", "greaterThan", "greaterOrEqual"))[0] == "l"
+
     def _speed(self, node: Node, name: str) -> _Test:
         """`X.speed`."""
-        if node.get("direction") not in ("", "longitudinal"):
-            self.findings.refuse(node, "direction: speeds are read along the road")
-        return self._compared(node, f"{self.called(name)}.speed", "m/s")
+        return self._along(node, f"{self.called(name)}.speed", "m/s")
 
     def _acceleration(self, node: Node, name: str) -> _Test:
         """`X.acceleration`."""
-        node.get("direction")
-        return self._compared(node, f"{self.called(name)}.acceleration", "m/s²")
+        return self._along(node, f"{self.called(name)}.acceleration", "m/s²")
 
     def _relative_speed(self, node: Node, name: str) -> _Test | None:
         """`speed_difference(X, Y)`."""
-        node.get("direction")
         other = node.get("entityRef")
-        known = self._is_known(node, other)
-        return (
-            self._compared(node, f"speed_difference({self.called(name)}, {self.called(other)})", "m/s")
-            if known
-            else None
-        )
+        if not self._is_known(node, other):
+            return None
+        return self._along(node, f"speed_difference({self.called(name)}, {self.called(other)})", "m/s")
 
     def _stands(self, node: Node, name: str) -> _Test:
         """`X.speed < 0.1 m/s for` its duration."""
@@ -215,6 +228,12 @@ class Triggers:
         """`X.position`, from where the vehicle begins; it must begin on the ego's route."""
         return self._at_or_beyond(node, name, self.along(name))
 
+    def _ends(self, node: Node, name: str) -> _Test | None:
+        """`X.position` at the end of the ego's road, or of its route."""
+        if not math.isfinite(self.end):
+            self.findings.refuse(node, "the ego's road has no end")
+        return _Test(f"{self.called(name)}.position >= {self.end:.3f} m")
+
     def _at_or_beyond(self, node: Node, name: str, begin: float | None) -> _Test | None:
         if begin is None:
             self.findings.refuse(node, f"{name} does not begin on the ego's route, along which FogSim measures")
@@ -225,18 +244,21 @@ class Triggers:
 
     def _relative_distance(self, node: Node, name: str) -> _Test | None:
         """`gap(X, Y)`, ahead or behind, without `freespace` between rear axles; or straight: `distance(X, Y)`."""
-        other, kind = node.get("entityRef"), node.get("relativeDistanceType")
-        node.get("coordinateSystem")
+        other = node.get("entityRef")
         if not self._is_known(node, other):
             return None
-        if kind in ("cartesianDistance", "euclidianDistance", "euclideanDistance"):
-            if self._is_free(node):
-                self.findings.leave_out(node, "straight distances are between front bumpers")
-            return self._compared(node, f"distance({self.called(name)}, {self.called(other)})", "m")
-        if kind != "longitudinal":
-            self.findings.refuse(node, f"distances are longitudinal or cartesianDistance; got {kind!r}")
-            return None
-        return self._along_the_road(node, name, other)
+        if self._is_along(node):
+            return self._along_the_road(node, name, other)
+        if self._is_free(node):
+            self.findings.refuse(
+                node, "freespace: straight distances are from front bumper to front bumper; write false"
+            )
+        return self._compared(node, f"distance({self.called(name)}, {self.called(other)})", "m")
+
+    def _is_along(self, node: Node, default: str = "euclidianDistance") -> bool:
+        """Whether a distance is along the road, not straight; entities' own axes are taken as along the road."""
+        self.findings.word(node, "coordinateSystem", ("entity", "lane", "road"), "entity")
+        return self.findings.word(node, "relativeDistanceType", _DISTANCES, default) == "longitudinal"
 
     def _along_the_road(self, node: Node, name: str, other: str) -> _Test:
         one, far = self.vehicles[name], self.vehicles[other]
@@ -245,7 +267,7 @@ class Triggers:
         behind = 0.0 if free else one.rear + far.front
         value = self.findings.number(node, "value")
         gap, near = f"gap({self.called(name)}, {self.called(other)})", (value - ahead, behind - value)
-        if self.findings.word(node, "rule", tuple(RULES)).startswith("less"):
+        if self._is_less(node):
             return _Test(f"{gap} < {near[0]:.9g} m and {gap} > {near[1]:.9g} m")
         return _Test(f"{gap} > {near[0]:.9g} m or {gap} < {near[1]:.9g} m")
 
@@ -253,16 +275,15 @@ class Triggers:
         return self.findings.word(node, "freespace", ("true", "false")) == "true"
 
     def _distance(self, node: Node, name: str) -> _Test | None:
-        """`X.position` about a position on the ego's route."""
-        for key in ("alongRoute", "coordinateSystem", "relativeDistanceType", "freespace"):
-            node.get(key)
-        place = self._place_along(node)
+        """`X.position` about a position on the ego's route, without `freespace` of the rear axle."""
+        self._is_along(node)
+        place, free, vehicle = self._place_along(node), self._is_free(node), self.vehicles[name]
         if place is None:
             return None
         value, signal = self.findings.number(node, "value"), f"{self.called(name)}.position"
-        place += self.vehicles[name].front
-        near, far = place - value, place + value
-        if self.findings.word(node, "rule", tuple(RULES)).startswith("less"):
+        near = place - value + (0.0 if free else vehicle.front)
+        far = place + value + (vehicle.length if free else vehicle.front)
+        if self._is_less(node):
             return _Test(f"{signal} > {near:.3f} m and {signal} < {far:.3f} m")
         return _Test(f"{signal} < {near:.3f} m or {signal} > {far:.3f} m")
 
@@ -294,8 +315,7 @@ class Triggers:
         return self._between(node, name, target.get("entityRef"), "ttc")
 
     def _between(self, node: Node, name: str, other: str, signal: str) -> _Test | None:
-        node.get("alongRoute"), node.get("coordinateSystem")
-        if node.get("relativeDistanceType") not in ("", "longitudinal"):
+        if not self._is_along(node, "longitudinal"):
             self.findings.refuse(node, "relativeDistanceType: times are of distances along the road (longitudinal)")
         if not self._is_known(node, other):
             return None
@@ -303,10 +323,13 @@ class Triggers:
         return self._compared(node, f"{signal}({self.called(name)}, {self.called(other)}, {further:g} m)", "s")
 
     def _collides(self, node: Node, name: str) -> _Test:
-        """`X.collision`, with anybody."""
-        if node.children:
-            self.findings.leave_out(node, "a collision with anybody counts")
-        return _Test(f"{self.called(name)}.collision")
+        """`X.collision`, with anybody or a vehicle: `X.collision and Y.collision`."""
+        for kind in node.all("ByType"):
+            self.findings.word(kind, "type", ("vehicle",))
+        told = [self.called(name)]
+        for other in node.all("EntityRef"):
+            told += [self.called(other.get("entityRef"))] if self._is_known(other, other.get("entityRef")) else []
+        return _Test(" and ".join(f"{one}.collision" for one in told))
 
 
 _TESTS: Mapping[str, Callable[[Triggers, Node, str], _Test | None]] = {
@@ -315,6 +338,7 @@ _TESTS: Mapping[str, Callable[[Triggers, Node, str], _Test | None]] = {
     "RelativeSpeedCondition": Triggers._relative_speed,
     "StandStillCondition": Triggers._stands,
     "TraveledDistanceCondition": Triggers._traveled,
+    "EndOfRoadCondition": Triggers._ends,
     "RelativeDistanceCondition": Triggers._relative_distance,
     "DistanceCondition": Triggers._distance,
     "ReachPositionCondition": Triggers._reaches,

@@ -4,29 +4,28 @@ from collections.abc import Mapping
 
 from fogsim.openscenario.entities import CLASSES, Vehicle
 from fogsim.openscenario.initial import Beginning
-from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, Spot
-from fogsim.traffic.templates.xml_text import element
+from fogsim.traffic.appearance import BODY_PARAMETER
+from fogsim.traffic.templates.xml_text import element, opening
 
 STANDS = 0.1
 """Speed below which a vehicle has no desired speed to keep [m/s]."""
 
 
-def front_spot(vehicle: Vehicle, spot: Spot, lanes: OpenDriveLanes) -> Spot:
-    """Place of a vehicle's front bumper from its reference point; ValueError if the road ends before it."""
-    return lanes.along(spot, vehicle.front)
+_FOR_THE_ROUTE_ALONE = {"lcSpeedGain": 0, "lcKeepRight": 0, "lcCooperative": 0, "lcOpposite": 0}
+"""Attributes of drivers who change lane where their route needs it, and for nothing else."""
 
 
-def vehicles_text(vehicles: Mapping[str, Vehicle], begin: Beginning, lanes: OpenDriveLanes) -> str:
+def vehicles_text(vehicles: Mapping[str, Vehicle], begin: Beginning) -> str:
     """Text of the route file: every vehicle is present from the start, with its initial position and speed."""
     lines = []
     for name, vehicle in vehicles.items():
-        front = front_spot(vehicle, begin.spots[name], lanes)
-        speed = begin.speeds.get(name, 0.0)
+        front, speed = begin.fronts[name], begin.speed(name)
+        own = _FOR_THE_ROUTE_ALONE if name in begin.effect.routes else {}
         lines += [
-            "  " + element("vType", id=f"type.{name}", **_type(vehicle, speed, front.lane.limit)),
-            "  " + element("route", id=f"route.{name}", edges=" ".join(lanes.route(front.lane.edge))),
+            "  " + element("vType", id=f"type.{name}", **_type(vehicle, speed, front.lane.limit), **own),
+            "  " + element("route", id=f"route.{name}", edges=" ".join(begin.ways[name])),
             "  "
-            + element(
+            + opening(
                 "vehicle",
                 id=name,
                 type=f"type.{name}",
@@ -38,6 +37,8 @@ def vehicles_text(vehicles: Mapping[str, Vehicle], begin: Beginning, lanes: Open
                 # Exactly where the file has it, however near to the next vehicle.
                 insertionChecks="collision",
             ),
+            *([f'    <param key="{BODY_PARAMETER}" value="{vehicle.body}"/>'] if vehicle.body else ()),
+            "  </vehicle>",
         ]
     return '<?xml version="1.0" encoding="UTF-8"?>\n<routes>\n' + "\n".join(lines) + "\n</routes>\n"
 
@@ -45,7 +46,8 @@ def vehicles_text(vehicles: Mapping[str, Vehicle], begin: Beginning, lanes: Open
 def _type(vehicle: Vehicle, speed: float, limit: float) -> dict[str, object]:
     """Attributes of a separate type; its driver's desired speed is the initial one."""
     return {
-        "vClass": CLASSES[vehicle.category],
+        # Persons and obstacles are on lanes of vehicles as well as on footways.
+        "vClass": "ignoring" if vehicle.body else CLASSES[vehicle.category],
         "length": f"{vehicle.length:g}",
         "width": f"{vehicle.width:g}",
         "height": f"{vehicle.height:g}",

@@ -1,5 +1,6 @@
 """Elements of an XML file with their lines and paths, and a record of what was read."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -10,11 +11,16 @@ MOST_BYTES, MOST_ELEMENTS = 20_000_000, 500_000
 """Largest file that is read [bytes], and its maximum number of elements."""
 
 
+def sumo_name(name: str) -> str:
+    """Name with what SUMO's ids cannot hold, such as blanks, escaped as in addresses of the web."""
+    return re.sub(r"[^\w.:#@\-]", lambda found: f"%{ord(found[0]):02X}", name)
+
+
 @dataclass(slots=True)
 class Node:
     """An element, with its file and line; `label` is its tag with its name in brackets.
 
-    `is_read` and `read` record whether the element and which of its attributes were used.
+    `is_read` and `read` record whether the element and which of its attributes were used; a name always is, in `label`.
     """
 
     tag: str
@@ -25,7 +31,7 @@ class Node:
     above: "Node | None" = field(default=None, repr=False, compare=False)
     children: list["Node"] = field(default_factory=list)
     is_read: bool = False
-    read: set[str] = field(default_factory=set)
+    read: set[str] = field(default_factory=lambda: {"name"})
 
     @property
     def path(self) -> str:
@@ -38,10 +44,11 @@ class Node:
         return f"{self.file}:{self.line}: {self.path}"
 
     def get(self, key: str, default: str = "") -> str:
-        """Value of an attribute."""
+        """Value of an attribute; references to entities are as SUMO names these."""
         self.is_read = True
         self.read.add(key)
-        return self.attributes.get(key, default).strip()
+        value = self.attributes.get(key, default).strip()
+        return sumo_name(value) if key == "entityRef" else value
 
     def all(self, *tags: str) -> list["Node"]:
         """Child elements with one of these tags, or all."""

@@ -1,14 +1,14 @@
 """A YAML file as plain data with the line of each key, and overrides of single keys."""
 
 import copy
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from fogsim.errors import InputError, shown
 from fogsim.files.readers import read_text
-from fogsim.openscenario import is_openscenario, read_openscenario
+from fogsim.openscenario import is_openscenario, read_openscenario, read_parameter_cases
 from fogsim.scenario.plain_yaml import DEEPEST, MOST_BYTES, KeyPath, PlainYamlError, parse_yaml
 from fogsim.units.quantities import UNIT_OF_SUFFIX
 
@@ -109,11 +109,25 @@ def _place(block: object, key: str, path: tuple[str, ...], text: str) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """Plain data from a file; `origins` has each key's ``file:line``, or the override that set it."""
+    """Plain data from a file; `origins` has each key's ``file:line``, or the override that set it.
+
+    An OpenSCENARIO file that varies another one's parameters has `cases`, values of all of them, of which the first is
+    in `data`, and `of_case` reads another. `are_runs` if they are random test runs.
+    """
 
     path: Path
     data: dict[str, Any]
     origins: Mapping[KeyPath, str]
+    cases: tuple[Mapping[str, str], ...] = ()
+    of_case: "Callable[[Mapping[str, str]], Document] | None" = None
+    are_runs: bool = False
+
+    def changed(self, change: "Callable[[Document], Document]") -> "Document":
+        """Copy with a change of its data and origins, also in the other cases."""
+        of_case = self.of_case
+        if of_case is None:
+            return change(self)
+        return replace(change(self), of_case=lambda values: change(of_case(values)))
 
     def where(self, key_path: KeyPath) -> str:
         """Origin of a key, or of the nearest enclosing block that has one."""
@@ -171,7 +185,22 @@ def read_document(path: Path) -> Document:
 
 
 def _read_openscenario(path: Path) -> Document:
-    read = read_openscenario(path)
+    varied = read_parameter_cases(path)
+    if varied is None:
+        return _scenario_of(path, {})
+
+    def of_case(values: Mapping[str, str]) -> Document:
+        try:
+            return replace(_scenario_of(varied.base, values), path=path)
+        except InputError as error:
+            case = ",".join(f"{name}={value}" for name, value in values.items())
+            raise InputError(f"{error}\nin the case {case} of {path}") from error
+
+    return replace(of_case(varied.cases[0]), cases=varied.cases, of_case=of_case, are_runs=varied.are_drawn)
+
+
+def _scenario_of(path: Path, values: Mapping[str, str]) -> Document:
+    read = read_openscenario(path, values)
     return Document(path, read.data, {key: f"{path}:{line}" for key, line in read.lines.items()})
 
 
@@ -183,7 +212,10 @@ def _upon_openscenario(document: Document) -> Document:
         raise InputError(
             f"{document.where((_FOREIGN,))}: {_FOREIGN}: expected an OpenSCENARIO file (.xosc), got {shown(named)}"
         )
-    below = _read_openscenario(path)
+    return _read_openscenario(path).changed(lambda below: _upon(document, below))
+
+
+def _upon(document: Document, below: Document) -> Document:
     own = {key: value for key, value in document.data.items() if key != _FOREIGN}
     further, origins = own.pop(_TIMELINE, []), dict(below.origins)
     first = len(below.data[_TIMELINE]) if isinstance(further, list) else 0
@@ -196,7 +228,7 @@ def _upon_openscenario(document: Document) -> Document:
     # The file's own expectation is that its events happen; a test states its own.
     data = _laid_upon({**below.data, "expect": {}}, own)
     data[_TIMELINE] = [*below.data[_TIMELINE], *further] if isinstance(further, list) else further
-    return Document(document.path, data, origins)
+    return replace(below, path=document.path, data=data, origins=origins)
 
 
 def _laid_upon(below: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:

@@ -289,9 +289,13 @@ def _overridden(document: Document, overrides: Iterable[str]) -> Document:
     """Copy of a document with overrides, without the block ``sut`` around its keys."""
     if isinstance(overrides, str):
         raise InputError(f"overrides must be a list of key.path=value each, got the text {shown(overrides)}")
-    document, overrides = without_sut(document), tuple(without_sut_in_path(text) for text in overrides)
-    data = apply_overrides(document.data, overrides)
-    return replace(document.overridden(overrides), data=data)
+    overrides = tuple(without_sut_in_path(text) for text in overrides)
+
+    def change(one: Document) -> Document:
+        one = without_sut(one)
+        return replace(one.overridden(overrides), data=apply_overrides(one.data, overrides))
+
+    return document.changed(change)
 
 
 def _checked_case(

@@ -12,7 +12,9 @@ from importlib.resources import files
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.scene.solids import Material, box
 from fogsim.values.scene import Instance, Mesh, Surface
+from fogsim.values.traffic import BOX, PEDESTRIAN
 
 LIT_AREAS = {
     Surface.LAMP_POSITION_REAR: 62e-4,
@@ -23,6 +25,10 @@ LIT_AREAS = {
     Surface.LAMP_HEAD: 200e-4,
 }
 """Luminous area of each lamp [m²]: with its intensity, the luminance that its surface has when it is lit."""
+
+
+LAMPLESS = (BOX, PEDESTRIAN)
+"""Body kinds without lamps, which are none of `bodies`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +72,11 @@ class Body:
 def body_shapes() -> dict[str, Mesh]:
     """Shapes of all bodies by name, each with its levels of detail."""
     return dict(_shapes())
+
+
+def box_shapes() -> dict[str, Mesh]:
+    """Shape of an obstacle."""
+    return {BOX: box((-1.0, -0.5, 0.0), (0.0, 0.5, 1.0), Material((0.5, 0.5, 0.5), Surface.PAINT))}
 
 
 @cache
@@ -128,7 +139,7 @@ def body_of(vehicle_id: str, kind: str, length: float, height: float) -> str:
     vehicle_id : str
         Its id, by which vehicles of a kind and size are told apart.
     kind : str
-        "car", "van", "truck", "bus" or "motorcycle", or that of a piece of a body; any other is a car.
+        "car", "van", "truck", "bus", "motorcycle", "box", "pedestrian" or a piece of a body; any other is a car.
     length, height : float
         Its size [m]: trucks from 11 m are semitrailers, those below 2.9 m high flatbeds; cars shorter than 4.2 m are
         hatchbacks, those higher than 1.6 m sport utility vehicles, and none longer than 4.6 m is a hatchback.
@@ -139,7 +150,7 @@ def body_of(vehicle_id: str, kind: str, length: float, height: float) -> str:
         return name if chance < 0.5 else f"{name}_curtain"
     if kind == "truck":
         return "rigid_truck" if height >= 2.9 else "flatbed_truck"
-    if kind in {"van", "bus", "motorcycle", "tractor", "carriage"}:
+    if kind in {"van", "bus", "motorcycle", "tractor", "carriage", *LAMPLESS}:
         return kind
     if height > 1.6:
         return "suv"

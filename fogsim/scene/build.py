@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fogsim.errors import InputError
 from fogsim.garbage import no_garbage_collection
-from fogsim.scene.bodies import body_shapes
+from fogsim.scene.bodies import body_shapes, box_shapes
 from fogsim.scene.edges import Edge, lane_edge
 from fogsim.scene.ground import Border, GroundPlan, Rail
 from fogsim.scene.houses import house_places, house_shapes, houses, shapes_in_use
@@ -129,7 +129,7 @@ class ScenePlan:
         beside = structure_batches(network.structures)
         self.lanes = len(lanes)
         # What moves or changes comes last: it leaves the numbers of all else as they are.
-        self.shapes: Mapping[str, Mesh] = {**shapes, **signal_shapes(), **person_shapes()}
+        self.shapes: Mapping[str, Mesh] = {**shapes, **signal_shapes(), **person_shapes(), **box_shapes()}
         self.scenery = _joined([*posts, *sign_batches(signs.signs, hanging, terrain), *built, *growing, *beside])
         borders = [Border(edge, along) for edge, along in zip(edges, rails, strict=True)]
         self.ground = GroundPlan(network.areas, lanes, across, borders, bridges, index, terrain)

@@ -8,7 +8,7 @@ from functools import cache, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.scene.bodies import LIT_AREAS, BodyLamp, bodies
+from fogsim.scene.bodies import LAMPLESS, LIT_AREAS, BodyLamp, bodies
 from fogsim.scene.lamp_kernels import (
     AREA,
     AXIS,
@@ -228,9 +228,10 @@ def _lamps() -> _Lamps:
             rows += _rows_of(lamp, width * height)
         members.append(list(range(first, len(rows))))
     most = max(map(len, members))
+    members.append([])
     place, area, mask, intensity, colour, forwards = zip(*rows, strict=True)
     return _Lamps(
-        number={name: number for number, name in enumerate(bodies())},
+        number={**{name: n for n, name in enumerate(bodies())}, **dict.fromkeys(LAMPLESS, len(bodies()))},
         colour=np.array(colour),
         lamps=LampTable(
             place=np.array(place),

@@ -11,7 +11,7 @@ from fogsim.jit import kernel
 from fogsim.scene.bodies import body_of
 from fogsim.scene.town import person_batches, signal_batches
 from fogsim.values.scene import Batch, Instance
-from fogsim.values.traffic import TrafficState, with_pieces
+from fogsim.values.traffic import NO_PERSONS, PEDESTRIAN, PersonState, TrafficState, with_pieces
 
 
 def traffic_batches(state: TrafficState, skip: int | None) -> tuple[Batch, ...]:
@@ -24,7 +24,18 @@ def traffic_batches(state: TrafficState, skip: int | None) -> tuple[Batch, ...]:
     skip : int or None
         See `vehicle_batches`.
     """
-    return (*vehicle_batches(state, skip), *signal_batches(state.signals, state.time), *person_batches(state.persons))
+    standing = (*vehicle_batches(state, skip), *signal_batches(state.signals, state.time))
+    return (*standing, *person_batches(state.persons), *person_batches(_on_foot(state)))
+
+
+def _on_foot(state: TrafficState) -> PersonState:
+    """Persons among the vehicles."""
+    if PEDESTRIAN not in state.types:
+        return NO_PERSONS
+    rows = [row for row, kind in enumerate(state.types) if kind == PEDESTRIAN]
+    ids, lane = (tuple(names[row] for row in rows) for names in (state.ids, state.lane))
+    on_street = np.zeros(len(rows), np.bool_)
+    return PersonState(ids, state.position[rows], state.heading[rows], state.speed[rows], lane, on_street)
 
 
 def vehicle_batches(state: TrafficState, skip: int | None) -> tuple[Batch, ...]:
@@ -33,7 +44,7 @@ def vehicle_batches(state: TrafficState, skip: int | None) -> tuple[Batch, ...]:
     Parameters
     ----------
     state : TrafficState
-        Every vehicle; a body kind without a shape is drawn as a car.
+        Every vehicle, without persons among them; a body kind without a shape is drawn as a car.
     skip : int or None
         Row that is left out, as a rule the vehicle that carries the camera.
 
@@ -104,7 +115,7 @@ def _grouped(
     groups: dict[str, list[int]] = {}
     for row, name in enumerate(_names(ids, types, length, height)):
         group = groups.setdefault(name, [])
-        if row != skip:
+        if row != skip and name != PEDESTRIAN:
             group.append(row)
     ends = np.cumsum([0, *map(len, groups.values())]).tolist()
     shapes = tuple((name, slice(*ends[n : n + 2])) for n, name in enumerate(groups) if groups[name])

@@ -32,6 +32,9 @@ BODY_KINDS = {
 }
 """Body kind of a SUMO vehicle class, or what comes nearest to it; every other class is a car."""
 
+BODY_PARAMETER = "fogsim.body"
+"""Parameter of a SUMO vehicle with its body kind, in place of what follows from its class and shape."""
+
 TRAINS = frozenset({"rail_urban", "rail", "rail_electric", "rail_fast", "subway", "cable_car"})
 """SUMO's vehicle classes whose drivers go by signals and not by what they see of the way; trams are not among them."""
 

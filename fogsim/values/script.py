@@ -63,6 +63,9 @@ class ChangeSpeed:
         How.
     hold : float
         Time from the beginning until the driver drives by himself again [s].
+    like : str
+        Another vehicle, whose speed, times `factor`, plus `plus` [m/s], it comes to at each moment while that one is on
+        the road; "" for `speed`.
     """
 
     vehicle: str
@@ -70,6 +73,9 @@ class ChangeSpeed:
     duration: float = 0.0
     shape: Shape = Shape.LINEAR
     hold: float = math.inf
+    like: str = ""
+    factor: float = 1.0
+    plus: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,6 +136,8 @@ class ChangeLane:
         Time that the way over takes [s]; None for the usual one.
     indicator : float
         Time for which it indicates before [s]; the lamp goes out when it is over. 0 for no indicating.
+    oncoming : bool
+        Whether it goes to the lane beyond the left one, whose traffic comes towards it, whatever `lanes` is.
     """
 
     vehicle: str
@@ -137,6 +145,7 @@ class ChangeLane:
     stay: float = 60.0
     duration: float | None = None
     indicator: float = 0.0
+    oncoming: bool = False
 
 
 @dataclass(frozen=True, slots=True)

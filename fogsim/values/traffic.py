@@ -127,7 +127,7 @@ class TrafficState:
     ids : tuple of str
         Vehicle ids.
     types : tuple of str
-        Body kinds: "car", "van", "truck", "bus", "motorcycle".
+        Body kinds: "car", "van", "truck", "bus", "motorcycle"; "box" and "pedestrian" of what has no engine or lamps.
     position : (n, 3) float64
         Middle of the front bumper on the road surface [m]: east, north, up.
     heading : (n,) float64
@@ -237,8 +237,8 @@ def rear_of(state: TrafficState, row: int) -> tuple[NDArray[np.float64], float]:
     return front - rear, float(heading)
 
 
-PEDESTRIAN = "pedestrian"
-"""Kind of body of persons on foot where they are rows among vehicles."""
+BOX, PEDESTRIAN = "box", "pedestrian"
+"""Body kinds of obstacles and of persons on foot where they are rows among vehicles."""
 
 _PERSON_LENGTH, _PERSON_WIDTH, _PERSON_HEIGHT = 0.4, 0.6, 1.7  # [m]
 

@@ -166,6 +166,12 @@ def test_emissions_of_a_car_that_keeps_its_speed_coasts_and_stands() -> None:
     assert found["traffic_fuel_g_per_vehicle_km"] == pytest.approx((0.4931 + 0.10108 + 0.31096 + 0.4931) / 0.040)
 
 
+def test_obstacles_and_persons_emit_nothing() -> None:
+    road = lanes(("a", 0, 20), ("b", 0, 0), ("c", 0, 0))
+    found = watched(TrafficEmissions(), [(1.0, dataclasses.replace(road, types=("car", "box", "pedestrian")))])
+    assert found["traffic_co2_g_per_vehicle_km"] == pytest.approx(2.792 / 0.020, rel=1e-3)
+
+
 def test_collisions_by_what_was_driven() -> None:
     road = lanes(("a", 0, 20), ("a", 50, 30))
     hits = (Collision(0.0, "v0", "v1", 12.0), Collision(0.0, "far", "away", 30.0), Collision(0.0, "x", "v1", 4.0))

@@ -90,3 +90,15 @@ def test_a_run_that_was_cut_short_says_so(tmp_path: Path) -> None:
     root = read_xml(tmp_path / "scenario.xosc")
     assert "cut short" in root.children[0].attributes["description"]
     assert sum(node.tag == "Vertex" for node in root.walk()) == 2 * len(make_step().traffic.ids)
+
+
+def test_obstacles_and_persons_are_no_vehicles(tmp_path: Path) -> None:
+    recorder = OpenScenarioRecorder(tmp_path / "scenario.xosc", "made")
+    step = make_step()
+    recorder.record(replace(step, traffic=replace(step.traffic, types=("box", "pedestrian"))), {})
+    recorder.close(complete=True)
+    objects = [node for node in read_xml(tmp_path / "scenario.xosc").walk() if node.tag == "ScenarioObject"]
+    bodies = [child for node in objects for child in node.children]
+    assert [(body.tag, body.attributes["mass"]) for body in bodies] == [("MiscObject", "75.0"), ("Pedestrian", "75.0")]
+    assert [body.attributes.get("miscObjectCategory") for body in bodies] == ["obstacle", None]
+    assert [[part.tag for part in body.children] for body in bodies] == [["BoundingBox"]] * 2

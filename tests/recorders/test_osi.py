@@ -67,6 +67,17 @@ def test_vehicles_persons_lights_and_fog_come_back(tmp_path: Path) -> None:
     assert len(numbers[0]) == len(first.moving_object) + len(first.traffic_light)
 
 
+def test_obstacles_and_persons_are_no_vehicles(tmp_path: Path) -> None:
+    recorder, step = OsiRecorder(path := tmp_path / "ground_truth.osi"), make_step()
+    recorder.record(replace(step, traffic=replace(step.traffic, types=("box", "pedestrian"))))
+    recorder.close(complete=True)
+    with contextlib.closing(OSITrace(str(path), "GroundTruth")) as trace:
+        (message,) = trace
+    objects = message.moving_object
+    assert [one.type for one in objects] == [MovingObject.TYPE_OTHER, MovingObject.TYPE_PEDESTRIAN]
+    assert not any(one.HasField("vehicle_classification") for one in objects)
+
+
 @pytest.mark.parametrize(
     ("visibility", "name"),
     [

@@ -9,6 +9,7 @@ from xml.sax.saxutils import quoteattr
 from fogsim.files.atomic import write_text
 from fogsim.recorders.protocol import Derived
 from fogsim.values import Step, TrafficStep
+from fogsim.values.traffic import BOX, PEDESTRIAN
 
 REFERENCE_SHARE = 0.28
 """Where the middle of a body is ahead of the rear axle, the reference point, as a share of its length [-]."""
@@ -20,6 +21,12 @@ FARTHEST = 100_000.0
 """Visibility that stands for clear air, of which the format has none [m]."""
 
 _CATEGORIES = {"car": "car", "van": "van", "truck": "truck", "bus": "bus", "motorcycle": "motorbike"}
+
+_OTHERS = {
+    BOX: ("MiscObject", "miscObjectCategory", "obstacle"),
+    PEDESTRIAN: ("Pedestrian", "pedestrianCategory", "pedestrian"),
+}
+_MASS = 75.0  # of what is no vehicle, for the format asks for one [kg]
 
 
 @dataclass
@@ -124,11 +131,16 @@ class OpenScenarioRecorder:
         length, width, height = track.size
         axle = {"maxSteering": 0.5, "wheelDiameter": 0.6, "trackWidth": f"{0.85 * width:.3f}", "positionZ": 0.3}
         yield f"<ScenarioObject name={quoteattr(name)}>"
+        centre = _tag("Center", x=f"{REFERENCE_SHARE * length:.4f}", y=0, z=f"{0.5 * height:.4f}")
+        sides = _tag("Dimensions", width=f"{width:.4f}", length=f"{length:.4f}", height=f"{height:.4f}")
+        if track.kind in _OTHERS:
+            tag, category, value = _OTHERS[track.kind]
+            yield _opening(tag, name=track.kind, mass=_MASS, **{category: value})
+            yield f"<BoundingBox>{centre}{sides}</BoundingBox></{tag}>"
+            yield "</ScenarioObject>"
+            return
         yield _opening("Vehicle", name=track.kind, vehicleCategory=_CATEGORIES.get(track.kind, "car"))
-        yield "<BoundingBox>"
-        yield _tag("Center", x=f"{REFERENCE_SHARE * length:.4f}", y=0, z=f"{0.5 * height:.4f}")
-        yield _tag("Dimensions", width=f"{width:.4f}", length=f"{length:.4f}", height=f"{height:.4f}")
-        yield "</BoundingBox>"
+        yield f"<BoundingBox>{centre}{sides}</BoundingBox>"
         yield _tag("Performance", maxSpeed=70, maxAcceleration=10, maxDeceleration=10)
         yield "<Axles>"
         yield _tag("FrontAxle", **axle, positionX=f"{2 * REFERENCE_SHARE * length:.4f}")

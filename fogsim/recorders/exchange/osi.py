@@ -11,6 +11,7 @@ import numpy as np
 from fogsim.errors import MissingDependencyError
 from fogsim.recorders.protocol import Derived
 from fogsim.values import Lamp, SignalColour, Step, TrafficState, TrafficStep
+from fogsim.values.traffic import BOX, PEDESTRIAN
 
 FOG_CLASSES = ((50.0, "DENSE"), (200.0, "THICK"), (1000.0, "LIGHT"), (2000.0, "MIST"), (4000.0, "POOR_VISIBILITY"),
                (10_000.0, "MODERATE_VISIBILITY"), (40_000.0, "GOOD_VISIBILITY"))  # fmt: skip
@@ -127,7 +128,8 @@ class OsiRecorder:
 
     def _add_vehicle(self, vehicle: Any, traffic: TrafficState, row: int) -> None:
         self._identify(vehicle, "vehicle", traffic.ids[row])
-        vehicle.type = self._enums["object"].Value("TYPE_VEHICLE")
+        thing = {PEDESTRIAN: "PEDESTRIAN", BOX: "OTHER"}.get(traffic.types[row])
+        vehicle.type = self._enums["object"].Value(f"TYPE_{thing or 'VEHICLE'}")
         length, height = float(traffic.length[row]), float(traffic.height[row])
         heading, grade = float(traffic.heading[row]), float(traffic.grade[row])
         # The middle of the front bumper on the road becomes the middle of the body.
@@ -139,6 +141,8 @@ class OsiRecorder:
         base.orientation.yaw, base.orientation.pitch = heading, -grade
         _set_vector(base.velocity, float(traffic.speed[row]) * along)
         _set_vector(base.acceleration, float(traffic.acceleration[row]) * along)
+        if thing is not None:
+            return
         kind = _TYPES.get(traffic.types[row], "OTHER")
         vehicle.vehicle_classification.type = self._enums["vehicle"].Value(f"TYPE_{kind}")
         self._set_lamps(vehicle.vehicle_classification.light_state, Lamp(int(traffic.lamps[row])))

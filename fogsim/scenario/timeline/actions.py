@@ -8,6 +8,7 @@ from typing import Protocol
 from fogsim.scenario.sensors.faults import fault_of
 from fogsim.scenario.timeline.lamps import lamp_switches
 from fogsim.scenario.timeline.schema import (
+    LONGEST_CHANGE,
     DepartAction,
     Doing,
     FogActions,
@@ -40,6 +41,7 @@ from fogsim.values.script import (
 )
 
 _HAZARD = Lamp.INDICATOR_LEFT | Lamp.INDICATOR_RIGHT
+_SLOWEST = 0.01  # Speed at which a change of lane over any distance takes as long as it may [m/s]
 _STATES = {"red": "r", "yellow": "y", "green": "G", "off": "O"}
 
 
@@ -192,7 +194,7 @@ def _of_vehicle(subject: str, doing: VehicleActions, now: Situation) -> list[Tra
     if doing.stop:
         moves.append(_stopping(vehicle, doing.stop, now.position(subject)))
     if doing.change_lane:
-        moves.append(_lane_change(vehicle, doing.change_lane, subject, now))
+        moves.append(_lane_change(vehicle, doing.change_lane, subject, speed, now))
     moves += _switches(vehicle, doing)
     whole = [move for move in moves if move is not None]
     return whole if len(whole) == len(moves) else None
@@ -228,7 +230,11 @@ def _speed_change(vehicle: str, action: SpeedAction, begin: float, now: Situatio
     else:
         return None
     duration = abs(speed - begin) / action.rate_mps2 if action.rate_mps2 else action.over_s or 0.0
-    return ChangeSpeed(vehicle, speed, duration, action.shape, _endless(action.for_s))
+    change = ChangeSpeed(vehicle, speed, duration, action.shape, _endless(action.for_s))
+    if not action.continuous or action.like is None:
+        return change
+    plus = action.plus_kmh / KMH_PER_MPS
+    return dataclasses.replace(change, like=now.vehicle_id(action.like), factor=action.factor, plus=plus)
 
 
 def _braking(vehicle: str, now: float, speed: float, deceleration: float, hold: float | None) -> ChangeSpeed:
@@ -257,17 +263,21 @@ def _stopping(vehicle: str, action: StopAction, now: float | None) -> Stop | Non
     return Stop(vehicle, max(action.position_m - now, 0.0), action.deceleration_mps2, stand)
 
 
-def _lane_change(vehicle: str, action: LaneAction, subject: str, now: Situation) -> ChangeLane | None:
-    lanes, wanted = action.lanes or 0, action.to
+def _lane_change(vehicle: str, action: LaneAction, subject: str, speed: float, now: Situation) -> ChangeLane | None:
+    oncoming = action.to == "oncoming"
+    lanes, wanted = action.lanes or int(oncoming), None if action.to == "oncoming" else action.to
     if action.to_lane_of is not None:
         other = now.lane(action.to_lane_of)
         wanted = None if other is None else other + lanes
-    if action.to is not None or action.to_lane_of is not None:
+    if not oncoming and (action.to is not None or action.to_lane_of is not None):
         own = now.lane(subject)
         if own is None or wanted is None:
             return None
         lanes = wanted - own
-    return ChangeLane(vehicle, lanes, action.stay_s, action.duration_s, action.indicator_s)
+    duration = action.duration_s
+    if action.distance_m is not None:
+        duration = min(action.distance_m / max(speed, _SLOWEST), LONGEST_CHANGE)
+    return ChangeLane(vehicle, lanes, action.stay_s, duration, action.indicator_s, oncoming)
 
 
 def _density(action: FogActions, reference: float) -> float:

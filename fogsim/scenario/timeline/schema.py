@@ -23,6 +23,7 @@ from fogsim.scenario.section import (
     Distance,
     Flag,
     Id,
+    Length,
     Number,
     Period,
     Place,
@@ -53,6 +54,9 @@ class SpeedAction(Section):
     plus_kmh: Annotated[Number, Field(ge=-500, le=500)] = 0.0
     """What is added to it."""
 
+    continuous: Flag = False
+    """Whether it comes to the speed that the other vehicle has at each moment, not only at the beginning."""
+
     over_s: Time | None = None
     """Time that this takes, as far as its type can speed up; without it and the next, as fast as it can."""
 
@@ -69,6 +73,8 @@ class SpeedAction(Section):
     def _one_pace(self) -> Self:
         if (self.to_kmh is None) == (self.like is None):
             raise ValueError("say which speed: to_kmh or like (another vehicle), and not both")
+        if self.continuous and self.like is None:
+            raise ValueError("continuous goes with like, the vehicle whose speed it follows")
         given = [key for key in ("over_s", "rate_mps2") if getattr(self, key) is not None]
         if len(given) > 1 or (given and self.shape is Shape.STEP):
             raise ValueError("give over_s, rate_mps2 or shape: step, not two of them")
@@ -136,17 +142,25 @@ class StopAction(Section):
         return self
 
 
+LONGEST_CHANGE = 60.0
+"""Longest time of a change of lane [s]."""
+
+
 class LaneAction(Section):
     """A vehicle changes lane, whoever is there, as far as it does not hit anybody."""
 
     lanes: Annotated[Whole, Field(ge=-4, le=4)] | None = None
     """How many lanes to the left; negative to the right."""
 
-    to: Annotated[Whole, Field(ge=0, le=20)] | None = None
-    """Or the lane to go to: its number from the right, from 0."""
+    to: Annotated[Whole, Field(ge=0, le=20)] | Literal["oncoming"] | None = None
+    """Or the lane to go to: its number from the right, from 0; or `oncoming`, the one beyond the left lane, where the
+    network lets vehicles overtake there (SUMO's `neigh`). Any other change leads back from it to the left lane."""
 
-    duration_s: Annotated[Time, Field(le=60)] | None = None
+    duration_s: Annotated[Time, Field(le=LONGEST_CHANGE)] | None = None
     """Time that the way over takes in pictures and positions; 3 s a lane if not given. For SUMO it changes at once."""
+
+    distance_m: Length | None = None
+    """Or the distance that it drives meanwhile, at the speed with which it begins; for at most 60 s."""
 
     indicator_s: Annotated[Time, Field(le=60)] = 0.0
     """Time for which it indicates before; it does until it is over. 0 for not at all."""
@@ -159,6 +173,8 @@ class LaneAction(Section):
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
+        if self.duration_s is not None and self.distance_m is not None:
+            raise ValueError("takes either duration or distance")
         is_told = self.lanes is not None or self.to_lane_of is not None
         if is_told == (self.to is not None):
             raise ValueError(

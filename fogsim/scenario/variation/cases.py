@@ -7,9 +7,9 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, ValidationError
 
 from fogsim.errors import InputError, shown, suggest
 from fogsim.scenario.document import Document
@@ -17,7 +17,7 @@ from fogsim.scenario.mistakes import mistake_lines
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.section import Section, Share
 from fogsim.scenario.variation.grid import grid_mistake
-from fogsim.scenario.variation.levels import LevelsError, SeedLevels, Value, Values, parse_levels
+from fogsim.scenario.variation.levels import FileLevels, LevelsError, SeedLevels, Value, Values, parse_levels
 from fogsim.units.quantities import split_quantity
 
 _PLACE = re.compile(r"\$(?:\$|\{([^{}]*)\}|([A-Za-z_][A-Za-z0-9_]*))")
@@ -56,12 +56,6 @@ class VariationKeys(Section):
 
     verdict: Verdict = NONE_FAILS
     """When all cases together pass; without it, when none fails."""
-
-    @model_validator(mode="after")
-    def _something_varies(self) -> Self:
-        if "verdict" in self.model_fields_set and not self.vary:
-            raise ValueError("verdict: goes with vary, since it is about several cases")
-        return self
 
 
 KEYS = tuple(VariationKeys.model_fields)
@@ -112,7 +106,12 @@ def read_variation(document: Document) -> Variation:
         keys = VariationKeys.model_validate(written)
     except ValidationError as error:
         raise InputError(mistake_lines(document, VariationKeys, error)) from error
+    if document.cases:
+        return _of_file(document, keys)
     if not keys.vary:
+        if "verdict" in written:
+            where = document.where(("verdict",))
+            raise InputError(f"{where}: verdict: goes with vary, since it is about several cases")
         return Variation((Case({}),))
     varied, mistakes = _parsed(document, keys.vary)
     mistakes += _misplaced(document, keys.vary, varied)
@@ -122,6 +121,21 @@ def read_variation(document: Document) -> Variation:
         cases = _grid(document, varied)
     except LevelsError as error:
         raise InputError(f"{document.where(('vary',))}: vary: {error}") from error
+    _check_reachable(document, keys.verdict, len(cases))
+    return Variation(cases, varied, keys.verdict)
+
+
+def _of_file(document: Document, keys: VariationKeys) -> Variation:
+    """Cases of an OpenSCENARIO file that varies the parameters of another; random test runs have their numbers."""
+    if keys.vary:
+        where = document.where(("vary",))
+        raise InputError(f"{where}: vary: the OpenSCENARIO file varies parameters itself; leave this out")
+    run = next(name for name in ("run", "test_run", "number") if name not in document.cases[0])
+    cases = tuple(
+        Case({run: seed, **values} if document.are_runs else values, seed if document.are_runs else 0)
+        for seed, values in enumerate(document.cases)
+    )
+    varied = {name: FileLevels(tuple(dict.fromkeys(c.values[name] for c in cases))) for name in cases[0].values}
     _check_reachable(document, keys.verdict, len(cases))
     return Variation(cases, varied, keys.verdict)
 
@@ -209,8 +223,11 @@ def _check_reachable(document: Document, verdict: Verdict, number: int) -> None:
 
 def with_case(document: Document, case: Case) -> Document:
     """Copy of a document with a case's values in place of their names, and without `KEYS`."""
+    of_file = {name: str(case.values[name]) for name in document.cases[0]} if document.cases else {}
+    if document.of_case is not None and of_file != document.cases[0]:
+        document = document.of_case(of_file)
     data = {key: value for key, value in document.data.items() if key not in KEYS}
-    return replace(document, data=_put(data, case.values) if case.values else data)
+    return replace(document, data=data if of_file or not case.values else _put(data, case.values))
 
 
 def _put(value: Any, values: Mapping[str, Value]) -> Any:

@@ -68,6 +68,13 @@ class SeedLevels(Levels):
 
 
 @dataclass(frozen=True, slots=True)
+class FileLevels(Levels):
+    """Values of a parameter in the cases of an OpenSCENARIO file, which has no others."""
+
+    is_divisible = is_numeric = False
+
+
+@dataclass(frozen=True, slots=True)
 class Draws:
     """A value per seed from a distribution with `parameters` in `unit`; values outside `limits` are drawn again."""
 

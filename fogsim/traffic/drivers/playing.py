@@ -65,9 +65,13 @@ class _SpeedCourse:
 
     def speed(self, motion: Motion) -> float | None:
         passed = motion.time + motion.step - self.begun
-        if motion.time - self.begun >= self.action.hold - 1e-9:
+        action = self.action
+        if motion.time - self.begun >= action.hold - 1e-9:
             return None
-        return speed_on_the_way(self.action, self.first, passed)
+        if action.like and action.like in motion.present:
+            speed = max(motion.speed(action.like) * action.factor + action.plus, 0.0)
+            self.action = action = replace(action, speed=speed)
+        return speed_on_the_way(action, self.first, passed)
 
 
 def speed_on_the_way(action: ChangeSpeed, first: float, passed: float) -> float:

@@ -8,16 +8,21 @@ import shutil
 import subprocess
 import tempfile
 from pathlib import Path
+from xml.etree.ElementTree import Element, ElementTree
 
-from fogsim.errors import InputError, MissingDependencyError
+from fogsim.errors import InputError, MissingDependencyError, shown
+from fogsim.files.generated_files import kept_text
 from fogsim.files.readers import read_text
-from fogsim.traffic.road.opendrive import read_opendrive
+from fogsim.traffic.road.opendrive import is_opendrive, read_opendrive
 
 USUAL_LIMIT = 130.0 / 3.6
 """Speed limit of lanes without one in the OpenDRIVE file [m/s]."""
 
 _TYPES = ("driving", "entry", "exit", "onRamp", "offRamp", "mwyEntry", "mwyExit", "connectingRamp", "slipLane")
 """Types of OpenDRIVE lanes for vehicles; other lanes are not in the network."""
+
+_SIGNAL = {"id": "none", "type": "none", "orientation": "none", "dynamic": "no"}
+"""Attributes without which netconvert reads no signal, and what they are when they say nothing."""
 
 _LONGEST_RUN = 300.0  # [s]
 _MOST_MEMORY, _MOST_BYTES = 4 * 2**30, 2**28  # of the program; of its network [bytes]
@@ -39,26 +44,44 @@ def netconvert_program() -> str:
     return found
 
 
-def netconvert_recipe() -> bytes:
+def netconvert_recipe(*, with_oncoming: bool = False) -> bytes:
     """What a network depends on in addition to its OpenDRIVE file: the program and its arguments."""
     program = Path(netconvert_program())
-    return f"{program}\0{program.stat().st_mtime_ns}\0".encode() + Path(__file__).read_bytes()
+    return f"{program}\0{program.stat().st_mtime_ns}\0{with_oncoming}\0".encode() + Path(__file__).read_bytes()
 
 
-def opendrive_net(path: Path) -> str:
+def map_net(path: Path, *, with_oncoming: bool) -> str:
+    """Text of the SUMO network of a map; see `opendrive_net`."""
+    if not is_opendrive(path):
+        return read_text(path, _MOST_BYTES)
+    recipe = netconvert_recipe(with_oncoming=with_oncoming)
+    return kept_text("opendrive", path, recipe, lambda: opendrive_net(path, with_oncoming=with_oncoming))
+
+
+def opendrive_net(path: Path, *, with_oncoming: bool = False) -> str:
     """Text of the SUMO network of an OpenDRIVE file, in the file's coordinates.
 
-    Its lanes have the parameter ``origId``, OpenDRIVE's road and lane.
+    Its lanes have the parameter ``origId``, OpenDRIVE's road and lane. In a network `with_oncoming` lanes to overtake
+    on, both directions of a road count its length alike, also in bends.
     """
     program = netconvert_program()
-    read_opendrive(path)
+    source = read_opendrive(path)
+    for road in source.iter("road"):
+        if road.get("rule") == "LHT":
+            where = f"{path}: road {shown(road.get('id', '?'))}"
+            raise InputError(f'{where}: rule="LHT": expected right-hand traffic (RHT); lanes on the left are not read')
     with tempfile.TemporaryDirectory() as folder:
         types, net = Path(folder) / "types.typ.xml", Path(folder) / "road.net.xml"
+        roads = Path(folder) / "road.xodr"
+        ElementTree(_without_empty_attributes(source)).write(roads, encoding="utf-8")
         lines = [f'<type id="{name}" priority="1" speed="{USUAL_LIMIT:.3f}" width="3.65"/>' for name in _TYPES]
         types.write_text(f"<types>{''.join(lines)}</types>", encoding="utf-8")
-        command = [program, "--opendrive-files", str(path.resolve()), "-o", str(net), "-t", str(types)]
+        command = [program, "--opendrive-files", str(roads), "-o", str(net), "-t", str(types)]
         command += ["--output.original-names", "--offset.disable-normalization", "--opendrive.curve-resolution", "1"]
         command += ["--no-turnarounds", "--precision", "3", "--xml-validation", "never"]
+        # Speeds in bends are the file's.
+        command += ["--junctions.limit-turn-speed", "-1"]
+        command += ["--opposites.guess", "true"] if with_oncoming else []
         reported = _run(command, path, Path(folder))
         if reported or not net.is_file():
             raise InputError(
@@ -66,6 +89,19 @@ def opendrive_net(path: Path) -> str:
             )
         # A comment at the top has the time of the conversion.
         return _COMMENT.sub("", read_text(net, _MOST_BYTES))
+
+
+def _without_empty_attributes(source: Element) -> Element:
+    """The file without attributes that say nothing, at which netconvert would stop."""
+    for element in source.iter():
+        for key in [key for key, text in element.attrib.items() if not text.strip()]:
+            del element.attrib[key]
+        for key, text in _SIGNAL.items() if element.tag == "signal" else ():
+            element.attrib.setdefault(key, text)
+        for speed in element.findall("speed") if element.tag == "lane" else ():
+            if not speed.get("max", "").strip():
+                element.remove(speed)
+    return source
 
 
 def _run(command: list[str], path: Path, folder: Path) -> str:

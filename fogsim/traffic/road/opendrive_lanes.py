@@ -1,8 +1,10 @@
 """Lanes of a network that netconvert made from an OpenDRIVE file, found by road, lane and s, or by coordinates."""
 
+import heapq
+import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree.ElementTree import Element, fromstring
 
@@ -10,11 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
-from fogsim.traffic.road.opendrive import read_opendrive
+from fogsim.files.xml_reader import read_tree
+from fogsim.traffic.road.opendrive import is_opendrive, read_opendrive
 from fogsim.traffic.road.plan_view import PlanView, plan_view
 
-FARTHEST_ROUTE = 50_000.0
-"""Length at which an endless route is cut off [m]."""
+FARTHEST_ROUTE, LONGEST_LAPS = 50_000.0, 10_000.0
+"""Lengths at which an endless route, and one that goes round and round, is cut off [m]."""
+
+NEAR_JUNCTION = 2.0
+"""Distance by which a place inside a junction is moved to its end [m]."""
 
 _TURNS = {"s": 0, "r": 1, "R": 1, "l": 2, "L": 2}
 """Directions of connections, in order of preference."""
@@ -62,8 +68,8 @@ class Spot:
 class OpenDriveLanes:
     """Lanes for vehicles and their connections.
 
-    `followers` are the next edges, the straight one first; `roads` are reference lines; latitude and longitude [rad]
-    are None if the file has none.
+    `followers` are the next edges, the straight one first; `crossings` are the lengths of the ways to them across
+    junctions [m]; `roads` are reference lines; latitude and longitude [rad] are None if the file has none.
     """
 
     lanes: tuple[RoadLane, ...]
@@ -71,6 +77,7 @@ class OpenDriveLanes:
     roads: Mapping[str, PlanView]
     latitude: float | None
     longitude: float | None
+    crossings: Mapping[tuple[str, str], float] = field(default_factory=dict)
 
     def on_lane(self, road: str, lane: str, s: float) -> Spot:
         """Place on a lane by OpenDRIVE's road, lane and s [m]; ValueError if it is not on the road."""
@@ -107,36 +114,83 @@ class OpenDriveLanes:
             raise ValueError(f"there is no lane {abs(lanes)} to the {'left' if lanes > 0 else 'right'}")
         return Spot(found[0], spot.position * found[0].length / spot.lane.length)
 
-    def along(self, spot: Spot, distance: float) -> Spot:
-        """Place `distance` [m] farther along, or back; ValueError if the road ends before it."""
+    def along(self, spot: Spot, distance: float, route: Sequence[str] = ()) -> Spot:
+        """Place `distance` [m] farther along a route, or the road straight on, or back; ValueError if it ends before.
+
+        Junctions count, and no place is inside one but within `NEAR_JUNCTION` of its ends, where it is moved to.
+        """
         lane, position = spot.lane, spot.position + distance
         for _ in range(len(self.lanes)):
             if 0.0 <= position <= lane.length:
                 return Spot(lane, position)
-            position, lane = self._neighbour(lane, position)
+            other, crossing = self._neighbour(lane, position > lane.length, route)
+            beyond = position - lane.length if position > lane.length else -position
+            if beyond < crossing:
+                before, after = (lane, other) if position > lane.length else (other, lane)
+                left = beyond if position > lane.length else crossing - beyond
+                if min(left, crossing - left) > NEAR_JUNCTION:
+                    raise ValueError(f"{distance:g} m from there is inside a junction, where no vehicle can begin")
+                return Spot(before, before.length) if 2.0 * left < crossing else Spot(after, 0.0)
+            position, lane = (beyond - crossing if position > lane.length else other.length - beyond + crossing), other
         raise ValueError(f"{distance:g} m from there is not on the road any more")
 
-    def _neighbour(self, lane: RoadLane, position: float) -> tuple[float, RoadLane]:
-        ahead = position > lane.length
+    def _neighbour(self, lane: RoadLane, ahead: bool, route: Sequence[str]) -> tuple[RoadLane, float]:
+        """The lane of the next edge, or the one before, and the length of the way across the junction between [m]."""
         edges = self.followers.get(lane.edge, ()) if ahead else [e for e, f in self.followers.items() if lane.edge in f]
-        lanes = [one for one in self.lanes if edges and one.edge == edges[0]]
+        edge = next((one for one in edges if one in route), edges[0] if edges else "")
+        lanes = [one for one in self.lanes if one.edge == edge]
         if not lanes:
             raise ValueError(f"the road {'ends' if ahead else 'begins'} before that")
         other = min(lanes, key=lambda one: abs(one.index - lane.index))
-        return (position - lane.length if ahead else position + other.length), other
+        return other, self.crossings.get((lane.edge, edge) if ahead else (edge, lane.edge), 0.0)
 
-    def route(self, edge: str) -> tuple[str, ...]:
-        """Edges from one on, straight ahead where there is a choice, until the road ends or repeats."""
+    def route(self, edge: str, wanted: Sequence[str] = ()) -> tuple[str, ...]:
+        """Edges from one on through the `wanted`, and straight ahead until the road ends; ValueError without a way.
+
+        A closed road is repeated.
+        """
+        if wanted:
+            before = () if edge in wanted else self.way(edge, wanted[0])[:-1]
+            joined = (*before, *(wanted if before else wanted[list(wanted).index(edge) :]))
+            return (*joined, *self.route(joined[-1])[1:])
         lengths = {one.edge: one.length for one in self.lanes}
-        found, length = [edge], lengths[edge]
-        while length < FARTHEST_ROUTE and (following := self.followers.get(found[-1])):
-            if following[0] in found:
-                break
+        found, length, most = [edge], lengths[edge], FARTHEST_ROUTE
+        while length < most and (following := self.followers.get(found[-1])):
+            most = LONGEST_LAPS if following[0] in found else most
             found.append(following[0])
             length += lengths[found[-1]]
         return tuple(found)
 
+    def way(self, begin: str, end: str, *, is_fastest: bool = False) -> tuple[str, ...]:
+        """Edges of the shortest or fastest way between two, both included; ValueError if there is none."""
+        costs = {one.edge: 1.0 / one.limit if is_fastest else 1.0 for one in self.lanes}
+        lengths = {one.edge: one.length for one in self.lanes}
+        ahead: list[tuple[float, tuple[str, ...]]] = [(0.0, (begin,))]
+        seen: set[str] = set()
+        while ahead:
+            cost, edges = heapq.heappop(ahead)
+            if edges[-1] == end:
+                return edges
+            if edges[-1] in seen:
+                continue
+            seen.add(edges[-1])
+            for edge in self.followers.get(edges[-1], ()):
+                further = self.crossings.get((edges[-1], edge), 0.0) + lengths[edge]
+                heapq.heappush(ahead, (cost + further * costs[edge], (*edges, edge)))
+        raise ValueError(f"no way leads from {self._told(begin)} to {self._told(end)}")
+
+    def starts(self, route: Sequence[str]) -> tuple[float, ...]:
+        """Where along a route each of its edges begins, and where the last one ends [m]."""
+        lengths = {one.edge: one.length for one in self.lanes}
+        steps = [lengths[a] + self.crossings.get((a, b), 0.0) for a, b in itertools.pairwise((*route, ""))]
+        return (0.0, *itertools.accumulate(steps))
+
+    def _told(self, edge: str) -> str:
+        return f"lanes {', '.join(origin for one in self.lanes if one.edge == edge for origin in one.origins) or edge}"
+
     def _reference(self, road: str, s: float) -> tuple[float, float, float]:
+        if not self.roads:
+            raise ValueError("a map that is a SUMO network has no roads; write a WorldPosition, or take an .xodr")
         if road not in self.roads:
             raise ValueError(f"there is no road {road!r}; there are {', '.join(sorted(self.roads))}")
         return self.roads[road].at(s)
@@ -155,11 +209,18 @@ def _foot(lane: RoadLane, x: float, y: float) -> tuple[float, Spot]:
 
 
 def read_opendrive_lanes(net: str, opendrive: Path) -> OpenDriveLanes:
-    """Lanes of a network that `opendrive_net` made from an OpenDRIVE file; InputError if it has none for vehicles."""
-    root = fromstring(net)  # noqa: S314 - netconvert's own output
+    """Lanes of a network from `map_net`, and roads of its OpenDRIVE file; InputError if it has no lanes for vehicles.
+
+    A map that is a SUMO network has no roads; its coordinates are those before netconvert's offset.
+    """
+    # Text that netconvert wrote just now is no data from outside.
+    root = fromstring(net) if is_opendrive(opendrive) else read_tree(opendrive, "net")  # noqa: S314
     lanes = tuple(_lanes(root))
     if not lanes:
         raise InputError(f"{opendrive}: there is no lane to drive on")
+    followers = _followers(root, {lane.edge for lane in lanes})
+    if not is_opendrive(opendrive):
+        return OpenDriveLanes(lanes, followers, {}, None, None, _crossings(root))
     source = read_opendrive(opendrive)
     roads = {}
     for road in source.iter("road"):
@@ -168,12 +229,17 @@ def read_opendrive_lanes(net: str, opendrive: Path) -> OpenDriveLanes:
         except ValueError as error:
             raise InputError(f"{opendrive}: road {road.get('id')!r}: {error}") from None
     latitude, longitude = _origin(source.findtext("header/geoReference", ""))
-    return OpenDriveLanes(lanes, _followers(root, {lane.edge for lane in lanes}), roads, latitude, longitude)
+    return OpenDriveLanes(lanes, followers, roads, latitude, longitude, _crossings(root))
 
 
 def _lanes(root: Element) -> Iterator[RoadLane]:
+    location = root.find("location")
+    offset = "0,0" if location is None else location.get("netOffset", "0,0")
+    moved = np.array([float(part) for part in offset.split(",")])
     for edge in root.iter("edge"):
         for lane in edge.iter("lane") if edge.get("function") is None else ():
+            if not _is_for_cars(lane):
+                continue
             origins = next((p.get("value", "") for p in lane.iter("param") if p.get("key") == "origId"), "")
             points = [tuple(map(float, point.split(","))) for point in lane.attrib["shape"].split()]
             length, width = float(lane.attrib["length"]), float(lane.get("width", "3.2"))
@@ -183,10 +249,15 @@ def _lanes(root: Element) -> Iterator[RoadLane]:
                 length,
                 width,
                 float(lane.attrib["speed"]),
-                np.array([point[:2] for point in points], dtype=np.float64),
+                np.array([point[:2] for point in points], dtype=np.float64) - moved,
                 min(math.fsum(point[2:]) for point in points),
                 tuple(origins.split()),
             )
+
+
+def _is_for_cars(lane: Element) -> bool:
+    refused, allowed = lane.get("disallow", "").split(), lane.get("allow", "all").split()
+    return not {"all", "passenger"} & {*refused} and bool({"all", "passenger"} & {*allowed})
 
 
 def _followers(root: Element, edges: set[str]) -> dict[str, list[str]]:
@@ -196,6 +267,21 @@ def _followers(root: Element, edges: set[str]) -> dict[str, list[str]]:
         if begin in edges and end in edges:
             found.setdefault(begin, {}).setdefault(end, _TURNS.get(one.get("dir", ""), 3))
     return {begin: sorted(ends, key=lambda end: (ends[end], end)) for begin, ends in found.items()}
+
+
+def _crossings(root: Element) -> dict[tuple[str, str], float]:
+    """Length of the way across a junction between two edges, that of its first lane [m]."""
+    lengths = {one.attrib["id"]: float(one.attrib["length"]) for one in root.iter("lane")}
+    onward = {(one.attrib["from"], one.attrib["fromLane"]): one.get("via") for one in root.iter("connection")}
+    found: dict[tuple[str, str], float] = {}
+    for one in root.iter("connection"):
+        length, via = 0.0, one.get("via")
+        while via is not None:
+            length += lengths[via]
+            edge, _, number = via.rpartition("_")
+            via = onward.get((edge, number))
+        found.setdefault((one.attrib["from"], one.attrib["to"]), length)
+    return found
 
 
 def _origin(reference: str) -> tuple[float | None, float | None]:

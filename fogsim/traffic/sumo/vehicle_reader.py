@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.traffic.appearance import (
+    BODY_PARAMETER,
     OTHERS_LAMPS,
     body_kind,
     cross_section,
@@ -147,7 +148,8 @@ class VehicleBodies:
         if row == len(self._numbers):
             self._numbers = np.concatenate((self._numbers, np.empty_like(self._numbers)))
         length = get.getLength(vehicle)
-        kind = body_kind(get.getVehicleClass(vehicle), get.getShapeClass(vehicle), length)
+        own = get.getParameter(vehicle, BODY_PARAMETER)
+        kind = own or body_kind(get.getVehicleClass(vehicle), get.getShapeClass(vehicle), length)
         self._numbers[row, :3] = length, *cross_section(kind, get.getWidth(vehicle), get.getHeight(vehicle))
         self._numbers[row, 3:6] = paint(vehicle, get.getColor(vehicle))
         self._numbers[row, 6:] = [wish.own_value(vehicle) for wish in self._wishes]

@@ -20,6 +20,9 @@ not hit anybody."""
 LONGEST_CHANGE = 10.0
 """Time after which a change of lane that nobody could make is given up [s]."""
 
+_ONCOMING_STAY = 1.0
+"""Time for which SUMO is asked for the oncoming lane [s]: it wants as much free road, and leads nobody back."""
+
 
 class ScriptedActions:
     """Plays in SUMO what the script has begun.
@@ -49,6 +52,7 @@ class ScriptedActions:
         self._signals = SignalControl(api)
         self._modes = Claims(api, LANE_CHANGE_MODE, f"{session}.script")
         self._changing: dict[str, float] = {}
+        self._oncoming: set[str] = set()
 
     def begin(
         self, actions: Sequence[TrafficAction], time: float, present: Collection[str]
@@ -98,7 +102,9 @@ class ScriptedActions:
         return True
 
     def _has_lane(self, action: TrafficAction) -> bool:
-        return not isinstance(action, ChangeLane) or has_lane(self._api, action.vehicle, action.lanes)
+        if not isinstance(action, ChangeLane) or action.oncoming or action.vehicle in self._oncoming:
+            return True
+        return has_lane(self._api, action.vehicle, action.lanes)
 
     def _motion(self, time: float, present: Collection[str]) -> Motion:
         vehicle = self._api.vehicle
@@ -134,7 +140,15 @@ class ScriptedActions:
         self._changing[vehicle] = time + min(change.stay, LONGEST_CHANGE)
         if change.duration is not None:
             self._lane_changes.take_time(vehicle, change.duration)
-        self._api.vehicle.changeLaneRelative(vehicle, change.lanes, change.stay)
+        if change.oncoming:
+            beyond = self._api.edge.getLaneNumber(self._api.vehicle.getRoadID(vehicle))
+            self._oncoming.add(vehicle)
+            self._api.vehicle.changeLane(vehicle, beyond, _ONCOMING_STAY)
+        elif vehicle in self._oncoming:
+            self._oncoming.discard(vehicle)
+            self._api.vehicle.changeLaneRelative(vehicle, -1, change.stay)
+        else:
+            self._api.vehicle.changeLaneRelative(vehicle, change.lanes, change.stay)
 
     def _end_changes(self, time: float, present: Collection[str]) -> None:
         for vehicle in [one for one, end in self._changing.items() if time >= end]:

@@ -65,6 +65,44 @@ def test_what_is_no_road_is_told(tmp_path: Path) -> None:
         read_opendrive_lanes(opendrive_net(file), file)
 
 
+def test_what_says_nothing_stops_no_conversion(tmp_path: Path) -> None:
+    text = ROAD.read_text(encoding="utf-8")
+    file = tmp_path / "empty.xodr"
+    signal = '<signal s="100" t="-5" id="" type="" dynamic="" orientation=""/>'
+    changed = text.replace("<signals>", f"<signals>{signal}").replace("<width", '<speed sOffset="0" max=""/><width')
+    file.write_text(changed, encoding="utf-8")
+    assert opendrive_net(file) == opendrive_net(ROAD)
+
+
+def test_traffic_on_the_left_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "left.xodr"
+    file.write_text(ROAD.read_text(encoding="utf-8").replace('rule="RHT"', 'rule="LHT"'), encoding="utf-8")
+    with pytest.raises(InputError, match=r"left\.xodr: road '7': rule=\"LHT\": expected right-hand traffic"):
+        opendrive_net(file)
+
+
+def test_a_closed_road_is_driven_round_and_round(tmp_path: Path) -> None:
+    length = 2.0 * math.pi * 100.0 / 3.0
+    roads = [
+        f'<road length="{length:.6f}" id="{i + 1}" junction="-1"><link>'
+        f'<predecessor elementType="road" elementId="{(i - 1) % 3 + 1}" contactPoint="end"/>'
+        f'<successor elementType="road" elementId="{(i + 1) % 3 + 1}" contactPoint="start"/></link><planView>'
+        f'<geometry s="0" x="{100 * math.cos(i * length / 100):.6f}" y="{100 * math.sin(i * length / 100):.6f}" '
+        f'hdg="{i * length / 100 + math.pi / 2:.9f}" length="{length:.6f}"><arc curvature="0.01"/></geometry>'
+        '</planView><lanes><laneSection s="0"><center><lane id="0" type="none"/></center><right>'
+        '<lane id="-1" type="driving"><link><predecessor id="-1"/><successor id="-1"/></link>'
+        '<width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane></right>'
+        "</laneSection></lanes></road>"
+        for i in range(3)
+    ]
+    file = tmp_path / "ring.xodr"
+    file.write_text(f'<OpenDRIVE><header revMajor="1" revMinor="6"/>{"".join(roads)}</OpenDRIVE>', encoding="utf-8")
+    lanes = read_opendrive_lanes(opendrive_net(file), file)
+    route = lanes.route("-2")
+    assert route[:5] == ("-2", "-3", "-1", "-2", "-3")
+    assert sum(next(one.length for one in lanes.lanes if one.edge == edge) for edge in route) > 9_000.0
+
+
 def test_without_netconvert_it_is_told_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(netconvert.shutil, "which", lambda *_, **__: None)
     with pytest.raises(MissingDependencyError, match=r"pip install 'fogsim\[xodr\]'"):

@@ -1,0 +1,182 @@
+"""Files of parameter value distributions: the cases of another file, by values of its parameters."""
+
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fogsim.errors import InputError, shown, suggest
+from fogsim.openscenario.findings import Findings
+from fogsim.openscenario.xml_tree import Node, read_xml
+from fogsim.randomness import named_generator
+
+MOST_CASES = 100_000
+"""Maximum number of cases of a file."""
+
+_DRAWN = (
+    *("ProbabilityDistributionSet", "Histogram", "UniformDistribution"),
+    *("NormalDistribution", "LogNormalDistribution", "PoissonDistribution"),
+)
+_MOST_ROUNDS = 1_000  # Draws for all test runs before limits that hardly any draw meets are refused
+
+Assignment = Mapping[str, str]
+"""Values of parameters by name, as the file has them."""
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterCases:
+    """Values of the parameters of the file `base` in each case; `are_drawn` if the cases are random test runs."""
+
+    base: Path
+    cases: tuple[Assignment, ...]
+    are_drawn: bool
+
+
+def read_parameter_cases(path: Path) -> ParameterCases | None:
+    """Cases of a file with a ``ParameterValueDistribution``, all with the same parameters; None for any other file.
+
+    InputError if a distribution cannot be read, or the file that it refers to is missing or lacks its parameters.
+    """
+    whole = read_xml(path).one("ParameterValueDistribution")
+    if whole is None:
+        return None
+    findings = Findings()
+    base, declared = _base(whole)
+    fixed, drawn = whole.one("Deterministic"), whole.one("Stochastic")
+    if fixed is None and drawn is None:
+        findings.refuse(whole, "there are no cases; expected Deterministic or Stochastic")
+    cases = _grid(fixed or whole, findings) if drawn is None else _test_runs(drawn, findings)
+    findings.look_for_unread(whole)
+    known = {one.attributes.get("name", ""): one.attributes.get("value", "") for one in declared}
+    names = dict.fromkeys(name for case in cases for name in case)
+    for name in names:
+        if name not in known:
+            findings.refuse(whole, f"{base} declares no parameter {shown(name)}; {suggest(name, known)}")
+    findings.close(path)
+    # Where a set leaves a parameter out, it has the value of its declaration.
+    filled = tuple({name: case.get(name, known[name]) for name in names} for case in cases)
+    return ParameterCases(base, filled, drawn is not None)
+
+
+def _base(whole: Node) -> tuple[Path, list[Node]]:
+    """The file that is varied, and the declarations of its parameters."""
+    file = whole.one("ScenarioFile")
+    path = whole.file.parent / (file.get("filepath").replace("\\", "/") if file else "")
+    if file is None or not path.is_file():
+        there = sorted(one.name for one in path.parent.glob("*.xosc")) if path.parent.is_dir() else []
+        told = suggest(path.name, there) if there else f"the folder {path.parent} has no .xosc file"
+        raise InputError(f"{(file or whole).where}: filepath: there is no file {shown(str(path))}; {told}")
+    root = read_xml(path)
+    if root.one("ParameterValueDistribution") is not None:
+        raise InputError(f"{file.where}: {path} has a ParameterValueDistribution itself; expected a scenario")
+    return path, [one for block in root.all("ParameterDeclarations") for one in block.children]
+
+
+def _grid(block: Node, findings: Findings) -> list[Assignment]:
+    """All combinations of deterministic distributions, the last one fastest; those that are the same once."""
+    axes: list[list[Assignment]] = []
+    for one in block.all("DeterministicSingleParameterDistribution", "DeterministicMultiParameterDistribution"):
+        name, sets = one.get("parameterName"), one.one("ValueSetDistribution")
+        listed = [each.all("ParameterAssignment") for each in (sets.all("ParameterValueSet") if sets else ())]
+        together: list[Assignment] = [
+            {each.get("parameterRef"): each.get("value") for each in values} for values in listed
+        ]
+        axes.append(together or [{name: value} for value in _values(one, findings)])
+        if not axes[-1]:
+            findings.refuse(one, "expected a DistributionSet, DistributionRange or ValueSetDistribution with values")
+        if {name for case in axes[-1] for name in case} & {name for axis in axes[:-1] for c in axis for name in c}:
+            findings.refuse(one, "an earlier distribution has the same parameter")
+    number = math.prod(map(len, axes))
+    if number > MOST_CASES:
+        findings.refuse(block, f"{number:,} cases; at most {MOST_CASES:,} are allowed")
+        return []
+    merged = [{k: v for part in cell for k, v in part.items()} for cell in itertools.product(*axes)]
+    return [dict(items) for items in dict.fromkeys(tuple(case.items()) for case in merged)]
+
+
+def _values(node: Node, findings: Findings) -> list[str]:
+    listed, ranged = node.one("DistributionSet"), node.one("DistributionRange")
+    if listed is not None:
+        return [one.get("value") for one in listed.all("Element")]
+    if ranged is None:
+        return []
+    (low, high), step = _limits(ranged, findings), findings.number(ranged, "stepWidth")
+    number = math.floor((high - low) / step + 1e-9) + 1 if step > 0.0 and math.isfinite(high - low) else 0
+    if not 0 < number <= MOST_CASES:
+        findings.refuse(ranged, f"expected a stepWidth above 0 with 1 … {MOST_CASES:,} values from lowerLimit on")
+        return []
+    return [f"{low + i * step:.9g}" for i in range(number)]
+
+
+def _limits(node: Node, findings: Findings) -> tuple[float, float]:
+    """Lower and upper limit of a node's ``Range``, infinite without one."""
+    limits = node.one("Range")
+    if limits is None:
+        return -math.inf, math.inf
+    low, high = (findings.number(limits, key) for key in ("lowerLimit", "upperLimit"))
+    if low > high:
+        findings.refuse(limits, f"expected a lowerLimit of at most the upperLimit, got {low:g} and {high:g}")
+    return low, high
+
+
+def _test_runs(block: Node, findings: Findings) -> list[Assignment]:
+    """Random test runs; with the same seed a parameter has the same values, whatever else is drawn."""
+    number, seed = findings.number(block, "numberOfTestRuns"), findings.number(block, "randomSeed", 0.0)
+    if not (number.is_integer() and 1 <= number <= MOST_CASES):
+        findings.refuse(block, f"numberOfTestRuns: expected a whole number of 1 … {MOST_CASES:,}, got {number:g}")
+        return []
+    columns: dict[str, list[str]] = {}
+    for one in block.all("StochasticDistribution"):
+        name, kind = one.get("parameterName"), one.one(*_DRAWN)
+        if name in columns or kind is None:
+            told = "an earlier distribution has the same parameter" if kind else f"expected one of {', '.join(_DRAWN)}"
+            findings.refuse(one, told)
+            continue
+        generator = named_generator(int(np.float64(seed).view(np.uint64)), name)
+        try:
+            columns[name] = _drawn(kind, generator, int(number), findings)
+        except (ValueError, ArithmeticError) as error:
+            findings.refuse(kind, f"its numbers make no distribution: {error}")
+    rows = zip(*columns.values(), strict=True)
+    return [] if findings.refused else [dict(zip(columns, row, strict=True)) for row in rows]
+
+
+def _drawn(node: Node, generator: np.random.Generator, number: int, findings: Findings) -> list[str]:
+    """Values drawn from a distribution; ValueError if its numbers make none."""
+    if node.tag == "ProbabilityDistributionSet":
+        return [one.get("value") for one in _weighted(node.all("Element"), generator, number, findings)]
+    if node.tag == "Histogram":
+        ends = [_limits(one, findings) for one in _weighted(node.all("Bin"), generator, number, findings)]
+        return [f"{generator.uniform(low, high):.6g}" for low, high in ends]
+    (low, high), found = _limits(node, findings), np.empty(0)
+    for _ in range(_MOST_ROUNDS):
+        drawn = _unlimited(node, generator, number, findings)
+        found = np.concatenate([found, drawn[(low <= drawn) & (drawn <= high)]])
+        if len(found) >= number:
+            return [f"{value:.6g}" for value in found[:number]]
+    raise ValueError(f"hardly any draw is between its limits, {low:g} and {high:g}")
+
+
+def _unlimited(node: Node, generator: np.random.Generator, number: int, findings: Findings) -> Any:
+    if node.tag == "UniformDistribution":
+        return generator.uniform(*_limits(node, findings), number)
+    mean = findings.number(node, "expectedValue")
+    if node.tag == "PoissonDistribution":
+        return generator.poisson(mean, number)
+    variance = findings.number(node, "variance")
+    if node.tag == "NormalDistribution":
+        return generator.normal(mean, math.sqrt(variance), number)
+    # Expected value and variance are those of the parameter, not of its logarithm.
+    of_log = math.log1p(variance / mean**2)
+    return generator.lognormal(math.log(mean) - 0.5 * of_log, math.sqrt(of_log), number)
+
+
+def _weighted(parts: list[Node], generator: np.random.Generator, number: int, findings: Findings) -> list[Node]:
+    """Elements drawn by their weights."""
+    weights = [findings.number(one, "weight") for one in parts]
+    shares = np.array(weights) / (sum(weights) or 1.0)
+    return [parts[i] for i in generator.choice(len(parts), number, p=shares)]

@@ -1,0 +1,316 @@
+"""Small files of other people's kinds: each runs as it is meant, or is refused with the reason and the line."""
+
+import re
+import shutil
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import fogsim
+from fogsim.cli.app import app
+from fogsim.errors import InputError, LeftOutWarning
+from fogsim.openscenario import read_openscenario
+from fogsim.scenario.schema import Scenario
+from fogsim.values import Step
+
+CASES = Path(__file__).parents[1] / "data" / "openscenario" / "cases"
+QUIET = ["renderer=none", "estimators=[]", "drivers.see_through_fog=true"]
+
+
+def _changed(tmp_path: Path, name: str, *texts: tuple[str, str]) -> Path:
+    text = (CASES / f"{name}.xosc").read_text(encoding="utf-8")
+    for old, new in texts:
+        assert old in text
+        text = text.replace(old, new, 1)
+    (tmp_path / "road.xodr").write_bytes((CASES / "road.xodr").read_bytes())
+    (file := tmp_path / f"{name}.xosc").write_text(text, encoding="utf-8")
+    return file
+
+
+def _loaded(file: Path) -> Scenario:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        return fogsim.load_scenario(file, QUIET)
+
+
+def _run(file: Path, seconds: float) -> list[Step]:
+    return list(fogsim.run(fogsim.load_scenario(file, [*QUIET, f"duration_s={seconds}"])))
+
+
+def _x_and_speed(step: Step, vehicle: str) -> tuple[float, float]:
+    row = step.traffic.ids.index(vehicle)
+    return float(step.traffic.position[row, 0]), float(step.traffic.speed[row])
+
+
+def test_a_declaration_uses_those_before_it() -> None:
+    (step,) = _run(CASES / "chain_of_parameters.xosc", 0.1)[:1]
+    (ego, speed), (lead, _) = (_x_and_speed(step, name) for name in ("Ego", "Lead"))
+    assert (speed, lead - ego) == (pytest.approx(20.0), pytest.approx(60.0, abs=0.01))
+
+
+def test_pi_is_known_in_expressions(tmp_path: Path) -> None:
+    file = _changed(tmp_path, "chain_of_parameters", ("${$SpeedKmh / 3.6}", "${10 * sqrt(pi * 4 / pi)}"))
+    assert _x_and_speed(_run(file, 0.1)[0], "Ego")[1] == pytest.approx(20.0)
+
+
+@pytest.mark.parametrize(
+    ("constraints", "is_held"),
+    [
+        ('<ConstraintGroup><ValueConstraint rule="lessThan" value="$EgoSpeed"/></ConstraintGroup>', True),
+        ('<ConstraintGroup><ValueConstraint rule="lessThan" value="9"/></ConstraintGroup>', False),
+        (
+            '<ConstraintGroup><ValueConstraint rule="lessThan" value="9"/></ConstraintGroup>'
+            '<ConstraintGroup><ValueConstraint rule="equalTo" value="10.0"/></ConstraintGroup>',
+            True,
+        ),
+        (
+            '<ConstraintGroup><ValueConstraint rule="greaterThan" value="5"/>'
+            '<ValueConstraint rule="lessThan" value="9"/></ConstraintGroup>',
+            False,
+        ),
+    ],
+)
+def test_a_value_fits_one_group_of_constraints(tmp_path: Path, constraints: str, is_held: bool) -> None:
+    old = '<ConstraintGroup>\n<ValueConstraint rule="lessThan" value="$EgoSpeed"/>\n</ConstraintGroup>'
+    file = _changed(tmp_path, "constraint_of_parameter", (old, constraints))
+    if is_held:
+        assert _loaded(file).traffic.ego == "Ego"
+        return
+    told = r":6: /OpenSCENARIO/ParameterDeclarations/\S+\[LeadSpeed\]: value: its ConstraintGroup wants lessThan 9, got"
+    with pytest.raises(InputError, match=told):
+        _loaded(file)
+
+
+def test_a_dollar_in_a_declaration_is_remarked() -> None:
+    with pytest.warns(
+        LeftOutWarning, match=r"(?s)5: /OpenSCENARIO/\S+\[\$who\]: a declaration has its name without \$"
+    ):
+        scenario = fogsim.load_scenario(CASES / "dollar_in_declaration.xosc", QUIET)
+    assert next(entry for entry in scenario.timeline if entry.name == "brake").do.keys() == {"Lead"}
+
+
+def test_a_line_in_a_message_is_no_emoji(tmp_path: Path) -> None:
+    file = _changed(tmp_path, "dollar_in_declaration", ('entityRef="$who"', 'entityRef="$whom"'))
+    assert f"{file}:100: " in CliRunner().invoke(app, ["validate", str(file)]).stderr
+
+
+def test_an_act_with_empty_triggers_begins_at_once_and_is_not_stopped() -> None:
+    run = _run(CASES / "empty_triggers.xosc", 5.0)
+    speeds = [_x_and_speed(step, "Lead")[1] for step in run]
+    assert speeds[30] == pytest.approx(speeds[0], abs=0.5)
+    assert speeds[-1] < speeds[0] - 5.0
+
+
+def test_a_hitch_without_a_trailer_is_nothing(tmp_path: Path) -> None:
+    assert _loaded(CASES / "hitch_without_trailer.xosc").traffic.ego == "Ego"
+    hitch = re.search(r"<TrailerHitch[^>]*/>", (CASES / "hitch_without_trailer.xosc").read_text(encoding="utf-8"))
+    assert hitch is not None
+    for trailer, is_none in (("", True), (' entityRef=""', True), (' entityRef="Lead"', False)):
+        with_trailer = f"{hitch[0]}<Trailer><TrailerRef{trailer}/></Trailer>"
+        file = _changed(tmp_path, "hitch_without_trailer", (hitch[0], with_trailer))
+        if is_none:
+            _loaded(file)
+        else:
+            with pytest.raises(InputError, match="Trailer: vehicles have no trailers"):
+                _loaded(file)
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("left_hand_road", r"road_left\.xodr: road '7': rule=\"LHT\": expected right-hand traffic"),
+        (
+            "turned_round",
+            r"\.xosc:77: \S+/LanePosition: h: vehicles stand, and drive, along their lanes; it stands 180 deg",
+        ),
+        ("sun_between_0_and_1", r"\.xosc:46: \S+/Sun: intensity: expected lux, .* got 0\.85: night if .* as in CARLA"),
+        ("speed_and_distance_at_once", r"\.xosc:94: \S+/LongitudinalDistanceAction\[Ego\]: continuous: "),
+        ("speed_and_distance_at_once", r"keeps a distance to a vehicle ahead; Ego is not ahead of Lead"),
+    ],
+)
+def test_what_would_run_as_something_else_is_refused(name: str, told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        _loaded(CASES / f"{name}.xosc")
+
+
+@pytest.mark.parametrize(
+    ("position", "is_along"),
+    [
+        ('<LanePosition roadId="7" laneId="-1" s="500"><Orientation type="relative" h="6.28"/></LanePosition>', True),
+        ('<LanePosition roadId="7" laneId="-1" s="500"><Orientation type="absolute" h="0"/></LanePosition>', True),
+        ('<LanePosition roadId="7" laneId="1" s="500"><Orientation type="absolute" h="3.14"/></LanePosition>', True),
+        ('<LanePosition roadId="7" laneId="1" s="500"><Orientation type="absolute" h="0"/></LanePosition>', False),
+        ('<LanePosition roadId="7" laneId="1" s="500"><Orientation type="relative" h="3.14"/></LanePosition>', False),
+        ('<RoadPosition roadId="7" t="1.7" s="500"><Orientation type="relative" h="3.14"/></RoadPosition>', True),
+        ('<LanePosition roadId="7" laneId="-1" s="500"><Orientation type="relative" h="1.2"/></LanePosition>', False),
+        ('<WorldPosition x="500" y="-1.7" h="0.9"/>', False),
+        ('<WorldPosition x="500" y="1.7" h="3.1"/>', True),
+        ('<RelativeLanePosition entityRef="Ego" dLane="0" ds="9"><Orientation p="1"/></RelativeLanePosition>', True),
+    ],
+)
+def test_a_vehicle_stands_along_its_lane_or_is_refused(tmp_path: Path, position: str, is_along: bool) -> None:
+    text = (CASES / "turned_round.xosc").read_text(encoding="utf-8")
+    begin = text.index('<LanePosition roadId="7" laneId="-1" s="500">')
+    old = text[begin : text.index("</LanePosition>", begin) + len("</LanePosition>")]
+    file = _changed(tmp_path, "turned_round", (old, position))
+    if is_along:
+        assert _loaded(file).traffic.ego == "Ego"
+    else:
+        with pytest.raises(InputError, match="h: vehicles stand, and drive, along their lanes"):
+            _loaded(file)
+
+
+@pytest.mark.parametrize(
+    ("sun", "lux"),
+    [
+        ('intensity="0.85" azimuth="3" elevation="-0.2"', 0.85),
+        ('intensity="0" azimuth="3" elevation="0.9"', 0.0),
+        ('illuminance="900" azimuth="3" elevation="0.05"', 900.0),
+        ('illuminance="40" azimuth="3" elevation="0.9"', None),
+        ('illuminance="0.5" azimuth="3"', None),
+    ],
+)
+def test_the_sun_is_in_lux(tmp_path: Path, sun: str, lux: float | None) -> None:
+    file = _changed(tmp_path, "sun_between_0_and_1", ('intensity="0.85" azimuth="3" elevation="0.9"', sun))
+    if lux is not None:
+        assert _loaded(file).light.illuminance_lx == lux
+    else:
+        with pytest.raises(InputError, match=r"Sun: (intensity|illuminance): expected lux"):
+            _loaded(file)
+
+
+def test_files_of_carla_have_their_own_axes_and_sun(tmp_path: Path) -> None:
+    texts = (
+        (
+            '<LanePosition roadId="7" laneId="-1" s="30">\n</LanePosition>',
+            '<WorldPosition x="30" y="1.7" z="0.5" h="0"/>',
+        ),
+        (
+            '<LanePosition roadId="7" laneId="-1" s="90">\n</LanePosition>',
+            '<RelativeWorldPosition entityRef="Ego" dx="40" dy="-0.4"/>',
+        ),
+    )
+    for intensity, lux in ((1.0, 90_164.0), (0.5, 90_164.0 * (1.0 - 0.75 * 0.5**3.4))):
+        sun = ('intensity="0.85"', f'intensity="{intensity}"')
+        file = _changed(tmp_path, "sun_between_0_and_1", ('description="', 'description="CARLA:'), sun, *texts)
+        step = _run(file, 0.1)[0]
+        assert [float(step.traffic.position[row, 1]) for row in range(2)] == pytest.approx([-1.75, -1.75], abs=0.1)
+        assert _loaded(file).light.illuminance_lx == pytest.approx(lux, rel=1e-3)
+
+
+def test_an_initial_speed_and_a_distance_go_together(tmp_path: Path) -> None:
+    action = '<LongitudinalDistanceAction entityRef="Ego" timeGap="2" freespace="true" continuous="false"/>'
+    file = _changed(
+        tmp_path,
+        "speed_and_distance_at_once",
+        (action, action.replace("false", "true")),
+        ('laneId="-1" s="30"', 'laneId="-1" s="300"'),
+    )
+    steps = _run(file, 5.0)
+    assert _x_and_speed(steps[0], "Lead")[1] == pytest.approx(15.0, abs=0.3)
+    assert max(_x_and_speed(step, "Lead")[1] for step in steps) > 20.0
+
+
+def test_two_actions_of_an_event_on_the_same_motion_are_refused(tmp_path: Path) -> None:
+    text = (CASES / "chain_of_parameters.xosc").read_text(encoding="utf-8")
+    action = text[text.index('<Action name="brakeA">') : text.index("</Action>") + len("</Action>")]
+    file = _changed(tmp_path, "chain_of_parameters", (action, action + action.replace("brakeA", "brakeB")))
+    with pytest.raises(
+        InputError, match=r"SpeedAction: another action of this event orders the motion of Lead as well"
+    ):
+        _loaded(file)
+
+
+def test_a_relative_speed_is_kept_while_the_other_changes_its_own(tmp_path: Path) -> None:
+    relative = '<RelativeTargetSpeed entityRef="Lead" value="3" speedTargetValueType="delta" continuous="{}"/>'
+    for continuous, after in (("true", 5.0), ("false", 23.0)):
+        # Ego's speed is told by that of Lead, which is told later, and brakes from 20 m/s to 2 m/s at 3 s.
+        file = _changed(
+            tmp_path,
+            "chain_of_parameters",
+            ('<AbsoluteTargetSpeed value="$Speed"/>', relative.format(continuous)),
+            ('laneId="-1" s="30"', 'laneId="1" s="700"'),
+        )
+        steps = _run(file, 12.0)
+        assert _x_and_speed(steps[0], "Ego")[1] == pytest.approx(23.0)
+        assert _x_and_speed(steps[-1], "Ego")[1] == pytest.approx(after, abs=0.2)
+
+
+def test_fog_thickens_in_steps() -> None:
+    steps = _run(CASES / "fog_thickens_in_steps.xosc", 8.0)
+    seen = [float(step.truth.visibility) for step in steps]
+    changes = [(steps[i].time, seen[i]) for i in range(1, len(steps)) if not np.isclose(seen[i], seen[i - 1])]
+    assert [visibility for _, visibility in changes] == pytest.approx([1000.0, 500.0, 250.0, 100.0])
+    assert [time for time, _ in changes] == pytest.approx([1.0, 3.0, 5.0, 7.0], abs=0.21)
+
+
+@pytest.mark.parametrize(
+    ("position", "x"),
+    [
+        # s = 500 m on the lane that leads back, 3.7 m before the front bumper.
+        ('<RelativeLanePosition entityRef="Ego" dLane="0" ds="20"/>', 520.0 - 3.7),
+        ('<RelativeLanePosition entityRef="Ego" dLane="0" dsLane="20"/>', 480.0 - 3.7),
+    ],
+)
+def test_ds_goes_by_the_road_and_ds_lane_by_the_entity(tmp_path: Path, position: str, x: float) -> None:
+    file = _changed(
+        tmp_path,
+        "hitch_without_trailer",
+        (
+            '<LanePosition roadId="7" laneId="-1" s="30">\n</LanePosition>',
+            '<LanePosition roadId="7" laneId="1" s="500"/>',
+        ),
+        ('<LanePosition roadId="7" laneId="-1" s="90">\n</LanePosition>', position),
+    )
+    assert _x_and_speed(_run(file, 0.1)[0], "Lead")[0] == pytest.approx(x, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('<AbsoluteTargetSpeed value="2"/>', '<AbsoluteTargetSpeed value="-2"/>', "vehicles do not drive backwards"),
+        (
+            '<SpeedAction>\n<SpeedActionDynamics dynamicsShape="linear"',
+            '<LongitudinalDistanceAction entityRef="Led" timeGap="2" freespace="true" continuous="true"/>'
+            '<SpeedAction><SpeedActionDynamics dynamicsShape="linear"',
+            r"LongitudinalDistanceAction\[Led\]: there is no vehicle 'Led'",
+        ),
+        (
+            'conditionEdge="none">\n<ByValueCondition>\n<SimulationTimeCondition value="3"',
+            'conditionEdge="falling">\n<ByValueCondition>\n<SimulationTimeCondition value="3"',
+            "what has begun does not end again",
+        ),
+        ('value="3" rule="greaterThan"', 'value="3" rule="notEqualTo"', "rule: FogSim has no 'notEqualTo' here"),
+        ('frictionScaleFactor="1"', 'frictionScaleFactor="0.5"', "RoadCondition: roads are dry"),
+        (
+            '<Fog visualRange="200"/>',
+            '<Precipitation precipitationType="rain" intensity="0.3"/>',
+            "rain and snow are not",
+        ),
+        ('<Center x="1.4" y="0"', '<Center x="1.4" y="0.5"', "Center: y: a body lies about its reference point"),
+    ],
+)
+def test_values_that_mean_something_else_are_refused(tmp_path: Path, old: str, new: str, told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        _loaded(_changed(tmp_path, "chain_of_parameters", (old, new)))
+
+
+def test_constraints_hold_for_the_values_that_a_catalog_is_given(tmp_path: Path) -> None:
+    shutil.copytree(CASES.parent, tmp_path, dirs_exist_ok=True)
+    catalog = tmp_path / "catalogs" / "vehicles.xosc"
+    old = '<ParameterDeclaration name="top_speed" parameterType="double" value="60"/>'
+    constraint = '<ConstraintGroup><ValueConstraint rule="greaterThan" value="{}"/></ConstraintGroup>'
+    text = catalog.read_text(encoding="utf-8")
+    for least, is_held in ((30, True), (50, False)):
+        declared = f"{old.removesuffix('/>')}>{constraint.format(least)}</ParameterDeclaration>"
+        catalog.write_text(text.replace(old, declared), encoding="utf-8")
+        if is_held:
+            read_openscenario(tmp_path / "everything.xosc")
+        else:
+            with pytest.raises(
+                InputError, match=r"vehicles\.xosc:7: \S+: value: its ConstraintGroup wants .* got '40'"
+            ):
+                read_openscenario(tmp_path / "everything.xosc")

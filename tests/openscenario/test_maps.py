@@ -1,0 +1,69 @@
+"""Maps by name in a folder of the user's: OpenDRIVE files and SUMO networks."""
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import fogsim
+from fogsim.cli.app import app
+from fogsim.errors import InputError
+from fogsim.files.maps import MAPS
+from fogsim.openscenario import read_openscenario
+from fogsim.traffic.road.netconvert import opendrive_net
+from tests.openscenario.writing import CAR, ROAD, lane, speed, write
+
+QUIET = ["renderer=none", "estimators=[]", "drivers.see_through_fog=true"]
+
+
+@pytest.fixture
+def maps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The user's folder of maps, with a town."""
+    (folder := tmp_path / "maps").mkdir()
+    shutil.copy(ROAD, folder / "Town01.xodr")
+    monkeypatch.setenv(MAPS, str(folder))
+    return folder
+
+
+def _begins(file: Path) -> tuple[float, float]:
+    step = next(iter(fogsim.run(fogsim.load_scenario(file, QUIET))))
+    x, y, _ = map(float, step.traffic.position[step.ego])
+    return x, y
+
+
+@pytest.mark.parametrize("written", ["Town01", "Town01.xodr", "other/folder/Town01.xodr", "C:\\maps\\Town01.xodr"])
+def test_a_map_is_found_by_its_name(tmp_path: Path, maps: Path, written: str) -> None:
+    file = write(tmp_path, {"Ego": CAR}, {"Ego": f"{lane(30)}\n{speed(5)}"}, road=Path(written))
+    assert _begins(file) == pytest.approx((33.7, -1.75), abs=0.1)
+
+
+def test_a_sumo_network_has_places_by_coordinates_alone(tmp_path: Path, maps: Path) -> None:
+    net = re.sub(r'netOffset="[^"]*"', 'netOffset="0.00,-20.00"', opendrive_net(ROAD))
+    moved = re.sub(r",(-?1\.750)", lambda y: f",{float(y[1]) - 20.0:.3f}", net)
+    (maps / "Village.net.xml").write_text(moved, encoding="utf-8")
+    here = '<Position><WorldPosition x="30" y="-1.75" h="0"/></Position>'
+    assert _begins(write(tmp_path, {"Ego": CAR}, {"Ego": here}, road=Path("Village"))) == pytest.approx((33.7, -21.75))
+    with pytest.raises(InputError, match="a map that is a SUMO network has no roads; write a WorldPosition"):
+        read_openscenario(write(tmp_path, {"Ego": CAR}, {"Ego": lane(30)}, road=Path("Village")))
+
+
+def test_a_missing_map_is_told_with_what_is_there(tmp_path: Path, maps: Path) -> None:
+    file = write(tmp_path, {"Ego": CAR}, {"Ego": lane(30)}, road=Path("Town02"))
+    with pytest.raises(InputError) as refused:
+        read_openscenario(file)
+    told = f"RoadNetwork/LogicFile: there is no map 'Town02' in {maps}; did you mean 'Town01.xodr'? Known: Town01.xodr"
+    assert told in str(refused.value)
+    (maps / "Town01.xodr").unlink()
+    with pytest.raises(InputError, match=r"there is no \.xodr or \.net\.xml file at all"):
+        read_openscenario(file)
+
+
+def test_the_command_line_names_the_folder(tmp_path: Path, maps: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(MAPS)
+    file = write(tmp_path, {"Ego": CAR}, {"Ego": lane(30)}, road=Path("Town01"))
+    without = CliRunner().invoke(app, ["validate", str(file)])
+    assert without.exit_code == 2
+    assert "a map in a folder that --maps names" in " ".join(without.output.split())
+    assert CliRunner().invoke(app, ["validate", str(file), "--maps", str(maps)]).exit_code == 0

@@ -1,0 +1,99 @@
+"""Routes of vehicles and positions on them, on a road that forks after 100 m: straight on, or to the left."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fogsim
+from fogsim.errors import InputError
+from fogsim.openscenario import read_openscenario
+from tests.openscenario.writing import CAR, after, speed, write
+
+FORK = Path(__file__).parents[1] / "data" / "openscenario" / "fork.xodr"
+QUIET = ["renderer=none", "estimators=[]", "drivers.see_through_fog=true"]
+
+
+def _on(road: int, s: float) -> str:
+    return f'<Position><LanePosition roadId="{road}" laneId="-1" s="{s}"/></Position>'
+
+
+def _route(*places: str, strategy: str = "shortest", closed: str = "false") -> str:
+    points = "".join(f'<Waypoint routeStrategy="{strategy}">{place}</Waypoint>' for place in places)
+    return f'<Route name="r" closed="{closed}">{points}</Route>'
+
+
+def _routing(inner: str, tag: str = "AssignRouteAction") -> str:
+    return f"<PrivateAction><RoutingAction><{tag}>{inner}</{tag}></RoutingAction></PrivateAction>"
+
+
+def _on_route(route: str, along: float) -> str:
+    return (
+        f"<Position><RoutePosition><RouteRef>{route}</RouteRef><InRoutePosition>"
+        f'<FromLaneCoordinates pathS="{along}" laneId="-1"/></InRoutePosition></RoutePosition></Position>'
+    )
+
+
+NORTH, EAST = _route(_on(1, 20), _on(3, 50)), _route(_on(1, 20), _on(2, 50))
+NAMED = NORTH.replace('"r"', '"to the north"')
+CATALOG = (
+    '<OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="2026-01-01T00:00:00" description="" author=""/>'
+    f'<Catalog name="Ways">{NAMED}</Catalog></OpenSCENARIO>'
+)
+FROM_CATALOG = '<CatalogReference catalogName="Ways" entryName="to the north"/>'
+
+
+@pytest.mark.parametrize(
+    ("routing", "ends_north"),
+    [
+        ("", False),
+        (_routing(NORTH), True),
+        (_routing(EAST), False),
+        (_routing(FROM_CATALOG), True),
+        (_routing(_on(3, 50), "AcquirePositionAction"), True),
+    ],
+)
+def test_vehicles_drive_their_routes(tmp_path: Path, routing: str, ends_north: bool) -> None:
+    (tmp_path / "ways.xosc").write_text(CATALOG, encoding="utf-8")
+    begin = "\n".join(filter(None, [_on(1, 30), routing, speed(10)]))
+    file = write(tmp_path, {"Ego": CAR}, {"Ego": begin}, stop=after(15), visibility=5000.0, road=FORK)
+    steps = list(fogsim.run(fogsim.load_scenario(file, QUIET)))
+    places = np.array([step.traffic.position[step.ego, :2] for step in steps])
+    # At 10 m/s for 15 s from 33.7 m on: to 183.7 m, of which the left arc takes 21.75 m · π/2 = 34.2 m.
+    expected = (121.75, 20.0 + 183.7 - 100.0 - 34.2) if ends_north else (183.7, -1.75)
+    assert places[-1] == pytest.approx(expected, abs=2.0)
+    assert np.all(np.hypot(*np.diff(places, axis=0).T) < 1.2)
+
+
+def test_positions_on_a_route_and_conditions_count_the_junction(tmp_path: Path) -> None:
+    # From the first waypoint 80 m to the road's end, 35.1 across the junction, and 40 m up the road to the north.
+    begin = {"Ego": f"{_on(1, 30)}\n{_routing(NORTH)}\n{speed(10)}", "Other": _on_route(NORTH, 155.1)}
+    file = write(tmp_path, {"Ego": CAR, "Other": CAR}, begin, visibility=5000.0, road=FORK)
+    step = next(iter(fogsim.run(fogsim.load_scenario(file, QUIET))))
+    row = step.traffic.row("Other")
+    assert row is not None
+    assert step.traffic.position[row, :2] == pytest.approx((121.75, 20.0 + 40.0 + 3.7), abs=0.3)
+
+
+@pytest.mark.parametrize(
+    ("routing", "told"),
+    [
+        (_routing(_route(_on(3, 20), _on(2, 50))), "no way leads from lanes 3_-1 to lanes 2_-1"),
+        (_routing(_route(_on(1, 20), _on(1, 10))), "a waypoint lies behind the one before"),
+        (_routing(_route(_on(1, 20), _on(3, 10), strategy="random")), "routeStrategy: FogSim has no 'random' here"),
+        (_routing(_route(_on(1, 20), _on(3, 10), closed="true")), "closed: write the waypoints of each lap"),
+        (_routing("<Route/>"), "expected a Route of Waypoints"),
+        (_routing("<TrajectoryRef/>", "FollowTrajectoryAction"), "vehicles keep to their lanes"),
+        (_routing(FROM_CATALOG), "there is no catalog 'Ways'"),
+    ],
+)
+def test_what_cannot_be_driven_is_refused(tmp_path: Path, routing: str, told: str) -> None:
+    file = write(tmp_path, {"Ego": CAR}, {"Ego": f"{_on(1, 30)}\n{routing}"}, road=FORK)
+    with pytest.raises(InputError, match=rf"RoutingAction/.*{told}"):
+        read_openscenario(file)
+
+
+def test_a_place_inside_the_junction_is_refused(tmp_path: Path) -> None:
+    begin = {"Ego": _on(1, 30), "Other": _on_route(NORTH, 100.0)}
+    with pytest.raises(InputError, match="RoutePosition: 100 m from there is inside a junction"):
+        read_openscenario(write(tmp_path, {"Ego": CAR, "Other": CAR}, begin, road=FORK))

@@ -1,0 +1,151 @@
+"""Stories: changes of lane by distance and onto the oncoming lane, delays, repeated events, and the end of the road."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fogsim
+from fogsim.errors import InputError
+from fogsim.openscenario import read_openscenario
+from fogsim.values import Ending, Step
+from tests.openscenario.writing import CAR, after, event, lane, speed, write
+
+CASES = Path(__file__).parents[1] / "data" / "openscenario" / "cases"
+QUIET = ["renderer=none", "estimators=[]", "drivers.see_through_fog=true"]
+
+
+def _run(file: Path) -> list[Step]:
+    return list(fogsim.run(fogsim.load_scenario(file, QUIET)))
+
+
+def _at(steps: Sequence[Step], time: float, name: str) -> tuple[float, float, float]:
+    """x and y of the front bumper [m] and speed [m/s] at a time [s]."""
+    step = min(steps, key=lambda one: abs(one.time - time))
+    row = step.traffic.ids.index(name)
+    return (*map(float, step.traffic.position[row, :2]), float(step.traffic.speed[row]))
+
+
+def _changes_lane(target: int, dimension: str, value: float) -> str:
+    return (
+        "<PrivateAction><LateralAction><LaneChangeAction><LaneChangeActionDynamics "
+        f'dynamicsShape="cubic" dynamicsDimension="{dimension}" value="{value}"/><LaneChangeTarget>'
+        f'<AbsoluteTargetLane value="{target}"/></LaneChangeTarget></LaneChangeAction></LateralAction></PrivateAction>'
+    )
+
+
+def _state(kind: str, name: str, state: str, delay: float = 0.0) -> str:
+    """A condition on the state of an element."""
+    return (
+        f'<Condition name="s" delay="{delay}" conditionEdge="none"><ByValueCondition><StoryboardElementStateCondition '
+        f'storyboardElementType="{kind}" storyboardElementRef="{name}" state="{state}"/></ByValueCondition></Condition>'
+    )
+
+
+def _faster_than(value: float, delay: float = 0.0) -> str:
+    return (
+        f'<Condition name="v" delay="{delay}" conditionEdge="none"><ByEntityCondition><TriggeringEntities '
+        'triggeringEntitiesRule="any"><EntityRef entityRef="Ego"/></TriggeringEntities><EntityCondition>'
+        f'<SpeedCondition value="{value}" rule="greaterThan"/></EntityCondition></ByEntityCondition></Condition>'
+    )
+
+
+def _group(*conditions: str) -> str:
+    return f"<ConditionGroup>{''.join(conditions)}</ConditionGroup>"
+
+
+def test_forty_metres_at_fifteen_metres_a_second_take_2_7_seconds() -> None:
+    # Lead changes from lane -1 at y = -1.75 m to lane 1, that of oncoming traffic, at y = 1.75 m.
+    steps = _run(CASES / "lane_change_by_distance.xosc")
+    begins = next(step.time for step in steps if any(one.name == "leave" and not one.is_over for one in step.begun))
+    ends = next(step.time for step in steps if any(one.name == "leave" and one.is_over for one in step.begun))
+    assert ends - begins == pytest.approx(40.0 / 15.0, abs=0.11)
+    assert _at(steps, begins - 0.1, "Lead")[1] == pytest.approx(-1.75, abs=0.01)
+    assert _at(steps, begins + 40.0 / 30.0 + 0.1, "Lead")[1] == pytest.approx(0.0, abs=0.35)
+    assert _at(steps, ends + 0.3, "Lead")[1] == pytest.approx(1.75, abs=0.05)
+    # It keeps its speed and its direction, and stays there.
+    assert _at(steps, 9.9, "Lead") == pytest.approx((90.0 + 3.7 + 15.0 * 9.9, 1.75, 15.0), abs=0.5)
+
+
+def test_what_follows_a_change_by_distance_waits_until_it_is_over(tmp_path: Path) -> None:
+    leave = event("leave", _changes_lane(1, "distance", 30.0), after(1.0))
+    back = event("back", _changes_lane(-1, "time", 2.0), _group(_state("event", "leave", "completeState")))
+    begin = {"Ego": f"{lane(30)}\n{speed(5)}", "Lead": f"{lane(90)}\n{speed(10)}"}
+    steps = _run(write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": leave + back}, visibility=5000.0))
+    begun = {one.name: one.time for step in steps for one in step.begun if not one.is_over}
+    assert begun["back"] - begun["leave"] == pytest.approx(3.0, abs=0.25)
+    assert _at(steps, begun["back"] - 0.1, "Lead")[1] == pytest.approx(1.75, abs=0.1)
+    assert _at(steps, begun["back"] + 2.3, "Lead")[1] == pytest.approx(-1.75, abs=0.1)
+
+
+def test_lanes_beyond_the_nearest_oncoming_one_and_rates_are_refused(tmp_path: Path) -> None:
+    two = Path(__file__).parents[1] / "data" / "openscenario" / "two_lanes.xodr"
+    action = event("leave", _changes_lane(2, "rate", 1.0), after(1.0))
+    file = write(tmp_path, {"Ego": CAR}, {"Ego": lane(30)}, {"Ego": action}, road=two)
+    with pytest.raises(InputError) as refused:
+        read_openscenario(file)
+    assert "AbsoluteTargetLane: of the oncoming lanes, vehicles drive on the nearest" in str(refused.value)
+    assert "dynamicsDimension: changes of lane take a time or a distance" in str(refused.value)
+
+
+def test_the_first_of_two_delayed_groups_ends_the_run() -> None:
+    steps = _run(CASES / "stop_with_two_delays.xosc")
+    assert steps[-1].time == pytest.approx(7.0, abs=0.11)
+
+
+def test_groups_have_delays_of_their_own(tmp_path: Path) -> None:
+    starts = _group(_faster_than(99)) + _group(_faster_than(10, delay=1.5))
+    begin = {"Ego": f"{lane(30)}\n{speed(15)}"}
+    file = write(tmp_path, {"Ego": CAR}, begin, {"Ego": event("brake", speed(5), starts)}, visibility=5000.0)
+    (begun,) = (one.time for step in _run(file) for one in step.begun if one.name == "brake" and not one.is_over)
+    # The speed holds in the first step; a mark and what waits for it are looked at once a camera period.
+    assert begun == pytest.approx(1.5, abs=0.31)
+
+
+def test_a_condition_that_stays_true_may_have_a_delay_beside_others(tmp_path: Path) -> None:
+    begin = {"Ego": f"{lane(30)}\n{speed(15)}"}
+    first = event("first", speed(12), after(1.0))
+    second = event("second", speed(5), _group(_state("event", "first", "startTransition", 2.0), _faster_than(10)))
+    file = write(tmp_path, {"Ego": CAR}, begin, {"Ego": first + second}, visibility=5000.0)
+    begun = {one.name: one.time for step in _run(file) for one in step.begun if not one.is_over}
+    assert begun["second"] - begun["first"] == pytest.approx(2.0, abs=0.31)
+    wrong = event("second", speed(5), _group(_state("event", "first", "startTransition"), _faster_than(10, delay=2.0)))
+    with pytest.raises(InputError, match=r"those that may become false again must have none; got \[0.0, 2.0\]"):
+        read_openscenario(write(tmp_path, {"Ego": CAR}, begin, {"Ego": first + wrong}))
+
+
+def test_events_are_played_as_often_as_they_may(tmp_path: Path) -> None:
+    slower = (
+        '<PrivateAction><LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="linear" value="1" '
+        'dynamicsDimension="time"/><SpeedActionTarget><RelativeTargetSpeed entityRef="Ego" value="-2" '
+        'speedTargetValueType="delta" continuous="false"/></SpeedActionTarget></SpeedAction></LongitudinalAction>'
+        "</PrivateAction>"
+    )
+    events = event("slower", slower, _group(_faster_than(8)), count=5)
+    file = write(tmp_path, {"Ego": CAR}, {"Ego": f"{lane(30)}\n{speed(13)}"}, {"Ego": events}, visibility=5000.0)
+    steps = _run(file)
+    begun = [one.time for step in steps for one in step.begun if one.name.startswith("slower") and not one.is_over]
+    # 13, 11, 9 and then 7 m/s, which is not above 8 any more: three of five times.
+    assert len(begun) == 3
+    assert np.diff(begun) == pytest.approx([1.0, 1.0], abs=0.21)
+    assert _at(steps, 9.9, "Ego")[2] == pytest.approx(7.0, abs=0.05)
+    assert read_openscenario(file).data["expect"] == {"slower": {"happened": "slower"}}
+
+
+@pytest.mark.parametrize("count", ["0", "1.5", "101"])
+def test_counts_out_of_range_are_refused(tmp_path: Path, count: str) -> None:
+    events = event("e", speed(5), after(1)).replace('ExecutionCount="1"', f'ExecutionCount="{count}"')
+    with pytest.raises(InputError, match=r"Event\[e\]: maximumExecutionCount: expected 1 … 100, got"):
+        read_openscenario(write(tmp_path, {"Ego": CAR}, {"Ego": lane(30)}, {"Ego": events}))
+
+
+def test_the_end_of_the_road_ends_the_run(tmp_path: Path) -> None:
+    end = _faster_than(0).replace(
+        '<SpeedCondition value="0" rule="greaterThan"/>', '<EndOfRoadCondition duration="0"/>'
+    )
+    begin = {"Ego": f"{lane(700)}\n{speed(15)}"}
+    steps = _run(write(tmp_path, {"Ego": CAR}, begin, stop=_group(end), visibility=5000.0))
+    assert steps[-1].ending in (Ending.END_CONDITION, Ending.ARRIVED)
+    # From a front bumper at 703.7 m to 10 m before the end of the road at 800 m.
+    assert steps[-1].time == pytest.approx((790.0 - 703.7) / 15.0, abs=0.2)

@@ -1,0 +1,96 @@
+"""Small OpenSCENARIO files on a country road of 800 m along x, with a lane of 3.5 m each way."""
+
+from pathlib import Path
+
+ROAD = Path(__file__).parents[1] / "data" / "openscenario" / "cases" / "road.xodr"
+
+CAR = (
+    '<Vehicle name="car" vehicleCategory="car"><BoundingBox><Center x="1.4" y="0" z="0.75"/>'
+    '<Dimensions width="1.9" length="4.6" height="1.5"/></BoundingBox>'
+    '<Performance maxSpeed="60" maxDeceleration="9" maxAcceleration="4"/><Axles/></Vehicle>'
+)
+"""A car whose front bumper is 3.7 m ahead of its reference point, the middle of the rear axle."""
+
+
+def box(tag: str, kind: str, length: float, width: float, height: float) -> str:
+    """A ``MiscObject`` or ``Pedestrian`` whose reference point is its middle."""
+    attribute = "pedestrianCategory" if tag == "Pedestrian" else "miscObjectCategory"
+    return (
+        f'<{tag} name="thing" mass="20" {attribute}="{kind}"><BoundingBox><Center x="0" y="0" z="{0.5 * height}"/>'
+        f'<Dimensions width="{width}" length="{length}" height="{height}"/></BoundingBox></{tag}>'
+    )
+
+
+def lane(s: float, number: int = -1) -> str:
+    """Position on a lane of the road."""
+    return f'<Position><LanePosition roadId="7" laneId="{number}" s="{s}"/></Position>'
+
+
+def after(time: float, delay: float = 0.0) -> str:
+    """Group of one condition on the time [s]."""
+    return (
+        f'<ConditionGroup><Condition name="t" delay="{delay}" conditionEdge="none"><ByValueCondition>'
+        f'<SimulationTimeCondition value="{time}" rule="greaterThan"/></ByValueCondition></Condition></ConditionGroup>'
+    )
+
+
+def speed(value: float) -> str:
+    """Action that sets a speed [m/s] at once."""
+    return (
+        '<PrivateAction><LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="step" value="0" '
+        f'dynamicsDimension="time"/><SpeedActionTarget><AbsoluteTargetSpeed value="{value}"/></SpeedActionTarget>'
+        "</SpeedAction></LongitudinalAction></PrivateAction>"
+    )
+
+
+def event(name: str, action: str, start: str, count: int = 1) -> str:
+    """Event of one action, and its trigger's groups."""
+    return (
+        f'<Event name="{name}" priority="override" maximumExecutionCount="{count}"><Action name="{name} action">'
+        f"{action}</Action><StartTrigger>{start}</StartTrigger></Event>"
+    )
+
+
+def write(
+    folder: Path,
+    entities: dict[str, str],
+    begin: dict[str, str],
+    story: dict[str, str] | None = None,
+    stop: str = "",
+    visibility: float = 200.0,
+    road: Path = ROAD,
+) -> Path:
+    """Write a file: descriptions of entities, their initial positions and actions, and events by actor."""
+    objects = "".join(f'<ScenarioObject name="{name}">{what}</ScenarioObject>' for name, what in entities.items())
+    private = "".join(
+        f'<Private entityRef="{name}">'
+        + "".join(
+            part
+            if part.startswith("<PrivateAction")
+            else f"<PrivateAction><TeleportAction>{part}</TeleportAction></PrivateAction>"
+            for part in written.split("\n")
+        )
+        + "</Private>"
+        for name, written in begin.items()
+    )
+    groups = "".join(
+        f'<ManeuverGroup name="of {name}" maximumExecutionCount="1"><Actors selectTriggeringEntities="false">'
+        f'<EntityRef entityRef="{name}"/></Actors><Maneuver name="m">{events}</Maneuver></ManeuverGroup>'
+        for name, events in (story or {}).items()
+    )
+    act = (
+        f'<Story name="s"><Act name="a">{groups}<StartTrigger>{after(0)}</StartTrigger></Act></Story>' if story else ""
+    )
+    file = folder / "small.xosc"
+    file.write_text(
+        '<?xml version="1.0"?><OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="2026-01-01T00:00:00" '
+        'description="" author=""/><CatalogLocations><RouteCatalog><Directory path="."/></RouteCatalog>'
+        f'</CatalogLocations><RoadNetwork><LogicFile filepath="{road}"/></RoadNetwork>'
+        f"<Entities>{objects}</Entities><Storyboard><Init><Actions><GlobalAction><EnvironmentAction>"
+        f'<Environment name="e"><Weather><Sun illuminance="20000" azimuth="0" elevation="0.9"/>'
+        f'<Fog visualRange="{visibility}"/></Weather><RoadCondition frictionScaleFactor="1"/></Environment>'
+        f"</EnvironmentAction></GlobalAction>{private}</Actions></Init>{act}"
+        f"<StopTrigger>{stop or after(10)}</StopTrigger></Storyboard></OpenSCENARIO>",
+        encoding="utf-8",
+    )
+    return file

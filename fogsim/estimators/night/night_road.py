@@ -85,13 +85,14 @@ LEAD_HALF_WIDTH, LEAD_HEIGHT, LEAD_MARGIN, CLOSEST_LEAD = 1.5, 4.0, 0.4, 8.0
 """What a vehicle ahead covers at most, below its wheels too, for they and the pitch are not known, and how near it
 leaves too little [m]."""
 
-COMMON, MOSTLY_LAMPS = {False: 0.95, True: 0.7}, 0.9
-"""Part of the deviation of ln V that is of lamps, droplets and pavement, the same in all frames of a drive, by whether
-others' lamps, which pass, shine too; and share of lamplight above which there is little daylight [-]."""
+COMMON = 0.95
+"""Part of the deviation of ln V that is of lamps, droplets and pavement, the same in all frames of a drive [-]."""
 
-POWER, MOSTLY_DAYLIGHT = {False: 1.0, True: 4.0}, 0.5
-"""Power whose mean of the likelihood over draws is taken, by whether daylight outshines the own lamps, and share of
-lamplight below which it does: fog that hides what the lamps light fits with any lamps, which is no evidence for it."""
+MOSTLY_DAYLIGHT, BY_DAYLIGHT = 0.5, (4.0, 0.7)
+"""Share of lamplight below which daylight outshines the own lamps; there, the power whose mean of the likelihood over
+draws is taken, for fog that hides what the lamps light fits with any lamps, which is no evidence for it; and what the
+result is raised to, for pavement and sky by day err in ways of their own: chosen by `benchmarks/night_estimators.py
+--pool 0`."""
 
 BOUND_SOFTNESS = 0.1
 """Standard deviation of bounds in ln k [-]."""
@@ -260,8 +261,8 @@ class NightRoad:
                 break
             found = log_likelihoods(measured, extinction, own.veil, own.road, variance, weight, best)
         misfit, lamplight = best.summary.tolist()
-        power = POWER[lamplight < MOSTLY_DAYLIGHT]
-        likelihood = np.exp(power * (found - found.max())).mean(axis=0) ** (1.0 / power)
+        power, doubt = BY_DAYLIGHT if lamplight < MOSTLY_DAYLIGHT else (1.0, 1.0)
+        likelihood = np.exp(power * (found - found.max())).mean(axis=0) ** (doubt / power)
         share = likelihood / likelihood.sum()
         low, middle, high = _quantiles(share)
         diagnostics: dict[str, object] = {"visibility_quantiles": (low, middle, high), "misfit": misfit}
@@ -283,9 +284,7 @@ class NightRoad:
             return replace(Estimate.invalid(self.method, reason, **diagnostics), bounds=bounds)
         value = extinction_from_visibility(middle)
         deviation = (extinction_from_visibility(low) - value) / NORMAL_90_PERCENT
-        # By dusk the way to clear air is as doubtful as that to dense fog.
-        side = math.log(middle / low) if lamplight > MOSTLY_LAMPS else 0.5 * math.log(high / low)
-        common = COMMON[len(measured.others) > 0] * side / NORMAL_90_PERCENT
+        common = COMMON * 0.5 * math.log(high / low) / NORMAL_90_PERCENT
         return Estimate(self.method, value, deviation, diagnostics=diagnostics, common_deviation=common)
 
 

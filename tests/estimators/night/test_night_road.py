@@ -11,7 +11,7 @@ from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.calibration.cached import supply
 from fogsim.errors import InputError
 from fogsim.estimators import make
-from fogsim.estimators.night.light_fit import Measured, log_likelihoods
+from fogsim.estimators.night.light_fit import Fit, Measured, log_likelihoods
 from fogsim.estimators.night.night_road import DAYLIGHT, NightRoad
 from fogsim.estimators.night.own_light import VISIBILITIES, cell_luminance, cells_of, without_cut_noise
 from fogsim.values import Camera, Estimate, Lamp, LeadMeasurement, Observation
@@ -176,13 +176,16 @@ def test_the_likelihood_is_largest_where_the_light_was_made() -> None:
     veil, road = (np.exp(rng.standard_normal((3, 37, 30))).astype(np.float32) for _ in range(2))
     depth = np.where(np.arange(30) < 12, np.inf, np.geomspace(5.0, 100.0, 30))
     seen = 0.2 * (veil[1, 20] + road[1, 20]).astype(np.float64) + 1e-4
-    known = Measured(seen, (0.05 * seen) ** 2, depth, np.zeros(30), 0.0, 0.0, 6e-4, 16.0)
-    best = np.empty(32)
-    found = log_likelihoods(known, 3.0 / VISIBILITIES, veil, road, np.ones(30), best)
-    assert np.unravel_index(np.argmax(found), found.shape) == (1, 20)
-    assert np.allclose(best[:-2], seen, rtol=1e-3)
-    assert best[-2] < 1e-3
-    assert best[-1] == pytest.approx(1.0, abs=0.01)
+    glow = np.geomspace(1.0, 0.01, 30)[None]
+    for others, amount in ((glow[:0], 0.0), (glow, 0.0), (glow, 0.3)):
+        shown = seen + amount * glow[0]
+        known = Measured(shown, depth, np.zeros(30), others, 0.0, 0.0, 6e-4, 16.0)
+        best = Fit(np.empty(30), np.empty(2))
+        found = log_likelihoods(known, 3.0 / VISIBILITIES, veil, road, (0.05 * shown) ** 2, np.ones(30), best)
+        assert np.unravel_index(np.argmax(found), found.shape) == (1, 20)
+        assert np.allclose(best.luminance, shown, rtol=2e-3)
+        assert best.summary[0] < 1e-3
+        assert best.summary[1] == pytest.approx(seen.sum() / shown.sum(), abs=0.01)
 
 
 def test_noise_that_is_cut_off_at_the_dark_is_allowed_for() -> None:

@@ -140,7 +140,9 @@ def log_likelihoods(
                 likelihood += math.exp(value)
                 if value > highest:
                     highest, best.summary[0] = value, square
-                    _model(used, terms, math.exp(ratio), veil[draw, place], road[draw, place], even, measured, draw, best)
+                    _model(
+                        used, terms, math.exp(ratio), veil[draw, place], road[draw, place], even, measured, draw, best
+                    )
             found[draw, place] = math.log(max(likelihood, 1e-300))
     return found
 

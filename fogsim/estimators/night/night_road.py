@@ -57,12 +57,13 @@ MOST_MISFIT, LEAST_WEIGHT = {True: 2.0, False: 2.5}, 0.6
 """Mean squared deviation above which other light is seen, by whether the beam is known, and mean weight of the cells
 below which lamps of others shine over too much of the image [-]."""
 
-PEDESTAL, GLOW = 6e-4, 0.5
-"""Standard deviation of the sensor's dark offset and of light that the lens scatters evenly, of full scale, and where
-lamps of others are seen that of their glow, over the luminance of the sky [-]."""
+PEDESTAL = 6e-4
+"""Standard deviation of the sensor's dark offset and of light that the lens scatters evenly, of full scale [-]."""
 
 LEAST_LAMPLIGHT = 0.5
-"""Share of the light that the own lamps must give where no sensor reports the daylight [-]."""
+"""Share of the light that the own lamps must give by night, and where no sensor reports the daylight [-]."""
+
+OUTSHONE = "lamps of others outshine what the own ones light"
 
 ROUNDS, SETTLED = 4, 0.05
 """How often weights of the cells are found again, and changes of them that change nothing [-]."""
@@ -73,10 +74,9 @@ CLEAR, MAY_BE_CLEAR = 2000.0, 0.05
 GLOWS = [(1.2 + 0.2 * (i % 5), 20.0 * 6.0 ** (i % 4 / 3)) for i in range(20)]
 """Shapes of the glow of others' lamps: power of the angle by which it falls, and distance of the lamps [m]."""
 
-LAMPS_FROM, HALO, MOST_GLARE = 40.0, 0.06, 1e-3
-"""Distance on the road beyond which what is clipped may be a lamp [m], how far from it cells are left
-out [rad], and solid angle of all of it from which on its halo is everywhere [sr]: chosen on seeds 100 and 101 of
-rural_night_fog, rural_night_oncoming and night_motorway_fog, where readings above it were a fifth of the truth."""
+LAMPS_FROM, HALO = 40.0, 0.03
+"""Distance on the road beyond which what is clipped may be a lamp [m], and how far from it cells are left out [rad]:
+chosen by `benchmarks/night_lamps.py --choose`."""
 
 MAY_BE_DENSER = 0.25
 """Probability of the densest fog of the model from which on there may be denser fog [-]."""
@@ -189,9 +189,9 @@ class NightRoad:
             self._earlier.clear()
             self._lit = lit
         seen = self._look(image)
-        beside, others, glare = self._lamps_of_others(image)
+        beside, others = self._lamps_of_others(image)
         used = (seen.clipped < MOST_CLIPPED) & ~self._hidden(observation) & ~beside
-        if why := _too_little(seen, used, self._cells.is_sky, glare):
+        if why := _too_little(seen, used, self._cells.is_sky):
             return Estimate.invalid(self.method, why)
         if self._source is None:
             return Estimate.invalid(self.method, "it has no calibration; fogsim.estimators.make supplies one")
@@ -199,7 +199,9 @@ class NightRoad:
         if self._own is None or self._own[0] != wanted:
             self._own = wanted, self._source.own_light(without_noise(self._camera), *wanted, self._lamps)
         return self._estimate(
-            self._measured(seen, used, light, np.ascontiguousarray(others[:, used])), _of_cells(self._own[1], used), used
+            self._measured(seen, used, light, np.ascontiguousarray(others[:, used])),
+            _of_cells(self._own[1], used),
+            used,
         )
 
     def _look(self, image: Pixels) -> Seen:
@@ -220,8 +222,8 @@ class NightRoad:
         hidden: NDArray[np.bool_] = upright & (aside < LEAD_HALF_WIDTH)
         return hidden
 
-    def _lamps_of_others(self, image: Pixels) -> tuple[NDArray[np.bool_], Floats, float]:
-        """Cells beside lamps of others, which are clipped, shapes of their glow, and their solid angle [sr]."""
+    def _lamps_of_others(self, image: Pixels) -> tuple[NDArray[np.bool_], Floats]:
+        """Cells beside lamps of others, which are clipped, and shapes that the glow of these may have."""
         camera, green = self._camera, image if image.ndim == 2 else image[:, :, 1]
         end = max(min(round(camera.horizon_row + camera.row_distance / LAMPS_FROM), camera.height), 0)
         v, u = np.nonzero(green[:end] >= 2**camera.bits - 1)
@@ -237,7 +239,7 @@ class NightRoad:
             before = np.minimum(1.0, self._depth / distance)
             shape[:] = before * ((edge / np.maximum(away, edge)) ** power).sum(axis=1)
         beside = (away < HALO).any(axis=1)
-        return beside, glow, len(v) / camera.focal_length**2
+        return beside, glow
 
     def _measured(self, seen: Seen, used: NDArray[np.bool_], light: float, others: Floats) -> Measured:
         luminance, is_sky = seen.luminance[used], self._cells.is_sky[used]
@@ -269,10 +271,11 @@ class NightRoad:
         diagnostics |= {"lamplight": lamplight, "weight": float(weight.mean())}
         if misfit > MOST_MISFIT[self._lamps != "unknown"]:
             return Estimate.invalid(self.method, "other light than that of the own head lamps", **diagnostics)
-        if measured.sky_scale > 0.0 and lamplight < LEAST_LAMPLIGHT:
-            return Estimate.invalid(self.method, "light of the day, or of lamps all around", **diagnostics)
+        if measured.lamp_scale == 0.0 and lamplight < LEAST_LAMPLIGHT:
+            others = "light of the day, or of lamps all around" if measured.sky_scale > 0.0 else OUTSHONE
+            return Estimate.invalid(self.method, others, **diagnostics)
         if weight.mean() < LEAST_WEIGHT:
-            return Estimate.invalid(self.method, "lamps of others outshine what the own ones light", **diagnostics)
+            return Estimate.invalid(self.method, OUTSHONE, **diagnostics)
         widened = math.exp(NORMAL_90_PERCENT * BOUND_SOFTNESS)
         if share[VISIBILITIES > CLEAR].sum() > MAY_BE_CLEAR:
             bounds = ExtinctionBounds(most=extinction_from_visibility(low) / widened, softness=BOUND_SOFTNESS)
@@ -314,10 +317,10 @@ def _of_cells(own: OwnLight, used: NDArray[np.bool_]) -> OwnLight:
     return OwnLight(np.ascontiguousarray(own.veil[:, :, used]), np.ascontiguousarray(own.road[:, :, used]))
 
 
-def _too_little(seen: Seen, used: NDArray[np.bool_], is_sky: NDArray[np.bool_], glare: float) -> str:
-    """Why nothing can be told from the cells of use, beside lamps of others [sr]; empty if something may."""
+def _too_little(seen: Seen, used: NDArray[np.bool_], is_sky: NDArray[np.bool_]) -> str:
+    """Why nothing can be told from the cells of use; empty if something may."""
     if np.count_nonzero(used) < LEAST_CELLS or np.count_nonzero(used & ~is_sky) < LEAST_ROAD:
         return "too little is seen that is neither too bright nor too dark"
     if float(seen.luminance[used].max()) < LEAST_PEAK:
         return "too dark: the head lamps light nothing"
-    return "lamps of others outshine what the own ones light" if glare > MOST_GLARE else ""
+    return ""

@@ -125,9 +125,19 @@ def test_vehicles_ahead_and_lamps_of_others_are_left_out() -> None:
     picture[58:66, 74:86] = 30  # its rear, 20 m ahead
     picture[50:54, 30:34] = 255
     assert estimate(picture, lead=LeadMeasurement(20.0, 0.0)).visibility == pytest.approx(100.0, rel=0.3)
-    # Near lamps have halos that reach everywhere.
-    picture[44:60, 26:40] = 255
-    assert "outshine" in str(estimate(picture).diagnostics["reason"])
+
+
+@pytest.mark.parametrize("power", [1.3, 1.8])
+@pytest.mark.parametrize("visibility", [60.0, 150.0])
+def test_the_glow_of_near_lamps_is_part_of_the_model(visibility: float, power: float) -> None:
+    picture = night_picture(visibility)
+    rows, cols = np.indices(picture.shape[:2])
+    away = np.hypot(rows - 52.0, cols - 33.0)
+    linear = (picture / 255.0) ** 2.2 + 1.2 * (np.maximum(away, 4.0) / 4.0)[..., None] ** -power
+    glowing = np.round(255.0 * np.minimum(linear, 1.0) ** (1 / 2.2)).astype(np.uint8)
+    found = estimate(glowing)
+    assert found.valid or found.bounds is not None
+    assert holds(found, visibility)
 
 
 def test_a_camera_that_sees_no_sky_reads_the_road() -> None:
@@ -184,7 +194,7 @@ def test_the_likelihood_is_largest_where_the_light_was_made() -> None:
         found = log_likelihoods(known, 3.0 / VISIBILITIES, veil, road, (0.05 * shown) ** 2, np.ones(30), best)
         assert np.unravel_index(np.argmax(found), found.shape) == (1, 20)
         assert np.allclose(best.luminance, shown, rtol=2e-3)
-        assert best.summary[0] < 1e-3
+        assert best.summary[0] < 1e-2
         assert best.summary[1] == pytest.approx(seen.sum() / shown.sum(), abs=0.01)
 
 

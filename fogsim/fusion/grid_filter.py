@@ -146,7 +146,7 @@ class GridFilter:
         return Belief(self._log_extinction, self._with_common_errors(), denser)
 
     def _update_common(self, common: float) -> None:
-        """Follow the common deviation of the best estimate; what better images have shown stays known for some seconds."""
+        """Follow the common deviation of the best estimate; better images stay known for some seconds."""
         worse = min(max(common - self._common, 0.0), MOST_COMMON)
         self._common = min(common, self._common + worse * min(self._elapsed / COMMON_TIME, 1.0))
 

@@ -77,7 +77,7 @@ class Gallen2014:
     low_beam_below : float
         Visibility below which low beams are lit [m].
     hysteresis : float
-        High beams are lit once the median visibility exceeds that by this share [-].
+        High beams are lit once visibility exceeds that by this share [-].
     near_lead : float
         Distance by radar up to which who drives ahead would be dazzled [m]; UNECE R48 asks for 100 m.
     dwell : float
@@ -109,13 +109,12 @@ class Gallen2014:
         belief, observation, time, previous
             What is believed and measured, the instant, and lamps lit now.
         """
-        careful, median = (belief.known_visibility(share) for share in (self.quantile, 0.5))
-        if careful is None or median is None:
+        visibility = belief.known_visibility(self.quantile)
+        if visibility is None:
             return LampChoice(BY_DAY)
-        # Doubt and hysteresis are two margins, not one upon the other.
-        margin = 1.0 if Lamp.HIGH_BEAM in previous.lamps else 1.0 + self.hysteresis
-        enough = careful >= self.low_beam_below and median >= self.low_beam_below * margin
-        high = is_dark(observation) and enough and not would_dazzle(observation, self.near_lead)
+        has_high = Lamp.HIGH_BEAM in previous.lamps
+        enough = self.low_beam_below * (1.0 if has_high else 1.0 + self.hysteresis)
+        high = is_dark(observation) and visibility >= enough and not would_dazzle(observation, self.near_lead)
         rules = FogLampRules(self.rear_fog_below, self.front_fog_below, self.hysteresis, self.quantile)
         low = rules.lamps(belief, previous.lamps)
         return settled(HIGH_BEAMS | low & Lamp.REAR_FOG if high else low, time, previous, self.dwell)

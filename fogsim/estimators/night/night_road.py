@@ -91,8 +91,8 @@ COMMON = 0.95
 MOSTLY_DAYLIGHT, BY_DAYLIGHT = 0.5, (4.0, 0.7)
 """Share of lamplight below which daylight outshines the own lamps; there, the power whose mean of the likelihood over
 draws is taken, for fog that hides what the lamps light fits with any lamps, which is no evidence for it; and what the
-result is raised to, for pavement and sky by day err in ways of their own: chosen by `benchmarks/night_estimators.py
---pool 0`."""
+result is raised to, for pavement and sky by day err in ways of their own: chosen on pool 0 of
+`benchmarks/night_estimators.py` and on rural_night_alone while night falls."""
 
 BOUND_SOFTNESS = 0.1
 """Standard deviation of bounds in ln k [-]."""

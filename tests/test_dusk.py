@@ -82,3 +82,16 @@ def test_what_cannot_be_drawn_is_refused(settings: list[str], told: str) -> None
     dusk = DUSK.replace("illuminance: 0.05 lx", "illuminance_lx: 0.05")
     with pytest.raises(fogsim.InputError, match=told):
         fogsim.load_scenario("motorway_fog_bank", [dusk, *settings])
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("visibility", [40.0, 80.0, 150.0])
+def test_the_belief_stays_honest_while_night_falls_on_front_fog_lamps(visibility: float, seed: int) -> None:
+    lit = "{method: fog_lamp_rules, informed_by: truth, parameters: {front_fog_below: 1e5, rear_fog_below: 0}}"
+    night_falls = "timeline=[{when: time > 2 s, do: {light: {illuminance: 0.05 lx, over: 16 s, course: factors}}}]"
+    settings = ["expect={}", "duration=22 s", "light.illuminance=3000 lx", "sut.estimators=[joint_road, night_road]"]
+    settings += [f"fog.visibility={visibility} m", f"sut.lighting={lit}", night_falls]
+    scenario = fogsim.load_scenario("rural_night_alone", settings)
+    beliefs = [step.belief for step in fogsim.run(scenario, seed=seed)]
+    held = [one.visibility_quantile(0.05) <= visibility <= one.visibility_quantile(0.95) for one in beliefs]
+    assert np.mean(held) >= 0.95

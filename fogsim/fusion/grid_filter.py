@@ -132,23 +132,23 @@ class GridFilter:
         self._advance(time)
         denser = self._announcements.update(estimates, time)
         farthest = 0.0 if denser is None else denser.distance
-        log_likelihood, common = np.zeros(CELLS), math.inf
-        for estimate in estimates:
-            if estimate.reach < farthest:
-                continue
-            if estimate.valid and math.isfinite(estimate.extinction) and math.isfinite(estimate.standard_deviation):
+        log_likelihood = np.zeros(CELLS)
+        reaching = [estimate for estimate in estimates if estimate.reach >= farthest]
+        self._update_common(min((one.common_deviation for one in reaching if _is_measured(one)), default=self._common))
+        for estimate in reaching:
+            if _is_measured(estimate):
                 log_likelihood += self._weight * self._log_likelihood(estimate)
-                common = min(common, estimate.common_deviation)
-            elif estimate.bounds is not None:
+            elif not estimate.valid and estimate.bounds is not None:
                 log_likelihood += self._weight * self._log_likelihood_within(estimate.bounds)
         # The largest exponent is zero: no product of densities can overflow, and the sum cannot vanish.
         posterior = self._probability * np.exp(log_likelihood - log_likelihood.max())
         self._probability = posterior / posterior.sum()
-        if common < math.inf:
-            # What better images have shown stays known for some seconds.
-            worse = min(max(common - self._common, 0.0), MOST_COMMON)
-            self._common = min(common, self._common + worse * min(self._elapsed / COMMON_TIME, 1.0))
         return Belief(self._log_extinction, self._with_common_errors(), denser)
+
+    def _update_common(self, common: float) -> None:
+        """Follow the common deviation of the best estimate; better images stay known for some seconds."""
+        worse = min(max(common - self._common, 0.0), MOST_COMMON)
+        self._common = min(common, self._common + worse * min(self._elapsed / COMMON_TIME, 1.0))
 
     def _with_common_errors(self) -> Floats:
         """The probability, spread by what all images of the best method in use have wrong in common."""
@@ -205,7 +205,9 @@ class GridFilter:
         # A deviation far beyond the grid says as little as one a bit beyond it, and squares to no infinity.
         seen = estimate.reach * measured / OPTICAL_DEPTH_AT_VISIBILITY if measured > 0.0 else 1.0
         unseen = self._unseen_deviation * max(0.0, 1.0 - seen) * measured
-        deviation = math.hypot(min(max(estimate.own_deviation, 0.0), 10.0), floor, unseen)
+        # Errors in common that do not yet widen the belief are errors of this estimate.
+        more = math.sqrt(max(min(estimate.common_deviation, MOST_COMMON) ** 2 - self._common**2, 0.0))
+        deviation = math.hypot(min(max(estimate.own_deviation, 0.0), 10.0), floor, unseen, more * measured)
         return _log_likelihoods(self._extinction, measured, deviation, self._outlier_share)
 
     def _log_likelihood_within(self, bounds: ExtinctionBounds) -> Floats:
@@ -219,6 +221,10 @@ class GridFilter:
         # Signs that are told wrongly are more than other outliers, and the belief must survive two of them.
         share = max(self._outlier_share, LEAST_UNBOUND)
         return np.asarray(np.log(share + (1.0 - share) * inside))
+
+
+def _is_measured(estimate: Estimate) -> bool:
+    return estimate.valid and math.isfinite(estimate.extinction) and math.isfinite(estimate.standard_deviation)
 
 
 def _normal_share(deviations: Floats) -> Floats:

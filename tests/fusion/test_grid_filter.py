@@ -113,6 +113,16 @@ def test_what_all_images_have_wrong_in_common_stays_in_the_belief():
     assert feed(fusion, [Estimate.invalid("test", "nothing seen")], start=35.0).log_standard_deviation < 0.2
 
 
+@pytest.mark.parametrize("wrong", [0.5, 2.0])
+def test_errors_in_common_do_not_make_surer_of_a_wrong_value(wrong):
+    fusion = make("grid_filter")
+    feed(fusion, [measured(80.0)] * 50)
+    worse = dataclasses.replace(measured(wrong * 80.0, 0.8), common_deviation=0.6)
+    for number in range(150):
+        belief = fusion.update([worse], 5.0 + 0.2 * number)
+        assert belief.visibility_quantile(0.05) < 80.0 < belief.visibility_quantile(0.95)
+
+
 def test_agreeing_methods_narrow_the_belief():
     one = make("grid_filter").update([measured(100.0)], 0.0)
     two = make("grid_filter").update([measured(100.0), measured(100.0)], 0.0)

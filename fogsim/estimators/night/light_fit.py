@@ -23,8 +23,13 @@ SOFTNESS = 0.25
 SOFT, HARD = 2.5, 3.5
 """Deviations from which on a cell that is too bright or too dark counts less: others' lamps, things on the road [-]."""
 
-TERMS = 5
-"""Lamplight, pedestal, airlight, the road by day, and how the sky brightens upward."""
+LAMPS, PEDESTAL, AIRLIGHT, DAY_ROAD, SLOPE, OTHERS = range(6)
+"""Terms: lamplight, pedestal, airlight, the road by day, how the sky brightens upward, glow of others' lamps."""
+
+AIRLIGHT_MEAN, AIRLIGHT_DEVIATION = 0.7, 0.5
+DAY_ROAD_MEAN, DAY_ROAD_DEVIATION = 0.15, 0.12
+SLOPE_DEVIATION = 0.3
+"""What is known of airlight, of the road by day, and of how the sky brightens upward, over their scale [-]."""
 
 
 class Measured(NamedTuple):
@@ -34,12 +39,13 @@ class Measured(NamedTuple):
     ----------
     seen : (cells,) float64
         Luminance of the cells, full scale being 1.
-    variance : (cells,) float64
-        Of what the model says of each.
     depth : (cells,) float64
         Distance to the road, inf in the sky [m].
     up : (cells,) float64
         Elevation of sky cells over the highest [-], 0 on the road.
+    others : (shapes, cells) float64
+        Glow of others' lamps, by the shapes that it may have, were it of full scale where they are clipped; of no
+        shape where there are none. Draws have them in turn.
     sky_scale, lamp_scale : float
         Standard size of the airlight: of full scale, and relative to the lamplight's amplitude; 0 where unused.
     even : float
@@ -49,18 +55,39 @@ class Measured(NamedTuple):
     """
 
     seen: Floats
-    variance: Floats
     depth: Floats
     up: Floats
+    others: Floats
     sky_scale: float
     lamp_scale: float
     even: float
     independent: float
 
 
+class Fit(NamedTuple):
+    """What the likeliest fit says.
+
+    Attributes
+    ----------
+    luminance : (cells,) float64
+        Luminance of the cells, full scale being 1.
+    summary : (2,) float64
+        Mean squared deviation, and share of the light of all cells that is the lamps'.
+    """
+
+    luminance: Floats
+    summary: Floats
+
+
 @kernel
 def log_likelihoods(
-    measured: Measured, extinction: Floats, veil: Templates, road: Templates, weight: Floats, best: Floats
+    measured: Measured,
+    extinction: Floats,
+    veil: Templates,
+    road: Templates,
+    variance: Floats,
+    weight: Floats,
+    best: Fit,
 ) -> Floats:
     """Logarithm of the likelihood (draws, extinctions), largest over amplitudes, summed over ratios.
 
@@ -72,45 +99,62 @@ def log_likelihoods(
         Extinction coefficients [1/m].
     veil, road : (draws, n, cells) float32
         What lamps light.
+    variance : (cells,) float64
+        Of what the model says of each cell.
     weight : (cells,) float64
         How much each cell counts.
-    best : (cells + 2,) float64
-        Written to: luminance of the cells by the likeliest fit, its mean squared deviation, and which share of the
-        light of all cells is the lamps'.
+    best : Fit
+        Written to.
     """
-    seen, independent = measured.seen, measured.independent
+    seen, independent, others = measured.seen, measured.independent, measured.others
     draws, count, cells = veil.shape
-    found, precision, total = np.empty((draws, count)), weight / measured.variance, weight.sum()
+    found, precision, total = np.empty((draws, count)), weight / variance, weight.sum()
     power = (precision * seen * seen).sum()
-    even, gram, side = np.empty((3, cells)), np.zeros((TERMS + 1, TERMS + 1)), np.zeros(TERMS + 1)
-    matrix, right, used = np.zeros((TERMS, TERMS)), np.zeros(TERMS), np.zeros(TERMS)
-    scratch = np.empty((TERMS, TERMS + 1))
     is_day = measured.sky_scale > 0.0 or measured.lamp_scale > 0.0
-    terms, scale, highest = TERMS if is_day else 2, 0.0, -np.inf
+    terms = _terms(is_day, len(others) > 0)
+    even, gram, side = np.empty((3, cells)), np.zeros((OTHERS + 2, OTHERS + 2)), np.zeros(OTHERS + 2)
+    matrix, right, used = np.zeros((len(terms), len(terms))), np.zeros(len(terms)), np.zeros(len(terms))
+    known, scratch = np.zeros((2, len(terms))), np.empty((len(terms), len(terms) + 1))
+    highest = -np.inf
     for place in range(count):
         _even_light(measured, extinction[place], even)
         _sums_of_light(even, seen, precision, gram, side)
         gram[2, 2] += 1.0 / measured.even**2
         for draw in range(draws):
-            _sums_of_lamps(veil[draw, place], road[draw, place], even, seen, precision, terms, gram, side)
-            if is_day:
+            _sums_of_lamps(veil[draw, place], road[draw, place], even, seen, precision, is_day, gram, side)
+            if len(others) > 0:
+                glow = others[draw % len(others)]
+                _sums_of_others(glow, veil[draw, place], road[draw, place], even, seen, precision, gram, side)
+            if len(terms) > 2:
                 _combine(gram, side, 1.0, terms, matrix, right)
-                scale = max(_daylight_scale(matrix, right, measured, used, scratch), 1e-7)
+                _set_known(terms, _daylight_scale(matrix, right, terms, measured, used, known, scratch), known)
             likelihood = 0.0
             for ratio in RATIOS:
                 _combine(gram, side, math.exp(ratio), terms, matrix, right)
-                if is_day:
-                    rest = power + _of_lamps_and_day(matrix, right, scale, used, scratch)
+                if len(terms) > 2:
+                    rest = power + _of_all_light(matrix, right, terms, known, used, scratch)
                 else:
                     rest = power + _of_lamps_alone(matrix, right, used)
                 square = max(rest, 0.0) / total
                 value = -0.5 * (independent * math.log(SOFTNESS + square) + (ratio / RATIO_DEVIATION) ** 2)
                 likelihood += math.exp(value)
                 if value > highest:
-                    highest, best[cells] = value, square
-                    _model(used, math.exp(ratio), veil[draw, place], road[draw, place], even, best)
+                    highest, best.summary[0] = value, square
+                    _model(
+                        used, terms, math.exp(ratio), veil[draw, place], road[draw, place], even, measured, draw, best
+                    )
             found[draw, place] = math.log(max(likelihood, 1e-300))
     return found
+
+
+@kernel
+def _terms(is_day: bool, has_others: bool) -> NDArray[np.int64]:
+    """Terms of which the light consists."""
+    terms = np.arange(OTHERS + 1)
+    if is_day:
+        return terms if has_others else terms[:OTHERS].copy()
+    terms[2] = OTHERS
+    return terms[:3].copy() if has_others else terms[:2].copy()
 
 
 @kernel
@@ -123,17 +167,30 @@ def _even_light(measured: Measured, extinction: float, even: Floats) -> None:
 
 @kernel
 def _model(
-    used: Floats, factor: float, veil: NDArray[np.float32], road: NDArray[np.float32], even: Floats, best: Floats
+    used: Floats,
+    terms: NDArray[np.int64],
+    factor: float,
+    veil: NDArray[np.float32],
+    road: NDArray[np.float32],
+    even: Floats,
+    measured: Measured,
+    draw: int,
+    best: Fit,
 ) -> None:
-    """Luminance of the cells by amplitudes, and the lamps' share of it, written to `best`."""
+    """Set what amplitudes make of the cells."""
     by_lamps = total = 0.0
     for cell in range(len(veil)):
         lit = used[0] * (factor * veil[cell] + road[cell])
-        by_day = used[2] * even[0, cell] + used[3] * even[1, cell] + used[4] * even[2, cell]
-        best[cell] = lit + used[1] + by_day
+        rest = used[1]
+        for i in range(2, len(terms)):
+            if terms[i] == OTHERS:
+                rest += used[i] * measured.others[draw % len(measured.others), cell]
+            else:
+                rest += used[i] * even[terms[i] - AIRLIGHT, cell]
+        best.luminance[cell] = lit + rest
         by_lamps += lit
-        total += best[cell]
-    best[len(veil) + 1] = by_lamps / max(total, 1e-12)
+        total += lit + rest
+    best.summary[1] = by_lamps / max(total, 1e-12)
 
 
 @kernel
@@ -160,7 +217,7 @@ def _sums_of_lamps(
     even: Floats,
     seen: Floats,
     precision: Floats,
-    terms: int,
+    is_day: bool,
     gram: Floats,
     side: Floats,
 ) -> None:
@@ -176,7 +233,7 @@ def _sums_of_lamps(
         r1 += r
         vy += v * seen[cell]
         ry += r * seen[cell]
-        if terms > 2:
+        if is_day:
             va += v * even[0, cell]
             ra += r * even[0, cell]
             vd += v * even[1, cell]
@@ -188,25 +245,62 @@ def _sums_of_lamps(
 
 
 @kernel
-def _combine(gram: Floats, side: Floats, factor: float, terms: int, matrix: Floats, right: Floats) -> None:
-    """Normal equations of lamplight as one, with a ratio of veil and road."""
-    matrix[0, 0] = factor * factor * gram[0, 0] + 2.0 * factor * gram[0, 1] + gram[1, 1]
-    right[0] = factor * side[0] + side[1]
-    for i in range(1, terms):
-        matrix[0, i] = matrix[i, 0] = factor * gram[0, 1 + i] + gram[1, 1 + i]
-        right[i] = side[1 + i]
-        for j in range(i, terms):
-            matrix[i, j] = matrix[j, i] = gram[1 + i, 1 + j]
+def _sums_of_others(
+    glow: Floats,
+    veil: NDArray[np.float32],
+    road: NDArray[np.float32],
+    even: Floats,
+    seen: Floats,
+    precision: Floats,
+    gram: Floats,
+    side: Floats,
+) -> None:
+    """Normal equations of the glow of others' lamps."""
+    last = OTHERS + 1
+    gram[:, last], side[last] = 0.0, 0.0
+    for cell in range(len(seen)):
+        g = precision[cell] * glow[cell]
+        gram[0, last] += g * veil[cell]
+        gram[1, last] += g * road[cell]
+        gram[2, last] += g
+        for i in range(3):
+            gram[3 + i, last] += g * even[i, cell]
+        gram[last, last] += g * glow[cell]
+        side[last] += g * seen[cell]
 
 
 @kernel
-def _daylight_scale(matrix: Floats, right: Floats, measured: Measured, used: Floats, scratch: Floats) -> float:
+def _combine(
+    gram: Floats, side: Floats, factor: float, terms: NDArray[np.int64], matrix: Floats, right: Floats
+) -> None:
+    """Normal equations of lamplight as one, with a ratio of veil and road."""
+    matrix[0, 0] = factor * factor * gram[0, 0] + 2.0 * factor * gram[0, 1] + gram[1, 1]
+    right[0] = factor * side[0] + side[1]
+    for i in range(1, len(terms)):
+        row = 1 + terms[i]
+        matrix[0, i] = matrix[i, 0] = factor * gram[0, row] + gram[1, row]
+        right[i] = side[row]
+        for j in range(i, len(terms)):
+            matrix[i, j] = matrix[j, i] = gram[row, 1 + terms[j]]
+
+
+@kernel
+def _daylight_scale(
+    matrix: Floats,
+    right: Floats,
+    terms: NDArray[np.int64],
+    measured: Measured,
+    used: Floats,
+    known: Floats,
+    scratch: Floats,
+) -> float:
     """Standard size of the airlight: of the sky that is seen, or by the light sensor and the lamplight's amplitude."""
     if measured.lamp_scale == 0.0:
-        return measured.sky_scale
+        return max(measured.sky_scale, 1e-7)
     _of_lamps_alone(matrix, right, used)
-    _of_lamps_and_day(matrix, right, max(measured.lamp_scale * used[0], 1e-7), used, scratch)
-    return float(measured.lamp_scale * used[0])
+    _set_known(terms, max(measured.lamp_scale * used[0], 1e-7), known)
+    _of_all_light(matrix, right, terms, known, used, scratch)
+    return float(max(measured.lamp_scale * used[0], 1e-7))
 
 
 @kernel
@@ -220,63 +314,68 @@ def _of_lamps_alone(matrix: Floats, right: Floats, used: Floats) -> float:
     return float(form - 2.0 * (lamp * right[0] + dark * right[1]))
 
 
-AIRLIGHT, AIRLIGHT_DEVIATION = 0.7, 0.5
-DAY_ROAD, DAY_ROAD_DEVIATION = 0.15, 0.12
-SLOPE_DEVIATION = 0.3
-"""What is known of airlight, of the road by day, and of how the sky brightens upward, over their scale [-]."""
+@kernel
+def _set_known(terms: NDArray[np.int64], scale: float, known: Floats) -> None:
+    """Set means and precisions of amplitudes, before anything is seen, by the size of the daylight."""
+    for i in range(2, len(terms)):
+        mean, deviation = 0.0, SLOPE_DEVIATION * scale
+        if terms[i] == AIRLIGHT:
+            mean, deviation = AIRLIGHT_MEAN * scale, AIRLIGHT_DEVIATION * scale
+        elif terms[i] == DAY_ROAD:
+            mean, deviation = DAY_ROAD_MEAN * scale, DAY_ROAD_DEVIATION * scale
+        elif terms[i] == OTHERS:
+            # A halo is no brighter than full scale where it begins: at the edge of what is clipped.
+            deviation = 1.0
+        known[0, i], known[1, i] = mean, 1.0 / deviation**2
 
 
 @kernel
-def _of_lamps_and_day(matrix: Floats, right: Floats, scale: float, used: Floats, scratch: Floats) -> float:
-    """As `_of_lamps_alone`, with daylight whose size is about known."""
-    free = np.ones(TERMS, np.bool_)
-    mean = (0.0, 0.0, AIRLIGHT * scale, DAY_ROAD * scale, 0.0)
-    weight = (
-        0.0,
-        0.0,
-        1.0 / (AIRLIGHT_DEVIATION * scale) ** 2,
-        1.0 / (DAY_ROAD_DEVIATION * scale) ** 2,
-        1.0 / (SLOPE_DEVIATION * scale) ** 2,
-    )
+def _of_all_light(
+    matrix: Floats, right: Floats, terms: NDArray[np.int64], known: Floats, used: Floats, scratch: Floats
+) -> float:
+    """As `_of_lamps_alone`, with light of others and of the day, whose size is about known."""
+    count = len(terms)
+    free = np.ones(count, np.bool_)
     while True:
-        for i in range(TERMS):
-            scratch[i, TERMS] = right[i] + weight[i] * mean[i] if free[i] else 0.0
-            for j in range(TERMS):
+        for i in range(count):
+            scratch[i, count] = right[i] + known[1, i] * known[0, i] if free[i] else 0.0
+            for j in range(count):
                 scratch[i, j] = matrix[i, j] if free[i] and free[j] else 0.0
-            scratch[i, i] = matrix[i, i] + weight[i]
+            scratch[i, i] = matrix[i, i] + known[1, i] if free[i] else 1.0
         _eliminate(scratch, used)
         fixed = False
-        # Lamplight, airlight and the road by day are not negative.
-        for i in (0, 2, 3):
-            if used[i] < 0.0 and not fixed:
+        # But for the pedestal and the slope no light is negative.
+        for i in range(count):
+            if terms[i] not in (PEDESTAL, SLOPE) and used[i] < 0.0 and not fixed:
                 free[i], fixed = False, True
         if not fixed:
-            return _form(matrix, right, mean, weight, used)
+            return _form(matrix, right, known, used)
 
 
 @kernel
 def _eliminate(a: Floats, found: Floats) -> None:
     """Solve positive definite equations, whose right side is the last column, by elimination in place."""
-    for i in range(TERMS):
+    count = len(a)
+    for i in range(count):
         scale = 1.0 / a[i, i]
-        for k in range(i + 1, TERMS):
+        for k in range(i + 1, count):
             share = a[k, i] * scale
-            for j in range(i + 1, TERMS + 1):
+            for j in range(i + 1, count + 1):
                 a[k, j] -= share * a[i, j]
-    for i in range(TERMS - 1, -1, -1):
-        rest = a[i, TERMS]
-        for j in range(i + 1, TERMS):
+    for i in range(count - 1, -1, -1):
+        rest = a[i, count]
+        for j in range(i + 1, count):
             rest -= a[i, j] * found[j]
         found[i] = rest / a[i, i]
 
 
 @kernel
-def _form(matrix: Floats, right: Floats, mean: tuple[float, ...], weight: tuple[float, ...], used: Floats) -> float:
+def _form(matrix: Floats, right: Floats, known: Floats, used: Floats) -> float:
     """Quadratic form of amplitudes, and what is known of them, less the form's constant."""
     form = 0.0
-    for i in range(TERMS):
-        form += weight[i] * (used[i] - mean[i]) ** 2 - 2.0 * used[i] * right[i]
-        for j in range(TERMS):
+    for i in range(len(used)):
+        form += known[1, i] * (used[i] - known[0, i]) ** 2 - 2.0 * used[i] * right[i]
+        for j in range(len(used)):
             form += used[i] * matrix[i, j] * used[j]
     return form
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fogsim.errors import InputError, shown
 from fogsim.estimators.image_check import ObservationCheck
-from fogsim.estimators.night.light_fit import Measured, log_likelihoods, robust_weights
+from fogsim.estimators.night.light_fit import Fit, Measured, log_likelihoods, robust_weights
 from fogsim.estimators.night.own_light import (
     KNOWN_HEAD_LAMPS,
     SKY,
@@ -58,12 +58,13 @@ MOST_MISFIT, LEAST_WEIGHT = {True: 2.0, False: 2.5}, 0.6
 """Mean squared deviation above which other light is seen, by whether the beam is known, and mean weight of the cells
 below which lamps of others shine over too much of the image [-]."""
 
-PEDESTAL, GLOW = 6e-4, 0.5
-"""Standard deviation of the sensor's dark offset and of light that the lens scatters evenly, of full scale, and where
-lamps of others are seen that of their glow, over the luminance of the sky [-]."""
+PEDESTAL = 6e-4
+"""Standard deviation of the sensor's dark offset and of light that the lens scatters evenly, of full scale [-]."""
 
 LEAST_LAMPLIGHT = 0.5
-"""Share of the light that the own lamps must give where no sensor reports the daylight [-]."""
+"""Share of the light that the own lamps must give by night, and where no sensor reports the daylight [-]."""
+
+OUTSHONE = "lamps of others outshine what the own ones light"
 
 ROUNDS, SETTLED = 4, 0.05
 """How often weights of the cells are found again, and changes of them that change nothing [-]."""
@@ -71,10 +72,12 @@ ROUNDS, SETTLED = 4, 0.05
 CLEAR, MAY_BE_CLEAR = 2000.0, 0.05
 """Visibility above which own lamps show no fog [m], and its probability from which on there is no upper bound [-]."""
 
-LAMPS_FROM, HALO, MOST_GLARE = 40.0, 0.06, 1e-3
-"""Distance on the road beyond which what is clipped may be a lamp [m], how far from it cells are left
-out [rad], and solid angle of all of it from which on its halo is everywhere [sr]: chosen on seeds 100 and 101 of
-rural_night_fog, rural_night_oncoming and night_motorway_fog, where readings above it were a fifth of the truth."""
+GLOWS = [(1.2 + 0.2 * (i % 5), 20.0 * 6.0 ** (i % 4 / 3)) for i in range(20)]
+"""Shapes of the glow of others' lamps: power of the angle by which it falls, and distance of the lamps [m]."""
+
+LAMPS_FROM, HALO = 40.0, 0.03
+"""Distance on the road beyond which what is clipped may be a lamp [m], and how far from it cells are left out [rad]:
+chosen by `benchmarks/night_lamps.py --choose`."""
 
 MAY_BE_DENSER = 0.25
 """Probability of the densest fog of the model from which on there may be denser fog [-]."""
@@ -83,9 +86,14 @@ LEAD_HALF_WIDTH, LEAD_HEIGHT, LEAD_MARGIN, CLOSEST_LEAD = 1.5, 4.0, 0.4, 8.0
 """What a vehicle ahead covers at most, below its wheels too, for they and the pitch are not known, and how near it
 leaves too little [m]."""
 
-COMMON, MOSTLY_LAMPS = {False: 0.95, True: 0.7}, 0.9
-"""Part of the deviation of ln V that is of lamps, droplets and pavement, the same in all frames of a drive, by whether
-others' lamps, which pass, shine too; and share of lamplight above which there is little daylight [-]."""
+COMMON = 0.95
+"""Part of the deviation of ln V that is of lamps, droplets and pavement, the same in all frames of a drive [-]."""
+
+MOSTLY_DAYLIGHT, BY_DAYLIGHT = 0.5, (4.0, 0.7)
+"""Share of lamplight below which daylight outshines the own lamps; there, the power whose mean of the likelihood over
+draws is taken, for fog that hides what the lamps light fits with any lamps, which is no evidence for it; and what the
+result is raised to, for pavement and sky by day err in ways of their own: chosen on pool 0 of
+`benchmarks/night_estimators.py` and on rural_night_alone while night falls."""
 
 BOUND_SOFTNESS = 0.1
 """Standard deviation of bounds in ln k [-]."""
@@ -182,9 +190,9 @@ class NightRoad:
             self._earlier.clear()
             self._lit = lit
         seen = self._look(image)
-        beside, glare = self._beside_lamps(image)
+        beside, others = self._lamps_of_others(image)
         used = (seen.clipped < MOST_CLIPPED) & ~self._hidden(observation) & ~beside
-        if why := _too_little(seen, used, self._cells.is_sky, glare):
+        if why := _too_little(seen, used, self._cells.is_sky):
             return Estimate.invalid(self.method, why)
         if self._source is None:
             return Estimate.invalid(self.method, "it has no calibration; fogsim.estimators.make supplies one")
@@ -192,7 +200,9 @@ class NightRoad:
         if self._own is None or self._own[0] != wanted:
             self._own = wanted, self._source.own_light(without_noise(self._camera), *wanted, self._lamps)
         return self._estimate(
-            self._measured(seen, used, light, others=bool(beside.any())), _of_cells(self._own[1], used)
+            self._measured(seen, used, light, np.ascontiguousarray(others[:, used])),
+            _of_cells(self._own[1], used),
+            used,
         )
 
     def _look(self, image: Pixels) -> Seen:
@@ -213,56 +223,60 @@ class NightRoad:
         hidden: NDArray[np.bool_] = upright & (aside < LEAD_HALF_WIDTH)
         return hidden
 
-    def _beside_lamps(self, image: Pixels) -> tuple[NDArray[np.bool_], float]:
-        """Cells near lamps of others, which are clipped, and the solid angle of these [sr].
-
-        Their halos are not of the model.
-        """
+    def _lamps_of_others(self, image: Pixels) -> tuple[NDArray[np.bool_], Floats]:
+        """Cells beside lamps of others, which are clipped, and shapes that the glow of these may have."""
         camera, green = self._camera, image if image.ndim == 2 else image[:, :, 1]
         end = max(min(round(camera.horizon_row + camera.row_distance / LAMPS_FROM), camera.height), 0)
         v, u = np.nonzero(green[:end] >= 2**camera.bits - 1)
-        beside = np.zeros(len(self._below), np.bool_)
-        # One pixel in each square of some pixels is enough.
+        # Squares of some pixels are fine enough.
         step = max(camera.width // 80, 1)
-        for down, across in set(zip((v // step).tolist(), (u // step).tolist(), strict=True)):
-            below = (step * (down + 0.5) - camera.horizon_row) / camera.focal_length
-            aside = (camera.principal_point[0] - step * (across + 0.5)) / camera.focal_length
-            beside |= np.hypot(self._below - below, self._aside - aside) < HALO
-        return beside, len(v) / camera.focal_length**2
+        square, count = np.unique((v // step) * 4096 + u // step, return_counts=True)
+        below = (step * (square // 4096 + 0.5) - camera.horizon_row) / camera.focal_length
+        aside = (camera.principal_point[0] - step * (square % 4096 + 0.5)) / camera.focal_length
+        away = np.hypot(self._below[:, None] - below, self._aside[:, None] - aside)
+        edge = np.sqrt(count / math.pi) / camera.focal_length
+        glow = np.zeros((len(GLOWS) if len(v) else 0, len(self._below)))
+        for shape, (power, distance) in zip(glow, GLOWS, strict=False):
+            before = np.minimum(1.0, self._depth / distance)
+            shape[:] = before * ((edge / np.maximum(away, edge)) ** power).sum(axis=1)
+        beside = (away < HALO).any(axis=1)
+        return beside, glow
 
-    def _measured(self, seen: Seen, used: NDArray[np.bool_], light: float, *, others: bool) -> Measured:
+    def _measured(self, seen: Seen, used: NDArray[np.bool_], light: float, others: Floats) -> Measured:
         luminance, is_sky = seen.luminance[used], self._cells.is_sky[used]
-        texture = np.where(is_sky, SKY_TEXTURE, ROAD_TEXTURE) * luminance
-        variance = texture**2 + FLOOR**2 + (LEVEL * luminance.mean()) ** 2
         lamp_scale = light / math.pi if light > NIGHT else 0.0
         sky = float(luminance[is_sky].mean()) if is_sky.any() else float(luminance.min())
         sky_scale = sky if math.isnan(light) else 0.0
         seen_road = np.count_nonzero(~is_sky) / np.count_nonzero(~self._cells.is_sky)
         independent = INDEPENDENT[self._lamps != "unknown"] * seen_road
-        even = math.hypot(PEDESTAL, GLOW * sky if others else 0.0)
-        scales = sky_scale, lamp_scale, even, independent
-        return Measured(luminance, variance, self._depth[used], self._up[used], *scales)
+        scales = sky_scale, lamp_scale, PEDESTAL, independent
+        return Measured(luminance, self._depth[used], self._up[used], others, *scales)
 
-    def _estimate(self, measured: Measured, own: OwnLight) -> Estimate:
+    def _estimate(self, measured: Measured, own: OwnLight, used: NDArray[np.bool_]) -> Estimate:
         extinction = np.array([extinction_from_visibility(one) for one in VISIBILITIES.tolist()])
-        weight, best = np.ones(len(measured.seen)), np.empty(len(measured.seen) + 2)
-        found = log_likelihoods(measured, extinction, own.veil, own.road, weight, best)
+        is_sky, seen = self._cells.is_sky[used], measured.seen
+        variance = (np.where(is_sky, SKY_TEXTURE, ROAD_TEXTURE) * seen) ** 2 + FLOOR**2 + (LEVEL * seen.mean()) ** 2
+        weight, best = np.ones(len(seen)), Fit(np.empty(len(seen)), np.empty(2))
+        found = log_likelihoods(measured, extinction, own.veil, own.road, variance, weight, best)
         for _ in range(ROUNDS):
-            earlier, weight = weight, robust_weights(measured.seen, best[:-2], measured.variance)
+            earlier, weight = weight, robust_weights(seen, best.luminance, variance)
             if np.abs(weight - earlier).max() < SETTLED:
                 break
-            found = log_likelihoods(measured, extinction, own.veil, own.road, weight, best)
-        likelihood = np.exp(found - found.max()).sum(axis=0)
+            found = log_likelihoods(measured, extinction, own.veil, own.road, variance, weight, best)
+        misfit, lamplight = best.summary.tolist()
+        power, doubt = BY_DAYLIGHT if lamplight < MOSTLY_DAYLIGHT else (1.0, 1.0)
+        likelihood = np.exp(power * (found - found.max())).mean(axis=0) ** (doubt / power)
         share = likelihood / likelihood.sum()
         low, middle, high = _quantiles(share)
-        diagnostics: dict[str, object] = {"visibility_quantiles": (low, middle, high), "misfit": float(best[-2])}
-        diagnostics |= {"lamplight": float(best[-1]), "weight": float(weight.mean())}
-        if best[-2] > MOST_MISFIT[self._lamps != "unknown"]:
+        diagnostics: dict[str, object] = {"visibility_quantiles": (low, middle, high), "misfit": misfit}
+        diagnostics |= {"lamplight": lamplight, "weight": float(weight.mean())}
+        if misfit > MOST_MISFIT[self._lamps != "unknown"]:
             return Estimate.invalid(self.method, "other light than that of the own head lamps", **diagnostics)
-        if measured.sky_scale > 0.0 and best[-1] < LEAST_LAMPLIGHT:
-            return Estimate.invalid(self.method, "light of the day, or of lamps all around", **diagnostics)
+        if measured.lamp_scale == 0.0 and lamplight < LEAST_LAMPLIGHT:
+            others = "light of the day, or of lamps all around" if measured.sky_scale > 0.0 else OUTSHONE
+            return Estimate.invalid(self.method, others, **diagnostics)
         if weight.mean() < LEAST_WEIGHT:
-            return Estimate.invalid(self.method, "lamps of others outshine what the own ones light", **diagnostics)
+            return Estimate.invalid(self.method, OUTSHONE, **diagnostics)
         widened = math.exp(NORMAL_90_PERCENT * BOUND_SOFTNESS)
         if share[VISIBILITIES > CLEAR].sum() > MAY_BE_CLEAR:
             bounds = ExtinctionBounds(most=extinction_from_visibility(low) / widened, softness=BOUND_SOFTNESS)
@@ -274,9 +288,7 @@ class NightRoad:
             return replace(Estimate.invalid(self.method, reason, **diagnostics), bounds=bounds)
         value = extinction_from_visibility(middle)
         deviation = (extinction_from_visibility(low) - value) / NORMAL_90_PERCENT
-        # By dusk the way to clear air is as doubtful as that to dense fog.
-        side = math.log(middle / low) if best[-1] > MOSTLY_LAMPS else 0.5 * math.log(high / low)
-        common = COMMON[measured.even > PEDESTAL] * side / NORMAL_90_PERCENT
+        common = COMMON * 0.5 * math.log(high / low) / NORMAL_90_PERCENT
         return Estimate(self.method, value, deviation, diagnostics=diagnostics, common_deviation=common)
 
 
@@ -306,10 +318,10 @@ def _of_cells(own: OwnLight, used: NDArray[np.bool_]) -> OwnLight:
     return OwnLight(np.ascontiguousarray(own.veil[:, :, used]), np.ascontiguousarray(own.road[:, :, used]))
 
 
-def _too_little(seen: Seen, used: NDArray[np.bool_], is_sky: NDArray[np.bool_], glare: float) -> str:
-    """Why nothing can be told from the cells of use, beside lamps of others [sr]; empty if something may."""
+def _too_little(seen: Seen, used: NDArray[np.bool_], is_sky: NDArray[np.bool_]) -> str:
+    """Why nothing can be told from the cells of use; empty if something may."""
     if np.count_nonzero(used) < LEAST_CELLS or np.count_nonzero(used & ~is_sky) < LEAST_ROAD:
         return "too little is seen that is neither too bright nor too dark"
     if float(seen.luminance[used].max()) < LEAST_PEAK:
         return "too dark: the head lamps light nothing"
-    return "lamps of others outshine what the own ones light" if glare > MOST_GLARE else ""
+    return ""

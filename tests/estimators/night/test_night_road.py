@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.errors import InputError
 from fogsim.estimators import make
-from fogsim.estimators.night.light_fit import Measured, log_likelihoods
+from fogsim.estimators.night.light_fit import Fit, Measured, log_likelihoods
 from fogsim.estimators.night.night_road import DAYLIGHT, NightRoad
 from fogsim.estimators.night.own_light import VISIBILITIES, cell_luminance, cells_of, without_cut_noise
 from fogsim.scenario.parts.methods import supply
@@ -125,9 +125,19 @@ def test_vehicles_ahead_and_lamps_of_others_are_left_out() -> None:
     picture[58:66, 74:86] = 30  # its rear, 20 m ahead
     picture[50:54, 30:34] = 255
     assert estimate(picture, lead=LeadMeasurement(20.0, 0.0)).visibility == pytest.approx(100.0, rel=0.3)
-    # Near lamps have halos that reach everywhere.
-    picture[44:60, 26:40] = 255
-    assert "outshine" in str(estimate(picture).diagnostics["reason"])
+
+
+@pytest.mark.parametrize("power", [1.3, 1.8])
+@pytest.mark.parametrize("visibility", [60.0, 150.0])
+def test_the_glow_of_near_lamps_is_part_of_the_model(visibility: float, power: float) -> None:
+    picture = night_picture(visibility)
+    rows, cols = np.indices(picture.shape[:2])
+    away = np.hypot(rows - 52.0, cols - 33.0)
+    linear = (picture / 255.0) ** 2.2 + 1.2 * (np.maximum(away, 4.0) / 4.0)[..., None] ** -power
+    glowing = np.round(255.0 * np.minimum(linear, 1.0) ** (1 / 2.2)).astype(np.uint8)
+    found = estimate(glowing)
+    assert found.valid or found.bounds is not None
+    assert holds(found, visibility)
 
 
 def test_a_camera_that_sees_no_sky_reads_the_road() -> None:
@@ -176,13 +186,16 @@ def test_the_likelihood_is_largest_where_the_light_was_made() -> None:
     veil, road = (np.exp(rng.standard_normal((3, 37, 30))).astype(np.float32) for _ in range(2))
     depth = np.where(np.arange(30) < 12, np.inf, np.geomspace(5.0, 100.0, 30))
     seen = 0.2 * (veil[1, 20] + road[1, 20]).astype(np.float64) + 1e-4
-    known = Measured(seen, (0.05 * seen) ** 2, depth, np.zeros(30), 0.0, 0.0, 6e-4, 16.0)
-    best = np.empty(32)
-    found = log_likelihoods(known, 3.0 / VISIBILITIES, veil, road, np.ones(30), best)
-    assert np.unravel_index(np.argmax(found), found.shape) == (1, 20)
-    assert np.allclose(best[:-2], seen, rtol=1e-3)
-    assert best[-2] < 1e-3
-    assert best[-1] == pytest.approx(1.0, abs=0.01)
+    glow = np.geomspace(1.0, 0.01, 30)[None]
+    for others, amount in ((glow[:0], 0.0), (glow, 0.0), (glow, 0.3)):
+        shown = seen + amount * glow[0]
+        known = Measured(shown, depth, np.zeros(30), others, 0.0, 0.0, 6e-4, 16.0)
+        best = Fit(np.empty(30), np.empty(2))
+        found = log_likelihoods(known, 3.0 / VISIBILITIES, veil, road, (0.05 * shown) ** 2, np.ones(30), best)
+        assert np.unravel_index(np.argmax(found), found.shape) == (1, 20)
+        assert np.allclose(best.luminance, shown, rtol=2e-3)
+        assert best.summary[0] < 1e-2
+        assert best.summary[1] == pytest.approx(seen.sum() / shown.sum(), abs=0.01)
 
 
 def test_noise_that_is_cut_off_at_the_dark_is_allowed_for() -> None:

@@ -126,7 +126,7 @@ class FieldFilter:
         """
         if not math.isfinite(place):
             raise InputError(f"field_filter: the place of an update must be finite, got {place!r}")
-        now = self._here.update(estimates, time)
+        now = self._here.update_at(estimates, time, place)
         if self._time is not None and time > self._time:
             self._share = min(1.0, (time - self._time) / self._correlation_time)
             self._field.elapse(time - self._time)

@@ -15,6 +15,7 @@ from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY, extinction_from_visibility
 from fogsim.values.belief import Belief
 from fogsim.values.estimate import Estimate, ExtinctionBounds
+from fogsim.values.observation import FogReport
 
 Floats = NDArray[np.float64]
 
@@ -27,6 +28,9 @@ _MOST_STEPS = 64
 MOST_COMMON, COMMON_TIME = 3.0, 5.0
 """Largest common deviation that counts [-]: a wider one leaves nothing known either; and the time over which that of
 worse estimates comes to count [s]."""
+
+SLOW, STILL = 5.0, 0.1
+"""Speed below which fog changes in proportion to the way [m/s]; and the least share, since wind moves fog, too [-]."""
 
 LEAST_UNBOUND = 0.2
 """Least share of bounds that are taken for wrong [-]: signs that bound the fog may be missing or hidden."""
@@ -42,7 +46,8 @@ class GridFilter:
     Neighbouring frames share their errors (road texture, pitch), so an estimate counts only for the share of
     `correlation_time` that has passed since the one before: the likelihood is raised to that power. What all images
     share (`Estimate.common_deviation`) widens the belief, whatever their number. Invalid estimates
-    change nothing but by their bounds, beyond which k is as unlikely as bounds are wrong; time alone widens the belief.
+    change nothing but by their bounds, beyond which k is as unlikely as bounds are wrong. Time widens the belief, at a
+    place that hardly changes (`update_at`) more slowly.
     Before the first estimate every ln k on the grid is equally likely.
 
     An estimate speaks of the fog up to its `reach`. Where that is nearer than the visibility that it gives, the fog
@@ -107,6 +112,25 @@ class GridFilter:
         self._time: float | None = None
         self._weight = 1.0
         self._common, self._elapsed = 0.0, math.inf
+        self._place, self._moving = math.nan, 1.0
+
+    def update_at(
+        self,
+        estimates: Sequence[Estimate],
+        time: float,
+        place: float,
+        reports: Sequence[FogReport] = (),  # noqa: ARG002 - the protocol's; they say nothing of here and now
+    ) -> Belief:
+        """Take in the estimates of one instant at a place along the way; see `LocatedFusion.update_at`.
+
+        Slower than 5 m/s the belief widens more slowly.
+        """
+        elapsed = math.nan if self._time is None else time - self._time
+        share = abs(place - self._place) / (SLOW * elapsed) if elapsed > 0.0 else math.nan
+        # In tenths, for the distributions over steps are kept.
+        self._moving = 1.0 if math.isnan(share) else min(max(round(share, 1), STILL), 1.0)
+        self._place = place
+        return self.update(estimates, time)
 
     def update(self, estimates: Sequence[Estimate], time: float) -> Belief:
         """Take in the estimates of one instant.
@@ -164,7 +188,7 @@ class GridFilter:
         if self._time is not None and time > self._time:
             elapsed = self._elapsed = time - self._time
             self._weight = min(1.0, elapsed / self._correlation_time)
-            self._probability = self._diffused(elapsed)
+            self._probability = self._diffused(elapsed * self._moving)
         self._time = time
 
     def _diffused(self, elapsed: float) -> Floats:

@@ -215,7 +215,7 @@ def test_reset_forgets_and_places_must_be_numbers():
 
 def test_either_kind_of_fusion_can_be_asked():
     assert isinstance(make("field_filter"), LocatedFusion)
-    assert not isinstance(make("grid_filter"), LocatedFusion)
+    assert not isinstance(make("none"), LocatedFusion)
     assert DatedFusion(make("grid_filter")).update_at([seen(100.0)], 0.0, 10.0).profile is None
     assert DatedFusion(make("field_filter")).update_at([seen(100.0)], 0.0, 10.0).profile is not None
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from fogsim.errors import InputError, UnknownNameError
-from fogsim.fusion import FUSIONS, make
+from fogsim.fusion import FUSIONS, LocatedFusion, make
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import Estimate
 from fogsim.values.estimate import ExtinctionBounds
@@ -235,3 +235,21 @@ def test_a_wrong_bound_does_not_outweigh_good_estimates():
         Estimate.invalid("test", "a sign is missing"), bounds=ExtinctionBounds(least=k_of(30.0))
     )
     assert feed(fusion, [wrong] * 5, start=2.0).visibility == pytest.approx(300.0, rel=0.15)
+
+
+def test_the_belief_hardly_widens_while_the_vehicle_stands() -> None:
+    seen = Estimate("m", 0.03, 0.001, True)
+
+    def spread_after_silence(speed: float) -> float:
+        fusion = make("grid_filter")
+        assert isinstance(fusion, LocatedFusion)
+        for number in range(20):
+            fusion.update_at([seen], 0.2 * number, 0.2 * number * 20.0)
+        for number in range(20, 70):
+            belief = fusion.update_at([], 0.2 * number, 80.0 + 0.2 * (number - 20) * speed)
+        low, high = belief.visibility_quantiles((0.05, 0.95))
+        return high / low
+
+    standing, slow, driving, faster = (spread_after_silence(speed) for speed in (0.0, 2.0, 5.0, 30.0))
+    assert standing < 2.0 < slow < driving
+    assert driving == pytest.approx(faster)

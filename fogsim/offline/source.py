@@ -138,6 +138,8 @@ class Animation:
     @classmethod
     def open(cls, path: Path, temporal: bool = True) -> "Animation | None":
         """The frames of a file; None if it has one alone or is no such image."""
+        if not path.is_file():
+            return None  # a pipe would be waited for
         try:
             with Image.open(path) as image:
                 if image.format not in ANIMATED_FORMATS or getattr(image, "n_frames", 1) == 1:

@@ -9,6 +9,7 @@ exit code is 1 if a file ends in anything but a run or a refusal, or does not fi
 
 import argparse
 import importlib.util
+import os
 import re
 import sys
 import traceback
@@ -74,7 +75,10 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("paths", nargs="+", type=Path)
     parser.add_argument("--run", action="store_true", help=f"run each file for {SECONDS:g} s")
+    parser.add_argument("--maps", type=Path, help="folder with the maps that files name (Town01.xodr)")
     given = parser.parse_args()
+    if given.maps:
+        os.environ["FOGSIM_MAPS"] = str(given.maps)
     files = [f for path in given.paths for f in (sorted(path.rglob("*.xosc")) if path.is_dir() else [path])]
     warnings.simplefilter("ignore")
     known, counts, kinds, is_bad = schemas(), Counter[str](), Counter[str](), False

@@ -18,6 +18,8 @@ import numpy as np
 from fogsim.errors import InputError, nearest, shown, suggest
 
 C = TypeVar("C", bound=Callable[..., Any])
+FileName = Annotated[str, "a file"]
+"""Name of a file; in a scenario it is relative to the scenario's folder."""
 Check = Callable[[Any], str | None]
 """From a value to what was expected; None if the value fits."""
 
@@ -139,6 +141,22 @@ def accepted_parameters(factory: Callable[..., object], given_elsewhere: Collect
     }
 
 
+def paths_in(factory: Callable[..., object], given: Mapping[str, Any], folder: Path) -> dict[str, Path]:
+    """Paths of the files that parameters of a factory name (`FileName`), relative to a folder."""
+    known = accepted_parameters(factory)
+    return {
+        name: folder / value
+        for name, value in given.items()
+        if name in known and isinstance(value, str) and _is_file_name(known[name].annotation, value)
+    }
+
+
+def _is_file_name(annotation: Any, value: str) -> bool:
+    parts = get_args(annotation)
+    is_choice = any(get_origin(part) is Literal and value in get_args(part) for part in parts)
+    return FileName in (annotation, *parts) and not is_choice
+
+
 def parameter_mistakes(
     factory: Callable[..., object],
     given: Mapping[str, object],
@@ -184,6 +202,8 @@ def check_of(annotation: Any, *, classes: bool) -> Check | None:
         check = _union_check([check_of(part, classes=classes) for part in parts])
     elif origin is Literal:
         check = _literal_check(parts)
+    elif annotation == FileName:
+        check = _instance_check((str,), parts[1])
     elif origin is Annotated:
         interval = next((part for part in parts if isinstance(part, Range)), None)
         check = check_of(parts[0], classes=classes) if interval is None else _plain_check(parts[0], interval)

@@ -15,7 +15,7 @@ from fogsim.randomness import Seed
 from fogsim.scenario import Scenario, build
 from fogsim.values import Ending, Step
 from fogsim_envs.actions import checked_action, checked_options
-from fogsim_envs.hosting import Simulation
+from fogsim_envs.hosting import Simulation, refuse_copies
 from fogsim_envs.rendering import RENDER_MODES, StepRenderer, render_modes
 from fogsim_envs.rewards import RewardWeights, reward_terms
 from fogsim_envs.spaces import ImageSize, action_space, command_of, observation_space, observe
@@ -75,6 +75,11 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         self._act_in(self._scenario)
         self.observation_space = cast("spaces.Space[Observation]", observation_space(build.camera(self._scenario)))
         self.action_space = action_space(continuous)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What pickle and copy take; a running simulation cannot be copied."""
+        refuse_copies(self._simulation is not None)
+        return self.__dict__
 
     def _act_in(self, scenario: Scenario) -> None:
         """Take up what a scenario says of clocks and safety, which an episode may change."""

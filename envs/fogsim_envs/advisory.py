@@ -75,12 +75,8 @@ class FogAdvisoryEnv(AdvisingEnv):
         timeout: Timeout = TIMEOUT,
     ) -> None:
         checked_timeout(timeout)
-
-        def load(settings: Sequence[str]) -> Scenario:
-            return override(scenario, settings) if isinstance(scenario, Scenario) else load_scenario(scenario, settings)
-
         super().__init__(
-            load,
+            functools.partial(_loaded, scenario),
             functools.partial(begin, timeout=timeout),
             overrides=overrides,
             image_size=image_size,
@@ -88,3 +84,7 @@ class FogAdvisoryEnv(AdvisingEnv):
             reward_weights=reward_weights,
             render_mode=render_mode,
         )
+
+
+def _loaded(scenario: str | Path | Scenario, settings: Sequence[str]) -> Scenario:
+    return override(scenario, settings) if isinstance(scenario, Scenario) else load_scenario(scenario, settings)

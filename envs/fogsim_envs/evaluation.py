@@ -14,6 +14,7 @@ from fogsim.errors import InputError
 from fogsim.parameters import Range, checked_parameters
 from fogsim.randomness import Seed
 from fogsim_envs.baselines import Info, Policy, baseline
+from fogsim_envs.infos import reward_terms_of, word_of
 
 RESAMPLES = 2000
 CONFIDENCE = 0.95
@@ -273,11 +274,11 @@ class _Sums:
         self._weight *= self._discount
         self.steps += 1
         self.cost += float(info.get("cost", 0.0))
-        for name, term in info.get("reward_terms", {}).items():
+        for name, term in reward_terms_of(info).items():
             self.terms[name] = self.terms.get(name, 0.0) + float(term)
 
     def result(self, seed: int, info: Info, struck: bool) -> EpisodeResult:
-        ending, time = info.get("ending") or "time", float(info.get("time_s", math.nan))
+        ending, time = word_of(info, "ending") or "time", float(info.get("time_s", math.nan))
         return EpisodeResult(seed, self.value, self.steps, time, ending, struck, self.cost, self.terms)
 
 
@@ -289,7 +290,7 @@ def _episode(env: gymnasium.Env[Any, Any], policy: Policy, seed: int, discount: 
         observation, reward, terminated, truncated, info = env.step(policy(observation, info))
         sums.add(float(reward), info)
         over = terminated or truncated
-    return sums.result(seed, info, info.get("fault") == "ego")
+    return sums.result(seed, info, word_of(info, "fault") == "ego")
 
 
 def _parallel_episode(env: Any, policy: AnyPolicy, seed: int, discount: float) -> EpisodeResult:

@@ -1,5 +1,6 @@
 """The agent advises the ego of a highway-env environment."""
 
+import functools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
@@ -70,26 +71,24 @@ class FogHighwayEnv(AdvisingEnv):
         made = highway_environment(environment, config)
         settings = highway_config(made)
 
-        def load(more: Sequence[str]) -> Scenario:
-            return highway_scenario(settings, visibility, more)
-
-        def begin(scenario: Scenario, seed: int) -> tuple[HighwayLoop, Step]:
-            loop = HighwayLoop(made, scenario)
-            try:
-                return loop, loop.start(seed)
-            except BaseException:
-                loop.close()
-                raise
-
         super().__init__(
-            load,
-            begin,
+            functools.partial(highway_scenario, settings, visibility),
+            functools.partial(_begun, made),
             overrides=overrides,
             image_size=image_size,
             continuous=continuous,
             reward_weights=reward_weights,
             render_mode=render_mode,
         )
+
+
+def _begun(environment: Any, scenario: Scenario, seed: int) -> "tuple[HighwayLoop, Step]":
+    loop = HighwayLoop(environment, scenario)
+    try:
+        return loop, loop.start(seed)
+    except BaseException:
+        loop.close()
+        raise
 
 
 class HighwayLoop:

@@ -46,7 +46,7 @@ def serve(connection: "Connection[Any, Any]") -> None:
             except FogSimError as error:
                 answer = error
             connection.send(("done", answer))
-    except (EOFError, BrokenPipeError):
+    except (EOFError, ConnectionError):
         return
     finally:
         if loop is not None:

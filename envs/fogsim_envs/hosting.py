@@ -108,6 +108,12 @@ def _begun(simulation: Simulation, seed: int) -> tuple[Simulation, Step]:
         raise
 
 
+def refuse_copies(was_reset: bool) -> None:
+    """Refuse to pickle or copy an environment that has begun an episode."""
+    if was_reset:
+        raise InputError("an environment can be pickled or copied only before its first reset()")
+
+
 class TrafficSimulation(Protocol):
     """What an environment needs of traffic without an ego, wherever it runs."""
 

@@ -11,7 +11,7 @@ import pickle
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
-from importlib import import_module, metadata
+from importlib import metadata
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar, cast
 
@@ -21,11 +21,9 @@ from fogsim.calibration.halo_calibration import Watch, measure_halo_threshold
 from fogsim.calibration.lit_fog import lit_fog
 from fogsim.calibration.sign_calibration import measure_operating_range
 from fogsim.calibration.veil_references import usual_references
-from fogsim.estimators import Estimator
 from fogsim.estimators.night.halos import HaloThreshold
 from fogsim.estimators.night.own_light import KNOWN_HEAD_LAMPS, OwnLight
 from fogsim.estimators.night.references import VeilReferences
-from fogsim.estimators.protocol import TakesCalibrations
 from fogsim.estimators.signs.operating_range import OperatingRange
 from fogsim.files.cache_entries import keep_newest, read_entry, write_entry
 from fogsim.files.user_cache import cache_directory
@@ -57,13 +55,17 @@ _NEWS_PERIOD = 10.0  # between two lines about the progress [s]
 class CachedCalibrations:
     """Calibrations by staged scenes and by the night model, made once for each camera and then read."""
 
+    def __init__(self, read_lamps: Callable[[Path], LampMount]) -> None:
+        self._read_lamps = read_lamps
+
     def veil_references(self, camera: Camera, lamps: Lamp, setback: float) -> VeilReferences:
         """References for a car's head lamps, computed once in each process."""
         return usual_references(camera, lamps, setback)
 
     def own_light(self, camera: Camera, lamps: Lamp, setback: float, head_lamps: str) -> OwnLight:
         """What a camera sees of its own head lamps: a car's, of an unknown pattern, or of a file."""
-        return _own_light(camera, lamps, setback, head_lamps)
+        mount = LampMount() if head_lamps in KNOWN_HEAD_LAMPS else self._read_lamps(Path(head_lamps))
+        return _own_light(camera, lamps, setback, mount, known=head_lamps != "unknown")
 
     def halo_threshold(self, camera: Camera) -> HaloThreshold:
         """Sharpness of halos below which there is fog; InputError if the camera shows none."""
@@ -79,11 +81,7 @@ class CachedCalibrations:
         )
 
 
-def _own_light(camera: Camera, lamps: Lamp, setback: float, head_lamps: str) -> OwnLight:
-    known, mount = head_lamps != "unknown", LampMount()
-    if head_lamps not in KNOWN_HEAD_LAMPS:
-        # By name, for YAML is read by a room that no calibration may import.
-        mount = import_module("fogsim.offline.lamp_file").load_lamps(Path(head_lamps))
+def _own_light(camera: Camera, lamps: Lamp, setback: float, mount: LampMount, *, known: bool) -> OwnLight:
     beams = [(str(lamp), one.azimuth, one.elevation, one.intensity) for lamp, one in mount.beams.items()]
     digest = hashlib.sha256(pickle.dumps((known, replace(mount, beams={}), beams))).hexdigest()
     name = f"the light of {lamp_names(lamps)} {setback:g} m ahead"
@@ -94,12 +92,6 @@ def _own_light(camera: Camera, lamps: Lamp, setback: float, head_lamps: str) -> 
         lambda watch: lit_fog(camera, lamps, setback, mount=mount, known=known, watch=watch),
         digest,
     )
-
-
-def supply(estimator: Estimator) -> None:
-    """Give an estimator calibrations to take where it was given none."""
-    if isinstance(estimator, TakesCalibrations):
-        estimator.take_calibrations(CachedCalibrations())
 
 
 class _Form(NamedTuple, Generic[_T]):

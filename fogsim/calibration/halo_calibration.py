@@ -7,7 +7,7 @@ import numpy as np
 
 from fogsim.calibration.staged_night import GLARE, NightRoad, NightScene, NightVehicle
 from fogsim.errors import InputError
-from fogsim.estimators.night.halos import HaloThreshold, largest_sharpness, mean_steepness
+from fogsim.estimators.night.halos import NEAREST, HaloThreshold, largest_sharpness, mean_steepness
 from fogsim.values import Camera, Lamp
 from fogsim.vision.sources.halo_profile import halos_of
 from fogsim.vision.sources.source_tree import source_tree
@@ -31,7 +31,7 @@ def random_scene(rng: np.random.Generator, strengths: tuple[float, float] = STRE
     vehicles = []
     if rng.random() < 0.6:
         lamps = _LIT | Lamp.STOP if rng.random() < 0.3 else _LIT
-        vehicles.append(NightVehicle(_between(rng, 12.0, 90.0), 0.1, lamps))
+        vehicles.append(NightVehicle(_between(rng, NEAREST, 90.0), 0.1, lamps))
     street = bool(rng.random() < 0.5)
     least = 0 if street or vehicles else 1
     oncoming = range(max(int(rng.integers(0, 3)), least))

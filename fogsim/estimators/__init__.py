@@ -84,7 +84,7 @@ def make(name: str, camera: Camera, **options: object) -> Estimator:
     made: Estimator = registry.make(ESTIMATORS, name, camera, **options)
     if isinstance(made, TakesCalibrations):
         # By name, for scenes are drawn by stages that no estimator may import.
-        import_module("fogsim.calibration.cached").supply(made)
+        import_module("fogsim.scenario.parts.methods").supply(made)
     return made
 
 

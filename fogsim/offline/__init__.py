@@ -9,7 +9,8 @@ from fogsim.offline.overlay import OverlayFile
 from fogsim.offline.rectification import Straightener, straightened
 from fogsim.offline.results import record_lines, summary_rows, table_heading, table_rows
 from fogsim.offline.sign_watch import SignSummary, SignWatch, watch_signs
-from fogsim.offline.source import ImageFiles, Picture, Source, VideoFile
+from fogsim.offline.source import ImageFiles, Picture, Source
+from fogsim.offline.video_source import VideoFile
 
 __all__ = [
     "NIGHT_METHODS",

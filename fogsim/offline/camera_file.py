@@ -107,12 +107,12 @@ def straight_camera(calibration: Calibration, path: Path) -> Camera:
     return calibration.camera
 
 
-def load_calibration(path: Path) -> Calibration:
+def load_calibration(path: str | Path) -> Calibration:
     """Read a camera file.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         A YAML file with the keys of `CameraFile`.
 
     Returns
@@ -125,7 +125,7 @@ def load_calibration(path: Path) -> Calibration:
     InputError
         If the file cannot be read or a key does not fit; one line for each mistake.
     """
-    document = read_document(path)
+    document = read_document(Path(path))
     try:
         keys = CameraFile.model_validate(document.data)
     except ValidationError as error:
@@ -175,12 +175,12 @@ def camera_text(guess: CameraGuess) -> str:
     return "".join(lines)
 
 
-def write_camera(path: Path, guess: CameraGuess, *, overwrite: bool = False) -> None:
+def write_camera(path: str | Path, guess: CameraGuess, *, overwrite: bool = False) -> None:
     """Write a guessed calibration as a camera file, whole or not at all.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         The camera file.
     guess : CameraGuess
         The calibration and its reasons.
@@ -192,5 +192,6 @@ def write_camera(path: Path, guess: CameraGuess, *, overwrite: bool = False) -> 
     InputError
         If it exists and must not be replaced, or cannot be written.
     """
-    refuse_unwritable(path, "--camera", overwrite=overwrite)
-    write_text(path, camera_text(guess))
+    file = Path(path)
+    refuse_unwritable(file, "--camera", overwrite=overwrite)
+    write_text(file, camera_text(guess))

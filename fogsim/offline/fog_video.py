@@ -17,8 +17,8 @@ from fogsim.offline.fog_image import (
 )
 from fogsim.offline.layered_fog import FogLayer
 from fogsim.offline.road_plane import RoadPlane
-from fogsim.offline.source import VideoFile
 from fogsim.offline.video_file import VideoWriter, refuse_unfit_video
+from fogsim.offline.video_source import VideoFile
 from fogsim.values import Camera
 
 
@@ -43,14 +43,15 @@ def fog_video(
     distance, sines = road.distance(), road.sines()
     air: NDArray[np.float64] | None = None
     damage = ""
-    with VideoWriter(out, video.period) as writer:
+    with VideoWriter(out) as writer:
         for picture in video.pictures():
             if picture.image is None:
                 damage = picture.error
                 continue
             if air is None:
                 air = _airlight(picture.image, distance, camera, airlight, layer)
-            writer.write(fog_image(picture.image, distance, visibility, camera, air, layer, sines))
+            fogged = fog_image(picture.image, distance, visibility, camera, air, layer, sines)
+            writer.write(fogged, picture.time)
             yield air
     if damage:
         raise InputError(f"{damage}; {out} has what could be read")

@@ -22,8 +22,16 @@ from fogsim.values import Camera
 DEPTH_KINDS = ("planar", "range")
 """Types of a depth map: distance along the optical axis, or along the viewing ray."""
 
-CHECKED_FORMATS = ("JPEG", "PNG", "BMP", "PPM")
+CHECKED_FORMATS = ("JPEG", "MPO", "PNG", "BMP", "PPM")
 """Pillow's names of formats whose truncated files OpenCV may read as far as they go."""
+
+ANIMATED_FORMATS = ("GIF", "WEBP", "PNG")
+_PARTS = dict.fromkeys(ANIMATED_FORMATS, "frames") | {"TIFF": "pages"}
+"""Several images in a file, by Pillow's name of the format; in others (MPO) the first is the photograph."""
+
+_ORIENTATION = 0x0112  # EXIF, as below
+_SIDEWAYS = (5, 6, 7, 8)
+_TOP_TO_BOTTOM, _LEFT_TO_RIGHT = (3, 4, 7, 8), (2, 3, 6, 7)
 
 MOST_BYTES = 2**31
 """Largest file of an image or a depth map [bytes]."""
@@ -32,7 +40,7 @@ Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
 
 def read_image(path: Path) -> Pixels:
-    """Read an image of 8 or 16 bits as it is stored, with colours in OpenCV's order."""
+    """Read an image of 8 or 16 bits, turned upright by its orientation tag, with colours in OpenCV's order."""
     image = _decoded(path)
     if image.dtype not in (np.uint8, np.uint16) or (image.ndim == 3 and image.shape[2] not in (1, 3, 4)):
         channels = 1 if image.ndim == 2 else image.shape[2]
@@ -44,7 +52,7 @@ def _decoded(path: Path) -> NDArray[np.generic]:
     data = read_bytes(path, MOST_BYTES)
     if not data:
         raise InputError(f"{path}: the file is empty")
-    _refuse_damaged(path, data)
+    orientation = _checked(path, data)
     # OpenCV would also print its own messages about errors that are reported below.
     level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
@@ -55,24 +63,37 @@ def _decoded(path: Path) -> NDArray[np.generic]:
         cv2.utils.logging.setLogLevel(level)
     if image is None:
         raise InputError(f"{path}: this is no image that can be read (PNG, TIFF, JPEG, …)")
-    return np.asarray(image)
+    return _upright(np.asarray(image), orientation)
 
 
-def _refuse_damaged(path: Path, data: bytes) -> None:
-    """Refuse images that OpenCV would silently fill up, or that would exhaust memory."""
+def _upright(image: NDArray[np.generic], orientation: int) -> NDArray[np.generic]:
+    """An image turned and mirrored as EXIF's orientation (1 to 8) says."""
+    turned = image.swapaxes(0, 1) if orientation in _SIDEWAYS else image
+    turned = turned[::-1] if orientation in _TOP_TO_BOTTOM else turned
+    turned = turned[:, ::-1] if orientation in _LEFT_TO_RIGHT else turned
+    return np.ascontiguousarray(turned)
+
+
+def _checked(path: Path, data: bytes) -> int:
+    """EXIF's orientation of an image; refuses what OpenCV would silently fill up or cut, or would exhaust memory."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             image = Image.open(io.BytesIO(data))
             if image.format in CHECKED_FORMATS:
                 image.load()
+            parts, orientation = getattr(image, "n_frames", 1), image.getexif().get(_ORIENTATION, 1)
     except UnidentifiedImageError:
         # OpenCV knows formats that Pillow does not.
-        return
+        return 1
     except Image.DecompressionBombError as error:
         raise InputError(f"{path}: by its header the image is larger than any camera's: {error}") from error
     except (OSError, SyntaxError, ValueError, EOFError, MemoryError) as error:
         raise InputError(f"{path}: the image is damaged or cut off: {error}") from error
+    if parts > 1 and image.format in _PARTS:
+        raise InputError(f"{path}: expected one image, got {parts} {_PARTS[image.format]}")
+    # OpenCV turns TIFF by itself.
+    return orientation if isinstance(orientation, int) and image.format != "TIFF" else 1
 
 
 class DepthMap(NamedTuple):

@@ -8,7 +8,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from fogsim.errors import InputError, suggest
-from fogsim.offline.source import ImageFiles, Source, VideoFile
+from fogsim.offline.source import Animation, ImageFiles, Source
+from fogsim.offline.video_source import VideoFile
 
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".pgm", ".ppm")
 """Suffixes of the images that are taken from a folder."""
@@ -53,6 +54,8 @@ def find_source(
     paths = [path for one in given for path in _paths(str(one))]
     if not paths:
         raise InputError("no image and no video is given")
+    if len(paths) == 1 and rate is None and (animation := Animation.open(paths[0], sequence is not False)):
+        return animation
     if not any(is_video(path) for path in paths):
         temporal = is_sequence(paths) if sequence is None else sequence
         return ImageFiles(tuple(paths), temporal, 1.0 / (rate or SEQUENCE_RATE))

@@ -174,7 +174,7 @@ class OverlayFile:
         _check(path, source, overwrite)
         self._path = path
         self._overlay = Overlay(camera, methods)
-        self._video = VideoWriter(path, source.period, LOOKED_AT)
+        self._video = VideoWriter(path, LOOKED_AT)
         self._format = PICTURE_FORMATS.get(path.suffix.lower())
         self._picture = b""
 
@@ -190,7 +190,7 @@ class OverlayFile:
             return
         drawn = self._overlay.draw(result)
         if self._format is None:
-            self._video.write(np.asarray(drawn))
+            self._video.write(np.asarray(drawn), result.picture.time)
             return
         content = io.BytesIO()
         drawn.save(content, self._format)

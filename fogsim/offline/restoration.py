@@ -84,7 +84,7 @@ def restored_images(source: Source, camera: Camera, wish: RestorationWish) -> It
             held = not estimate.valid and source.temporal and last is not None
             last = estimate if estimate.valid or not source.temporal else last
             if last is None or not last.valid:
-                yield Restored(picture, None, reason=f"no fog found: {estimate.diagnostics.get('reason', 'unknown')}")
+                yield Restored(picture, None, reason=f"no visibility: {estimate.diagnostics.get('reason', 'unknown')}")
                 continue
         yield _restored(picture, picture.image, camera, wish, last, held)
 
@@ -173,23 +173,23 @@ def restore_video(
 ) -> Generator[Restored]:
     """Restore a video frame by frame; the file has its final name only when complete.
 
-    Frames before the first in which fog is found are kept as they are; InputError if fog is found in none.
+    Frames before the first estimate are kept as they are; InputError if no frame has one.
     """
     refuse_unfit_video(out, source.paths, camera, kind="restored", overwrite=overwrite)
     found, reason, damage = False, "", ""
-    with VideoWriter(out, source.period) as writer:
+    with VideoWriter(out) as writer:
         for one in restored_images(source, camera, wish):
             seen = one.picture.image
             if seen is None:
                 damage = one.picture.error
                 continue
             as_it_was = np.concatenate([seen, seen], axis=1) if wish.beside else seen
-            writer.write(as_it_was if one.image is None else one.image)
+            writer.write(as_it_was if one.image is None else one.image, one.picture.time)
             found, reason = found or one.image is not None, reason or one.reason
             yield one
         if not found:
             raise InputError(
-                f"{source.paths[0]}: {reason}, nor in any other frame; --visibility restores it all the same"
+                f"{source.paths[0]}: {reason}, and none in any other frame; --visibility restores it all the same"
             )
     if damage:
         raise InputError(f"{damage}; {out} has what could be read")

@@ -11,7 +11,7 @@ from fogsim.errors import InputError
 from fogsim.offline.camera_file import Calibration
 from fogsim.offline.image_files import read_image
 from fogsim.offline.input_paths import is_video
-from fogsim.offline.source import VideoFile
+from fogsim.offline.video_source import VideoFile
 from fogsim.values import Camera, CameraPose, Response
 from fogsim.values.pinhole import camera_axes
 

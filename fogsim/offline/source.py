@@ -1,19 +1,15 @@
-"""Sources of images: image files and videos."""
+"""Sources of images: image files and animations."""
 
-import re
-import subprocess
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Protocol
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from PIL import Image, ImageSequence
 
 from fogsim.errors import InputError
-from fogsim.offline.image_files import Pixels, read_image
-from fogsim.recorders.video import ffmpeg_program
+from fogsim.offline.image_files import ANIMATED_FORMATS, Pixels, read_image
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,165 +117,71 @@ def _red_first(stored: Pixels) -> Pixels:
     return stored[:, :, 2::-1].copy(order="C")
 
 
-_DURATION = re.compile(r"Duration: (\d+):(\d+):(\d+(?:\.\d+)?)")
-_RATE = re.compile(r"Video:.*?(\d+(?:\.\d+)?k?) (?:fps|tbr)")
-_ADDRESS = re.compile(r" @ 0x[0-9a-f]+")
-MOST_MISSING = 0.5
-"""Time by which a complete video's frames may end before its header's duration, as with longer sound [s]."""
-
-MOST_SAID = 100_000
-"""Bytes of ffmpeg's messages that are read."""
-
-CONTAINERS = "mov,matroska,avi,mpeg,mpegvideo,mpegts,asf,flv,m4v,h264,hevc"
-"""ffmpeg's names of the allowed formats: none that opens further files or addresses, such as a playlist."""
-
-MOST_PIXELS = 16_384**2 // 2
-"""Most pixels of a frame [px]."""
-
-_HEADER_LINES = 3  # P6, size, largest value: https://netpbm.sourceforge.net/doc/ppm.html as ffmpeg writes it
-
-
 @dataclass(frozen=True, slots=True)
-class VideoFile:
-    """A video; its frames have 8 bits a channel and are turned upright.
+class Animation:
+    """A GIF, WebP or PNG file with several frames.
 
     Attributes
     ----------
     path : Path
         The file.
     temporal : bool
-        Whether its frames are used in order; False treats each separately.
-    size : tuple of int
-        Columns and rows [px].
-    period : float
-        Time between two frames [s].
-    duration : float
-        Its length from its header [s]; 0 if unknown.
+        Whether its frames are used in order.
+    times : tuple of float
+        When each frame begins [s].
     """
 
     path: Path
     temporal: bool
-    size: tuple[int, int]
-    period: float
-    duration: float
+    times: tuple[float, ...]
 
     @classmethod
-    def open(cls, path: Path, temporal: bool = True) -> "VideoFile":
-        """Read the header and the first frame of a video.
+    def open(cls, path: Path, temporal: bool = True) -> "Animation | None":
+        """The frames of a file; None if it has one alone or is no such image."""
+        try:
+            with Image.open(path) as image:
+                if image.format not in ANIMATED_FORMATS or getattr(image, "n_frames", 1) == 1:
+                    return None
+                times = [0.0]
+                for frame in ImageSequence.Iterator(image):
+                    frame.load()
+                    times.append(times[-1] + 1e-3 * (frame.info.get("duration", 0) or _USUAL_FRAME_MS))
+        except (OSError, SyntaxError, ValueError, Image.DecompressionBombError):
+            return None  # `read_image` says why
+        return cls(path, temporal, tuple(times[:-1]))
 
-        Parameters
-        ----------
-        path : Path
-            The file.
-        temporal : bool
-            Whether its frames are a sequence.
-
-        Raises
-        ------
-        InputError
-            If it cannot be read as one, or has no frames.
-        """
-        # ffmpeg would wait for a writer of a pipe.
-        if not path.is_file():
-            raise InputError(f"{path}: cannot be read: not a regular file")
-        done = subprocess.run(  # noqa: S603 - imageio's own ffmpeg with arguments made here
-            _command(path, "-frames:v", "1"), stdin=subprocess.DEVNULL, capture_output=True, check=False
-        )
-        told = done.stderr.decode(errors="replace")
-        rate = _RATE.search(told)
-        if rate is None:
-            raise InputError(f"{path}: this is no video that can be read")
-        header = done.stdout.split(b"\n", _HEADER_LINES)
-        if len(header) <= _HEADER_LINES:
-            raise InputError(f"{path}: this video has no frames that can be read")
-        cols, rows = (int(part) for part in header[1].split())
-        duration = _DURATION.search(told)
-        seconds = 0.0
-        if duration is not None:
-            hours, minutes, rest = duration.groups()
-            seconds = 3600.0 * int(hours) + 60.0 * int(minutes) + float(rest)
-        return cls(path, temporal, (cols, rows), 1.0 / _number(rate[1]), seconds)
+    @property
+    def period(self) -> float:
+        """Mean time from one frame to the next [s]."""
+        return self.times[-1] / (self.count - 1)
 
     @property
     def count(self) -> int:
-        """Number of frames by the header."""
-        return max(round(self.duration / self.period), 1)
+        """Number of frames."""
+        return len(self.times)
 
     @property
     def description(self) -> str:
-        """Size and rate."""
-        kind = "" if self.temporal else ", each frame on its own"
-        return f"a video of {self.size[0]} × {self.size[1]} pixels at {1.0 / self.period:.4g} frames a second{kind}"
+        """Number of frames and length."""
+        kind = "" if self.temporal else ", each on its own"
+        return f"an animation of {self.count} frames in {self.times[-1] + self.period:.4g} s{kind}"
 
     @property
     def paths(self) -> tuple[Path, ...]:
-        """The path of the video."""
+        """The path of the file."""
         return (self.path,)
 
     def pictures(self) -> Iterator[Picture]:
-        """Read the frames; where the file is damaged, ffmpeg conceals or skips what it cannot decode.
-
-        After the frames of a damaged video, or of one that ends early, a picture without image follows, whose
-        ``error`` has the number of frames that were read and ffmpeg's first message.
-        """
-        read = 0
-        # A file, not a pipe, which could fill up while frames are read.
-        with (
-            tempfile.TemporaryFile() as complaints,
-            subprocess.Popen(  # noqa: S603 - imageio's own ffmpeg with arguments made here
-                _command(self.path, log="error"), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=complaints
-            ) as process,
-        ):
-            assert process.stdout is not None  # noqa: S101 - it was opened as a pipe
-            try:
-                for image in _frames(process.stdout):
-                    yield Picture(read, read * self.period, image)
-                    read += 1
-                failed = process.wait() != 0
-            finally:
-                process.kill()
-            complaints.seek(0)
-            said = complaints.read(MOST_SAID).decode(errors="replace").splitlines()
-        is_short = bool(self.duration) and self.count - read > max(MOST_MISSING / self.period, 2)
-        if failed or said or is_short:
-            frames = f"{read} of {self.count} frames" if is_short else f"{read} frames"
-            reason = f" ({_ADDRESS.sub('', said[0])})" if said else ""
-            message = f"{self.path}: the video is cut off or damaged: {frames} could be read{reason}"
-            yield Picture(read, read * self.period, None, message)
+        """Read the frames; where the file is cut off, a picture without image follows the last."""
+        with Image.open(self.path) as image:
+            for index, time in enumerate(self.times):
+                try:
+                    image.seek(index)
+                    yield Picture(index, time, np.array(image.convert("RGB")))
+                except (OSError, SyntaxError, ValueError, EOFError) as error:
+                    yield Picture(index, time, None, f"{self.path}: the animation is damaged or cut off: {error}")
+                    return
 
 
-def _number(text: str) -> float:
-    """Rate as ffmpeg writes it: "90k" is 90,000."""
-    return 1000.0 * float(text[:-1]) if text.endswith("k") else float(text)
-
-
-def _command(path: Path, *limits: str, log: str = "info") -> list[str]:
-    """Command line of a decoder that writes frames as PPM images, one behind the other."""
-    allowed = ["-protocol_whitelist", "file", "-format_whitelist", CONTAINERS, "-max_pixels", str(MOST_PIXELS)]
-    source = [*allowed, "-i", f"file:{path}", "-map", "0:v:0", *limits]
-    return [
-        ffmpeg_program(),
-        "-hide_banner",
-        "-nostdin",
-        "-loglevel",
-        log,
-        *source,
-        "-f",
-        "image2pipe",
-        "-c:v",
-        "ppm",
-        "-pix_fmt",
-        "rgb24",
-        "-",
-    ]
-
-
-def _frames(pipe: IO[bytes]) -> Iterator[NDArray[np.uint8]]:
-    while pipe.readline():
-        cols, rows = (int(part) for part in pipe.readline().split())
-        pipe.readline()
-        data = pipe.read(3 * cols * rows)
-        if len(data) < 3 * cols * rows:
-            return
-        # A copy, since kernels would be compiled again for a read-only array.
-        yield np.frombuffer(data, np.uint8).reshape(rows, cols, 3).copy()
+_USUAL_FRAME_MS = 100
+"""Duration of a frame that states none, as browsers show it [ms]."""

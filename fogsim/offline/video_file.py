@@ -1,36 +1,44 @@
-"""Videos that are written frame by frame, and get their names when complete."""
+"""Videos that are written frame by frame with their times, and get their names when complete."""
 
+import struct
 from pathlib import Path
 from types import TracebackType
 from typing import Self
+
+import numpy as np
 
 from fogsim.errors import InputError
 from fogsim.files.atomic import partial_path, publish
 from fogsim.files.output_targets import refuse_unwritable
 from fogsim.offline.image_files import Pixels
-from fogsim.recorders.video import Encoder, encoder_command
+from fogsim.recorders.video import Encoder, encoding_command
 from fogsim.values import Camera
 
 RATE_FACTOR = 12
 """Constant rate factor: distant road in fog differs by only a few pixel values, which must be kept."""
 
+_TICKS = 90_000  # a second
+
 
 class VideoWriter:
-    """Writes a video with frames `period` [s] apart; as a context, it names the file only after success.
+    """Writes a video of frames at uneven times; as a context, it names the file only after success.
 
     `rate_factor` is libx264's constant rate factor, 0 … 51.
     """
 
-    def __init__(self, out: Path, period: float, rate_factor: int = RATE_FACTOR) -> None:
-        self._out, self._period, self._rate_factor = out, period, rate_factor
+    def __init__(self, out: Path, rate_factor: int = RATE_FACTOR) -> None:
+        self._out, self._rate_factor = out, rate_factor
         self._encoder: Encoder | None = None
 
-    def write(self, frame: Pixels) -> None:
-        """Add a frame (rows, cols, 3), red first, of the first frame's size."""
+    def write(self, frame: Pixels, time: float) -> None:
+        """Add a frame (rows, cols, 3), red first, of the first frame's size, from a time on [s] later than the last."""
+        rows, cols = frame.shape[:2]
         if self._encoder is None:
-            size = frame.shape[1], frame.shape[0]
-            self._encoder = Encoder(encoder_command(partial_path(self._out), self._period, size, self._rate_factor))
-        self._encoder.write(frame.tobytes())
+            self._encoder = Encoder(encoding_command(partial_path(self._out), ["-f", "ivf"], self._rate_factor))
+            self._encoder.write(struct.pack("<4sHH4sHHIIQ", b"DKIF", 0, 32, b"RGBA", cols, rows, _TICKS, 1, 0))
+        pixels = np.full((rows, cols, 4), 255, np.uint8)
+        pixels[..., :3] = frame
+        self._encoder.write(struct.pack("<IQ", pixels.nbytes, round(time * _TICKS)) + pixels.tobytes())
 
     def __enter__(self) -> Self:
         """Begin; the file is created with the first frame."""

@@ -180,10 +180,15 @@ def encoder_command(
         If there is no ffmpeg.
     """
     rate = Fraction(1.0 / frame_period).limit_denominator(1001)
-    source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(rate), "-i", "-"]
+    source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(rate)]
+    return encoding_command(path, source, rate_factor)
+
+
+def encoding_command(path: Path, source: list[str], rate_factor: int) -> list[str]:
+    """Command line that encodes what comes from a pipe, of the format by ffmpeg's options, at the times it has."""
     coding = ["-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", str(rate_factor), "-pix_fmt", "yuv420p"]
-    sink = ["-movflags", "+faststart", "-f", "mp4", f"file:{path}"]
-    return [ffmpeg_program(), "-y", "-loglevel", "error", *source, *coding, *sink]
+    sink = ["-fps_mode", "passthrough", "-movflags", "+faststart", "-f", "mp4", f"file:{path}"]
+    return [ffmpeg_program(), "-y", "-loglevel", "error", *source, "-i", "-", *coding, *sink]
 
 
 def encoder_report() -> str:

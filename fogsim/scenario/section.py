@@ -7,13 +7,14 @@ constructors.
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, ValidationInfo
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from fogsim.errors import InputError, is_name
-from fogsim.parameters import parameter_mistakes
+from fogsim.parameters import parameter_mistakes, paths_in
 from fogsim.registry import Registry
 from fogsim.registry.user_code import import_anything
 from fogsim.units.quantities import is_quantity, parse_quantity
@@ -168,18 +169,23 @@ def method_of(registry: Registry[Callable[..., Any]]) -> BeforeValidator:
                 # pydantic shows only a plain ValueError's message.
                 raise ValueError(str(error)) from None
             if factory is not None:
-                _check_parameters(factory, written.get("parameters"))
+                _check_parameters(factory, written.get("parameters"), context.get("folder"))
         return written
 
     return BeforeValidator(check)
 
 
-def _check_parameters(factory: Callable[..., Any], parameters: object) -> None:
+def _check_parameters(factory: Callable[..., Any], parameters: object, folder: Path | None) -> None:
     if not isinstance(parameters, dict | None):
         return  # the model says what it must be
+    given = parameters or {}
+    found = list(parameter_mistakes(factory, given, GIVEN_BY_THE_LOOP))
+    if folder is not None:
+        paths = paths_in(factory, given, folder)
+        found += [(name, f"there is no file {path}") for name, path in paths.items() if not path.is_file()]
     mistakes = [
         InitErrorDetails(type=PydanticCustomError(MISTAKE, "{told}", {"told": told}), loc=("parameters", name), input=0)
-        for name, told in parameter_mistakes(factory, parameters or {}, GIVEN_BY_THE_LOOP)
+        for name, told in found
     ]
     if mistakes:
         raise ValidationError.from_exception_data("parameters", mistakes)

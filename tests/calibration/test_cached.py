@@ -16,6 +16,7 @@ from fogsim.estimators import make
 from fogsim.estimators.night.halos import HaloThreshold
 from fogsim.estimators.night.own_light import OwnLight
 from fogsim.estimators.signs.operating_range import OperatingRange
+from fogsim.scenario.parts.lamp_file import load_lamps
 from fogsim.values import Camera, Estimate, Lamp, Observation
 from tests.estimators.night.test_gallen2014 import CAMERA as NIGHT_CAMERA
 from tests.estimators.night.test_gallen2014 import LAMPS, MEASURED
@@ -52,19 +53,19 @@ def measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[object]:
 
 def test_a_calibration_is_kept_for_its_camera_and_size(measured: list[object]) -> None:
     for _ in range(2):
-        assert CachedCalibrations().operating_range(CAMERA, 0.9) == RANGE
-        assert CachedCalibrations().halo_threshold(CAMERA) == MEASURED
+        assert CachedCalibrations(load_lamps).operating_range(CAMERA, 0.9) == RANGE
+        assert CachedCalibrations(load_lamps).halo_threshold(CAMERA) == MEASURED
     assert measured == [(CAMERA, 0.9), CAMERA]
-    CachedCalibrations().operating_range(CAMERA, 0.6)
-    CachedCalibrations().operating_range(replace(CAMERA, pitch=0.02), 0.9)
+    CachedCalibrations(load_lamps).operating_range(CAMERA, 0.6)
+    CachedCalibrations(load_lamps).operating_range(replace(CAMERA, pitch=0.02), 0.9)
     assert len(measured) == 4
 
 
 def test_a_damaged_file_is_made_again(measured: list[object], tmp_path: Path) -> None:
-    CachedCalibrations().operating_range(CAMERA, 0.9)
+    CachedCalibrations(load_lamps).operating_range(CAMERA, 0.9)
     (file,) = (tmp_path / "cache" / "calibrations").iterdir()
     file.write_bytes(file.read_bytes().replace(b"45.1", b"54.1"))
-    assert CachedCalibrations().operating_range(CAMERA, 0.9) == RANGE
+    assert CachedCalibrations(load_lamps).operating_range(CAMERA, 0.9) == RANGE
     assert len(measured) == 2
 
 
@@ -74,12 +75,14 @@ def test_without_a_cache_directory_it_is_made_all_the_same(
     (tmp_path / "file").touch()
     monkeypatch.setenv("FOGSIM_CACHE_DIR", str(tmp_path / "file"))
     for _ in range(2):
-        assert CachedCalibrations().operating_range(CAMERA, 0.9) == RANGE
+        assert CachedCalibrations(load_lamps).operating_range(CAMERA, 0.9) == RANGE
     assert len(measured) == 2
 
 
 def test_who_comes_while_it_is_made_waits_for_it(measured: list[object]) -> None:
-    waiting = [threading.Thread(target=CachedCalibrations().operating_range, args=(CAMERA, 0.9)) for _ in range(4)]
+    waiting = [
+        threading.Thread(target=CachedCalibrations(load_lamps).operating_range, args=(CAMERA, 0.9)) for _ in range(4)
+    ]
     for thread in waiting:
         thread.start()
     for thread in waiting:
@@ -88,7 +91,7 @@ def test_who_comes_while_it_is_made_waits_for_it(measured: list[object]) -> None
 
 
 def test_it_is_announced(measured: list[object], caplog: pytest.LogCaptureFixture) -> None:
-    CachedCalibrations().operating_range(CAMERA, 0.9)
+    CachedCalibrations(load_lamps).operating_range(CAMERA, 0.9)
     assert "calibrating signs of 0.9 m for a camera of 320 × 160 px, once" in caplog.text
     assert measured
 
@@ -131,10 +134,10 @@ def test_own_light_is_kept_for_its_camera_and_lamps(
 
     monkeypatch.setattr(cached, "lit_fog", compute)
     for head_lamps in ("usual", "usual", "unknown", "unknown"):
-        kept = CachedCalibrations().own_light(CAMERA, Lamp.LOW_BEAM, 1.7, head_lamps)
+        kept = CachedCalibrations(load_lamps).own_light(CAMERA, Lamp.LOW_BEAM, 1.7, head_lamps)
         assert np.array_equal(kept.veil, light.veil)
         assert kept.road.dtype == np.float32
-    CachedCalibrations().own_light(CAMERA, Lamp.HIGH_BEAM, 1.7, "usual")
+    CachedCalibrations(load_lamps).own_light(CAMERA, Lamp.HIGH_BEAM, 1.7, "usual")
     assert made == [
         (CAMERA, Lamp.LOW_BEAM, 1.7, True),
         (CAMERA, Lamp.LOW_BEAM, 1.7, False),

@@ -10,7 +10,7 @@ import pytest
 from flat_road import Road, photograph, scan
 
 from fogsim.offline.camera_file import load_calibration
-from fogsim.offline.source import VideoFile
+from fogsim.offline.video_source import VideoFile
 from fogsim.recorders.video import Encoder, encoder_command
 
 Command = Callable[..., "CompletedProcess[str]"]
@@ -76,7 +76,7 @@ def test_an_image_without_road_is_named_and_not_written(folder: Path, command: C
     cv2.imwrite(str(folder / "dark.png"), np.zeros((240, 320, 3), np.uint8))
     done = command("restore", "dark.png", "fog.png", *WITH_CAMERA, "--out", "clear", cwd=folder)
     assert done.returncode == 2
-    assert "dark.png: no fog found: too dark above the horizon" in done.stderr
+    assert "dark.png: no visibility: too dark above the horizon" in done.stderr
     assert [path.name for path in (folder / "clear").iterdir()] == ["fog.png"]
 
 
@@ -92,8 +92,8 @@ def test_in_a_video_the_last_estimate_holds(folder: Path, foggy: np.ndarray, com
     put_video(folder / "drive.mp4", [dark, foggy, dark])
     done = command("restore", "drive.mp4", *WITH_CAMERA, "--out", "clear.mp4", cwd=folder)
     assert done.returncode == 0, done.stderr
-    assert "in 1 images no fog was found; the last estimate was taken" in done.stderr
-    assert "1 frames before the first estimate are as they were: no fog found" in done.stderr
+    assert "1 images had no estimate; the last one was used" in done.stderr
+    assert "1 frames before the first estimate are as they were: no visibility" in done.stderr
     frames = [picture.image for picture in VideoFile.open(folder / "clear.mp4").pictures()]
     assert len(frames) == 3
     assert frames[1] is not None
@@ -104,7 +104,7 @@ def test_a_video_in_which_no_fog_is_found_leaves_nothing(folder: Path, foggy: np
     put_video(folder / "drive.mp4", [np.zeros_like(foggy)])
     done = command("restore", "drive.mp4", *WITH_CAMERA, "--out", "clear.mp4", cwd=folder)
     assert done.returncode == 2
-    assert "drive.mp4: no fog found: too dark" in done.stderr
+    assert "drive.mp4: no visibility: too dark" in done.stderr
     assert sorted(path.name for path in folder.iterdir()) == ["camera.yaml", "drive.mp4", "fog.png"]
 
 

@@ -61,11 +61,11 @@ def test_episodes_differ_repeat_and_are_told(env: gymnasium.Env[Any, Any]) -> No
     observation, info = env.reset(seed=3)
     other, _ = env.reset(seed=4)
     again, told = env.reset(seed=3)
-    assert told["episode"] == info["episode"]
+    assert told["drawn"] == info["drawn"]
     np.testing.assert_equal(again, observation)
     assert not np.array_equal(other["camera"], observation["camera"])
     assert not observation["signs_mask"].any()
-    assert all(one.startswith(_DRAWN) for one in info["episode"]["settings"])
+    assert all(one.startswith(_DRAWN) for one in info["drawn"]["settings"])
 
 
 def test_scripts_lights_and_drivers_are_drawn_by_their_weights() -> None:
@@ -83,7 +83,7 @@ def test_scripts_lights_and_drivers_are_drawn_by_their_weights() -> None:
 def test_a_braking_leader_is_played(env: gymnasium.Env[Any, Any]) -> None:
     episode = HighwayDistribution(scripts={"braking_lead": 1.0}).draw(np.random.default_rng(1))
     _, info = env.reset(seed=1, options={"episode": episode})
-    assert info["episode"]["script"] == "braking_lead"
+    assert info["drawn"]["script"] == "braking_lead"
     with pytest.raises(InputError, match="road: roads and vehicles are highway-env's own"):
         env.reset(seed=1, options={"overrides": ["road={template: motorway, length_m: 1000}"]})
     with pytest.raises(InputError, match=r"clocks\.traffic_step_s: highway-env moves by"):

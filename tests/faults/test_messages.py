@@ -14,9 +14,9 @@ from fogsim.cli import printing
 from fogsim.cli.progress import progress_bar
 from fogsim.errors import InputError
 from fogsim.offline.camera_file import CameraFile
-from fogsim.offline.lamp_file import LampFile
 from fogsim.scenario import Scenario, load_scenario
 from fogsim.scenario.mistakes import mistakes_in
+from fogsim.scenario.parts.lamp_file import LampFile
 from fogsim.scenario.timeline import FogActions, LightActions, TimelineEntry
 from fogsim.scenario.timeline.schema import SignalActions, VehicleActions
 from fogsim.scenario.variation import VariationKeys

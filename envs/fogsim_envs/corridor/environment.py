@@ -29,7 +29,8 @@ from fogsim_envs.corridor.observation import (
 )
 from fogsim_envs.corridor.rewards import CorridorReward, CorridorWeights
 from fogsim_envs.corridor.road import SignedRoad, signed_road
-from fogsim_envs.hosting import TIMEOUT, Timeout, TrafficSimulation, begin_traffic, checked_timeout
+from fogsim_envs.hosting import TIMEOUT, Timeout, TrafficSimulation, begin_traffic, checked_timeout, refuse_copies
+from fogsim_envs.infos import flat_numbers
 from fogsim_envs.task.episodes import FogDistribution
 from fogsim_envs.task.sampling import EpisodeChoice, EpisodeSource
 
@@ -72,9 +73,9 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
     ``state()`` is all of them one after another.
 
     ### Reward
-    The same to all: the sum of ``infos[agent]["reward_terms"]``, in points (`CorridorWeights`): delay, overdriving,
-    conflict, collision, of all vehicles. Who finds no room to come onto the road pays its delay there, so nothing is
-    won by a queue that nobody counts.
+    The same to all: the sum of ``reward_terms/…`` in ``infos[agent]``, in points (`CorridorWeights`): delay,
+    overdriving, conflict, collision, of all vehicles. Vehicles that wait to enter the road pay their delay there,
+    so a queue wins nothing.
 
     ### Episodes
     Fog and demand are drawn at each reset; ``options`` of `reset` fix ``visibility``, ``scenario``, ``overrides`` or a
@@ -123,9 +124,16 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
         self._action_spaces = {agent: spaces.Discrete(len(SHOWN_SPEEDS)) for agent in self.possible_agents}
         size = len(self.possible_agents) * int(np.prod(corridor_space().shape))
         self.state_space = spaces.Box(0.0, 1.0, (size,), np.float32)
+        self.drawn: dict[str, Any] = {}
+        """What was drawn for the episode; as option ``episode`` of `reset` it repeats it."""
         self._rng = np.random.default_rng()
         self._simulation: TrafficSimulation | None = None
         self._observed: dict[str, NDArray[np.float32]] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What pickle and copy take; a running simulation cannot be copied."""
+        refuse_copies(hasattr(self, "_rule"))
+        return self.__dict__
 
     def observation_space(self, agent: str) -> spaces.Box:
         """Space of what an agent observes, always the same object.
@@ -184,9 +192,8 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
         self._shown = (math.inf,) * len(self.possible_agents)
         self.agents = list(self.possible_agents)
         self._move()
-        infos = self._infos({})
-        episode = drawn.episode.as_info()
-        return self._observe(), {agent: {**info, "episode": episode} for agent, info in infos.items()}
+        self.drawn = drawn.episode.as_info()
+        return self._observe(), self._infos(dict.fromkeys(CorridorWeights.__dataclass_fields__, 0.0))
 
     def _checked_road(self, scenario: Scenario) -> SignedRoad:
         road = signed_road(scenario)
@@ -288,7 +295,7 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
         return np.concatenate([self._observed[agent] for agent in self.possible_agents])
 
     def _infos(self, terms: dict[str, float]) -> dict[str, dict[str, Any]]:
-        """What is told beside the observations; agents must not use ``truth``."""
+        """Numbers beyond the observations, in the same keys at each step; agents must not use ``truth``."""
         step = self._step
         advised = _by_start(self._rule, step)
         common = {
@@ -296,14 +303,16 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
             "time_s": step.time,
             "vehicles": len(step.traffic.ids),
             "waiting": step.waiting,
-            "ending": None if step.ending is None else step.ending.value,
+            "ending": "" if step.ending is None else step.ending.value,
         }
         return {
-            agent: {
-                **common,
-                "built_in_advice_mps": advised.get(section.stretch.start, math.inf),
-                "truth": {"extinction_per_m": section.extinction},
-            }
+            agent: flat_numbers(
+                {
+                    **common,
+                    "built_in_advice_mps": advised.get(section.stretch.start, math.inf),
+                    "truth": {"extinction_per_m": section.extinction},
+                }
+            )
             for agent, section in zip(self.possible_agents, step.truth.sections, strict=True)
         }
 

@@ -18,7 +18,8 @@ from fogsim.randomness import Seed
 from fogsim.scenario import Scenario, build
 from fogsim.values import Command, Ending, Step
 from fogsim_envs.actions import checked_action, checked_options
-from fogsim_envs.hosting import TIMEOUT, Simulation, Timeout, begin, begin_anew, checked_timeout
+from fogsim_envs.hosting import TIMEOUT, Simulation, Timeout, begin, begin_anew, checked_timeout, refuse_copies
+from fogsim_envs.infos import flat_numbers
 from fogsim_envs.rendering import RENDER_MODES, StepRenderer, render_modes
 from fogsim_envs.spaces import ImageSize, action_space, command_of
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
@@ -70,7 +71,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
     ### Episodes
     Fog, light, traffic, what a lead vehicle does, how fast the ego's own driver goes without advice, and the errors of
     the told calibration are drawn at each reset (`FogDistribution`, `ScenarioDistribution`);
-    ``info["episode"]`` tells them, and ``reset(options={"episode": info["episode"]})`` gives the same again. ``split``
+    ``info["drawn"]`` has them, and ``reset(options={"episode": info["drawn"]})`` repeats the episode. ``split``
     "test" draws from other random numbers than "train", whatever the seeds.
 
     ### Start and end
@@ -91,6 +92,8 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
     reward_weights : `TaskWeights`
     render_mode : None, "rgb_array" (the camera frame beside a panel with estimate, truth, advice, speed and lamps), or
     "human" (that in a window, each step as long as it takes)
+    flat_info : whether ``info`` is a flat dictionary of numbers, ``truth/visibility_m`` for example; ``ending``,
+    ``warning`` and ``fault`` are then numbers, 0 for none, and ``drawn`` is left out
     timeout : how long a child process that runs the simulation may give no sign of life [s]; ``inf`` for ever
 
     ### Version history
@@ -113,6 +116,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         continuous: bool = False,
         reward_weights: TaskWeights | None = None,
         render_mode: str | None = None,
+        flat_info: bool = False,
         timeout: Timeout = TIMEOUT,
     ) -> None:
         checked_timeout(timeout)
@@ -121,7 +125,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         self._timeout = timeout
         size = () if image_size is None else (f"camera.width={image_size[0]}", f"camera.height={image_size[1]}")
         self._source = EpisodeSource(scenario, scenario_distribution, fog_distribution, (*size, *overrides), split)
-        self._mode, self._continuous = observation, continuous
+        self._mode, self._continuous, self._is_flat = observation, continuous, flat_info
         self._weights = reward_weights or TaskWeights()
         self._renderer = self._make_renderer(render_mode)
         self.render_mode = render_mode
@@ -150,7 +154,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         options : dict or None
             What of the episode is not to be drawn: ``visibility`` where the fog is densest [m], ``scenario``, further
             ``overrides`` (list of ``key.path=value``), ``driver`` of the ego, or a whole ``episode`` as
-            ``info["episode"]`` tells it.
+            in ``info["drawn"]``.
 
         Raises
         ------
@@ -173,7 +177,12 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         self._own = self._built_in = Command()
         self._renderer.begin_episode()
         self._show()
-        return self._observe(), {**self._info(), "episode": self._episode.as_info()}
+        return self._observe(), self._info(dict.fromkeys(TaskWeights.__dataclass_fields__, 0.0))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What pickle and copy take; a running simulation cannot be copied."""
+        refuse_copies(hasattr(self, "_adviser"))
+        return self.__dict__
 
     def _make_renderer(self, render_mode: str | None) -> StepRenderer:
         return StepRenderer(render_mode, type(self).__name__)
@@ -233,8 +242,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         terms = task_terms(before, self._step, self._way, self._weights, self._standard)
         truncated = self._step.ending is Ending.TIME
         terminated = self._step.ending is not None and not truncated
-        info = {**self._info(), "reward_terms": terms}
-        return self._observe(), float(sum(terms.values())), terminated, truncated, info
+        return self._observe(), float(sum(terms.values())), terminated, truncated, self._info(terms)
 
     def _make_action_space(self, continuous: bool) -> spaces.Space[Any]:
         return action_space(continuous)
@@ -268,13 +276,13 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
             raise gymnasium.error.ResetNeeded("call reset() first")
         return self._step
 
-    def _info(self) -> dict[str, Any]:
-        """What is told beside the observation; agents must not use ``truth``, which is for oracles and evaluation."""
+    def _info(self, terms: dict[str, float]) -> dict[str, Any]:
+        """More than the observation, of the same tree at each step; agents must not use ``truth``."""
         step = self._current
         low, median, high = step.belief.visibility_quantiles((0.05, 0.5, 0.95))
         # What the built-in adviser would say here: it remembers what it said itself, not what the agent did.
         self._built_in = self._adviser.decide(step, self._built_in)
-        return {
+        info = {
             "time_s": step.time,
             "route_position_m": step.route_position,
             "speed_mps": float(step.traffic.speed[step.ego]),
@@ -282,23 +290,26 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
             "time_to_collision_s": time_to_collision(step),
             "collisions": len(step.collisions),
             "fault": fault(step),
-            "ending": None if step.ending is None else step.ending.value,
+            "ending": "" if step.ending is None else step.ending.value,
             "built_in_advice_mps": self._built_in.advice.speed,
             "built_in_lamps": int(self._built_in.lamps),
-            "warning": None if self._built_in.warning is None else self._built_in.warning.value,
+            "warning": "" if self._built_in.warning is None else self._built_in.warning.value,
             "belief": {
                 "visibility_m": median,
                 "visibility_low_m": low,
                 "visibility_high_m": high,
             },
             "cost": float(strikes(step)) + unseen_share(step, self._standard),
-            "unplayed": step.unplayed.lines,
+            "unplayed": "\n".join(step.unplayed.lines),
             "truth": {
                 "extinction_per_m": step.truth.extinction,
                 "visibility_m": step.truth.visibility,
                 "visibility_ahead_m": step.truth.visibility_ahead,
             },
+            "reward_terms": terms,
+            "drawn": self._episode.as_info(),
         }
+        return flat_numbers(info) if self._is_flat else info
 
     def render(self) -> NDArray[np.uint8] | None:
         """Draw the latest camera frame and its panel; with a window, each step is drawn as it is made."""

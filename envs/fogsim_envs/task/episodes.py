@@ -58,7 +58,7 @@ class Episode:
         check_driver(self.driver)
 
     def as_info(self) -> dict[str, Any]:
-        """Plain data for ``info["episode"]``."""
+        """Plain data for ``info["drawn"]``."""
         return {
             "settings": list(self.settings),
             "driver": self.driver,

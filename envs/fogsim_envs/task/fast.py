@@ -45,8 +45,8 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
     frames.
 
     ### Arguments
-    scenario, scenario_distribution, fog_distribution, split, overrides, continuous, reward_weights, timeout : as of
-    `FogAdvisoryV1Env`
+    scenario, scenario_distribution, fog_distribution, split, overrides, continuous, reward_weights, flat_info,
+    timeout : as of `FogAdvisoryV1Env`
     render_mode : None, "rgb_array" (road, traffic and fog from above beside a panel with belief, truth, advice, speed
     and lamps), or "human", which shows it in a window
     surrogate : file with a table of your own, made by ``benchmarks/surrogate.py --fit``; None for the one that was
@@ -70,6 +70,7 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
         reward_weights: TaskWeights | None = None,
         render_mode: str | None = None,
         surrogate: str | Path | None = None,
+        flat_info: bool = False,
         timeout: Timeout = TIMEOUT,
     ) -> None:
         is_own = is_own_motorway(scenario, scenario_distribution)
@@ -86,6 +87,7 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
             continuous=continuous,
             reward_weights=reward_weights,
             render_mode=render_mode,
+            flat_info=flat_info,
             timeout=timeout,
         )
 
@@ -108,7 +110,11 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
 
 
 def _panel_beside_view_from_above() -> FramePanel:
-    return FramePanel(lambda step: draw_view_from_above(step, partial(_extinction_now, step)))
+    return FramePanel(_view_from_above)
+
+
+def _view_from_above(step: Step) -> Any:
+    return draw_view_from_above(step, partial(_extinction_now, step))
 
 
 def _extinction_now(step: Step, places: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,9 +1,10 @@
 """The task of `fogsim_envs.task.advisory` on the roads and in the traffic of highway-env."""
 
 import dataclasses
+import functools
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any
 
 import numpy as np
@@ -69,6 +70,10 @@ class HighwayDistribution(ScenarioDistribution):
         return Episode((*settings, f"traffic.events={json.dumps([brake])}"), drawn.driver, drawn.light, drawn.script)
 
 
+def _scenario(settings: Mapping[str, Any], more: Sequence[str]) -> Scenario:
+    return highway_scenario(settings, math.inf, [*one_frame_clocks(settings), *more])
+
+
 @checked_parameters
 class FogHighwayV1Env(FogAdvisoryV1Env):
     """Advise a vehicle's speed and lamps in fog, in the traffic of highway-env, in another fog each episode.
@@ -92,8 +97,8 @@ class FogHighwayV1Env(FogAdvisoryV1Env):
     config : its configuration; ``duration`` is 150 s where it is not among it
     way : how far the ego has to go [m]; less where the road ends before
     scenario_distribution : `HighwayDistribution`
-    fog_distribution, split, observation, overrides, image_size, continuous, reward_weights, render_mode : as of
-    `FogAdvisoryV1Env`; of ``traffic`` no overrides that name files or the ego
+    fog_distribution, split, observation, overrides, image_size, continuous, reward_weights, render_mode,
+    flat_info : as of `FogAdvisoryV1Env`; of ``traffic`` no overrides that name files or the ego
 
     ### Version history
     * v1: another fog, light and driver in each episode; the task's reward, in which time and arrival count
@@ -115,6 +120,7 @@ class FogHighwayV1Env(FogAdvisoryV1Env):
         continuous: bool = False,
         reward_weights: TaskWeights | None = None,
         render_mode: str | None = None,
+        flat_info: bool = False,
     ) -> None:
         if not way > 0.0:
             raise InputError(f"way: expected more than 0 m, got {way!r}")
@@ -122,7 +128,7 @@ class FogHighwayV1Env(FogAdvisoryV1Env):
         self._environment = highway_environment(environment, {"duration": DURATION, **(config or {})})
         settings = highway_config(self._environment)
         super().__init__(
-            lambda more: highway_scenario(settings, math.inf, [*one_frame_clocks(settings), *more]),
+            functools.partial(_scenario, settings),
             scenario_distribution=scenario_distribution or HighwayDistribution(),
             fog_distribution=fog_distribution,
             split=split,
@@ -132,6 +138,7 @@ class FogHighwayV1Env(FogAdvisoryV1Env):
             continuous=continuous,
             reward_weights=reward_weights,
             render_mode=render_mode,
+            flat_info=flat_info,
             timeout=TIMEOUT,
         )
 

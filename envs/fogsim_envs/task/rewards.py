@@ -167,8 +167,8 @@ def conflict(step: Step, threshold: float) -> float:
     return max(0.0, 1.0 - time_to_collision(step) / threshold)
 
 
-def fault(step: Step) -> str | None:
-    """Who is at fault in the ego's collision: "ego" if it strikes somebody, "other" if it is struck; None without one.
+def fault(step: Step) -> str:
+    """Who is at fault in the ego's collision: "ego" if it strikes somebody, "other" if it is struck; "" without one.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def fault(step: Step) -> str | None:
     if strikes(step):
         return "ego"
     ego = step.traffic.ids[step.ego]
-    return "other" if any(ego == one.victim for one in step.collisions) else None
+    return "other" if any(ego == one.victim for one in step.collisions) else ""
 
 
 def strikes(step: Step) -> bool:

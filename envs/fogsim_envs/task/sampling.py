@@ -1,6 +1,5 @@
 """Draws episodes: from distributions, or as the caller of ``reset`` fixes them."""
 
-import functools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -70,7 +69,7 @@ class EpisodeChoice:
         keys = {one.name for one in fields(Episode)}
         if set(self.episode) != keys:
             raise InputError(
-                f"options['episode']: expected info['episode'], with {sorted(keys)}, got {shown(self.episode)}"
+                f"options['episode']: expected info['drawn'], with {sorted(keys)}, got {shown(self.episode)}"
             )
         return Episode(**self.episode)
 
@@ -139,8 +138,7 @@ class EpisodeSource:
             raise InputError("scenario and scenario_distribution: give one scenario or several to draw from, not both")
         else:
             self._scenarios = _several(self._drawn)
-        # Most resets of a fixed scenario ask for the same one again.
-        self._load = functools.lru_cache(_KEPT_SCENARIOS)(_loaded)
+        self._kept: dict[tuple[str | Path, tuple[str, ...]], Scenario] = {}
 
     def first_scenario(self) -> Scenario:
         """A scenario of them, for what all have in common."""
@@ -192,11 +190,15 @@ class EpisodeSource:
     def _loaded(self, scenario: AnyScenario, settings: tuple[str, ...]) -> Scenario:
         if isinstance(scenario, Scenario):
             return override(scenario, settings)
-        return scenario(settings) if callable(scenario) else self._load(scenario, settings)
+        return scenario(settings) if callable(scenario) else self._read(scenario, settings)
 
-
-def _loaded(scenario: str | Path, settings: tuple[str, ...]) -> Scenario:
-    return load_scenario(scenario, settings)
+    def _read(self, scenario: str | Path, settings: tuple[str, ...]) -> Scenario:
+        """A scenario from its file; most resets of a fixed scenario ask for the same one again."""
+        if (scenario, settings) not in self._kept:
+            if len(self._kept) == _KEPT_SCENARIOS:
+                self._kept.pop(next(iter(self._kept)))
+            self._kept[scenario, settings] = load_scenario(scenario, settings)
+        return self._kept[scenario, settings]
 
 
 def _several(scenarios: object) -> tuple[AnyScenario, ...]:

@@ -162,7 +162,7 @@ def _fog_road(
     from fogsim.offline.fog_image import fog_file
     from fogsim.offline.fog_video import fog_video
     from fogsim.offline.input_paths import is_video
-    from fogsim.offline.source import VideoFile
+    from fogsim.offline.video_source import VideoFile
 
     if not is_video(image):
         return fog_file(image, road, visibility, road.calibration.camera, out, light, layer=layer, overwrite=overwrite)

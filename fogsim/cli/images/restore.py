@@ -82,7 +82,7 @@ def _tell(out: Path, wish: "RestorationWish", told: "Counter[str]", last: "Resto
         text += " (estimated by joint_road)" if wish.estimates else ""
     stdout.print(escape(text), soft_wrap=True)
     if told["held"]:
-        print_remarks("held", (f"in {told['held']} images no fog was found; the last estimate was taken for them",))
+        print_remarks("held", (f"in {told['held']} images had no estimate; the last one was used",))
 
 
 def _tell_lacking(lacking: "list[Restored]", files: bool) -> None:

@@ -7,9 +7,18 @@ from typing import Annotated, Self
 from fogsim.errors import InputError
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.night.gallen2014_veil import LEAST_ROWS, Gallen2014Veil
-from fogsim.estimators.night.halos import PUBLISHED, WINDOW, HaloReading, HaloThreshold, HaloWatch, largest_sharpness
+from fogsim.estimators.night.halos import (
+    NEAREST,
+    PUBLISHED,
+    WINDOW,
+    HaloReading,
+    HaloThreshold,
+    HaloWatch,
+    largest_sharpness,
+)
+from fogsim.estimators.night.own_light import HeadLamps
 from fogsim.estimators.protocol import Calibrations
-from fogsim.parameters import Range, checked_parameters
+from fogsim.parameters import FileName, Range, checked_parameters
 from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate, ExtinctionBounds
@@ -75,8 +84,8 @@ class Gallen2014:
         self,
         camera: Camera,
         *,
-        halos: str | None = None,
-        head_lamps: str = "usual",
+        halos: FileName | None = None,
+        head_lamps: HeadLamps = "usual",
         window: Annotated[int, Range(1, 10_000)] = WINDOW,
         as_published: bool = False,
     ) -> None:
@@ -148,6 +157,8 @@ class Gallen2014:
             return Estimate.invalid(self.method, why)
         if not lit_by_lamps(levelled(image, self._camera), self._camera):
             return Estimate.invalid(self.method, "no lamps light the road: this is a method for the night")
+        if not self._as_published and observation.lead is not None and observation.lead.distance < NEAREST:
+            return Estimate.invalid(self.method, "a vehicle close ahead: so near, lamps have no halo in any fog")
         self._calibrate()
         reading = self._watch.look(image, self._camera.bits)
         if reading.is_fog is not None:
@@ -215,7 +226,7 @@ class Gallen2014Halo(Gallen2014):
         self,
         camera: Camera,
         *,
-        halos: str | None = None,
+        halos: FileName | None = None,
         window: Annotated[int, Range(1, 10_000)] = WINDOW,
         as_published: bool = False,
     ) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.night.cells import CellMeans, cell_means, cell_size
 from fogsim.estimators.night.night_road import NightRoad
-from fogsim.estimators.night.own_light import lit_head_lamps, setback_of, without_noise
+from fogsim.estimators.night.own_light import HeadLamps, lit_head_lamps, setback_of, without_noise
 from fogsim.estimators.night.veil_correlation import VeilScores, VeilTemplates, visibility_by_parabola
 from fogsim.estimators.protocol import Calibrations
 from fogsim.parameters import Range, checked_parameters
@@ -82,7 +82,7 @@ class Gallen2014Veil:
         self,
         camera: Camera,
         *,
-        head_lamps: str = "usual",
+        head_lamps: HeadLamps = "usual",
         frames: Annotated[int, Range(1, 1000)] = 10,
         median: bool = False,
         threshold: Annotated[float, Range(0.0, 1.0)] = 0.4,

@@ -21,6 +21,9 @@ from fogsim.vision.sources.source_tree import SourceTree, source_tree
 PUBLISHED = 9.0
 """The paper's threshold of the mean Br50, of its camera [levels of 255 a pixel]."""
 
+NEAREST = 12.0
+"""Distance of the nearest vehicle ahead that the threshold is calibrated with [m]: closer lamps have no halo."""
+
 WINDOW = 25
 """Frames of the sliding mean: a second of the paper's."""
 

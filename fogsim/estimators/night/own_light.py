@@ -5,12 +5,13 @@ import itertools
 import math
 from dataclasses import dataclass, replace
 from statistics import NormalDist
-from typing import NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
+from fogsim.parameters import FileName
 from fogsim.values.camera import Camera, Response
 from fogsim.values.light import Lamp
 from fogsim.values.observation import Observation
@@ -20,7 +21,11 @@ from fogsim.vision.light.pixel_kernels import Pixels
 HEAD_LAMPS = Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.FRONT_FOG
 """Lamps that throw light ahead."""
 
-KNOWN_HEAD_LAMPS = ("usual", "unknown")
+_Known = Literal["usual", "unknown"]
+HeadLamps = _Known | FileName
+"""A car's head lamps, low beams of any pattern, or a file of lamps."""
+
+KNOWN_HEAD_LAMPS: tuple[str, ...] = get_args(_Known)
 """Names of head lamps: a car's, and low beams of any pattern; every other name is that of a file."""
 
 USUAL_SETBACK = 1.9

@@ -14,7 +14,7 @@ from fogsim.estimators.signs.regions import PoseDeviation
 from fogsim.estimators.signs.track import SignTrack
 from fogsim.estimators.signs.watch import SignWatch, Watched, sign_looks
 from fogsim.mixture import majority, reduced
-from fogsim.parameters import Range, checked_parameters
+from fogsim.parameters import FileName, Range, checked_parameters
 from fogsim.units import extinction_from_visibility, visibility_from_extinction
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate, ExtinctionBounds
@@ -94,7 +94,7 @@ class Belaroussi2015:
         self,
         camera: Camera,
         *,
-        operating_range: str | None = None,
+        operating_range: FileName | None = None,
         as_published: bool = False,
         setback: Annotated[float, Range(0.0, 10.0, "m")] | None = None,
         position_deviation: Annotated[float, Range(0.0, 100.0, "m")] = 0.5,

@@ -1,16 +1,20 @@
 """From a scenario to its methods: estimators, fusion, advisers, lighting, and what measures them."""
 
 import dataclasses
+from collections.abc import Callable
 from typing import TypeVar
 
 from fogsim.advice import ADVISERS, Adviser, VehicleAdviser
-from fogsim.calibration.cached import supply
+from fogsim.calibration.cached import CachedCalibrations
 from fogsim.errors import InputError
 from fogsim.estimators import ESTIMATORS, Estimator
+from fogsim.estimators.protocol import TakesCalibrations
 from fogsim.fusion import FUSIONS, Fusion, LocatedFusion
 from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy, VehicleLightingPolicy
 from fogsim.metrics import SafetyStandard
+from fogsim.parameters import paths_in
 from fogsim.registry import Registry
+from fogsim.scenario.parts.lamp_file import load_lamps
 from fogsim.scenario.schema import NO_RENDERER, Scenario
 from fogsim.scenario.section import Method
 from fogsim.values import Camera
@@ -70,10 +74,16 @@ def estimators(scenario: Scenario, assumed: Camera) -> tuple[Estimator, ...]:
     assumed : Camera
         The assumed calibration.
     """
-    made = tuple(_factory(ESTIMATORS, one, scenario)(assumed, **one.parameters) for one in scenario.estimators)
+    made = tuple(_made(ESTIMATORS, one, scenario, assumed) for one in scenario.estimators)
     for estimator in made:
         supply(estimator)
     return made
+
+
+def supply(estimator: Estimator) -> None:
+    """Give an estimator cached calibrations to take where it was given no files of them."""
+    if isinstance(estimator, TakesCalibrations):
+        estimator.take_calibrations(CachedCalibrations(load_lamps))
 
 
 def fusion(scenario: Scenario) -> Fusion | LocatedFusion:
@@ -84,7 +94,7 @@ def fusion(scenario: Scenario) -> Fusion | LocatedFusion:
     scenario : Scenario
         The scenario.
     """
-    return _factory(FUSIONS, scenario.fusion, scenario)(**scenario.fusion.parameters)
+    return _made(FUSIONS, scenario.fusion, scenario)
 
 
 def adviser(scenario: Scenario) -> Adviser | VehicleAdviser:
@@ -95,7 +105,7 @@ def adviser(scenario: Scenario) -> Adviser | VehicleAdviser:
     scenario : Scenario
         The scenario.
     """
-    return _factory(ADVISERS, scenario.advice, scenario)(**scenario.advice.parameters)
+    return _made(ADVISERS, scenario.advice, scenario)
 
 
 def road_adviser(scenario: Scenario) -> Adviser:
@@ -163,8 +173,10 @@ def lighting_policy(scenario: Scenario) -> LightingPolicy | VehicleLightingPolic
     scenario : Scenario
         The scenario.
     """
-    return _factory(LIGHTING_POLICIES, scenario.lighting, scenario)(**scenario.lighting.parameters)
+    return _made(LIGHTING_POLICIES, scenario.lighting, scenario)
 
 
-def _factory(registry: Registry[T], written: Method, scenario: Scenario) -> T:
-    return registry.find(written.method, scenario.directory, scenario.method_timeout_s)
+def _made(registry: Registry[Callable[..., T]], written: Method, scenario: Scenario, *given: object) -> T:
+    factory = registry.find(written.method, scenario.directory, scenario.method_timeout_s)
+    paths = paths_in(factory, written.parameters, scenario.directory)
+    return factory(*given, **{**written.parameters, **{name: str(path) for name, path in paths.items()}})

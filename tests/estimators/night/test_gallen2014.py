@@ -9,7 +9,7 @@ from fogsim.errors import InputError
 from fogsim.estimators import make
 from fogsim.estimators.night.gallen2014 import Gallen2014, Gallen2014Halo, fog_class
 from fogsim.estimators.night.halos import HaloThreshold
-from fogsim.values import Camera, Lamp, Observation, Response
+from fogsim.values import Camera, Lamp, LeadMeasurement, Observation, Response
 from tests.vision.sources.night_pictures import in_colour, picture
 
 CAMERA = Camera(320, 240, 300.0, (159.5, 119.5), 1.4, pitch=0.03, response=Response.SRGB)
@@ -37,6 +37,17 @@ def test_halos_tell_fog_but_not_how_much() -> None:
     assert clear.diagnostics["detected"] is False
     assert clear.visibility_interval[0] > 100.0
     assert clear.visibility_interval[1] == float("inf")
+
+
+def test_lamps_of_a_vehicle_close_ahead_say_nothing() -> None:
+    near, far = (
+        Gallen2014Halo(CAMERA)
+        .calibrated(MEASURED)
+        .update(dataclasses.replace(seen(LAMPS), lead=LeadMeasurement(distance, 0.0)))
+        for distance in (4.0, 40.0)
+    )
+    assert (near.bounds, near.valid) == (None, False)
+    assert far.bounds is not None
 
 
 def test_without_lamps_the_veil_is_asked() -> None:

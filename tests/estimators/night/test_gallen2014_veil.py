@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from fogsim.calibration.cached import supply
 from fogsim.estimators import make
 from fogsim.estimators.night.gallen2014_veil import Gallen2014Veil
 from fogsim.estimators.night.veil_correlation import (
@@ -12,6 +11,7 @@ from fogsim.estimators.night.veil_correlation import (
     otsu_threshold,
     visibility_by_parabola,
 )
+from fogsim.scenario.parts.methods import supply
 from fogsim.values import Estimate, Lamp, Observation
 from tests.estimators.night.pictures import CAMERA, SETBACK, night_picture
 

@@ -1,0 +1,41 @@
+"""Infos as flat dictionaries of numbers, for libraries that stack or store them."""
+
+from collections.abc import Mapping
+from numbers import Real
+from typing import Any
+
+from fogsim.values import DriverWarning, Ending
+
+_WORDS: Mapping[str, tuple[str, ...]] = {
+    "ending": ("", *(one.value for one in Ending)),
+    "warning": ("", *(one.value for one in DriverWarning)),
+    "fault": ("", "ego", "other"),
+}
+"""Words by the number that stands for each."""
+
+_TERMS = "reward_terms"
+
+
+def flat_numbers(info: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
+    """Numbers of a nested info under keys like ``truth/visibility_m``; other values are left out."""
+    flat: dict[str, float] = {}
+    for key, value in info.items():
+        if isinstance(value, Mapping):
+            flat |= flat_numbers(value, f"{prefix}{key}/")
+        elif key in _WORDS:
+            flat[f"{prefix}{key}"] = float(_WORDS[key].index(value))
+        elif isinstance(value, Real):
+            flat[f"{prefix}{key}"] = float(value)
+    return flat
+
+
+def word_of(info: Mapping[str, Any], key: str) -> str:
+    """A word of an info, nested or flat; empty if it has none."""
+    value = info.get(key) or ""
+    return value if isinstance(value, str) else _WORDS[key][int(value)]
+
+
+def reward_terms_of(info: Mapping[str, Any]) -> dict[str, float]:
+    """Terms of the reward of an info, nested or flat."""
+    flat = {key.removeprefix(f"{_TERMS}/"): value for key, value in info.items() if key.startswith(f"{_TERMS}/")}
+    return flat or dict(info.get(_TERMS, {}))

@@ -1,0 +1,210 @@
+"""Videos that are read frame by frame by ffmpeg."""
+
+import os
+import re
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.errors import InputError
+from fogsim.offline.source import Picture
+from fogsim.recorders.video import ffmpeg_program
+
+_DURATION = re.compile(r"Duration: (\d+):(\d+):(\d+(?:\.\d+)?)")
+_RATE = re.compile(r"Video:.*?(\d+(?:\.\d+)?k?) (?:fps|tbr)")
+_ADDRESS = re.compile(r" @ 0x[0-9a-f]+")
+_FRAME_TIME = re.compile(r"\[info\] n: *\d+ .*?pts_time:(\S+)")
+_ERROR, _TRANSPORT_STREAM = "[error] ", "Input #0, mpegts"
+_PACKET_SIZES = (188, 192, 204)  # of MPEG transport streams: ISO/IEC 13818-1, with a time code, with error correction
+MOST_MISSING = 0.5
+"""Time by which a complete video's frames may end before its header's duration, as with longer sound [s]."""
+
+_BLOCK, _MOST_ERRORS = 100_000, 100
+
+CONTAINERS = "mov,matroska,avi,mpeg,mpegvideo,mpegts,asf,flv,m4v,h264,hevc"
+"""ffmpeg's names of the allowed formats: none that opens further files or addresses, such as a playlist."""
+
+MOST_PIXELS = 16_384**2 // 2
+"""Most pixels of a frame [px]."""
+
+_HEADER_LINES = 3  # P6, size, largest value: https://netpbm.sourceforge.net/doc/ppm.html as ffmpeg writes it
+
+
+@dataclass(frozen=True, slots=True)
+class VideoFile:
+    """A video; its frames have 8 bits a channel and are turned upright.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    temporal : bool
+        Whether its frames are used in order; False treats each separately.
+    size : tuple of int
+        Columns and rows [px].
+    period : float
+        Time between two frames [s].
+    duration : float
+        Its length from its header [s]; 0 if unknown.
+    """
+
+    path: Path
+    temporal: bool
+    size: tuple[int, int]
+    period: float
+    duration: float
+
+    @classmethod
+    def open(cls, path: Path, temporal: bool = True) -> "VideoFile":
+        """Read the header and the first frame of a video.
+
+        Parameters
+        ----------
+        path : Path
+            The file.
+        temporal : bool
+            Whether its frames are a sequence.
+
+        Raises
+        ------
+        InputError
+            If it cannot be read as one, or has no frames.
+        """
+        # ffmpeg would wait for a writer of a pipe.
+        if not path.is_file():
+            raise InputError(f"{path}: cannot be read: not a regular file")
+        done = subprocess.run(  # noqa: S603 - imageio's own ffmpeg with arguments made here
+            _command(path, "-frames:v", "1"), stdin=subprocess.DEVNULL, capture_output=True, check=False
+        )
+        header_text = done.stderr.decode(errors="replace")
+        rate = _RATE.search(header_text)
+        if rate is None:
+            raise InputError(f"{path}: this is no video that can be read")
+        header = done.stdout.split(b"\n", _HEADER_LINES)
+        if len(header) <= _HEADER_LINES:
+            raise InputError(f"{path}: this video has no frames that can be read")
+        cols, rows = (int(part) for part in header[1].split())
+        duration = _DURATION.search(header_text)
+        seconds = 0.0
+        if duration is not None:
+            hours, minutes, rest = duration.groups()
+            seconds = 3600.0 * int(hours) + 60.0 * int(minutes) + float(rest)
+        return cls(path, temporal, (cols, rows), 1.0 / _number(rate[1]), seconds)
+
+    @property
+    def count(self) -> int:
+        """Number of frames by the header."""
+        return max(round(self.duration / self.period), 1)
+
+    @property
+    def description(self) -> str:
+        """Size and rate."""
+        kind = "" if self.temporal else ", each frame on its own"
+        return f"a video of {self.size[0]} × {self.size[1]} pixels at {1.0 / self.period:.4g} frames a second{kind}"
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """The path of the video."""
+        return (self.path,)
+
+    def pictures(self) -> Iterator[Picture]:
+        """Read the frames with their times; where the file is damaged, ffmpeg conceals or skips what it cannot decode.
+
+        After the frames of a damaged video, or of one that ends early, a picture without image follows, whose
+        ``error`` has the number of frames that were read and ffmpeg's first message.
+        """
+        read, end = 0, 0.0
+        # A file, not a pipe, which could fill up while frames are read.
+        with (
+            tempfile.TemporaryFile() as messages,
+            subprocess.Popen(  # noqa: S603 - imageio's own ffmpeg with arguments made here
+                _command(self.path), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=messages
+            ) as process,
+        ):
+            assert process.stdout is not None  # noqa: S101 - it was opened as a pipe
+            log = _Log(messages.fileno(), self.period)
+            try:
+                for image in _frames(process.stdout):
+                    time = log.time_of(read)
+                    yield Picture(read, time, image)
+                    read, end = read + 1, time + self.period
+                failed = process.wait() != 0
+            finally:
+                process.kill()
+            log.read()
+        said = [*log.errors, *(["the last packet is incomplete"] if log.is_stream and self._ends_in_a_packet() else [])]
+        is_short = self.duration - end > max(MOST_MISSING, 2.0 * self.period)
+        if failed or said or is_short:
+            frames = f"{read} of {self.count} frames" if is_short else f"{read} frames"
+            reason = f" ({said[0]})" if said else ""
+            message = f"{self.path}: the video is cut off or damaged: {frames} could be read{reason}"
+            yield Picture(read, end, None, message)
+
+    def _ends_in_a_packet(self) -> bool:
+        size = self.path.stat().st_size
+        return all(size % packet for packet in _PACKET_SIZES)
+
+
+class _Log:
+    """ffmpeg's messages in a file that it writes while it decodes: times of frames, and errors."""
+
+    def __init__(self, file: int, period: float) -> None:
+        self._file, self._period = file, period
+        self._at, self._rest = 0, b""
+        self._times: list[float] = []
+        self.errors: list[str] = []
+        self.is_stream = False
+
+    def time_of(self, frame: int) -> float:
+        """Time of a frame that was written, from the first [s]; by the rate if the file has none."""
+        if len(self._times) <= frame:
+            self.read()
+        return self._times[frame] - self._times[0]
+
+    def read(self) -> None:
+        """Read what has been written since."""
+        while data := os.pread(self._file, _BLOCK, self._at):
+            self._at += len(data)
+            *lines, self._rest = (self._rest + data).split(b"\n")
+            for line in lines:
+                self._take(line.decode(errors="replace"))
+
+    def _take(self, line: str) -> None:
+        if time := _FRAME_TIME.search(line):
+            after = self._times[-1] + self._period if self._times else 0.0
+            self._times.append(after if time[1] == "NOPTS" else float(time[1]))
+        elif _ERROR in line and len(self.errors) < _MOST_ERRORS:
+            self.errors.append(_ADDRESS.sub("", line).replace(_ERROR, "").strip())
+        elif _TRANSPORT_STREAM in line:
+            self.is_stream = True
+
+
+def _number(text: str) -> float:
+    """Rate as ffmpeg writes it: "90k" is 90,000."""
+    return 1000.0 * float(text[:-1]) if text.endswith("k") else float(text)
+
+
+def _command(path: Path, *limits: str) -> list[str]:
+    """Command line of a decoder that writes each frame as a PPM image, and its time among its messages."""
+    allowed = ["-protocol_whitelist", "file", "-format_whitelist", CONTAINERS, "-max_pixels", str(MOST_PIXELS)]
+    source = [*allowed, "-i", f"file:{path}", "-map", "0:v:0", "-vf", "showinfo=checksum=0", *limits]
+    # Neither repeated nor dropped for a constant rate.
+    sink = ["-fps_mode", "passthrough", "-f", "image2pipe", "-c:v", "ppm", "-pix_fmt", "rgb24", "-"]
+    return [ffmpeg_program(), "-hide_banner", "-nostdin", "-nostats", "-loglevel", "level+info", *source, *sink]
+
+
+def _frames(pipe: IO[bytes]) -> Iterator[NDArray[np.uint8]]:
+    while pipe.readline():
+        cols, rows = (int(part) for part in pipe.readline().split())
+        pipe.readline()
+        data = pipe.read(3 * cols * rows)
+        if len(data) < 3 * cols * rows:
+            return
+        # A copy, since kernels would be compiled again for a read-only array.
+        yield np.frombuffer(data, np.uint8).reshape(rows, cols, 3).copy()

@@ -1,0 +1,83 @@
+"""Files as cameras and phones write them: stored turned, at uneven times, animated, cut off."""
+
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image, ImageOps
+
+from fogsim.errors import InputError
+from fogsim.offline import find_source
+from fogsim.offline.image_files import read_image
+from fogsim.offline.video_file import VideoWriter
+from fogsim.recorders.video import ffmpeg_program
+
+TIMES = (0.0, 0.05, 0.1, 0.5, 0.9, 2.0)
+
+
+def frame(index: int) -> np.ndarray:
+    image = np.full((32, 48, 3), 40 * index, np.uint8)
+    image[: 4 * index + 4, :8] = 200
+    return image
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+@pytest.mark.parametrize("ending", [".jpg", ".png", ".tif", ".webp"])
+def test_images_are_turned_upright(tmp_path: Path, orientation: int, ending: str) -> None:
+    path, tag = tmp_path / f"turned{ending}", Image.Exif()
+    tag[0x0112] = orientation
+    options = {"lossless": True} if ending == ".webp" else {}
+    Image.fromarray(frame(3)).save(path, exif=tag, **options)
+    with Image.open(path) as stored:
+        expected = np.asarray(ImageOps.exif_transpose(stored).convert("RGB"))
+    np.testing.assert_array_equal(read_image(path)[..., ::-1], expected)
+
+
+@pytest.mark.parametrize("ending", [".gif", ".webp", ".png"])
+def test_an_animation_is_a_sequence(tmp_path: Path, ending: str) -> None:
+    path, durations = tmp_path / f"moving{ending}", [50, 400, 100]
+    first, *others = (Image.fromarray(frame(index)) for index in range(3))
+    first.save(path, save_all=True, append_images=others, duration=durations)
+    source = find_source(path)
+    pictures = list(source.pictures())
+    assert source.temporal
+    assert [one.time for one in pictures] == pytest.approx([0.0, 0.05, 0.45])
+    for index, one in enumerate(pictures):
+        assert np.abs(one.image.astype(int) - frame(index)).mean() < 3
+    with pytest.raises(InputError, match=r"expected one image, got 3 frames"):
+        read_image(path)
+
+
+def test_pages_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "scan.tif"
+    Image.fromarray(frame(0)).save(path, save_all=True, append_images=[Image.fromarray(frame(1))])
+    with pytest.raises(InputError, match=r"expected one image, got 2 pages"):
+        read_image(path)
+
+
+def test_frames_of_a_video_keep_their_times(tmp_path: Path) -> None:
+    path = tmp_path / "uneven.mp4"
+    with VideoWriter(path) as writer:
+        for index, time in enumerate(TIMES):
+            writer.write(frame(index), time)
+    pictures = list(find_source(path).pictures())
+    assert [one.time for one in pictures] == pytest.approx(TIMES, abs=1e-3)
+    assert [round(float(one.image.mean()) / 40) for one in pictures] == [
+        round(float(frame(index).mean()) / 40) for index in range(len(TIMES))
+    ]
+
+
+@pytest.mark.parametrize("codec", ["libx264", "mpeg2video"])
+def test_a_stream_that_was_cut_off_says_so(tmp_path: Path, codec: str) -> None:
+    whole, stream, cut = (tmp_path / name for name in ("whole.mp4", "stream.ts", "cut.ts"))
+    with VideoWriter(whole) as writer:
+        for index in range(50):
+            writer.write(np.random.default_rng(index).integers(0, 255, (64, 96, 3), np.uint8), index / 25)
+    command = [ffmpeg_program(), "-loglevel", "error", "-i", str(whole), "-c:v", codec, "-f", "mpegts", str(stream)]
+    subprocess.run(command, check=True)
+    assert all(not one.error for one in find_source(stream).pictures())
+    cut.write_bytes(stream.read_bytes()[: stream.stat().st_size * 6 // 10])
+    *_, last = find_source(cut).pictures()
+    assert last.image is None
+    assert "the video is cut off or damaged" in last.error

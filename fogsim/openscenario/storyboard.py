@@ -13,6 +13,7 @@ from fogsim.openscenario.xml_tree import Node
 
 _BEGUN, _OVER = ("startTransition", "runningState"), ("endTransition", "completeState")
 _MOST_TIMES = 100
+_MOTION = {"speed", "follow"}
 _PARTS = ("Story", "Act", "ManeuverGroup", "Maneuver", "Event", "Action")
 
 
@@ -106,9 +107,24 @@ class Storyboard:
                     until, trigger = _until(stop, triggers, event), entry.trigger
                     for name in entry.names:
                         written.append((event, _written(entry, name, trigger, until)))
+                        ends = self._end_others(entry, name, trigger)
+                        written += [(event, _written(one, one.names[0], one.trigger, until)) for one in ends]
                         # It is played again once it is over and its own trigger holds.
                         trigger = both(self._played(entry, name), entry.trigger)
         return written
+
+    def _end_others(self, entry: Entry, name: str, trigger: Trigger) -> list[Entry]:
+        """What an overriding event does to others of its maneuver that have begun: speeds stay as they are."""
+        if entry.node.get("priority") == "parallel" or not trigger.condition:
+            return []
+        actors = [one for one in entry.actors if not entry.effect.do.get(one, {}).keys() & _MOTION]
+        others = [one for one in self.entries.values() if one is not entry and one.node.above is entry.node.above]
+        begun = [f"happened({one.names[0]})" for one in others if any(map(one.effect.changes_speed, actors))]
+        if not begun:
+            return []
+        condition = f"({trigger.condition}) and not happened({name}) and ({' or '.join(begun)})"
+        held = Effect({one: {"speed": self.actions.held(one)} for one in actors})
+        return [Entry([f"{name}_ends_others"], entry.node, actors, held, Trigger(condition, trigger.delay))]
 
     def _need_triggers(self) -> Triggers:
         if self.triggers is None:
@@ -176,7 +192,7 @@ class Storyboard:
         """When an execution of an event is over."""
         effect, told = entry.effect, f"happened({name})"
         if effect.ends_itself:
-            if any({"speed", "follow"} & done.keys() for done in effect.do.values()):
+            if any(_MOTION & done.keys() for done in effect.do.values()):
                 self.findings.refuse(
                     entry.node, "together with a speed, the end of a change of lane by distance is not known"
                 )

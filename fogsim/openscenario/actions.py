@@ -86,7 +86,7 @@ class Actions:
             elif one.tag == "EnvironmentAction":
                 self._environment(one, effect)
             elif one.tag == "OverrideControllerValueAction":
-                if any(input_.get("active") == "true" for input_ in one.all()):
+                if any(self.findings.flag(input_, "active", "false") for input_ in one.all()):
                     self.findings.refuse(one, "speeds and lanes are ordered, not pedals; write active=false")
             elif one.tag in HARMLESS:
                 self.findings.leave_out(one, HARMLESS[one.tag])
@@ -142,7 +142,7 @@ class Actions:
         value = self.findings.number(relative, "value")
         how = self.findings.word(relative, "speedTargetValueType", ("delta", "factor"))
         share = {"factor": value} if how == "factor" else {"plus_kmh": value * KMH_PER_MPS}
-        follows = {"continuous": True} if relative.get("continuous") == "true" else {}
+        follows = {"continuous": True} if self.findings.flag(relative, "continuous", "false") else {}
         return {"like": self._other(relative), **share, **follows}
 
     def _other(self, node: Node) -> str:
@@ -171,33 +171,32 @@ class Actions:
     def _dynamics(self, node: Node) -> tuple[str, str, float] | None:
         """Shape, dimension and value of a change; None if it happens at once, whatever its dimension."""
         shape, by = self.findings.word(node, "dynamicsShape", tuple(SHAPES)), node.get("dynamicsDimension")
-        value = abs(self.findings.number(node, "value", 0.0 if shape == "step" else None, is_finite=False))
-        if shape == "step":
-            return None
-        by = self.findings.word(node, "dynamicsDimension", ("time", "rate", "distance"))
-        return None if math.isinf(value) or (value == 0.0 and by != "rate") else (shape, by, value)
+        value = self.findings.number(node, "value", 0.0 if shape == "step" else None, is_finite=by != "rate")
+        if shape != "step":
+            by = self.findings.word(node, "dynamicsDimension", ("time", "rate", "distance"))
+        is_at_once = shape == "step" or math.isinf(value) or (value == 0.0 and by != "rate")
+        return None if is_at_once else (shape, by, abs(value))
 
     def _lane_change(self, action: Node, actor: str, effect: Effect) -> None:
         """`change_lane`: absolute, or relative to a vehicle; by time, distance or rate."""
         dynamics, target = action.one("LaneChangeActionDynamics"), action.one("LaneChangeTarget")
         if self.findings.number(action, "targetLaneOffset", 0.0):
             self.findings.refuse(action, "targetLaneOffset: vehicles are in the middle of their lanes; write 0")
-        told = None if dynamics is None else self._dynamics(dynamics)
-        lanes, begins = None if target is None else self._lanes(target, actor), self.positions.entities.get(actor)
-        if target is None or lanes is None or begins is None:
+        if dynamics is None or target is None:
+            self.findings.refuse(action, "expected LaneChangeActionDynamics and a LaneChangeTarget")
             return
-        change: dict[str, Any] = {**lanes, "stay_s": _STAY, "duration_s": 0.0}
-        if told is not None:
-            shape, by, value = told
-            if by == "rate" and value == 0.0:
-                self.findings.refuse(dynamics or action, "value: expected a rate above 0")
-            elif by == "rate":
-                value = _STEEPEST[shape] * self._across(target, lanes, begins) / value
-            change.pop("duration_s")
-            change |= {"distance_m": value} if by == "distance" else {"duration_s": min(value, 60.0)}
-        effect.lasts = max(effect.lasts, change.get("duration_s", 0.0))
-        effect.ends_itself = "distance_m" in change
-        effect.add(actor, change_lane=change)
+        shape, by, value = self._dynamics(dynamics) or ("step", "time", 0.0)
+        if by == "rate" and value == 0.0:
+            self.findings.refuse(dynamics, "value: expected a rate above 0")
+        lanes, begins = self._lanes(target, actor), self.positions.entities.get(actor)
+        if lanes is None or begins is None:
+            return
+        if by == "rate":
+            value = _STEEPEST[shape] * self._across(target, lanes, begins) / (value or 1.0)
+        pace = {"distance_m": value} if by == "distance" else {"duration_s": min(value, 60.0)}
+        effect.lasts = max(effect.lasts, pace.get("duration_s", 0.0))
+        effect.ends_itself = by == "distance"
+        effect.add(actor, change_lane={**lanes, "stay_s": _STAY, **pace})
 
     def _across(self, target: Node, lanes: Mapping[str, Any], begins: Spot) -> float:
         """Way across of a change of lane, by the lanes on which the vehicles begin [m]."""
@@ -234,10 +233,9 @@ class Actions:
 
     def _has_one_lane(self, spot: Spot | None) -> bool:
         """Whether a road has one lane each way, so that the lane to the left is that of oncoming traffic."""
-        origins = spot.lane.origins if spot else ()
-        roads = {name.rpartition("_")[0] for name in origins if name.endswith(("_1", "_-1"))}
-        there = {o for one in self.positions.lanes.lanes for o in one.origins if o.rpartition("_")[0] in roads}
-        return bool(roads) and there == {f"{road}_{lane}" for road in roads for lane in ("1", "-1")}
+        road = spot.lane.origins[0].rpartition("_")[0] if spot and spot.lane.origins else ""
+        there = {name for one in self.positions.lanes.lanes for name in one.origins if name.startswith(f"{road}_")}
+        return there == {f"{road}_1", f"{road}_-1"}
 
     def _lights(self, action: Node, actor: str, effect: Effect) -> None:
         """`lamps`; a flashing lamp is an indicator, or on."""
@@ -262,12 +260,12 @@ class Actions:
     def _keep_distance(self, action: Node, actor: str, effect: Effect) -> None:
         """`follow`, by `timeGap` with `freespace` and `continuous`, of a vehicle ahead."""
         headway = self.findings.number(action, "timeGap", 0.0)
-        if not headway or self.findings.word(action, "freespace", ("true", "false")) != "true":
+        if not headway or not self.findings.flag(action, "freespace"):
             self.findings.refuse(action, "a distance is kept by a timeGap with freespace=true")
             return
         self.findings.word(action, "coordinateSystem", ("entity", "lane", "road"), "entity")
         self.findings.word(action, "displacement", ("any", "trailingReferencedEntity"), "any")
-        if action.get("continuous") != "true":
+        if not self.findings.flag(action, "continuous"):
             self.findings.refuse(action, "continuous: a distance, once reached, is kept; write true")
         effect.add(actor, follow={"vehicle": self._other(action), "headway_s": headway})
 

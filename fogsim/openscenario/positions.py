@@ -141,7 +141,7 @@ class Positions:
         known = [spot for spot in spots if spot is not None]
         if node is None or not known or len(known) != len(points):
             raise ValueError("expected a Route of Waypoints that have a Position")
-        if node.get("closed") == "true":
+        if self.findings.flag(node, "closed", "false"):
             self.findings.refuse(node, "closed: write the waypoints of each lap")
         edges: tuple[str, ...] = (known[0].lane.edge,)
         for point, (before, after) in zip(points, itertools.pairwise(known), strict=False):

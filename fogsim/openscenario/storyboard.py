@@ -51,7 +51,7 @@ class Storyboard:
         for group in self._groups():
             actors = group.one("Actors")
             names = [one.get("entityRef") for one in actors.all("EntityRef")] if actors else []
-            if actors and actors.get("selectTriggeringEntities", "false") == "true":
+            if actors and self.findings.flag(actors, "selectTriggeringEntities", "false"):
                 self.findings.refuse(actors, "selectTriggeringEntities: name the actors")
             for one in names:
                 if one not in self.actions.vehicles:

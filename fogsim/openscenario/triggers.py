@@ -272,7 +272,7 @@ class Triggers:
         return _Test(f"{gap} > {near[0]:.9g} m or {gap} < {near[1]:.9g} m")
 
     def _is_free(self, node: Node) -> bool:
-        return self.findings.word(node, "freespace", ("true", "false")) == "true"
+        return self.findings.flag(node, "freespace")
 
     def _distance(self, node: Node, name: str) -> _Test | None:
         """`X.position` about a position on the ego's route, without `freespace` of the rear axle."""

@@ -229,3 +229,17 @@ def test_the_end_of_the_road_ends_the_run(tmp_path: Path) -> None:
     assert steps[-1].ending in (Ending.END_CONDITION, Ending.ARRIVED)
     # From a front bumper at 703.7 m to 10 m before the end of the road at 800 m.
     assert steps[-1].time == pytest.approx((790.0 - 703.7) / 15.0, abs=0.2)
+
+
+@pytest.mark.parametrize(("written", "is_kept"), [("1", True), ("True", True), ("0", False), ("yes", None)])
+def test_truth_values_are_those_of_xml(tmp_path: Path, written: str, is_kept: bool | None) -> None:
+    relative = f'<RelativeTargetSpeed entityRef="Ego" value="1" speedTargetValueType="factor" continuous="{written}"/>'
+    action = speed(5).replace('<AbsoluteTargetSpeed value="5"/>', relative)
+    begin = {"Ego": lane(30), "Lead": lane(90)}
+    file = write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": event("like", action, after(1.0))})
+    if is_kept is None:
+        with pytest.raises(InputError, match="continuous: expected true or false, got 'yes'"):
+            read_openscenario(file)
+    else:
+        done = read_openscenario(file).data["timeline"][-1]["do"]["Lead"]["speed"]
+        assert done.get("continuous", False) is is_kept

@@ -34,7 +34,7 @@ class Storyboard:
 
     catalogs: Catalogs
     actions: Actions
-    triggers: Triggers | None = None
+    triggers: Triggers = field(init=False)
     entries: dict[int, Entry] = field(default_factory=dict)
     _acts: dict[int, Trigger] = field(default_factory=dict)
     _stories: list[Node] = field(default_factory=list)
@@ -93,7 +93,7 @@ class Storyboard:
 
     def timeline(self) -> list[tuple[Node, dict[str, Any]]]:
         """Entries of the timeline, each with its element."""
-        triggers = self._need_triggers()
+        triggers = self.triggers
         for story in self._stories:
             for act in story.all("Act"):
                 self._acts[id(act)] = self._act_begins(act, triggers)
@@ -126,11 +126,6 @@ class Storyboard:
         held = Effect({one: {"speed": self.actions.held(one)} for one in actors})
         return [Entry([f"{name}_ends_others"], entry.node, actors, held, Trigger(condition, trigger.delay))]
 
-    def _need_triggers(self) -> Triggers:
-        if self.triggers is None:
-            raise ValueError("expected the triggers to be there before the timeline, got none")
-        return self.triggers
-
     def _act_begins(self, act: Node, triggers: Triggers) -> Trigger:
         """When an act begins; a trigger that is more than a time becomes a mark."""
         begins = triggers.trigger(act.one("StartTrigger")) or AT_ONCE
@@ -141,7 +136,7 @@ class Storyboard:
         return Trigger(f"happened({name})", stays=True)
 
     def _begins(self, entry: Entry, act: Node) -> Trigger:
-        own = self._need_triggers().trigger(entry.node.one("StartTrigger")) or AT_ONCE
+        own = self.triggers.trigger(entry.node.one("StartTrigger")) or AT_ONCE
         return both(self._acts[id(act)], own)
 
     def state(self, node: Node) -> Trigger:
@@ -173,7 +168,7 @@ class Storyboard:
             # A story begins with the run.
             return AT_ONCE
         if id(act) not in self._acts:
-            self._acts[id(act)] = self._act_begins(act, self._need_triggers())
+            self._acts[id(act)] = self._act_begins(act, self.triggers)
         return self._acts[id(act)]
 
     def _over(self, part: Node) -> Trigger:

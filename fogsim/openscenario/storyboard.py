@@ -93,18 +93,15 @@ class Storyboard:
 
     def timeline(self) -> list[tuple[Node, dict[str, Any]]]:
         """Entries of the timeline, each with its element."""
-        triggers = self.triggers
-        for story in self._stories:
-            for act in story.all("Act"):
-                self._acts[id(act)] = self._act_begins(act, triggers)
+        self._acts = {id(act): self._act_begins(act, self.triggers) for act in self._all_acts()}
         written = []
         for story in self._stories:
             for act in story.all("Act"):
-                stop = triggers.trigger(act.one("StopTrigger"))
+                stop = self.triggers.trigger(act.one("StopTrigger"))
                 for event in _events(act):
                     entry = self.entries[id(event)]
                     entry.trigger = self._begins(entry, act)
-                    until, trigger = _until(stop, triggers, event), entry.trigger
+                    until, trigger = _until(stop, self.triggers, event), entry.trigger
                     for name in entry.names:
                         written.append((event, _written(entry, name, trigger, until)))
                         ends = self._end_others(entry, name, trigger)

@@ -91,7 +91,7 @@ class Positions:
         return self.lanes.at(*self.lanes.across(node.get("roadId"), s, t))
 
     def relative_lane(self, node: Node) -> Spot:
-        """The lane by an entity's number and `dLane`, so far along the road (`ds`), or ahead of it (`dsLane`)."""
+        """The lane by an entity's number and `dLane`, so far along the reference line (`ds`), or ahead of it (`dsLane`)."""
         self._no_offset(node)
         spot = self.entities[node.get("entityRef")]
         # Numbers of lanes grow to the left of the road, on whose left side vehicles drive against it.
@@ -99,7 +99,7 @@ class Positions:
         beside = self.lanes.beside(spot, int(sense * self.findings.number(node, "dLane")))
         if "dsLane" in node.attributes:
             return self.lanes.along(beside, self.findings.number(node, "dsLane"))
-        return self.lanes.along(beside, sense * self.findings.number(node, "ds"))
+        return self.lanes.farther(beside, self.findings.number(node, "ds"))
 
     def relative_world(self, node: Node) -> Spot:
         """The lane that is so far from an entity, along x and y."""

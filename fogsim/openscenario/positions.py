@@ -91,7 +91,7 @@ class Positions:
         return self.lanes.at(*self.lanes.across(node.get("roadId"), s, t))
 
     def relative_lane(self, node: Node) -> Spot:
-        """The lane by an entity's number and `dLane`, so far along the road's line (`ds`), or ahead of it (`dsLane`)."""
+        """The lane by an entity's number and `dLane`, along the road's line (`ds`), or ahead of it (`dsLane`)."""
         self._no_offset(node)
         spot = self.entities[node.get("entityRef")]
         # Numbers of lanes grow to the left of the road, on whose left side vehicles drive against it.

@@ -1,7 +1,6 @@
 """The storyboard as a timeline: acts, groups, maneuvers and events, each with a trigger in FogSim's language."""
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -48,7 +47,7 @@ class Storyboard:
     def find_events(self, storyboard: Node) -> None:
         """Find all events and their effects; triggers follow later, since events refer to one another."""
         self._stories = storyboard.all("Story")
-        for group in self._groups():
+        for group in (one for act in self._all_acts() for one in act.all("ManeuverGroup")):
             actors = group.one("Actors")
             names = [one.get("entityRef") for one in actors.all("EntityRef")] if actors else []
             if actors and self.findings.flag(actors, "selectTriggeringEntities", "false"):
@@ -65,11 +64,6 @@ class Storyboard:
                     self._find(event, names, times)
             if times > 1 and len(events := [e for m in group.all("Maneuver") for e in m.all("Event")]) > 1:
                 self.findings.refuse(group, f"maximumExecutionCount: {len(events)} events are played once; write 1")
-
-    def _groups(self) -> Iterator[Node]:
-        for story in self._stories:
-            for act in story.all("Act"):
-                yield from act.all("ManeuverGroup")
 
     def _executions(self, node: Node) -> int:
         times = self.findings.number(node, "maximumExecutionCount", 1.0)
@@ -95,19 +89,18 @@ class Storyboard:
         """Entries of the timeline, each with its element."""
         self._acts = {id(act): self._act_begins(act, self.triggers) for act in self._all_acts()}
         written = []
-        for story in self._stories:
-            for act in story.all("Act"):
-                stop = self.triggers.trigger(act.one("StopTrigger"))
-                for event in _events(act):
-                    entry = self.entries[id(event)]
-                    entry.trigger = self._begins(entry, act)
-                    until, trigger = _until(stop, self.triggers, event), entry.trigger
-                    for name in entry.names:
-                        written.append((event, _written(entry, name, trigger, until)))
-                        ends = self._end_others(entry, name, trigger)
-                        written += [(event, _written(one, one.names[0], one.trigger, until)) for one in ends]
-                        # It is played again once it is over and its own trigger holds.
-                        trigger = both(self._played(entry, name), entry.trigger)
+        for act in self._all_acts():
+            stop = self.triggers.trigger(act.one("StopTrigger"))
+            for event in _events(act):
+                entry = self.entries[id(event)]
+                entry.trigger = self._begins(entry, act)
+                until, trigger = _until(stop, self.triggers, event), entry.trigger
+                for name in entry.names:
+                    written.append((event, _written(entry, name, trigger, until)))
+                    ends = self._end_others(entry, name, trigger)
+                    written += [(event, _written(one, one.names[0], one.trigger, until)) for one in ends]
+                    # It is played again once it is over and its own trigger holds.
+                    trigger = both(self._played(entry, name), entry.trigger)
         return written
 
     def _end_others(self, entry: Entry, name: str, trigger: Trigger) -> list[Entry]:

@@ -59,7 +59,7 @@ def read_beginning(init: Node | None, vehicles: Mapping[str, Vehicle], actions: 
             continue
         try:
             wanted = begin.effect.routes.get(name, ())
-            begin.fronts[name] = _front(name, begin, vehicles, actions.positions.lanes)
+            begin.fronts[name] = _front(name, begin, vehicles, actions)
             begin.ways[name] = _way(begin.fronts[name].lane.edge, wanted, actions.positions.lanes)
         except ValueError as error:
             actions.findings.refuse(vehicle.node, f"{name} cannot begin where it is to: {error}")
@@ -67,11 +67,11 @@ def read_beginning(init: Node | None, vehicles: Mapping[str, Vehicle], actions: 
     return begin
 
 
-def _front(name: str, begin: Beginning, vehicles: Mapping[str, Vehicle], lanes: OpenDriveLanes) -> Spot:
-    """Place of a front bumper; ValueError if it is on no road, or another vehicle is there."""
-    vehicle = vehicles[name]
-    front = lanes.along(begin.spots[name], vehicle.front, begin.effect.routes.get(name, ()))
-    for other, there in begin.fronts.items():
+def _front(name: str, begin: Beginning, vehicles: Mapping[str, Vehicle], actions: Actions) -> Spot:
+    """Place of a front bumper; ValueError if it is on no road or, all places being as written, in another vehicle."""
+    wanted, vehicle = begin.effect.routes.get(name, ()), vehicles[name]
+    front = actions.positions.lanes.along(begin.spots[name], vehicle.front, wanted)
+    for other, there in begin.fronts.items() if not actions.findings.refused else ():
         is_same = (there.lane.edge, there.lane.index) == (front.lane.edge, front.lane.index)
         if is_same and -vehicles[other].length < front.position - there.position < vehicle.length:
             raise ValueError(f"{other} is there")

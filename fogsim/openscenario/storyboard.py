@@ -110,11 +110,10 @@ class Storyboard:
         actors = [one for one in entry.actors if not entry.effect.do.get(one, {}).keys() & _MOTION]
         others = [one for one in self.entries.values() if one is not entry and one.node.above is entry.node.above]
         begun = [f"happened({one.names[0]})" for one in others if any(map(one.effect.changes_speed, actors))]
-        if not begun:
-            return []
         condition = f"({trigger.condition}) and not happened({name}) and ({' or '.join(begun)})"
         held = Effect({one: {"speed": self.actions.held(one)} for one in actors})
-        return [Entry([f"{name}_ends_others"], entry.node, actors, held, Trigger(condition, trigger.delay))]
+        ends = Entry([f"{name}_ends_others"], entry.node, actors, held, Trigger(condition, trigger.delay))
+        return [ends] if begun else []
 
     def _act_begins(self, act: Node, triggers: Triggers) -> Trigger:
         """When an act begins; a trigger that is more than a time becomes a mark."""

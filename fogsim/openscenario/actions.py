@@ -13,6 +13,7 @@ from fogsim.openscenario.environment import environment_of
 from fogsim.openscenario.findings import Findings
 from fogsim.openscenario.positions import Positions
 from fogsim.openscenario.xml_tree import Node
+from fogsim.traffic.road.opendrive_lanes import Spot
 from fogsim.units import KMH_PER_MPS
 
 SHAPES = {"step": "step", "linear": "linear", "sinusoidal": "sinusoidal", "cubic": "sinusoidal"}
@@ -33,6 +34,7 @@ LAMPS = {
 """Lamps of each type of light."""
 
 _UNLIT = ("licensePlateIllumination", "reversingLights", "specialPurposeLights")
+_STEEPEST = {"linear": 1.0, "sinusoidal": 0.5 * math.pi, "cubic": 1.5}  # Greatest rate of a shape, over its mean
 _STAY = 1e5  # Time for which a vehicle stays in the lane that it has changed to [s]
 _NEAR = 0.05  # Difference at which a speed has been reached [m/s]
 
@@ -55,6 +57,11 @@ class Effect:
         mine = self.do.setdefault(subject, {})
         for key, block in blocks.items():
             mine[key] = {**mine.get(key, {}), **block} if key == "lamps" else block
+
+    def changes_speed(self, subject: str) -> bool:
+        """Whether a subject's speed changes, or goes by another vehicle's, for some time."""
+        speed = self.do.get(subject, {}).get("speed", {})
+        return "follow" in self.do.get(subject, {}) or "continuous" in speed or speed.get("shape", "step") != "step"
 
 
 @dataclass
@@ -79,7 +86,7 @@ class Actions:
             elif one.tag == "EnvironmentAction":
                 self._environment(one, effect)
             elif one.tag == "OverrideControllerValueAction":
-                if any(input_.get("active") == "true" for input_ in one.all()):
+                if any(self.findings.flag(input_, "active", "false") for input_ in one.all()):
                     self.findings.refuse(one, "speeds and lanes are ordered, not pedals; write active=false")
             elif one.tag in HARMLESS:
                 self.findings.leave_out(one, HARMLESS[one.tag])
@@ -122,7 +129,8 @@ class Actions:
         if "rate_mps2" in speed and "to_kmh" in speed:
             own, to = f"{self.called(actor)}.speed", speed["to_kmh"] / KMH_PER_MPS
             effect.ends.append(f"{own} > {to - _NEAR:.9g} m/s and {own} < {to + _NEAR:.9g} m/s")
-        effect.add(actor, speed=speed)
+        # At a rate of 0 a speed stays as it is.
+        effect.add(actor, speed=self.held(actor) if speed.get("rate_mps2") == 0.0 else speed)
 
     def _target(self, target: Node) -> dict[str, Any]:
         absolute, relative = target.one("AbsoluteTargetSpeed"), target.one("RelativeTargetSpeed")
@@ -137,7 +145,7 @@ class Actions:
         value = self.findings.number(relative, "value")
         how = self.findings.word(relative, "speedTargetValueType", ("delta", "factor"))
         share = {"factor": value} if how == "factor" else {"plus_kmh": value * KMH_PER_MPS}
-        follows = {"continuous": True} if relative.get("continuous") == "true" else {}
+        follows = {"continuous": True} if self.findings.flag(relative, "continuous", "false") else {}
         return {"like": self._other(relative), **share, **follows}
 
     def _other(self, node: Node) -> str:
@@ -147,50 +155,67 @@ class Actions:
             self.findings.refuse(node, f"there is no vehicle {name!r}")
         return self.called(name).strip('"')
 
+    def held(self, actor: str) -> dict[str, Any]:
+        """The order to keep the speed of that moment."""
+        return {"like": self.called(actor).strip('"'), "shape": "step"}
+
     def _pace(self, dynamics: Node, effect: Effect) -> dict[str, Any]:
-        shape = SHAPES[self.findings.word(dynamics, "dynamicsShape", tuple(SHAPES))]
-        value = abs(self.findings.number(dynamics, "value", 0.0, is_finite=False))
-        by = self.findings.word(dynamics, "dynamicsDimension", ("time", "rate", "distance"))
-        if shape == "step" or value == 0.0 or math.isinf(value):
+        told = self._dynamics(dynamics)
+        if told is None:
             return {"shape": "step"}
+        shape, by, value = told
         if by == "distance":
             self.findings.refuse(dynamics, "dynamicsDimension: speeds change by time or rate")
             return {}
         if by == "time":
             effect.lasts = max(effect.lasts, value)
-        return {"shape": shape, "over_s" if by == "time" else "rate_mps2": value}
+        return {"shape": SHAPES[shape], "over_s" if by == "time" else "rate_mps2": value}
+
+    def _dynamics(self, node: Node) -> tuple[str, str, float] | None:
+        """Shape, dimension and value of a change; None if it happens at once, whatever its dimension."""
+        shape, by = self.findings.word(node, "dynamicsShape", tuple(SHAPES)), node.get("dynamicsDimension")
+        value = self.findings.number(node, "value", 0.0 if shape == "step" else None, is_finite=by != "rate")
+        if shape != "step":
+            by = self.findings.word(node, "dynamicsDimension", ("time", "rate", "distance"))
+        is_at_once = shape == "step" or math.isinf(value) or (value == 0.0 and by != "rate")
+        return None if is_at_once else (shape, by, abs(value))
 
     def _lane_change(self, action: Node, actor: str, effect: Effect) -> None:
-        """`change_lane`: absolute, or relative to a vehicle; by time or distance."""
+        """`change_lane`: absolute, or relative to a vehicle; by time, distance or rate."""
         dynamics, target = action.one("LaneChangeActionDynamics"), action.one("LaneChangeTarget")
         if self.findings.number(action, "targetLaneOffset", 0.0):
             self.findings.refuse(action, "targetLaneOffset: vehicles are in the middle of their lanes; write 0")
-        lanes = None if target is None else self._lanes(target, actor)
-        if lanes is None:
+        if dynamics is None or target is None:
+            self.findings.refuse(action, "expected LaneChangeActionDynamics and a LaneChangeTarget")
             return
-        change: dict[str, Any] = {**lanes, "stay_s": _STAY}
-        if dynamics is not None:
-            change |= self._duration(dynamics)
-            effect.lasts = max(effect.lasts, change.get("duration_s", 0.0))
-            effect.ends_itself = "distance_m" in change
-        effect.add(actor, change_lane=change)
-
-    def _duration(self, dynamics: Node) -> dict[str, float]:
-        shape = self.findings.word(dynamics, "dynamicsShape", tuple(SHAPES))
-        value = abs(self.findings.number(dynamics, "value", 0.0, is_finite=False))
-        by = self.findings.word(dynamics, "dynamicsDimension", ("time", "rate", "distance"))
-        if shape == "step" or value == 0.0:
-            return {"duration_s": 0.0}
+        shape, by, value = self._dynamics(dynamics) or ("step", "time", 0.0)
+        if by == "rate" and value == 0.0:
+            self.findings.refuse(dynamics, "value: expected a rate above 0")
+        lanes, begins = self._lanes(target, actor), self.positions.entities.get(actor)
+        if lanes is None or begins is None:
+            return
         if by == "rate":
-            self.findings.refuse(dynamics, "dynamicsDimension: changes of lane take a time or a distance")
-        return {"distance_m": value} if by == "distance" else {"duration_s": min(value, 60.0)}
+            value = _STEEPEST[shape] * self._across(target, lanes, begins) / (value or 1.0)
+        pace = {"distance_m": value} if by == "distance" else {"duration_s": min(value, 60.0)}
+        effect.lasts = max(effect.lasts, pace.get("duration_s", 0.0))
+        effect.ends_itself = by == "distance"
+        effect.add(actor, change_lane={**lanes, "stay_s": _STAY, **pace})
+
+    def _across(self, target: Node, lanes: Mapping[str, Any], begins: Spot) -> float:
+        """Way across of a change of lane, by the lanes on which the vehicles begin [m]."""
+        relative = target.one("RelativeTargetLane")
+        other = self.positions.entities.get(relative.get("entityRef")) if relative else None
+        to = lanes["to"] if "to" in lanes else (other or begins).lane.index + lanes["lanes"]
+        return begins.lane.width * (1 if to == "oncoming" else max(abs(to - begins.lane.index), 1))
 
     def _lanes(self, target: Node, actor: str) -> dict[str, Any] | None:
         absolute, relative = target.one("AbsoluteTargetLane"), target.one("RelativeTargetLane")
+        begins = self.positions.entities.get(actor)
         if relative is not None:
             other, lanes = self._other(relative), int(self.findings.number(relative, "value"))
+            if lanes > 0 and self._has_one_lane(self.positions.entities.get(relative.get("entityRef"))):
+                return self._oncoming(relative, lanes)
             return {"lanes": lanes} if relative.get("entityRef") == actor else {"to_lane_of": other, "lanes": lanes}
-        begins = self.positions.entities.get(actor)
         if absolute is None or begins is None:
             self.findings.refuse(target, "expected an AbsoluteTargetLane or RelativeTargetLane")
             return None
@@ -201,10 +226,19 @@ class Actions:
             return None
         if wanted.startswith("-") == begins.lane.origins[0].partition("_")[2].startswith("-"):
             return {"to": found[0].index}
-        if wanted.lstrip("-") != "1":
-            self.findings.refuse(absolute, "of the oncoming lanes, vehicles drive on the nearest; write 1 or -1")
+        return self._oncoming(absolute, abs(int(wanted)))
+
+    def _oncoming(self, node: Node, number: int) -> dict[str, Any]:
+        if number != 1:
+            self.findings.refuse(node, "of the oncoming lanes, vehicles drive on the nearest; write 1 or -1")
         self.positions.with_oncoming = True
         return {"to": "oncoming"}
+
+    def _has_one_lane(self, spot: Spot | None) -> bool:
+        """Whether a road has one lane each way, so that the lane to the left is that of oncoming traffic."""
+        road = spot.lane.origins[0].rpartition("_")[0] if spot and spot.lane.origins else ""
+        there = {name for one in self.positions.lanes.lanes for name in one.origins if name.startswith(f"{road}_")}
+        return there == {f"{road}_1", f"{road}_-1"}
 
     def _lights(self, action: Node, actor: str, effect: Effect) -> None:
         """`lamps`; a flashing lamp is an indicator, or on."""
@@ -229,12 +263,12 @@ class Actions:
     def _keep_distance(self, action: Node, actor: str, effect: Effect) -> None:
         """`follow`, by `timeGap` with `freespace` and `continuous`, of a vehicle ahead."""
         headway = self.findings.number(action, "timeGap", 0.0)
-        if not headway or self.findings.word(action, "freespace", ("true", "false")) != "true":
+        if not headway or not self.findings.flag(action, "freespace"):
             self.findings.refuse(action, "a distance is kept by a timeGap with freespace=true")
             return
         self.findings.word(action, "coordinateSystem", ("entity", "lane", "road"), "entity")
         self.findings.word(action, "displacement", ("any", "trailingReferencedEntity"), "any")
-        if action.get("continuous") != "true":
+        if not self.findings.flag(action, "continuous"):
             self.findings.refuse(action, "continuous: a distance, once reached, is kept; write true")
         effect.add(actor, follow={"vehicle": self._other(action), "headway_s": headway})
 

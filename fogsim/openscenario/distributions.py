@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from fogsim.errors import InputError, shown, suggest
 from fogsim.openscenario.findings import Findings
+from fogsim.openscenario.parameters import declared
 from fogsim.openscenario.xml_tree import Node, read_xml
 from fogsim.randomness import named_generator
 
@@ -45,25 +46,44 @@ def read_parameter_cases(path: Path) -> ParameterCases | None:
     if whole is None:
         return None
     findings = Findings()
-    base, declared = _base(whole)
+    base, root = _base(whole)
     fixed, drawn = whole.one("Deterministic"), whole.one("Stochastic")
     if fixed is None and drawn is None:
         findings.refuse(whole, "there are no cases; expected Deterministic or Stochastic")
     cases = _grid(fixed or whole, findings) if drawn is None else _test_runs(drawn, findings)
     findings.look_for_unread(whole)
-    known = {one.attributes.get("name", ""): one.attributes.get("value", "") for one in declared}
+    declarations = [one for block in root.all("ParameterDeclarations") for one in block.children]
+    known = {one.attributes.get("name", ""): one.attributes.get("value", "") for one in declarations}
     names = dict.fromkeys(name for case in cases for name in case)
     for name in names:
         if name not in known:
             findings.refuse(whole, f"{base} declares no parameter {shown(name)}; {suggest(name, known)}")
     findings.close(path)
     # Where a set leaves a parameter out, it has the value of its declaration.
-    filled = tuple({name: case.get(name, known[name]) for name in names} for case in cases)
-    return ParameterCases(base, filled, drawn is not None)
+    filled: list[Assignment] = [{name: case.get(name, known[name]) for name in names} for case in cases]
+    if drawn is None and any(one.children for one in declarations):
+        filled = _allowed(filled, replace(root, children=root.all("ParameterDeclarations")), whole, findings)
+        findings.close(path)
+    return ParameterCases(base, tuple(filled), drawn is not None)
 
 
-def _base(whole: Node) -> tuple[Path, list[Node]]:
-    """The file that is varied, and the declarations of its parameters."""
+def _allowed(cases: list[Assignment], declaring: Node, whole: Node, findings: Findings) -> list[Assignment]:
+    """Cases that keep the constraints of all declarations."""
+    allowed, broken = [], [""]
+    for case in cases:
+        declared(declaring.copy(), {}, trial := Findings(), case)
+        allowed += [] if trial.refused else [case]
+        broken = trial.refused or broken
+    if len(allowed) < len(cases):
+        told = (
+            f"{len(cases) - len(allowed):,} of {len(cases):,} cases break a ConstraintGroup and are none; {broken[0]}"
+        )
+        (findings.remark if allowed else findings.refuse)(whole, told)
+    return allowed
+
+
+def _base(whole: Node) -> tuple[Path, Node]:
+    """The file that is varied, and its root."""
     file = whole.one("ScenarioFile")
     path = whole.file.parent / (file.get("filepath").replace("\\", "/") if file else "")
     if file is None or not path.is_file():
@@ -73,7 +93,7 @@ def _base(whole: Node) -> tuple[Path, list[Node]]:
     root = read_xml(path)
     if root.one("ParameterValueDistribution") is not None:
         raise InputError(f"{file.where}: {path} has a ParameterValueDistribution itself; expected a scenario")
-    return path, [one for block in root.all("ParameterDeclarations") for one in block.children]
+    return path, root
 
 
 def _grid(block: Node, findings: Findings) -> list[Assignment]:

@@ -55,6 +55,13 @@ class Findings:
             return allowed[0]
         return text
 
+    def flag(self, node: Node, key: str, default: str = "") -> bool:
+        """Truth value of an attribute, in large or small letters, or as 1 or 0; any other becomes a finding."""
+        text = {"1": "true", "0": "false"}.get(node.get(key), node.get(key).lower()) or default
+        if text not in ("true", "false"):
+            self._add(self.refused, f"{node.where}: {key}: expected true or false, got {shown(text or 'nothing')}")
+        return text == "true"
+
     def look_for_unread(self, root: Node) -> None:
         """Refuse elements and attributes that were not read, unless they are harmless."""
         if root.tag in HARMLESS:

@@ -59,12 +59,23 @@ def read_beginning(init: Node | None, vehicles: Mapping[str, Vehicle], actions: 
             continue
         try:
             wanted = begin.effect.routes.get(name, ())
-            begin.fronts[name] = actions.positions.lanes.along(begin.spots[name], vehicle.front, wanted)
+            begin.fronts[name] = _front(name, begin, vehicles, actions)
             begin.ways[name] = actions.positions.lanes.route(begin.fronts[name].lane.edge, wanted)
         except ValueError as error:
             actions.findings.refuse(vehicle.node, f"{name} cannot begin where it is to: {error}")
             del begin.spots[name]
     return begin
+
+
+def _front(name: str, begin: Beginning, vehicles: Mapping[str, Vehicle], actions: Actions) -> Spot:
+    """Place of a front bumper; ValueError if it is on no road or, all places being as written, in another vehicle."""
+    wanted, vehicle = begin.effect.routes.get(name, ()), vehicles[name]
+    front = actions.positions.lanes.along(begin.spots[name], vehicle.front, wanted)
+    for other, there in begin.fronts.items() if not actions.findings.refused else ():
+        is_same = (there.lane.edge, there.lane.index) == (front.lane.edge, front.lane.index)
+        if is_same and -vehicles[other].length < front.position - there.position < vehicle.length:
+            raise ValueError(f"{other} is there")
+    return front
 
 
 def _take_global(action: Node, begin: Beginning, actions: Actions) -> None:

@@ -60,6 +60,8 @@ RULES = {
 }
 """Operators of rules."""
 
+_HOLDS = dict(zip(RULES, (operator.gt, operator.ge, operator.lt, operator.le, operator.eq, operator.ne), strict=True))
+
 Parameters = Mapping[str, str]
 """Values of parameters by name."""
 
@@ -109,11 +111,11 @@ def _check_constraints(declaration: Node, findings: Findings) -> None:
 
 
 def _fits(value: str, constraint: Node, findings: Findings) -> bool:
-    rule, limit = RULES[findings.word(constraint, "rule", tuple(RULES))], constraint.get("value")
+    rule, limit = findings.word(constraint, "rule", tuple(RULES)), constraint.get("value")
     try:
-        return _result(f"{float(value)} {rule} {float(limit)}", {}) == "true"
+        return bool(_HOLDS[rule](float(value), float(limit)))
     except ValueError:
-        return {"==": value == limit, "!=": value != limit}.get(rule, False)
+        return {"equalTo": value == limit, "notEqualTo": value != limit}.get(rule, False)
 
 
 def evaluated(text: str, known: Parameters) -> str:

@@ -91,7 +91,7 @@ class Positions:
         return self.lanes.at(*self.lanes.across(node.get("roadId"), s, t))
 
     def relative_lane(self, node: Node) -> Spot:
-        """The lane by an entity's number and `dLane`, so far along the road (`ds`), or ahead of it (`dsLane`)."""
+        """The lane by an entity's number and `dLane`, along the road's line (`ds`), or ahead of it (`dsLane`)."""
         self._no_offset(node)
         spot = self.entities[node.get("entityRef")]
         # Numbers of lanes grow to the left of the road, on whose left side vehicles drive against it.
@@ -99,7 +99,7 @@ class Positions:
         beside = self.lanes.beside(spot, int(sense * self.findings.number(node, "dLane")))
         if "dsLane" in node.attributes:
             return self.lanes.along(beside, self.findings.number(node, "dsLane"))
-        return self.lanes.along(beside, sense * self.findings.number(node, "ds"))
+        return self.lanes.farther(beside, self.findings.number(node, "ds"))
 
     def relative_world(self, node: Node) -> Spot:
         """The lane that is so far from an entity, along x and y."""
@@ -141,7 +141,7 @@ class Positions:
         known = [spot for spot in spots if spot is not None]
         if node is None or not known or len(known) != len(points):
             raise ValueError("expected a Route of Waypoints that have a Position")
-        if node.get("closed") == "true":
+        if self.findings.flag(node, "closed", "false"):
             self.findings.refuse(node, "closed: write the waypoints of each lap")
         edges: tuple[str, ...] = (known[0].lane.edge,)
         for point, (before, after) in zip(points, itertools.pairwise(known), strict=False):

@@ -1,7 +1,6 @@
 """The storyboard as a timeline: acts, groups, maneuvers and events, each with a trigger in FogSim's language."""
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,6 +12,7 @@ from fogsim.openscenario.xml_tree import Node
 
 _BEGUN, _OVER = ("startTransition", "runningState"), ("endTransition", "completeState")
 _MOST_TIMES = 100
+_MOTION = {"speed", "follow"}
 _PARTS = ("Story", "Act", "ManeuverGroup", "Maneuver", "Event", "Action")
 
 
@@ -33,7 +33,7 @@ class Storyboard:
 
     catalogs: Catalogs
     actions: Actions
-    triggers: Triggers | None = None
+    triggers: Triggers = field(init=False)
     entries: dict[int, Entry] = field(default_factory=dict)
     _acts: dict[int, Trigger] = field(default_factory=dict)
     _stories: list[Node] = field(default_factory=list)
@@ -47,10 +47,10 @@ class Storyboard:
     def find_events(self, storyboard: Node) -> None:
         """Find all events and their effects; triggers follow later, since events refer to one another."""
         self._stories = storyboard.all("Story")
-        for group in self._groups():
+        for group in (one for act in self._all_acts() for one in act.all("ManeuverGroup")):
             actors = group.one("Actors")
             names = [one.get("entityRef") for one in actors.all("EntityRef")] if actors else []
-            if actors and actors.get("selectTriggeringEntities", "false") == "true":
+            if actors and self.findings.flag(actors, "selectTriggeringEntities", "false"):
                 self.findings.refuse(actors, "selectTriggeringEntities: name the actors")
             for one in names:
                 if one not in self.actions.vehicles:
@@ -64,11 +64,6 @@ class Storyboard:
                     self._find(event, names, times)
             if times > 1 and len(events := [e for m in group.all("Maneuver") for e in m.all("Event")]) > 1:
                 self.findings.refuse(group, f"maximumExecutionCount: {len(events)} events are played once; write 1")
-
-    def _groups(self) -> Iterator[Node]:
-        for story in self._stories:
-            for act in story.all("Act"):
-                yield from act.all("ManeuverGroup")
 
     def _executions(self, node: Node) -> int:
         times = self.findings.number(node, "maximumExecutionCount", 1.0)
@@ -92,28 +87,33 @@ class Storyboard:
 
     def timeline(self) -> list[tuple[Node, dict[str, Any]]]:
         """Entries of the timeline, each with its element."""
-        triggers = self._need_triggers()
-        for story in self._stories:
-            for act in story.all("Act"):
-                self._acts[id(act)] = self._act_begins(act, triggers)
+        self._acts = {id(act): self._act_begins(act, self.triggers) for act in self._all_acts()}
         written = []
-        for story in self._stories:
-            for act in story.all("Act"):
-                stop = triggers.trigger(act.one("StopTrigger"))
-                for event in _events(act):
-                    entry = self.entries[id(event)]
-                    entry.trigger = self._begins(entry, act)
-                    until, trigger = _until(stop, triggers, event), entry.trigger
-                    for name in entry.names:
-                        written.append((event, _written(entry, name, trigger, until)))
-                        # It is played again once it is over and its own trigger holds.
-                        trigger = both(self._played(entry, name), entry.trigger)
+        for act in self._all_acts():
+            stop = self.triggers.trigger(act.one("StopTrigger"))
+            for event in _events(act):
+                entry = self.entries[id(event)]
+                entry.trigger = self._begins(entry, act)
+                until, trigger = _until(stop, self.triggers, event), entry.trigger
+                for name in entry.names:
+                    written.append((event, _written(entry, name, trigger, until)))
+                    ends = self._end_others(entry, name, trigger)
+                    written += [(event, _written(one, one.names[0], one.trigger, until)) for one in ends]
+                    # It is played again once it is over and its own trigger holds.
+                    trigger = both(self._played(entry, name), entry.trigger)
         return written
 
-    def _need_triggers(self) -> Triggers:
-        if self.triggers is None:
-            raise ValueError("expected the triggers to be there before the timeline, got none")
-        return self.triggers
+    def _end_others(self, entry: Entry, name: str, trigger: Trigger) -> list[Entry]:
+        """What an overriding event does to others of its maneuver that have begun: speeds stay as they are."""
+        if entry.node.get("priority") == "parallel" or not trigger.condition:
+            return []
+        actors = [one for one in entry.actors if not entry.effect.do.get(one, {}).keys() & _MOTION]
+        others = [one for one in self.entries.values() if one is not entry and one.node.above is entry.node.above]
+        begun = [f"happened({one.names[0]})" for one in others if any(map(one.effect.changes_speed, actors))]
+        condition = f"({trigger.condition}) and not happened({name}) and ({' or '.join(begun)})"
+        held = Effect({one: {"speed": self.actions.held(one)} for one in actors})
+        ends = Entry([f"{name}_ends_others"], entry.node, actors, held, Trigger(condition, trigger.delay))
+        return [ends] if begun else []
 
     def _act_begins(self, act: Node, triggers: Triggers) -> Trigger:
         """When an act begins; a trigger that is more than a time becomes a mark."""
@@ -125,7 +125,7 @@ class Storyboard:
         return Trigger(f"happened({name})", stays=True)
 
     def _begins(self, entry: Entry, act: Node) -> Trigger:
-        own = self._need_triggers().trigger(entry.node.one("StartTrigger")) or AT_ONCE
+        own = self.triggers.trigger(entry.node.one("StartTrigger")) or AT_ONCE
         return both(self._acts[id(act)], own)
 
     def state(self, node: Node) -> Trigger:
@@ -157,7 +157,7 @@ class Storyboard:
             # A story begins with the run.
             return AT_ONCE
         if id(act) not in self._acts:
-            self._acts[id(act)] = self._act_begins(act, self._need_triggers())
+            self._acts[id(act)] = self._act_begins(act, self.triggers)
         return self._acts[id(act)]
 
     def _over(self, part: Node) -> Trigger:
@@ -176,7 +176,7 @@ class Storyboard:
         """When an execution of an event is over."""
         effect, told = entry.effect, f"happened({name})"
         if effect.ends_itself:
-            if any({"speed", "follow"} & done.keys() for done in effect.do.values()):
+            if any(_MOTION & done.keys() for done in effect.do.values()):
                 self.findings.refuse(
                     entry.node, "together with a speed, the end of a change of lane by distance is not known"
                 )

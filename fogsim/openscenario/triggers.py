@@ -249,7 +249,7 @@ class Triggers:
             return None
         if self._is_along(node):
             return self._along_the_road(node, name, other)
-        if self._is_free(node):
+        if self.findings.flag(node, "freespace"):
             self.findings.refuse(
                 node, "freespace: straight distances are from front bumper to front bumper; write false"
             )
@@ -262,7 +262,7 @@ class Triggers:
 
     def _along_the_road(self, node: Node, name: str, other: str) -> _Test:
         one, far = self.vehicles[name], self.vehicles[other]
-        free = self._is_free(node)
+        free = self.findings.flag(node, "freespace")
         ahead = 0.0 if free else one.front + far.rear
         behind = 0.0 if free else one.rear + far.front
         value = self.findings.number(node, "value")
@@ -271,13 +271,10 @@ class Triggers:
             return _Test(f"{gap} < {near[0]:.9g} m and {gap} > {near[1]:.9g} m")
         return _Test(f"{gap} > {near[0]:.9g} m or {gap} < {near[1]:.9g} m")
 
-    def _is_free(self, node: Node) -> bool:
-        return self.findings.word(node, "freespace", ("true", "false")) == "true"
-
     def _distance(self, node: Node, name: str) -> _Test | None:
         """`X.position` about a position on the ego's route, without `freespace` of the rear axle."""
         self._is_along(node)
-        place, free, vehicle = self._place_along(node), self._is_free(node), self.vehicles[name]
+        place, free, vehicle = self._place_along(node), self.findings.flag(node, "freespace"), self.vehicles[name]
         if place is None:
             return None
         value, signal = self.findings.number(node, "value"), f"{self.called(name)}.position"
@@ -319,7 +316,9 @@ class Triggers:
             self.findings.refuse(node, "relativeDistanceType: times are of distances along the road (longitudinal)")
         if not self._is_known(node, other):
             return None
-        further = 0.0 if self._is_free(node) else self.vehicles[name].front + self.vehicles[other].rear
+        further = (
+            0.0 if self.findings.flag(node, "freespace") else self.vehicles[name].front + self.vehicles[other].rear
+        )
         return self._compared(node, f"{signal}({self.called(name)}, {self.called(other)}, {further:g} m)", "s")
 
     def _collides(self, node: Node, name: str) -> _Test:

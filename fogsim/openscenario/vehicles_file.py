@@ -35,7 +35,7 @@ def vehicles_text(vehicles: Mapping[str, Vehicle], begin: Beginning) -> str:
                 departPos=f"{front.position:.3f}",
                 departSpeed=f"{speed:.4f}",
                 # Exactly where the file has it, however near to the next vehicle.
-                insertionChecks="collision",
+                insertionChecks="none",
             ),
             *([f'    <param key="{BODY_PARAMETER}" value="{vehicle.body}"/>'] if vehicle.body else ()),
             "  </vehicle>",

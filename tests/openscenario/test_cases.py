@@ -126,7 +126,6 @@ def test_a_hitch_without_a_trailer_is_nothing(tmp_path: Path) -> None:
             "turned_round",
             r"\.xosc:77: \S+/LanePosition: h: vehicles stand, and drive, along their lanes; it stands 180 deg",
         ),
-        ("sun_between_0_and_1", r"\.xosc:46: \S+/Sun: intensity: expected lux, .* got 0\.85: night if .* as in CARLA"),
         ("speed_and_distance_at_once", r"\.xosc:94: \S+/LongitudinalDistanceAction\[Ego\]: continuous: "),
         ("speed_and_distance_at_once", r"keeps a distance to a vehicle ahead; Ego is not ahead of Lead"),
     ],
@@ -169,7 +168,8 @@ def test_a_vehicle_stands_along_its_lane_or_is_refused(tmp_path: Path, position:
         ('intensity="0.85" azimuth="3" elevation="-0.2"', 0.85),
         ('intensity="0" azimuth="3" elevation="0.9"', 0.0),
         ('illuminance="900" azimuth="3" elevation="0.05"', 900.0),
-        ('illuminance="40" azimuth="3" elevation="0.9"', None),
+        ('intensity="40" azimuth="3" elevation="0.9"', None),
+        ('illuminance="0.85" azimuth="3" elevation="0.9"', None),
         ('illuminance="0.5" azimuth="3"', None),
     ],
 )
@@ -178,11 +178,23 @@ def test_the_sun_is_in_lux(tmp_path: Path, sun: str, lux: float | None) -> None:
     if lux is not None:
         assert _loaded(file).light.illuminance_lx == lux
     else:
-        with pytest.raises(InputError, match=r"Sun: (intensity|illuminance): expected lux"):
+        with pytest.raises(InputError, match=r"Sun: (intensity|illuminance): \S+ lx would be night at a sun of"):
             _loaded(file)
 
 
-def test_files_of_carla_have_their_own_axes_and_sun(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("intensity", "lux"), [(1.0, 90_164.0), (0.5, 90_164.0 * (1.0 - 0.75 * 0.5**3.4))])
+def test_an_intensity_of_at_most_1_by_day_is_a_share_of_the_sky_and_told(
+    tmp_path: Path, intensity: float, lux: float
+) -> None:
+    file = _changed(tmp_path, "sun_between_0_and_1", ('intensity="0.85"', f'intensity="{intensity}"'))
+    with pytest.warns(
+        LeftOutWarning, match=r"46: /OpenSCENARIO/\S+/Sun: intensity: \S+ lx would be night .* read as the share"
+    ):
+        scenario = fogsim.load_scenario(file, QUIET)
+    assert scenario.light.illuminance_lx == pytest.approx(lux, rel=1e-3)
+
+
+def test_files_of_carla_have_their_own_axes(tmp_path: Path) -> None:
     texts = (
         (
             '<LanePosition roadId="7" laneId="-1" s="30">\n</LanePosition>',
@@ -193,12 +205,10 @@ def test_files_of_carla_have_their_own_axes_and_sun(tmp_path: Path) -> None:
             '<RelativeWorldPosition entityRef="Ego" dx="40" dy="-0.4"/>',
         ),
     )
-    for intensity, lux in ((1.0, 90_164.0), (0.5, 90_164.0 * (1.0 - 0.75 * 0.5**3.4))):
-        sun = ('intensity="0.85"', f'intensity="{intensity}"')
-        file = _changed(tmp_path, "sun_between_0_and_1", ('description="', 'description="CARLA:'), sun, *texts)
+    file = _changed(tmp_path, "sun_between_0_and_1", ('description="', 'description="CARLA:'), *texts)
+    with pytest.warns(LeftOutWarning, match="read as the share"):
         step = _run(file, 0.1)[0]
-        assert [float(step.traffic.position[row, 1]) for row in range(2)] == pytest.approx([-1.75, -1.75], abs=0.1)
-        assert _loaded(file).light.illuminance_lx == pytest.approx(lux, rel=1e-3)
+    assert [float(step.traffic.position[row, 1]) for row in range(2)] == pytest.approx([-1.75, -1.75], abs=0.1)
 
 
 def test_an_initial_speed_and_a_distance_go_together(tmp_path: Path) -> None:

@@ -1,12 +1,13 @@
 """Files of parameter value distributions: their cases, the values of each, and what is refused."""
 
+import re
 import shutil
 import statistics
 from pathlib import Path
 
 import pytest
 
-from fogsim.errors import InputError
+from fogsim.errors import InputError, LeftOutWarning
 from fogsim.openscenario import read_parameter_cases
 from fogsim.openscenario.distributions import ParameterCases
 from fogsim.scenario import Scenario
@@ -200,3 +201,32 @@ def test_the_base_scenarios_mistakes_name_the_case(folder: Path) -> None:
     two = '<DistributionSet><Element value="a"/><Element value="b"/></DistributionSet>'
     with pytest.raises(InputError, match=r"cut_in_in_fog.xosc:.*\n*in the case ego_kmh=a of .*varied.xosc"):
         load_scenario(_file(folder, f"<Deterministic>{_single('ego_kmh', two)}</Deterministic>"))
+
+
+def _constrain(folder: Path, name: str, rule: str, limit: str) -> None:
+    """Give a parameter of the varied file a constraint."""
+    file = folder / "cut_in_in_fog.xosc"
+    declared = re.search(f'<ParameterDeclaration name="{name}".*"/>', text := file.read_text(encoding="utf-8"))
+    assert declared is not None
+    group = (
+        f'<ConstraintGroup><ValueConstraint rule="{rule}" value="{limit}"/></ConstraintGroup></ParameterDeclaration>'
+    )
+    file.write_text(text.replace(declared[0], f"{declared[0][:-2]}>{group}"), encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("constraint", "kept"), [(("ego_kmh", "lessThan", "85"), "72"), (("faster", "lessThan", "${$ego_kmh / 64}"), "90")]
+)
+def test_combinations_that_break_a_constraint_are_no_cases(
+    folder: Path, constraint: tuple[str, str, str], kept: str
+) -> None:
+    _constrain(folder, *constraint)
+    with pytest.warns(LeftOutWarning, match=r"1 of 2 cases break a ConstraintGroup and are none; .* wants lessThan"):
+        read = _read(folder, f"<Deterministic>{_single('ego_kmh', SPEEDS)}</Deterministic>")
+    assert [case["ego_kmh"] for case in read.cases] == [kept]
+
+
+def test_a_file_all_of_whose_combinations_break_a_constraint_is_refused(folder: Path) -> None:
+    _constrain(folder, "ego_kmh", "lessThan", "20")
+    with pytest.raises(InputError, match=r"2 of 2 cases break a ConstraintGroup and are none; .* wants lessThan 20"):
+        _read(folder, f"<Deterministic>{_single('ego_kmh', SPEEDS)}</Deterministic>")

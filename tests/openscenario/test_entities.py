@@ -7,6 +7,7 @@ import pytest
 
 import fogsim
 from fogsim.errors import InputError
+from fogsim.openscenario import read_openscenario
 from fogsim.values import Step
 from fogsim.values.scene import Instance
 from tests.openscenario.writing import CAR, after, box, lane, speed, write
@@ -93,3 +94,14 @@ def test_a_thing_without_a_size_is_refused(tmp_path: Path) -> None:
     )
     with pytest.raises(InputError, match=r"MiscObject: a MiscObject needs a BoundingBox with Center and Dimensions"):
         fogsim.load_scenario(file, QUIET)
+
+
+@pytest.mark.parametrize(("ahead", "is_free"), [(4.7, True), (4.5, False), (0.0, False), (-4.5, False), (-4.7, True)])
+def test_no_vehicle_begins_where_another_one_is(tmp_path: Path, ahead: float, is_free: bool) -> None:
+    file = write(tmp_path, {"Ego": CAR, "Lead": CAR}, {"Ego": lane(90), "Lead": lane(90 + ahead)})
+    if is_free:
+        first = next(iter(fogsim.run(fogsim.load_scenario(file, QUIET))))
+        assert set(first.traffic.ids) == {"Ego", "Lead"}
+    else:
+        with pytest.raises(InputError, match="Lead cannot begin where it is to: Ego is there"):
+            read_openscenario(file)

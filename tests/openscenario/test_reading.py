@@ -149,9 +149,10 @@ def test_a_yaml_file_lays_expectations_upon_it(tmp_path: Path) -> None:
         "thicker_fog",
         "faster",
         "cut_in",
+        "cut_in_ends_others",
         "brake",
         "stop",
         "late",
     ]
-    assert read_scenario_document(file).where(("timeline", 6)).endswith("test.fog.yaml:6")
+    assert read_scenario_document(file).where(("timeline", 7)).endswith("test.fog.yaml:6")
     assert read_scenario_document(file).where(("timeline", 1)).endswith("cut_in_in_fog.xosc:59")

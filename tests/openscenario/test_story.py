@@ -1,5 +1,6 @@
 """Stories: changes of lane by distance and onto the oncoming lane, delays, repeated events, and the end of the road."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -79,14 +80,93 @@ def test_what_follows_a_change_by_distance_waits_until_it_is_over(tmp_path: Path
     assert _at(steps, begun["back"] + 2.3, "Lead")[1] == pytest.approx(-1.75, abs=0.1)
 
 
-def test_lanes_beyond_the_nearest_oncoming_one_and_rates_are_refused(tmp_path: Path) -> None:
+def test_lanes_beyond_the_nearest_oncoming_one_and_a_rate_of_0_are_refused(tmp_path: Path) -> None:
     two = Path(__file__).parents[1] / "data" / "openscenario" / "two_lanes.xodr"
-    action = event("leave", _changes_lane(2, "rate", 1.0), after(1.0))
+    action = event("leave", _changes_lane(2, "rate", 0.0), after(1.0))
     file = write(tmp_path, {"Ego": CAR}, {"Ego": lane(30)}, {"Ego": action}, road=two)
     with pytest.raises(InputError) as refused:
         read_openscenario(file)
     assert "AbsoluteTargetLane: of the oncoming lanes, vehicles drive on the nearest" in str(refused.value)
-    assert "dynamicsDimension: changes of lane take a time or a distance" in str(refused.value)
+    assert "LaneChangeActionDynamics: value: expected a rate above 0" in str(refused.value)
+    assert "does not know this attribute" not in str(refused.value)
+
+
+@pytest.mark.parametrize(("shape", "lasts"), [("linear", 3.5), ("sinusoidal", 0.5 * math.pi * 3.5), ("cubic", 5.25)])
+@pytest.mark.parametrize(
+    "target",
+    [
+        '<AbsoluteTargetLane value="1"/>',
+        '<RelativeTargetLane entityRef="Ego" value="1"/>',
+        '<RelativeTargetLane entityRef="Lead" value="1"/>',
+    ],
+)
+def test_a_rate_is_the_greatest_speed_across_and_the_lane_to_the_left_the_oncoming_one(
+    tmp_path: Path, target: str, shape: str, lasts: float
+) -> None:
+    action = _changes_lane(1, "rate", 1.0).replace("cubic", shape).replace('<AbsoluteTargetLane value="1"/>', target)
+    begin = {"Ego": lane(30), "Lead": lane(90)}
+    file = write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Ego": event("leave", action, after(1.0))})
+    done = read_openscenario(file).data["timeline"][-1]["do"]["Ego"]["change_lane"]
+    assert (done["to"], done["duration_s"]) == ("oncoming", pytest.approx(lasts))
+
+
+@pytest.mark.parametrize(("number", "lanes"), [(1, 1), (2, 2), (-1, 1)])
+def test_a_rate_is_across_as_many_lanes_as_there_are(tmp_path: Path, number: int, lanes: int) -> None:
+    two = Path(__file__).parents[1] / "data" / "openscenario" / "two_lanes.xodr"
+    target = f'<RelativeTargetLane entityRef="Ego" value="{number}"/>'
+    action = _changes_lane(-1, "rate", 2.0).replace('<AbsoluteTargetLane value="-1"/>', target)
+    file = write(tmp_path, {"Ego": CAR}, {"Ego": lane(30, -2)}, {"Ego": event("leave", action, after(1.0))}, road=two)
+    done = read_openscenario(file).data["timeline"][-1]["do"]["Ego"]["change_lane"]
+    assert (done["lanes"], done["duration_s"]) == (number, pytest.approx(lanes * 1.5 * 3.5 / 2.0))
+
+
+def _slows(dynamics: str, to: float = 2.0) -> str:
+    at_once = 'dynamicsShape="step" value="0" dynamicsDimension="time"'
+    return speed(to).replace(at_once, dynamics)
+
+
+@pytest.mark.parametrize("dynamics", ['dynamicsShape="step"', 'dynamicsShape="step" dynamicsDimension="distance"'])
+def test_what_happens_at_once_needs_no_dimension(tmp_path: Path, dynamics: str) -> None:
+    begin = {"Ego": f"{lane(30)}\n{_slows(dynamics, 12)}"}
+    file = write(tmp_path, {"Ego": CAR}, begin, {"Ego": event("slow", _slows(dynamics), after(1.0))})
+    assert read_openscenario(file).data["timeline"][-1]["do"]["Ego"]["speed"] == {"to_kmh": 7.2, "shape": "step"}
+
+
+@pytest.mark.parametrize(
+    "missing", ['dynamicsShape="linear" value="3"', 'dynamicsShape="linear" dynamicsDimension="time"']
+)
+def test_what_takes_time_needs_dimension_and_value(tmp_path: Path, missing: str) -> None:
+    file = write(tmp_path, {"Ego": CAR}, {"Ego": lane(30)}, {"Ego": event("slow", _slows(missing), after(1.0))})
+    with pytest.raises(InputError, match=r"dynamicsDimension: FogSim has no ''|expected a number for value"):
+        read_openscenario(file)
+
+
+def test_at_a_rate_of_0_a_speed_stays_as_it_is(tmp_path: Path) -> None:
+    never = event("never", _slows('dynamicsShape="linear" value="0" dynamicsDimension="rate"'), after(1.0))
+    begin = {"Ego": f"{lane(30)}\n{speed(5)}", "Lead": f"{lane(90)}\n{speed(10)}"}
+    steps = _run(write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": never}, stop=after(3.0)))
+    assert _at(steps, 2.9, "Lead") == pytest.approx((90.0 + 3.7 + 29.0, -1.75, 10.0), abs=0.1)
+
+
+@pytest.mark.parametrize(("priority", "speed_after"), [("override", 16.0), ("parallel", 10.0)])
+def test_an_event_that_overrides_ends_a_change_of_speed_of_its_maneuver(
+    tmp_path: Path, priority: str, speed_after: float
+) -> None:
+    brakes = event("brake", _slows('dynamicsShape="linear" value="2" dynamicsDimension="rate"'), after(1.0))
+    leaves = event("leave", _changes_lane(1, "time", 2.0), after(3.0)).replace("override", priority)
+    begin = {"Ego": f"{lane(30)}\n{speed(5)}", "Lead": f"{lane(90)}\n{speed(20)}"}
+    file = write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": leaves + brakes}, stop=after(6.1))
+    steps = _run(file)
+    assert _at(steps, 2.9, "Lead")[2] == pytest.approx(16.2, abs=0.25)
+    assert _at(steps, 6.0, "Lead")[1:] == pytest.approx((1.75, speed_after), abs=0.25)
+
+
+def test_an_event_that_overrides_leaves_alone_what_begins_later(tmp_path: Path) -> None:
+    brakes = event("brake", _slows('dynamicsShape="linear" value="2" dynamicsDimension="rate"'), after(2.0))
+    leaves = event("leave", _changes_lane(1, "time", 1.0), after(1.0))
+    begin = {"Ego": f"{lane(30)}\n{speed(5)}", "Lead": f"{lane(90)}\n{speed(20)}"}
+    file = write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": leaves + brakes}, stop=after(5.1))
+    assert _at(_run(file), 5.0, "Lead")[2] == pytest.approx(14.0, abs=0.25)
 
 
 def test_the_first_of_two_delayed_groups_ends_the_run() -> None:
@@ -149,3 +229,17 @@ def test_the_end_of_the_road_ends_the_run(tmp_path: Path) -> None:
     assert steps[-1].ending in (Ending.END_CONDITION, Ending.ARRIVED)
     # From a front bumper at 703.7 m to 10 m before the end of the road at 800 m.
     assert steps[-1].time == pytest.approx((790.0 - 703.7) / 15.0, abs=0.2)
+
+
+@pytest.mark.parametrize(("written", "is_kept"), [("1", True), ("True", True), ("0", False), ("yes", None)])
+def test_truth_values_are_those_of_xml(tmp_path: Path, written: str, is_kept: bool | None) -> None:
+    relative = f'<RelativeTargetSpeed entityRef="Ego" value="1" speedTargetValueType="factor" continuous="{written}"/>'
+    action = speed(5).replace('<AbsoluteTargetSpeed value="5"/>', relative)
+    begin = {"Ego": lane(30), "Lead": lane(90)}
+    file = write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": event("like", action, after(1.0))})
+    if is_kept is None:
+        with pytest.raises(InputError, match="continuous: expected true or false, got 'yes'"):
+            read_openscenario(file)
+    else:
+        done = read_openscenario(file).data["timeline"][-1]["do"]["Lead"]["speed"]
+        assert done.get("continuous", False) is is_kept

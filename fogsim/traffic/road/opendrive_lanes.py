@@ -114,6 +114,17 @@ class OpenDriveLanes:
             raise ValueError(f"there is no lane {abs(lanes)} to the {'left' if lanes > 0 else 'right'}")
         return Spot(found[0], spot.position * found[0].length / spot.lane.length)
 
+    def farther(self, spot: Spot, ds: float) -> Spot:
+        """Place on the same lane `ds` [m] farther along the reference line; beyond the road's ends, along the lanes."""
+        road, _, lane = (spot.lane.origins or ("",))[0].rpartition("_")
+        sense, rest = 1.0 if lane.startswith("-") else -1.0, ds
+        if road in self.roads:
+            x, y, _ = spot.world
+            to, pieces = self.roads[road].nearest(x, y) + ds, self.roads[road].pieces
+            s = min(max(to, 0.0), pieces[-1].s + pieces[-1].length)
+            spot, rest = self.on_lane(road, lane, s), to - s
+        return self.along(spot, sense * rest)
+
     def along(self, spot: Spot, distance: float, route: Sequence[str] = ()) -> Spot:
         """Place `distance` [m] farther along a route, or the road straight on, or back; ValueError if it ends before.
 

@@ -13,6 +13,8 @@ from fogsim.linear_algebra import matrix_product
 SPIRAL_NODES, SPIRAL_WEIGHTS = np.polynomial.legendre.leggauss(24)
 """Gauss-Legendre rule on −1 … 1; on a spiral that turns by π its error is far below a millimetre."""
 
+_STEP, _ROUNDS = 20.0, 6  # Distance of first guesses along a line [m], and corrections of the best one
+
 Place = tuple[float, float, float]
 """x, y [m] and heading, counterclockwise from east [rad]."""
 
@@ -98,6 +100,21 @@ class PlanView:
             raise ValueError(f"expected s on the road, 0 … {end:g} m, got {s:g}")
         piece = next((p for p in reversed(self.pieces) if p.s <= s), self.pieces[0])
         return piece.at(s - piece.s)
+
+    def nearest(self, x: float, y: float) -> float:
+        """Where the line is nearest to a point, s [m], as far as its shape is known; ValueError if nothing is."""
+        found = []
+        for piece in (one for one in self.pieces if not isinstance(one, UnknownPiece)):
+            steps = np.linspace(0.0, piece.length, int(piece.length / _STEP) + 2)
+            _, along = min((math.dist(piece.at(float(d))[:2], (x, y)), float(d)) for d in steps)
+            for _ in range(_ROUNDS):
+                near_x, near_y, heading = piece.at(along)
+                along += (x - near_x) * math.cos(heading) + (y - near_y) * math.sin(heading)
+                along = min(max(along, 0.0), piece.length)
+            found.append((math.dist(piece.at(along)[:2], (x, y)), piece.s + along))
+        if not found:
+            raise ValueError("places on line, arc, spiral and paramPoly3 are known, and the road has none")
+        return min(found)[1]
 
 
 @dataclass(frozen=True, slots=True)

@@ -53,6 +53,16 @@ def test_a_spiral_without_change_of_curvature_is_an_arc() -> None:
     assert line(almost).at(77.0) == pytest.approx(line(arc).at(77.0), abs=1e-5)
 
 
+def test_the_nearest_place_is_where_a_point_lies_beside_the_line() -> None:
+    unknown = '<geometry s="230" x="229" y="43" hdg="0.5" length="9"><poly3 a="0" b="0" c="0" d="0"/></geometry>'
+    whole = line(CURVE + unknown)
+    for s in (0.0, 37.0, 99.0, 131.0, 170.0, 229.0):
+        x, y, heading = whole.at(s)
+        for aside in (-9.0, 6.0):
+            found = whole.nearest(x - aside * math.sin(heading), y + aside * math.cos(heading))
+            assert found == pytest.approx(s, abs=0.02)
+
+
 def test_the_line_has_no_jumps_between_its_pieces() -> None:
     whole = line(CURVE)
     places = np.array([whole.at(s) for s in np.arange(0.0, 230.1, 0.5)])

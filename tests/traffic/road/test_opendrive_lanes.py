@@ -58,6 +58,17 @@ def test_places_beside_and_along(lanes: OpenDriveLanes) -> None:
             wrong()
 
 
+@pytest.mark.parametrize(("lane", "begin", "ds"), [("-2", 550.0, 300.0), ("2", 550.0, 300.0), ("-1", 820.0, -700.0)])
+def test_places_farther_along_a_road_count_along_its_reference_line(
+    lanes: OpenDriveLanes, lane: str, begin: float, ds: float
+) -> None:
+    found = lanes.farther(lanes.on_lane("7", lane, begin), ds)
+    assert found.world[:2] == pytest.approx(lanes.on_lane("7", lane, begin + ds).world[:2], abs=0.02)
+    for beyond in (1000.0, -1000.0):
+        with pytest.raises(ValueError, match=r"the road (ends|begins) before that"):
+            lanes.farther(found, beyond)
+
+
 def test_what_is_no_road_is_told(tmp_path: Path) -> None:
     file = tmp_path / "no.xodr"
     file.write_text("<OpenDRIVE><header/></OpenDRIVE>", encoding="utf-8")

@@ -240,8 +240,8 @@ class SumoTraffic:
         while ego is None and simulation.getTime() - begun < self._setup.warm_up - 0.5 * self._setup.step_length:
             self._step(run)
         while ego is not None and ego not in vehicle.getIDList():
-            waited = simulation.getTime() - begun
-            ended, limit = simulation.getTime() >= self._end, self._setup.warm_up_limit
+            now = simulation.getTime()
+            waited, ended, limit = now - begun, now >= self._end, self._setup.warm_up_limit
             if waited > limit or ended or simulation.getMinExpectedNumber() == 0:
                 until = f"the simulation's end is {self._end:g}" if ended else f"traffic.warm_up_limit_s is {limit:g}"
                 raise SimulationError(

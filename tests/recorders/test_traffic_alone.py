@@ -31,7 +31,7 @@ def some_steps() -> list[TrafficStep]:
 def nobody(step: TrafficStep) -> TrafficStep:
     """The same without any vehicle."""
     state = step.traffic
-    kept = {"time", "signals", "persons"}
+    kept = {"time", "signals", "persons", "pieces"}
     empty = {f.name: getattr(state, f.name)[:0] for f in dataclasses.fields(state) if f.name not in kept}
     truth = dataclasses.replace(step.truth, vehicle_extinctions=np.zeros(0))
     return dataclasses.replace(step, traffic=dataclasses.replace(state, **empty), truth=truth)

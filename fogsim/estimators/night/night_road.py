@@ -139,7 +139,7 @@ class NightRoad:
         frames: Annotated[int, Range(1, 1000)] = 3,
     ) -> None:
         if head_lamps not in KNOWN_HEAD_LAMPS and not Path(head_lamps).is_file():
-            raise InputError(f"head_lamps must be usual, unknown or a file; there is no file {shown(head_lamps)}")
+            raise InputError(f"head_lamps must be usual, unknown or a file, got {shown(head_lamps)}")
         self._camera, self._check = camera, ObservationCheck(camera)
         self._lamps, self._frames = head_lamps, int(frames)
         self._source: Calibrations | None = None

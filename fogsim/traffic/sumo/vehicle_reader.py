@@ -148,8 +148,10 @@ class VehicleBodies:
         if row == len(self._numbers):
             self._numbers = np.concatenate((self._numbers, np.empty_like(self._numbers)))
         length = get.getLength(vehicle)
-        own = get.getParameter(vehicle, BODY_PARAMETER)
-        kind = own or body_kind(get.getVehicleClass(vehicle), get.getShapeClass(vehicle), length)
+        named = get.getVehicleClass(vehicle)
+        # Obstacles and persons of OpenSCENARIO are of this class; asking everybody would be a message each.
+        own = get.getParameter(vehicle, BODY_PARAMETER) if named == "ignoring" else ""
+        kind = own or body_kind(named, get.getShapeClass(vehicle), length)
         self._numbers[row, :3] = length, *cross_section(kind, get.getWidth(vehicle), get.getHeight(vehicle))
         self._numbers[row, 3:6] = paint(vehicle, get.getColor(vehicle))
         self._numbers[row, 6:] = [wish.own_value(vehicle) for wish in self._wishes]

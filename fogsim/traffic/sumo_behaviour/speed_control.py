@@ -143,9 +143,9 @@ class SpeedControl:
 
     def _hold(self, vehicle: str, target: float, deceleration: float) -> None:
         self._held.add(vehicle)
-        limit = float(self._vehicles.getAllowedSpeed(vehicle))
         # Off the lanes there is nothing to be held to.
-        if limit == UNKNOWN or self._brakes_hard(vehicle):
+        limit = UNKNOWN if self._brakes_hard(vehicle) else float(self._vehicles.getAllowedSpeed(vehicle))
+        if limit == UNKNOWN:
             self._vehicles.setSpeed(vehicle, _SUMO_DRIVES)
             return
         # Advice does not make a driver faster than the road and the vehicle allow.

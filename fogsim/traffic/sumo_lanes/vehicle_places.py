@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from fogsim.errors import InputError
 from fogsim.traffic.drivers.advice_hearing import check_edges, check_start
-from fogsim.traffic.sumo.link import Api, getter, is_off_lanes, vehicle_getter
+from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_lanes.directions import LaneDirections, OppositeEdges
 from fogsim.traffic.sumo_lanes.route_position import connections
@@ -70,7 +70,7 @@ class SumoVehiclePlaces:
         """
         past = {}
         for vehicle, piece, is_against in self._on_pieces(self._find_pieces(stretch), among):
-            station = float(self._station(vehicle))
+            station = float(self._station(vehicle))  # far below 0 off the lanes
             # SUMO counts from where the oncoming lane begins.
             position = piece.end - station if is_against else piece.start + station
             if stretch.start <= position < stretch.end:
@@ -94,8 +94,7 @@ class SumoVehiclePlaces:
     def _sorted_by_edge(self, vehicles: Iterable[str]) -> Callable[[str], Iterable[str]]:
         there: dict[str, list[str]] = {}
         for vehicle in vehicles:
-            if not is_off_lanes(self._api, vehicle):
-                there.setdefault(self._edge(vehicle), []).append(vehicle)
+            there.setdefault(self._edge(vehicle), []).append(vehicle)
         return lambda edge: there.get(edge, ())
 
     def _is_against(self, vehicle: str) -> bool:

@@ -1,4 +1,4 @@
-"""Road networks that other people's files name: beside the file, or in the user's own folder of maps."""
+"""Road networks that other people's files name: next to the file, or in the user's own folder of maps."""
 
 import os
 from pathlib import Path

@@ -91,14 +91,14 @@ class Actions:
             elif one.tag in HARMLESS:
                 self.findings.leave_out(one, HARMLESS[one.tag])
             elif one.tag not in _PRIVATE:
-                told = REFUSED.get(one.tag, "FogSim does not know this element here")
-                self.findings.refuse(one, f"{told}; actions are {', '.join(ACTIONS)}")
+                message = REFUSED.get(one.tag, "FogSim does not know this element here")
+                self.findings.refuse(one, f"{message}; actions are {', '.join(ACTIONS)}")
             else:
                 self._private(one, _ORDERS.get(action.tag, set()), actors, effect)
 
     def _private(self, action: Node, orders: set[str], actors: list[str], effect: Effect) -> None:
         if not actors:
-            self.findings.refuse(action, "nobody does it: the Actors of the maneuver group name no entity")
+            self.findings.refuse(action, "no vehicle does it: the Actors of the maneuver group name no entity")
         for actor in actors:
             if effect.do.get(actor, {}).keys() & orders:
                 self.findings.refuse(action, f"another action of this event orders the motion of {actor} as well")
@@ -119,13 +119,13 @@ class Actions:
     def _speed(self, action: Node, actor: str, effect: Effect) -> None:
         """`speed`: absolute, or relative to a vehicle at that moment, or continuously; by time or rate."""
         dynamics, target = action.one("SpeedActionDynamics"), action.one("SpeedActionTarget")
-        told = {} if target is None else self._target(target)
-        if not told:
+        message = {} if target is None else self._target(target)
+        if not message:
             self.findings.refuse(
                 action, "expected a SpeedActionTarget with an AbsoluteTargetSpeed or RelativeTargetSpeed"
             )
             return
-        speed = {**told, **(self._pace(dynamics, effect) if dynamics else {"shape": "step"})}
+        speed = {**message, **(self._pace(dynamics, effect) if dynamics else {"shape": "step"})}
         if "rate_mps2" in speed and "to_kmh" in speed:
             own, to = f"{self.called(actor)}.speed", speed["to_kmh"] / KMH_PER_MPS
             effect.ends.append(f"{own} > {to - _NEAR:.9g} m/s and {own} < {to + _NEAR:.9g} m/s")
@@ -160,10 +160,10 @@ class Actions:
         return {"like": self.called(actor).strip('"'), "shape": "step"}
 
     def _pace(self, dynamics: Node, effect: Effect) -> dict[str, Any]:
-        told = self._dynamics(dynamics)
-        if told is None:
+        message = self._dynamics(dynamics)
+        if message is None:
             return {"shape": "step"}
-        shape, by, value = told
+        shape, by, value = message
         if by == "distance":
             self.findings.refuse(dynamics, "dynamicsDimension: speeds change by time or rate")
             return {}

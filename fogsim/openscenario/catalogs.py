@@ -55,8 +55,8 @@ class Catalogs:
                     put_parameters(whole, {**own, **given}, self.findings)
                     whole.is_read = True
                     return whole
-        told = suggest(name, names) if names else f"there is no catalog {shown(catalog)} in the CatalogLocations"
-        self.findings.refuse(reference, f"unknown entry {shown(name)} of {catalog}; {told}")
+        message = suggest(name, names) if names else f"there is no catalog {shown(catalog)} in the CatalogLocations"
+        self.findings.refuse(reference, f"unknown entry {shown(name)} of {catalog}; {message}")
         return None
 
     def _named(self, catalog: str) -> Iterator[Node]:

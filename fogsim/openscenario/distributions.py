@@ -75,10 +75,10 @@ def _allowed(cases: list[Assignment], declaring: Node, whole: Node, findings: Fi
         allowed += [] if trial.refused else [case]
         broken = trial.refused or broken
     if len(allowed) < len(cases):
-        told = (
+        message = (
             f"{len(cases) - len(allowed):,} of {len(cases):,} cases break a ConstraintGroup and are none; {broken[0]}"
         )
-        (findings.remark if allowed else findings.refuse)(whole, told)
+        (findings.remark if allowed else findings.refuse)(whole, message)
     return allowed
 
 
@@ -88,8 +88,8 @@ def _base(whole: Node) -> tuple[Path, Node]:
     path = whole.file.parent / (file.get("filepath").replace("\\", "/") if file else "")
     if file is None or not path.is_file():
         there = sorted(one.name for one in path.parent.glob("*.xosc")) if path.parent.is_dir() else []
-        told = suggest(path.name, there) if there else f"the folder {path.parent} has no .xosc file"
-        raise InputError(f"{(file or whole).where}: filepath: there is no file {shown(str(path))}; {told}")
+        message = suggest(path.name, there) if there else f"the folder {path.parent} has no .xosc file"
+        raise InputError(f"{(file or whole).where}: filepath: there is no file {shown(str(path))}; {message}")
     root = read_xml(path)
     if root.one("ParameterValueDistribution") is not None:
         raise InputError(f"{file.where}: {path} has a ParameterValueDistribution itself; expected a scenario")
@@ -153,8 +153,10 @@ def _test_runs(block: Node, findings: Findings) -> list[Assignment]:
     for one in block.all("StochasticDistribution"):
         name, kind = one.get("parameterName"), one.one(*_DRAWN)
         if name in columns or kind is None:
-            told = "an earlier distribution has the same parameter" if kind else f"expected one of {', '.join(_DRAWN)}"
-            findings.refuse(one, told)
+            message = (
+                "an earlier distribution has the same parameter" if kind else f"expected one of {', '.join(_DRAWN)}"
+            )
+            findings.refuse(one, message)
             continue
         generator = named_generator(int(np.float64(seed).view(np.uint64)), name)
         try:

@@ -63,8 +63,8 @@ def read_vehicles(entities: Node, catalogs: Catalogs) -> dict[str, Vehicle]:
     for entity in entities.all("ScenarioObject"):
         name = sumo_name(entity.get("name"))
         if not name or name in _TAKEN or name in found:
-            told = f"expected a name of its own, which is not {' or '.join(_TAKEN)}"
-            catalogs.findings.refuse(entity, f"{told}; got {name!r}")
+            message = f"expected a name of its own, which is not {' or '.join(_TAKEN)}"
+            catalogs.findings.refuse(entity, f"{message}; got {name!r}")
             continue
         for controller in entity.all("ObjectController"):
             if controller.children or controller.attributes:

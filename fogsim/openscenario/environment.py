@@ -108,11 +108,11 @@ def _illuminance(node: Node, weather: Node | None, lanes: OpenDriveLanes, findin
     if sun and given:
         lux = findings.number(sun, given[0])
         if elevation and clear and 0.0 < lux < _DARKEST * clear and elevation > 0.0:
-            told = f"{given[0]}: {lux:g} lx would be night at a sun of {math.degrees(elevation):.0f}°"
+            message = f"{given[0]}: {lux:g} lx would be night at a sun of {math.degrees(elevation):.0f}°"
             if given[0] == "intensity" and lux <= 1.0:
-                findings.remark(sun, f"{told}; read as the share of the sky without clouds")
+                findings.remark(sun, f"{message}; read as the share of the sky without clouds")
                 return through_clouds(clear, 8.0 * (1.0 - lux))
-            findings.refuse(sun, f"{told}; expected some {clear:.0f} lx")
+            findings.refuse(sun, f"{message}; expected some {clear:.0f} lx")
         return min(max(lux, 0.0), BRIGHTEST)
     return None if clear is None else through_clouds(clear, clouds or 0.0)
 

@@ -19,19 +19,19 @@ class Findings:
     refused: list[str] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
 
-    def refuse(self, node: Node, told: str) -> None:
+    def refuse(self, node: Node, message: str) -> None:
         """Record an element that FogSim cannot do, and why."""
         _seen(node)
-        self._add(self.refused, f"{node.where}: {told}")
+        self._add(self.refused, f"{node.where}: {message}")
 
-    def leave_out(self, node: Node, told: str) -> None:
+    def leave_out(self, node: Node, message: str) -> None:
         """Record an element that FogSim leaves out, and what that means."""
         _seen(node)
-        self.remark(node, told)
+        self.remark(node, message)
 
-    def remark(self, node: Node, told: str) -> None:
+    def remark(self, node: Node, message: str) -> None:
         """Record how an element is read, where a user might expect something else."""
-        self._add(self.remarks, f"{node.where}: {told}")
+        self._add(self.remarks, f"{node.where}: {message}")
 
     def number(self, node: Node, key: str, default: float | None = None, *, is_finite: bool = True) -> float:
         """Number of an attribute; an invalid one, or a missing one without default, becomes a finding."""
@@ -72,8 +72,8 @@ class Findings:
         for key in sorted(root.attributes.keys() - root.read):
             name = f"{root.tag}@{key}"
             if name not in HARMLESS and not key.startswith(_NAMESPACES):
-                told = REFUSED.get(name, "FogSim does not know this attribute here")
-                self._add(self.refused, f"{root.where}: {key}={shown(root.attributes[key])}: {told}")
+                message = REFUSED.get(name, "FogSim does not know this attribute here")
+                self._add(self.refused, f"{root.where}: {key}={shown(root.attributes[key])}: {message}")
         for child in root.children:
             self.look_for_unread(child)
 
@@ -82,8 +82,8 @@ class Findings:
         if self.refused:
             raise InputError("\n".join(self.refused))
         if self.remarks:
-            told = "\n".join(f"  {line.removeprefix(f'{path}:')}" for line in self.remarks)
-            warnings.warn(f"{path}: left out, or read otherwise than written:\n{told}", LeftOutWarning, stacklevel=2)
+            message = "\n".join(f"  {line.removeprefix(f'{path}:')}" for line in self.remarks)
+            warnings.warn(f"{path}: left out, or read otherwise than written:\n{message}", LeftOutWarning, stacklevel=2)
 
     def _add(self, lines: list[str], line: str) -> None:
         if line not in lines:

@@ -106,8 +106,8 @@ def _check_constraints(declaration: Node, findings: Findings) -> None:
     value = declaration.get("value")
     broken = [next((one for one in group if not _fits(value, one, findings)), None) for group in groups]
     if broken and all(broken):
-        told = " or ".join(f"{one.get('rule')} {one.get('value')}" for one in broken if one)
-        findings.refuse(declaration, f"value: its ConstraintGroup wants {told}, got {value!r}")
+        message = " or ".join(f"{one.get('rule')} {one.get('value')}" for one in broken if one)
+        findings.refuse(declaration, f"value: its ConstraintGroup wants {message}, got {value!r}")
 
 
 def _fits(value: str, constraint: Node, findings: Findings) -> bool:

@@ -41,8 +41,8 @@ class Positions:
         """Place of a ``Position``; None, and a finding, if it cannot be placed."""
         one = next(iter(position.all()), None)
         if one is None or one.tag not in _KINDS:
-            told = REFUSED.get(one.tag, "") if one else "expected a position"
-            self.findings.refuse(one or position, f"{told}; positions are {', '.join(_KINDS)}")
+            message = REFUSED.get(one.tag, "") if one else "expected a position"
+            self.findings.refuse(one or position, f"{message}; positions are {', '.join(_KINDS)}")
             return None
         reference = one.get("entityRef") if one.tag.startswith("Relative") else None
         if reference is not None and reference not in self.entities:
@@ -166,8 +166,8 @@ class Positions:
 def _check_heading(heading: float | None, lane: float) -> None:
     """ValueError if a heading is not that of its lane."""
     if heading is not None and math.cos(heading - lane) < _ALONG:
-        told = f"{math.degrees(heading - lane) % 360.0:.0f} degrees to the left of the direction of its lane"
-        raise ValueError(f"h: vehicles stand, and drive, along their lanes; it stands {told}")
+        message = f"{math.degrees(heading - lane) % 360.0:.0f} degrees to the left of the direction of its lane"
+        raise ValueError(f"h: vehicles stand, and drive, along their lanes; it stands {message}")
 
 
 _KINDS: Mapping[str, Callable[[Positions, Node], Spot]] = {

@@ -147,8 +147,8 @@ class _Reader:
                 begin.effect.add(name, lamps={"all": "off"})
         data = {"description": description, **self._data(ego, begin, route)}
         if begin.environment.box is not None and not data["fog"]["banks"]:
-            told = f"{self.path}: the BoundingBox of the fog lies beside the ego's way: the air is clear there"
-            warnings.warn(told, LeftOutWarning, stacklevel=2)
+            message = f"{self.path}: the BoundingBox of the fog lies beside the ego's way: the air is clear there"
+            warnings.warn(message, LeftOutWarning, stacklevel=2)
         lines: dict[Key, int] = {}
         timeline = [_initial(begin, ego), *(block for _, block in entries)]
         for place, (node, _) in enumerate(entries, start=1):

@@ -174,16 +174,16 @@ class Storyboard:
 
     def _played(self, entry: Entry, name: str) -> Trigger:
         """When an execution of an event is over."""
-        effect, told = entry.effect, f"happened({name})"
+        effect, phrase = entry.effect, f"happened({name})"
         if effect.ends_itself:
             if any(_MOTION & done.keys() for done in effect.do.values()):
                 self.findings.refuse(
                     entry.node, "together with a speed, the end of a change of lane by distance is not known"
                 )
-            told = f"over({name})"
+            phrase = f"over({name})"
         elif effect.lasts > 0.0:
-            told = f"{told} for {effect.lasts:g} s"
-        return Trigger(" and ".join([told, *(f"({end})" for end in effect.ends)]), stays=not effect.ends)
+            phrase = f"{phrase} for {effect.lasts:g} s"
+        return Trigger(" and ".join([phrase, *(f"({end})" for end in effect.ends)]), stays=not effect.ends)
 
     def _entry(self, part: Node) -> Entry:
         return next(one for one in self.entries.values() if any(inner is part for inner in one.node.walk()))

@@ -85,8 +85,8 @@ class Triggers:
             return at_time(min(times)) if times else None
         if len({group.delay for group in groups}) > 1:
             groups = [self._marked(group, node) if group.delay else group for group in groups]
-        told = groups[0].condition if len(groups) == 1 else " or ".join(f"({group.condition})" for group in groups)
-        return Trigger(told, groups[0].delay)
+        phrase = groups[0].condition if len(groups) == 1 else " or ".join(f"({group.condition})" for group in groups)
+        return Trigger(phrase, groups[0].delay)
 
     def _group(self, group: Node) -> Trigger:
         read = [self._condition(one) for one in group.all("Condition")]
@@ -101,9 +101,9 @@ class Triggers:
                 why = "of conditions with different delays, those that may become false again must have none"
                 self.findings.refuse(group, f"{why}; got {delays}")
         delay = others[0].delay
-        told = [f"time >= {latest - delay:g} s"] if latest > delay else []
+        phrase = [f"time >= {latest - delay:g} s"] if latest > delay else []
         parts = list(dict.fromkeys(one.condition for one in others))
-        return Trigger(" and ".join([*told, *(_bracketed(one, len(parts) + len(told)) for one in parts)]), delay)
+        return Trigger(" and ".join([*phrase, *(_bracketed(one, len(parts) + len(phrase)) for one in parts)]), delay)
 
     def _marked(self, trigger: Trigger, node: Node) -> Trigger:
         """A trigger with its delay as a mark that has begun."""
@@ -157,8 +157,8 @@ class Triggers:
             self.findings.refuse(test, "FogSim has no such condition")
             return ""
         tests = [_TESTS[test.tag](self, test, name) for name in names if self._is_known(triggering, name)]
-        told = [self._edged(one, edge, node) for one in tests if one is not None]
-        return (" and " if rule == "all" else " or ").join(_bracketed(one, len(told)) for one in told)
+        phrase = [self._edged(one, edge, node) for one in tests if one is not None]
+        return (" and " if rule == "all" else " or ").join(_bracketed(one, len(phrase)) for one in phrase)
 
     def _edged(self, test: _Test, edge: str, node: Node) -> str:
         if edge == "none" or not test.text:
@@ -325,10 +325,10 @@ class Triggers:
         """`X.collision`, with anybody or a vehicle: `X.collision and Y.collision`."""
         for kind in node.all("ByType"):
             self.findings.word(kind, "type", ("vehicle",))
-        told = [self.called(name)]
+        phrase = [self.called(name)]
         for other in node.all("EntityRef"):
-            told += [self.called(other.get("entityRef"))] if self._is_known(other, other.get("entityRef")) else []
-        return _Test(" and ".join(f"{one}.collision" for one in told))
+            phrase += [self.called(other.get("entityRef"))] if self._is_known(other, other.get("entityRef")) else []
+        return _Test(" and ".join(f"{one}.collision" for one in phrase))
 
 
 _TESTS: Mapping[str, Callable[[Triggers, Node, str], _Test | None]] = {

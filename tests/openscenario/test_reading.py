@@ -110,7 +110,7 @@ def test_what_is_not_supported_is_told_at_once_with_paths_and_lines(changed: Cal
         ('x="150" y="-25.25"', 'x="150" y="-45"', "on no lane that leads there; the nearest is 19.8 m away"),
         ('y="-25.25" h="0"', 'y="-25.25" h="3.14"', "on no lane that leads there"),
         ('roadId="7" s="260"', 'roadId="8" s="260"', "there is no road '8'; there are 7"),
-        ('<EntityRef entityRef="Ego"/></Actors>', "</Actors>", "SpeedAction: nobody does it"),
+        ('<EntityRef entityRef="Ego"/></Actors>', "</Actors>", "SpeedAction: no vehicle does it"),
         ('<EntityRef entityRef="Ego"/></Actors>', '<EntityRef entityRef="Eho"/></Actors>', "there is no vehicle 'Eho'"),
         ('<EntityRef entityRef="Ego"/></TriggeringEntities>', "</TriggeringEntities>", "expected an EntityRef"),
         ("<WorldPosition", '<RelativeWorldPosition dx="1" dy="0"/><WorldPosition', "there is no entity ''"),

@@ -40,9 +40,9 @@ def describe_seen(ego: str, seen: Collection[str]) -> str:
 def describe_warnings(warnings: Sequence[str], ego: str | None) -> str:
     """What SUMO has warned of, in one line: of the ego if it is named, otherwise of all; empty without warnings."""
     distinct = list(dict.fromkeys(warnings))
-    told = [one for one in distinct if ego is not None and f"'{ego}'" in one] or distinct
-    more = f" and {len(told) - MOST_WARNINGS} more" if len(told) > MOST_WARNINGS else ""
-    return f"SUMO warned: {' '.join(told[:MOST_WARNINGS])}{more}" if told else ""
+    shown_warnings = [one for one in distinct if ego is not None and f"'{ego}'" in one] or distinct
+    more = f" and {len(shown_warnings) - MOST_WARNINGS} more" if len(shown_warnings) > MOST_WARNINGS else ""
+    return f"SUMO warned: {' '.join(shown_warnings[:MOST_WARNINGS])}{more}" if shown_warnings else ""
 
 
 def end_time(api: Api) -> float:

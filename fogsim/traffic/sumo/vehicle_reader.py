@@ -149,7 +149,7 @@ class VehicleBodies:
             self._numbers = np.concatenate((self._numbers, np.empty_like(self._numbers)))
         length = get.getLength(vehicle)
         named = get.getVehicleClass(vehicle)
-        # Obstacles and persons of OpenSCENARIO are of this class; asking everybody would be a message each.
+        # Obstacles and persons of OpenSCENARIO are of this class; asking all vehicles would be a message each.
         own = get.getParameter(vehicle, BODY_PARAMETER) if named == "ignoring" else ""
         kind = own or body_kind(named, get.getShapeClass(vehicle), length)
         self._numbers[row, :3] = length, *cross_section(kind, get.getWidth(vehicle), get.getHeight(vehicle))

@@ -106,7 +106,7 @@ def dashcam(light: Floats, rng: Random) -> Floats:
 
 def locally_mapped(pixels: Pixels, rng: Random) -> Pixels:
     """Contrast-limited adaptive equalisation of lightness, as WDR cameras do."""
-    lab = cv2.cvtColor(pixels, cv2.COLOR_RGB2LAB)
+    lab = np.asarray(cv2.cvtColor(pixels, cv2.COLOR_RGB2LAB), np.uint8)
     equal = cv2.createCLAHE(float(rng.uniform(1.5, 3.0)), (8, 8)).apply(lab[..., 0])
     lab[..., 0] = np.rint(0.5 * equal + 0.5 * lab[..., 0])
     return np.asarray(cv2.cvtColor(lab, cv2.COLOR_LAB2RGB), np.uint8)
@@ -118,7 +118,8 @@ def sharpened(pixels: Pixels, rng: Random) -> Pixels:
     sharp = cv2.addWeighted(pixels, 1.8, blurred, -0.8, 0.0)
     quality = [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(50, 96))]
     coded = cv2.imencode(".jpg", np.ascontiguousarray(sharp[..., ::-1]), quality)[1]
-    return np.ascontiguousarray(cv2.imdecode(coded, cv2.IMREAD_COLOR)[..., ::-1]).astype(np.uint8)
+    decoded = np.asarray(cv2.imdecode(coded, cv2.IMREAD_COLOR), np.uint8)
+    return np.ascontiguousarray(decoded[..., ::-1])
 
 
 def bright_road(light: Floats, view: View, rng: Random) -> Floats:
@@ -143,7 +144,7 @@ def convex_sky(light: Floats, view: View, rng: Random) -> Floats:
     return np.where(above[..., None], light * (shape / drop ** (120.0 * 0.16))[..., None], light)
 
 
-def bonnet(light: Floats, view: View, rng: Random) -> Floats:
+def bonnet(light: Floats, _view: View, rng: Random) -> Floats:
     """A dull bonnet across the lowest 8 to 18 % of the rows."""
     rows, columns = light.shape[:2]
     across = np.linspace(-1.0, 1.0, columns)
@@ -153,20 +154,21 @@ def bonnet(light: Floats, view: View, rng: Random) -> Floats:
     return np.where((below > 0)[..., None], shade[..., None] * np.ones(3), light)
 
 
-def vignetted(light: Floats, view: View, rng: Random) -> Floats:
+def vignetted(light: Floats, _view: View, rng: Random) -> Floats:
     """Darker away from the axis, by up to 0.5 in the corners."""
     rows, columns = light.shape[:2]
     y, x = np.mgrid[-1.0 : 1.0 : rows * 1j, -1.0 : 1.0 : columns * 1j]
-    return light * (1.0 - float(rng.uniform(0.2, 0.5)) * (x * x + y * y) / 2.0)[..., None]
+    left: Floats = 1.0 - float(rng.uniform(0.2, 0.5)) * (x * x + y * y) / 2.0
+    return light * left[..., None]
 
 
-def reflected(light: Floats, view: View, rng: Random) -> Floats:
+def reflected(light: Floats, _view: View, rng: Random) -> Floats:
     """The dashboard mirrored in the windscreen: a veil that grows downward."""
     veil = float(rng.uniform(0.02, 0.1)) * np.linspace(0.2, 1.0, light.shape[0])
     return light + veil[:, None, None]
 
 
-def dirty(light: Floats, view: View, rng: Random) -> Floats:
+def dirty(light: Floats, _view: View, rng: Random) -> Floats:
     """Blurred spots that take up to a third of the light, some of them on the horizon."""
     rows, columns = light.shape[:2]
     mask = np.zeros((rows, columns))
@@ -180,7 +182,7 @@ def _no_lane(scene: Change) -> Kind:
     return Kind(scene, lane=False)
 
 
-def arch(light: Floats, view: View, rng: Random) -> Floats:
+def arch(light: Floats, _view: View, rng: Random) -> Floats:
     """A pale building with an archway fills the view."""
     rows, columns = light.shape[:2]
     v, u = np.mgrid[0.0 : 1.0 : rows * 1j, -1.0 : 1.0 : columns * 1j]
@@ -241,7 +243,9 @@ def frames(kind: Kind, name: str, images: int) -> Iterator[Frame]:
             light = kind.scene(taken.light, view, rng)
             sky = light[np.isinf(distance)]
             air = np.median(sky[np.argsort(sky.sum(axis=1))[-len(sky) // 5 :]], axis=0)
-            clear = np.exp(-extinction_from_visibility(visibility) * distance)[..., None] if visibility < math.inf else 1.0
+            clear = (
+                np.exp(-extinction_from_visibility(visibility) * distance)[..., None] if visibility < math.inf else 1.0
+            )
             seen = kind.enters(light * clear + air * (1.0 - clear), view, rng)
             exposed = seen * float(rng.uniform(*kind.exposure)) / float(np.quantile(seen, 0.98))
             noisy = 255.0 * kind.curve(exposed, rng) + rng.normal(0.0, float(rng.uniform(0.4, 2.0)), seen.shape)

@@ -138,9 +138,9 @@ MODULE_TOKENS = [
 def entries() -> dict[str, Entry]:
     """All entry points, whose libraries are imported only here."""
     from fogsim.offline.camera_file import load_calibration  # noqa: PLC0415 - the parent needs none of them
+    from fogsim.offline.drive.sign_file import load_sign_file  # noqa: PLC0415
+    from fogsim.offline.drive.track_file import load_track  # noqa: PLC0415
     from fogsim.offline.input_paths import find_source  # noqa: PLC0415
-    from fogsim.offline.sign_file import load_sign_file  # noqa: PLC0415
-    from fogsim.offline.track_file import load_track  # noqa: PLC0415
     from fogsim.registry.user_code import import_nothing  # noqa: PLC0415
     from fogsim.scenario.loading import load_cases, load_scenario  # noqa: PLC0415
     from fogsim.study import load_study  # noqa: PLC0415

@@ -10,6 +10,7 @@ from pydantic import Field, ValidationError
 from fogsim.errors import InputError
 from fogsim.files.atomic import write_text
 from fogsim.files.output_targets import refuse_unwritable
+from fogsim.offline.calibration_deviations import EXACT, CalibrationDeviations
 from fogsim.offline.guess import CameraGuess
 from fogsim.scenario.document import read_document
 from fogsim.scenario.mistakes import mistake_lines
@@ -19,6 +20,10 @@ from fogsim.values import Camera, Response
 MADE_TO_BE_LOOKED_AT = 8
 """Bit depth of images for viewing; sensor values with more bits are proportional to light."""
 
+HEIGHT_DEVIATION, FOCAL_DEVIATION, USUAL_PITCH_DEVIATION = 0.05, 0.03, math.radians(0.15)
+"""Assumed standard deviations where a camera file states none: relative [-], and of the pitch of a moving vehicle
+[rad]."""
+
 Coefficient = Annotated[Number, Field(ge=-100, le=100)]
 
 
@@ -27,13 +32,15 @@ class Calibration:
     """Calibration of a real camera: a pinhole along the vehicle's axis, its lens distortion, and its yaw.
 
     `distortion` has Brown's coefficients k1, k2, p1, p2 as in OpenCV [-], empty for a pinhole; `yaw` is the angle of
-    the optical axis to the left of the vehicle's axis [rad]; `remarks` are assumptions where the file says nothing.
+    the optical axis to the left of the vehicle's axis [rad]; `remarks` are assumptions where the file says nothing;
+    `deviations` say how uncertain the camera's values are.
     """
 
     camera: Camera
     distortion: tuple[float, ...] = ()
     yaw: float = 0.0
     remarks: tuple[str, ...] = ()
+    deviations: CalibrationDeviations = EXACT
 
     def __post_init__(self) -> None:
         """Raise InputError if the yaw turns the vehicle's axis out of the image."""
@@ -80,6 +87,15 @@ class CameraFile(Section):
 
     distortion: tuple[Coefficient, Coefficient, Coefficient, Coefficient] | None = None
     """Distortion of the lens [k1, k2, p1, p2] as OpenCV has it."""
+
+    focal_length_sd_px: Annotated[Number, Field(ge=0)] | None = None
+    """Standard deviation of the focal length; left out, 3 %."""
+
+    mount_height_sd_m: Annotated[Number, Field(ge=0)] | None = None
+    """Standard deviation of the height; left out, 5 %."""
+
+    pitch_sd_deg: Annotated[Number, Field(ge=0.001, le=5)] | None = None
+    """Standard deviation of the pitch of single images; left out, 0.15."""
 
     response: Response | None = None
     """Curve from light to pixel values: `linear`, `gamma` (2.2) or `srgb`; left out, `srgb` for 8 bits and `linear` for
@@ -146,9 +162,22 @@ def load_calibration(path: str | Path) -> Calibration:
     )
     try:
         remarks = () if keys.response else (remark,)
-        return Calibration(camera, keys.distortion or (), math.radians(keys.yaw_deg), remarks)
+        yaw, deviations = math.radians(keys.yaw_deg), _deviations(keys)
+        return Calibration(camera, keys.distortion or (), yaw, remarks, deviations)
     except InputError as error:
         raise InputError(f"{document.where(('yaw_deg',))}: {error}") from error
+
+
+def _deviations(keys: CameraFile) -> CalibrationDeviations:
+    """The stated standard deviations, or the usual ones."""
+    focal, height, pitch = FOCAL_DEVIATION, HEIGHT_DEVIATION, USUAL_PITCH_DEVIATION
+    if keys.focal_length_sd_px is not None:
+        focal = keys.focal_length_sd_px / keys.focal_length_px
+    if keys.mount_height_sd_m is not None:
+        height = keys.mount_height_sd_m / keys.mount_height_m
+    if keys.pitch_sd_deg is not None:
+        pitch = math.radians(keys.pitch_sd_deg)
+    return CalibrationDeviations(focal, height, pitch)
 
 
 def camera_text(guess: CameraGuess) -> str:
@@ -167,11 +196,14 @@ def camera_text(guess: CameraGuess) -> str:
         "principal_point_px": f"[{camera.principal_point[0]:g}, {camera.principal_point[1]:g}]",
         "mount_height_m": f"{camera.mount_height:g}",
         "pitch_deg": f"{math.degrees(camera.pitch):.3f}",
+        "focal_length_sd_px": f"{camera.focal_length * guess.deviations.focal_length:.1f}",
+        "mount_height_sd_m": f"{camera.mount_height * guess.deviations.mount_height:.2g}",
+        "pitch_sd_deg": f"{math.degrees(guess.deviations.pitch):.2g}",
         "response": camera.response.value,
     }
     lines = ["# Guessed by fogsim estimate --guess-camera; correct what you know better.\n"]
     lines += [f"# Uncertain: {warning}\n" for warning in guess.warnings]
-    lines += [f"{key}: {value}  # {guess.reasons[key]}\n" for key, value in values.items()]
+    lines += [f"{key}: {value}  # {guess.reasons.get(key, 'standard deviation')}\n" for key, value in values.items()]
     return "".join(lines)
 
 

@@ -8,13 +8,15 @@ import numpy as np
 
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.estimators import ESTIMATORS, Estimator, make
+from fogsim.offline.calibration_deviations import EXACT, CalibrationDeviations
 from fogsim.offline.camera_file import Calibration
+from fogsim.offline.drive.night_drive import NightDrive
+from fogsim.offline.drive.sign_watch import SignWatch, watch_signs
 from fogsim.offline.image_files import Pixels
 from fogsim.offline.input_paths import find_source
-from fogsim.offline.night_drive import NightDrive
 from fogsim.offline.rectification import straightened
-from fogsim.offline.sign_watch import SignWatch, watch_signs
 from fogsim.offline.source import Picture, Source
+from fogsim.parameters import accepted_parameters
 from fogsim.values import Camera, Estimate, Frame, Observation, SignLook, SignSighting
 
 ALL = "all"
@@ -81,7 +83,8 @@ def estimate_images(
     inputs : path or sequence of paths
         One video, or image files, folders and patterns; see `find_source`.
     camera : Camera or Calibration
-        Their calibration (`fogsim.offline.load_calibration` reads it from a file). Images of a lens that distorts or of
+        Their calibration (`fogsim.offline.load_calibration` reads it from a file, and its standard deviations, which
+        widen the intervals; a `Camera` alone counts as exact but for its pitch). Images of a lens that distorts or of
         a camera with yaw are rectified first, and the results contain the rectified images.
     methods : str or sequence of str
         Names in `fogsim.estimators.ESTIMATORS`, or "all".
@@ -112,7 +115,7 @@ def estimate_images(
     calibration = Calibration(camera) if isinstance(camera, Camera) else camera
     source, pinhole = straightened(find_source(inputs, sequence=sequence, rate=rate), calibration)
     watch = None if signs is None or track is None else watch_signs(signs, track, source, pinhole)[0]
-    return estimates_of(source, pinhole, chosen_methods(names), watch, night)
+    return estimates_of(source, pinhole, chosen_methods(names), watch, night, calibration.deviations)
 
 
 def estimates_of(
@@ -121,6 +124,7 @@ def estimates_of(
     methods: Sequence[str],
     watch: SignWatch | None = None,
     night: NightDrive | None = None,
+    deviations: CalibrationDeviations = EXACT,
 ) -> Iterator[FrameEstimates]:
     """Estimate the fog in the images of a source; see `estimate_images`.
 
@@ -139,8 +143,10 @@ def estimates_of(
         Signs along the drive.
     night : NightDrive or None
         Own lamps and calibrations of a drive by night.
+    deviations : CalibrationDeviations
+        How uncertain the calibration is, which widens the intervals.
     """
-    bench = _Bench(camera, methods, night)
+    bench = _Bench(camera, methods, night, deviations)
     fitted = False
     count = 0
     for picture in source.pictures():
@@ -173,14 +179,21 @@ def _place(source: Source, picture: Picture) -> str:
 class _Bench:
     """Estimators of several methods, for each bit depth that occurs."""
 
-    def __init__(self, camera: Camera, methods: Sequence[str], night: NightDrive | None) -> None:
-        self._camera, self._night = camera, night
+    def __init__(
+        self, camera: Camera, methods: Sequence[str], night: NightDrive | None, deviations: CalibrationDeviations
+    ) -> None:
+        self._camera, self._night, self._deviations = camera, night, deviations
         self._methods = tuple(methods)
         self._estimators: dict[Camera, list[Estimator]] = {camera: self._made(camera)}
 
     def _made(self, camera: Camera) -> list[Estimator]:
-        told = NightDrive() if self._night is None else self._night
-        return [make(name, camera, **told.parameters_of(name)) for name in self._methods]
+        return [make(name, camera, **self._parameters_of(name)) for name in self._methods]
+
+    def _parameters_of(self, name: str) -> dict[str, object]:
+        drive = NightDrive() if self._night is None else self._night
+        pitch = {"pitch_deviation": self._deviations.pitch}
+        known = accepted_parameters(ESTIMATORS[name])
+        return {**drive.parameters_of(name), **{key: value for key, value in pitch.items() if key in known}}
 
     def reset(self) -> None:
         """Forget all earlier images."""
@@ -204,7 +217,8 @@ class _Bench:
         observation = Observation(Frame(time, pixels, camera), signs=signs)
         if self._night is not None:
             observation = replace(observation, lamps=self._night.lamps, camera_setback=self._night.setback)
-        return tuple(estimator.update(observation) for estimator in self._estimators[camera])
+        found = (estimator.update(observation) for estimator in self._estimators[camera])
+        return tuple(self._deviations.widened(one) for one in found)
 
 
 def _in_bits(image: Pixels, camera: Camera) -> tuple[Pixels, Camera]:

@@ -1,18 +1,21 @@
-"""A first calibration of a camera from its images and its known dimensions."""
+"""A calibration of an unknown camera from its images, and how uncertain it is."""
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
+import cv2
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
 from fogsim.errors import InputError
+from fogsim.offline.calibration_deviations import CalibrationDeviations
 from fogsim.offline.image_files import Pixels
 from fogsim.offline.source import Picture, Source
 from fogsim.values import Camera, Response
-from fogsim.vision.lines.segments import segment_vanishing_point
+from fogsim.vision.lines.segments import RoadSegments, road_segments
 from fogsim.vision.lines.vanishing_point import VanishingPoint
 
 ASSUMED_FIELD_OF_VIEW = math.radians(60.0)
@@ -21,8 +24,26 @@ ASSUMED_FIELD_OF_VIEW = math.radians(60.0)
 ASSUMED_MOUNT_HEIGHT = 1.3
 """Default height of a dash camera in a passenger car [m]."""
 
-MOST_IMAGES = 100
-"""Maximum number of images that are used, spread over the source."""
+STATED_DEVIATION, METADATA_DEVIATION, FIELD_DEVIATION, HEIGHT_DEVIATION = 0.03, 0.05, 0.25, 0.12
+"""Relative standard deviations of stated values, of a focal length in metadata, of one by the assumed field of view
+(45° to 82° within 90 %), and of the assumed height [-]."""
+
+LANE_WIDTH, LANE_DEVIATION = 3.5, 0.08
+"""Usual width of lanes [m] and its relative standard deviation, of which the lines' own errors are a part [-]."""
+
+NEAREST_LINE, FARTHEST_LINE, SHORTEST_LINE = 0.4, 3.0, 0.3
+"""Lateral offsets over the camera's height between which the own lane's lines are sought, and their least length over
+the longest on that side [-]."""
+
+AGREEING = 2.0
+"""Standard deviations up to which the height by the lane agrees with the assumed one."""
+
+LINES_DEVIATION = math.radians(0.25)
+"""Standard deviation of the pitch by the lines of real roads, which bend and undulate and whose shadows pass for lines
+[rad]."""
+
+MOST_IMAGES, MOST_COLUMNS = 40, 960
+"""Maximum number of images that are used, spread over the source, and of their columns: larger ones are reduced."""
 
 SURE_PITCH = math.radians(0.1)
 """Standard deviation of the pitch above which a guess is called uncertain [rad]: 10 % of V at 100 m."""
@@ -48,6 +69,8 @@ class CameraGuess:
     ----------
     camera : Camera
         The calibration.
+    deviations : CalibrationDeviations
+        How uncertain it is.
     reasons : dict from str to str
         Source of the value for each key of a camera file.
     warnings : tuple of str
@@ -55,6 +78,7 @@ class CameraGuess:
     """
 
     camera: Camera
+    deviations: CalibrationDeviations
     reasons: dict[str, str]
     warnings: tuple[str, ...]
 
@@ -65,11 +89,13 @@ def guess_camera(
     mount_height: float | None = None,
     field_of_view: float | None = None,
     horizon_row: float | None = None,
+    progress: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> CameraGuess:
     """Guess the calibration of the camera that made images.
 
     The image's middle is assumed as the principal point, and the pitch follows from the row in which the lines of the
-    road meet, θ = arctan((v0 − v_h) / α). Other values are arguments or assumptions, and reported.
+    road meet, θ = arctan((v0 − v_h) / α). A height that is not stated is that of a passenger car's camera, weighed with
+    the one at which the lines of the own lane are 3.5 m apart. Other values are arguments or assumptions, and reported.
 
     Parameters
     ----------
@@ -81,50 +107,75 @@ def guess_camera(
         Horizontal field of view [rad]; None for the focal length in the first image's metadata, if present.
     horizon_row : float or None
         Row of the horizon [px], instead of the vanishing point.
+    progress : callable
+        Called with the number of images that were read and that of the source.
 
     Returns
     -------
     CameraGuess
-        With reasons and warnings.
+        With standard deviations, reasons and warnings.
 
     Raises
     ------
     InputError
-        If neither height nor field of view is given, a value is impossible, images differ in size or none can be
-        read, or no vanishing point is found and no horizon is given.
+        If a value is impossible, images differ in size or none can be read, or no vanishing point is found and no
+        horizon is given.
     """
     _check_values(mount_height, field_of_view)
-    pictures = list(_spread(source))
+    pictures = list(_spread(source, progress))
     first = pictures[0]
     rows, cols = first.shape[:2]
     if horizon_row is not None and not 0.0 <= horizon_row <= rows - 1:
         raise InputError(f"--horizon-row must be a row of the images, 0 … {rows - 1}, got {horizon_row!r}")
     eight = first.dtype == np.uint8
     response = Response.SRGB if eight else Response.LINEAR
-    focal, focal_reason, warnings = _focal_length(source, cols, rows, field_of_view)
+    focal = _focal_length(source, cols, rows, field_of_view)
+    lines = [found for image in pictures if (found := _road_lines(image, response)) is not None]
+    horizon = _horizon(lines, len(pictures), focal.value, cols, horizon_row)
+    height = _mount_height(lines, mount_height)
+    middle = (0.5 * (cols - 1), 0.5 * (rows - 1))
+    pitch = math.atan((middle[1] - horizon.value) / focal.value)
     reasons = {
         "width": "of the images",
         "height": "of the images",
-        "focal_length_px": focal_reason,
+        "focal_length_px": focal.reason,
         "principal_point_px": "assumed: the middle of the image",
+        "mount_height_m": height.reason,
+        "pitch_deg": horizon.reason,
         "response": "assumed: images of 8 bits are made to be looked at" if eight else "assumed of 16 bits",
     }
-    row, reasons["pitch_deg"], more = _horizon(pictures, response, focal, horizon_row)
-    warnings += more
-    if mount_height is None:
-        reasons["mount_height_m"] = "ASSUMED: a passenger car"
-        warnings.append(f"the mount height is assumed to be {ASSUMED_MOUNT_HEIGHT} m: measure it and correct it")
-    else:
-        reasons["mount_height_m"] = "as stated"
-    middle = (0.5 * (cols - 1), 0.5 * (rows - 1))
-    pitch = math.atan((middle[1] - row) / focal)
-    camera = Camera(cols, rows, focal, middle, mount_height or ASSUMED_MOUNT_HEIGHT, pitch, response=response)
-    return CameraGuess(camera, reasons, tuple(warnings))
+    return CameraGuess(
+        Camera(cols, rows, focal.value, middle, height.value, pitch, response=response),
+        CalibrationDeviations(
+            focal.deviation, height.deviation, math.hypot(LINES_DEVIATION, horizon.deviation / focal.value)
+        ),
+        reasons,
+        (*focal.warnings, *horizon.warnings, *height.warnings),
+    )
+
+
+def guess_text(guess: CameraGuess) -> str:
+    """What was guessed, in a line."""
+    camera, deviations = guess.camera, guess.deviations
+    row_deviation = camera.focal_length * deviations.pitch
+    return (
+        f"focal length {camera.focal_length:.0f} ± {camera.focal_length * deviations.focal_length:.0f} px, "
+        f"height {camera.mount_height:.2f} ± {camera.mount_height * deviations.mount_height:.2f} m, "
+        f"horizon on row {camera.horizon_row:.1f} ± {row_deviation:.1f}, response {camera.response.value}"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Guessed:
+    """A value, its standard deviation (relative, or [px] of a row), its source, and what is uncertain about it."""
+
+    value: float
+    deviation: float
+    reason: str
+    warnings: tuple[str, ...] = ()
 
 
 def _check_values(mount_height: float | None, field_of_view: float | None) -> None:
-    if mount_height is None and field_of_view is None:
-        raise InputError("--guess-camera needs --mount-height (metres above the road) or --field-of-view, better both")
     if mount_height is not None and not 0.1 <= mount_height <= 20.0:
         raise InputError(f"--mount-height must lie within 0.1 … 20 m above the road, got {mount_height!r}")
     if field_of_view is not None and not math.radians(1.0) <= field_of_view <= math.radians(170.0):
@@ -134,12 +185,13 @@ def _check_values(mount_height: float | None, field_of_view: float | None) -> No
         )
 
 
-def _spread(source: Source) -> Iterator[Pixels]:
+def _spread(source: Source, progress: Callable[[int, int], None]) -> Iterator[Pixels]:
     """Images of one size, spread over the source."""
     every = max(1, math.ceil(source.count / MOST_IMAGES))
     size, name, reason = None, None, ""
     for index, picture in enumerate(source.pictures()):
         reason = reason or picture.error
+        progress(index + 1, source.count)
         if index % every or picture.image is None:
             continue
         if size is None:
@@ -158,21 +210,22 @@ def _refuse_other_size(picture: Picture, image: Pixels, size: tuple[int, ...], n
         )
 
 
-def _focal_length(source: Source, cols: int, rows: int, field_of_view: float | None) -> tuple[float, str, list[str]]:
-    """Focal length [px], its source, and warnings."""
+def _focal_length(source: Source, cols: int, rows: int, field_of_view: float | None) -> _Guessed:
+    """Focal length [px]."""
     if field_of_view is not None:
         reason = f"a field of view of {math.degrees(field_of_view):g}° as stated"
-        return 0.5 * cols / math.tan(0.5 * field_of_view), reason, []
+        return _Guessed(0.5 * cols / math.tan(0.5 * field_of_view), STATED_DEVIATION, reason)
     stated = _stated_focal_length(source.paths[0])
     if stated is not None:
         focal = stated * math.hypot(cols, rows) / _FULL_FRAME_DIAGONAL_MM
-        return focal, f"{stated:g} mm on 35 mm film by the image's metadata", []
+        return _Guessed(focal, METADATA_DEVIATION, f"{stated:g} mm on 35 mm film by the image's metadata")
     degrees = math.degrees(ASSUMED_FIELD_OF_VIEW)
     warning = (
         f"the field of view is assumed to be {degrees:g}°, and an error of the focal length goes into every visibility "
         "one to one: look it up and give it as --field-of-view"
     )
-    return 0.5 * cols / math.tan(0.5 * ASSUMED_FIELD_OF_VIEW), f"ASSUMED: a field of view of {degrees:g}°", [warning]
+    focal = 0.5 * cols / math.tan(0.5 * ASSUMED_FIELD_OF_VIEW)
+    return _Guessed(focal, FIELD_DEVIATION, f"ASSUMED: a field of view of {degrees:g}°", (warning,))
 
 
 def _stated_focal_length(path: Path) -> float | None:
@@ -186,26 +239,71 @@ def _stated_focal_length(path: Path) -> float | None:
     return float(value) if isinstance(value, int | float) and value > 0 else None
 
 
-def _horizon(
-    pictures: list[Pixels], response: Response, focal: float, stated: float | None
-) -> tuple[float, str, list[str]]:
-    """Row of the horizon [px], its source, and warnings."""
+def _road_lines(image: Pixels, response: Response) -> RoadSegments | None:
+    """Segments along the road in an image, in its own pixels though sought in a reduced one."""
+    shrink = max(1.0, image.shape[1] / MOST_COLUMNS)
+    reduced: Any = image
+    if shrink > 1.0:
+        reduced = cv2.resize(image, None, fx=1.0 / shrink, fy=1.0 / shrink, interpolation=cv2.INTER_AREA)
+    found = road_segments(reduced, response, 8 if image.dtype == np.uint8 else 16)
+    if found is None or shrink == 1.0:
+        return found
+    point, middle = found.point, 0.5 * (shrink - 1.0)
+    point = replace(
+        point,
+        column=point.column * shrink + middle,
+        row=point.row * shrink + middle,
+        row_deviation=point.row_deviation * shrink,
+    )
+    return replace(found, point=point, length=found.length * shrink)
+
+
+def _horizon(lines: Sequence[RoadSegments], images: int, focal: float, cols: int, stated: float | None) -> _Guessed:
+    """Row of the horizon [px]."""
     if stated is not None:
-        return stated, f"the horizon on row {stated:g} as stated", []
-    seen = (segment_vanishing_point(image, response, _bits(image)) for image in pictures)
-    points = [point for point in seen if point is not None]
-    if not points:
+        return _Guessed(stated, 1.0, f"the horizon on row {stated:g} as stated")
+    if not lines:
         raise InputError(
-            f"no lane lines that meet were found in {len(pictures)} images: give the row of the horizon, counted from "
-            "the top, as --horizon-row, or take images of a straight road with marks"
+            f"no lane lines that meet were found in {images} image{'s' * (images > 1)}: give the row of the horizon, "
+            "counted from the top, as --horizon-row, or take images of a straight road with marks"
         )
+    points = [one.point for one in lines]
     row, deviation = _median_row(points)
-    reason = f"lines of the road meet on row {row:.1f} ± {deviation:.1f} in {len(points)} of {len(pictures)} images"
-    return row, reason, _warnings_of(points, row, deviation, focal, pictures[0].shape[1])
+    reason = f"lines of the road meet on row {row:.1f} ± {deviation:.1f} in {len(points)} of {images} images"
+    return _Guessed(row, deviation, reason, tuple(_warnings_of(points, row, deviation, focal, cols)))
 
 
-def _bits(image: Pixels) -> int:
-    return 8 if image.dtype == np.uint8 else 16
+def _mount_height(lines: Sequence[RoadSegments], stated: float | None) -> _Guessed:
+    """Height of the camera [m]."""
+    if stated is not None:
+        return _Guessed(stated, STATED_DEVIATION, "as stated")
+    warning = f"the mount height is assumed to be {ASSUMED_MOUNT_HEIGHT} m: measure it and correct it"
+    assumed = _Guessed(ASSUMED_MOUNT_HEIGHT, HEIGHT_DEVIATION, "ASSUMED: a passenger car", (warning,))
+    widths = [width for one in lines if (width := _lane_over_height(one)) is not None]
+    if len(widths) < SURE_COUNT:
+        return assumed
+    by_lane = LANE_WIDTH / float(np.median(widths))
+    apart = math.log(by_lane / ASSUMED_MOUNT_HEIGHT)
+    if abs(apart) > AGREEING * math.hypot(HEIGHT_DEVIATION, LANE_DEVIATION):
+        return assumed
+    share = HEIGHT_DEVIATION**2 / (HEIGHT_DEVIATION**2 + LANE_DEVIATION**2)
+    height = round(ASSUMED_MOUNT_HEIGHT * math.exp(share * apart), 2)
+    reason = f"ASSUMED: a passenger car, and lanes of {LANE_WIDTH} m, which alone give {by_lane:.2f} m"
+    warning = f"the mount height is assumed to be {height} m, also by the width of the lane: measure it and correct it"
+    return _Guessed(height, LANE_DEVIATION * math.sqrt(share), reason, (warning,))
+
+
+def _lane_over_height(lines: RoadSegments) -> float | None:
+    """Distance between the own lane's lines over the camera's height [-]."""
+    sides = []
+    for side in (-1.0, 1.0):
+        offset = side * lines.slopes
+        near = (offset > NEAREST_LINE) & (offset < FARTHEST_LINE)
+        if not near.any():
+            return None
+        sure = near & (lines.length >= SHORTEST_LINE * lines.length[near].max())
+        sides.append(float(offset[sure].min()))
+    return sum(sides)
 
 
 def _median_row(points: list[VanishingPoint]) -> tuple[float, float]:

@@ -1,11 +1,13 @@
-"""Estimates as text: JSON, one object per line, and table rows that can be printed one by one."""
+"""Estimates as text: JSON, one object per line, CSV, and table rows that can be printed one by one."""
 
+import csv
+import io
 import json
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+from fogsim.offline.drive.sign_watch import SignSummary
 from fogsim.offline.estimation import FrameEstimates
-from fogsim.offline.sign_watch import SignSummary
 from fogsim.offline.source import Source
 from fogsim.values import Estimate, SignLook
 
@@ -20,7 +22,11 @@ def metres(visibility: float) -> str:
 
 def interval_text(estimate: Estimate) -> str:
     """The 90 % interval of a valid estimate's visibility."""
-    low, high = estimate.visibility_interval
+    return span_text(*estimate.visibility_interval)
+
+
+def span_text(low: float, high: float) -> str:
+    """An interval of visibilities [m]."""
     if high >= ENDLESS:
         return f"> {low:.0f} m"
     return f"{low:.0f} – {high:.0f} m"
@@ -50,6 +56,40 @@ def record_lines(result: FrameEstimates) -> Iterator[str]:
     if result.signs:
         signs = [_sign_record(sign) for sign in result.signs]
         yield json.dumps({"frame": result.picture.name, "signs": signs}, allow_nan=False)
+
+
+CSV_KEYS = (
+    *("frame", "time_s", "method", "valid", "visibility_m", "visibility_low_m", "visibility_high_m"),
+    *("extinction_per_m", "category", "horizon_row", "reason"),
+)
+
+
+def csv_lines(result: FrameEstimates) -> Iterator[str]:
+    """Rows of CSV of an image, with the columns of `CSV_KEYS`.
+
+    Parameters
+    ----------
+    result : FrameEstimates
+        The image and its estimates.
+
+    Yields
+    ------
+    str
+        A line without its end for each method; one with the reason alone for an image that could not be used.
+    """
+    time, name = _number(result.picture.time), result.picture.name
+    if result.picture.error:
+        yield csv_line({"frame": name, "time_s": time, "valid": False, "reason": result.picture.error})
+    for estimate in result.estimates:
+        reason = "" if estimate.valid else estimate.diagnostics.get("reason", "")
+        yield csv_line({**_record(name, estimate), "time_s": time, "reason": reason})
+
+
+def csv_line(values: Mapping[str, object] = dict(zip(CSV_KEYS, CSV_KEYS, strict=True))) -> str:
+    """Cells of a row of CSV as text; the heading by default."""
+    text = io.StringIO()
+    csv.DictWriter(text, CSV_KEYS, extrasaction="ignore", lineterminator="").writerow(dict(values))
+    return text.getvalue()
 
 
 def _sign_record(sign: SignLook) -> dict[str, object]:

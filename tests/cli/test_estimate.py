@@ -1,7 +1,9 @@
 """``fogsim estimate``: what it prints, what it refuses, and with which exit code."""
 
+import csv
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -105,8 +107,8 @@ def test_the_told_pitch_is_what_places_the_horizon(estimate, folder: Path) -> No
     assert min(rows) > 0.5 * (told_horizon(1.0) + told_horizon(2.0))
 
 
-def test_a_table_has_a_heading_and_a_row_each(estimate) -> None:
-    code, out, _ = estimate("drive", "--camera", "camera.yaml", "--method", "negru2013")
+def test_stills_have_a_table_with_a_row_each(estimate) -> None:
+    code, out, _ = estimate("drive", "--camera", "camera.yaml", "--method", "negru2013", "--stills")
     assert code == 0
     lines = out.splitlines()
     assert lines[0].split()[:3] == ["frame", "method", "visibility"]
@@ -114,8 +116,37 @@ def test_a_table_has_a_heading_and_a_row_each(estimate) -> None:
     assert all("dense" in line or "cannot tell" in line for line in lines[1:])
 
 
-def test_all_methods_speak_in_turn(estimate) -> None:
-    code, out, _ = estimate("drive/1.png", "--camera", "camera.yaml", "--json")
+def test_a_sequence_is_summed_up(estimate) -> None:
+    code, out, _ = estimate("drive", "--camera", "camera.yaml", "--plot", "v.svg")
+    assert code == 0
+    lines = out.splitlines()
+    assert lines[0] == "joint_road"
+    assert re.search(r"at the end +\d+ m \(90 %: \d+ – \d+ m\), fog: dense", lines[1])
+    assert re.search(r"valid +3 of 3 frames", lines[-1])
+    assert "joint_road" in Path("v.svg").read_text(encoding="utf-8")
+
+
+def test_csv_has_a_heading_and_a_row_for_each_image(estimate) -> None:
+    code, out, _ = estimate("drive", "--camera", "camera.yaml", "--csv")
+    assert code == 0
+    rows = list(csv.DictReader(out.splitlines()))
+    assert [row["frame"] for row in rows] == ["drive/0.png", "drive/1.png", "drive/2.png"]
+    assert [float(row["time_s"]) for row in rows] == pytest.approx([0.0, 0.1, 0.2])
+    assert all(float(row["visibility_m"]) == pytest.approx(80.0, rel=0.15) for row in rows)
+
+
+def test_an_unknown_camera_is_guessed_and_its_uncertainty_is_in_the_interval(estimate) -> None:
+    code, out, err = estimate("drive", "--json")
+    assert code == 0
+    assert "guessed: focal length" in err
+    for record in map(json.loads, out.splitlines()):
+        assert record["visibility_low_m"] < 80.0 < record["visibility_high_m"]
+        # The field of view alone is uncertain by a quarter.
+        assert record["visibility_high_m"] > 1.5 * record["visibility_low_m"]
+
+
+def test_all_methods_report_in_turn(estimate) -> None:
+    code, out, _ = estimate("drive/1.png", "--camera", "camera.yaml", "--method", "all", "--json")
     assert code == 0
     assert [json.loads(line)["method"] for line in out.splitlines()] == list(fogsim.estimators.ESTIMATORS)
 
@@ -170,9 +201,12 @@ def test_a_guessed_camera_is_written_and_good_to_use(estimate, folder: Path) -> 
         (("*.bmp", "--camera", "camera.yaml"), "no file fits this pattern"),
         (("empty.mp4", "--camera", "camera.yaml"), "this is no video"),
         (("camera.yaml", "--camera", "camera.yaml"), "the only image cannot be read"),
-        (("drive", "--camera", "camera.yaml", "--mount-height", "1.4"), "--mount-height goes with --guess-camera"),
+        (("drive", "--camera", "camera.yaml", "--mount-height", "1.4"), "--mount-height is for a guess"),
+        (("drive", "--guess-camera"), "--camera camera.yaml"),
+        (("drive", "--camera", "camera.yaml", "--json", "--csv"), "give one of them"),
+        (("drive", "--camera", "camera.yaml", "--stills", "--plot", "v.png"), "--plot draws over time"),
+        (("drive", "--camera", "camera.yaml", "--plot", "v.bmp"), "--plot must end in .png, .svg or .pdf"),
         (("drive", "--camera", "camera.yaml", "--guess-camera", "--mount-height", "1.4"), "is there already"),
-        (("drive", "--camera", "new.yaml", "--guess-camera"), "needs --mount-height"),
         (("drive", "--camera", "camera.yaml", "--overlay", "a.avi"), "ends in .mp4"),
         (("drive", "--camera", "camera.yaml", "--rate", "-1"), "--rate"),
         (("drive", "--camera", "aside.yaml"), "aside.yaml:8: yaw_deg must lie within -29.0 … 28.9"),

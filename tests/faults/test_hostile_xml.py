@@ -10,7 +10,7 @@ import pytest
 
 from fogsim.errors import InputError
 from fogsim.files import xml_reader
-from fogsim.offline.track_file import load_track
+from fogsim.offline.drive.track_file import load_track
 from fogsim.openscenario import read_openscenario, xml_tree
 from fogsim.scenario.loading import load_scenario, scenario_from_config
 from fogsim.traffic.road import netconvert

@@ -14,9 +14,9 @@ from PIL import Image
 
 from fogsim.errors import InputError
 from fogsim.offline import ImageFiles, SignWatch, estimate_images, record_lines, summary_rows, watch_signs
+from fogsim.offline.drive.sign_file import USUAL_DIAMETER, USUAL_HEIGHT, load_sign_file
+from fogsim.offline.drive.track_file import load_track, metres_per_radian
 from fogsim.offline.overlay import Overlay
-from fogsim.offline.sign_file import USUAL_DIAMETER, USUAL_HEIGHT, load_sign_file
-from fogsim.offline.track_file import load_track, metres_per_radian
 from fogsim.recorders.sign_map import NET, write_sign_map
 from fogsim.recorders.style import ADVICE, MUTED
 from fogsim.values import Camera, Sign, SignMap

@@ -1,20 +1,27 @@
 """``fogsim estimate``: the visibility in a person's own images and videos."""
 
 import contextlib
+import io
 import math
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from fogsim.cli.printing import BAD_INPUT, escape, print_error, print_remarks, stderr
-from fogsim.cli.progress import progress_bar
+from fogsim.cli.progress import counting_bar, progress_bar
 from fogsim.errors import InputError, printable
 
 if TYPE_CHECKING:
-    from fogsim.offline import FrameEstimates, NightDrive, OverlayFile, SignWatch, Source
+    from collections.abc import Iterator
+
+    from fogsim.offline import Calibration, CameraGuess, FrameEstimates, NightDrive, SignWatch, Source
+    from fogsim.offline.clip_summary import Clip
     from fogsim.values import Camera
+
+PLOTS = (".png", ".svg", ".pdf")
 
 
 def estimate_command(
@@ -22,12 +29,18 @@ def estimate_command(
         list[str],
         typer.Argument(metavar="IMAGES|VIDEO", help="Image files, folders, patterns like 'a/*.png', or a video."),
     ],
-    camera: Annotated[Path, typer.Option(help="camera.yaml: the calibration; --guess-camera writes it.")],
+    camera: Annotated[
+        Path | None, typer.Option(help="camera.yaml: the calibration. Default: guessed from the images.")
+    ] = None,
     method: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME|all", help="A method (fogsim list); may be repeated. Default: all."),
+        typer.Option(metavar="NAME|all", help="A method (fogsim list); may be repeated. Default: joint_road."),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object a line and method on stdout.")] = False,
+    as_csv: Annotated[bool, typer.Option("--csv", help="One row of CSV an image and method on stdout.")] = False,
+    plot: Annotated[
+        Path | None, typer.Option(help="Draw the visibility over time: .png, .svg or .pdf. Not for stills.")
+    ] = None,
     overlay: Annotated[
         Path | None, typer.Option(help="Draw what was found over the images: .mp4, or .png for one image.")
     ] = None,
@@ -65,7 +78,7 @@ def estimate_command(
     ] = None,
     halos: Annotated[Path | None, typer.Option(help="File of fogsim calibrate halos.")] = None,
     guess_camera: Annotated[
-        bool, typer.Option("--guess-camera", help="Write the camera file from the images, and stop.")
+        bool, typer.Option("--guess-camera", help="Write the guess to --camera, and stop.")
     ] = False,
     mount_height: Annotated[
         float | None, typer.Option(min=0.1, max=20, help="For a guess: metres from the road to the lens.")
@@ -80,23 +93,90 @@ def estimate_command(
     ] = None,
 ) -> None:
     """Estimate the visibility in your own images or video (docs/how_to/estimate.md)."""
-    from fogsim.offline import NIGHT_METHODS, find_source
+    from fogsim.offline import find_source
 
+    guessing = _Guessing(mount_height, field_of_view, horizon_row)
     if guess_camera:
-        source = find_source(images, sequence=sequence, rate=rate)
-        _guess(source, camera, overwrite, mount_height, field_of_view, horizon_row)
+        if camera is None:
+            raise InputError("--guess-camera writes a camera file and needs its name: --camera camera.yaml")
+        _guess(find_source(images, sequence=sequence, rate=rate), camera, overwrite, guessing)
         return
-    for option, value in (
-        ("--mount-height", mount_height),
-        ("--field-of-view", field_of_view),
-        ("--horizon-row", horizon_row),
-    ):
-        if value is not None:
-            raise InputError(f"{option} goes with --guess-camera; else the camera file has it")
+    if camera is not None:
+        guessing.refuse_all()
+    if as_json and as_csv:
+        raise InputError("--json and --csv both go to stdout: give one of them")
     drive = _night_drive(night, lamps, setback, head_lamps, halos)
-    names = method or (["all"] if drive is None else list(NIGHT_METHODS))
-    mapped = (signs, track, track_offset)
-    _estimate(images, camera, names, as_json, overlay, sequence, rate, overwrite, mapped, drive)
+    source = find_source(images, sequence=sequence, rate=rate)
+    calibration = _calibration(source, camera, guessing)
+    outputs = _Outputs(as_json, as_csv, overlay, plot, overwrite)
+    _estimate(
+        source,
+        calibration,
+        _methods(method, drive, mapped=signs is not None),
+        outputs,
+        (signs, track, track_offset),
+        drive,
+    )
+
+
+def _methods(named: list[str] | None, night: "NightDrive | None", *, mapped: bool) -> list[str]:
+    """Named methods, or those that can apply: by day, by night, with a map of signs."""
+    from fogsim.offline import NIGHT_METHODS
+
+    if named or night is not None:
+        return named or list(NIGHT_METHODS)
+    return ["joint_road", *(("sign_contrast", "belaroussi2015") if mapped else ())]
+
+
+@dataclass(frozen=True)
+class _Guessing:
+    """What is stated of an unknown camera: height [m], field of view [deg], row of the horizon [px]."""
+
+    mount_height: float | None
+    field_of_view: float | None
+    horizon_row: float | None
+
+    def refuse_all(self) -> None:
+        for name in ("mount_height", "field_of_view", "horizon_row"):
+            if getattr(self, name) is not None:
+                raise InputError(f"--{name.replace('_', '-')} is for a guess; the camera file has it")
+
+    def __call__(self, source: "Source") -> "CameraGuess":
+        from fogsim.offline import guess_camera
+
+        with counting_bar(stderr, "looking for the camera's horizon and height") as progress:
+            return guess_camera(
+                source,
+                mount_height=self.mount_height,
+                field_of_view=None if self.field_of_view is None else math.radians(self.field_of_view),
+                horizon_row=self.horizon_row,
+                progress=progress,
+            )
+
+
+@dataclass(frozen=True)
+class _Outputs:
+    """Where results go."""
+
+    as_json: bool
+    as_csv: bool
+    overlay: Path | None
+    plot: Path | None
+    overwrite: bool
+
+
+def _calibration(source: "Source", camera: Path | None, guessing: _Guessing) -> "Calibration":
+    from fogsim.offline import Calibration, load_calibration
+    from fogsim.offline.guess import guess_text
+
+    if camera is not None:
+        calibration = load_calibration(camera)
+        print_remarks("assumed", calibration.remarks)
+        return calibration
+    guess = guessing(source)
+    print_remarks("guessed", (guess_text(guess),))
+    print_remarks("uncertain", guess.warnings)
+    return Calibration(guess.camera, deviations=guess.deviations)
 
 
 def _night_drive(
@@ -121,51 +201,70 @@ def _night_drive(
 
 
 def _estimate(
-    images: list[str],
-    camera_file: Path,
+    images: "Source",
+    calibration: "Calibration",
     names: list[str],
-    as_json: bool,
-    overlay: Path | None,
-    sequence: bool | None,
-    rate: float | None,
-    overwrite: bool,
+    outputs: _Outputs,
     mapped: tuple[Path | None, Path | None, float],
     night: "NightDrive | None",
 ) -> None:
-    from fogsim.offline import (
-        OverlayFile,
-        chosen_methods,
-        estimates_of,
-        find_source,
-        straightened,
-        table_heading,
-    )
-    from fogsim.offline.camera_file import load_calibration
+    from fogsim.offline import OverlayFile, chosen_methods, estimates_of, straightened
+    from fogsim.offline.clip_summary import Clip
 
     methods, unusable = chosen_methods(names), list[str]()
-    calibration = load_calibration(camera_file)
-    print_remarks("assumed", calibration.remarks)
-    source, camera = straightened(find_source(images, sequence=sequence, rate=rate), calibration)
+    source, camera = straightened(images, calibration)
+    _check_plot(outputs, source)
     watch = _watch(mapped, source, camera)
+    clip, rows = Clip(methods), _Rows(source, methods, outputs)
     with contextlib.ExitStack() as stack:
-        drawn = overlay and stack.enter_context(OverlayFile(overlay, source, camera, methods, overwrite=overwrite))
+        drawn = outputs.overlay and stack.enter_context(
+            OverlayFile(outputs.overlay, source, camera, methods, overwrite=outputs.overwrite)
+        )
         progress = stack.enter_context(progress_bar(stderr))
         task = progress.add_task(source.description, total=source.count)
-        if not as_json:
-            _say(table_heading(source, methods))
-        for result in estimates_of(source, camera, methods, watch, night):
-            _show(result, source, methods, as_json, drawn or None)
+        rows.begin()
+        for result in estimates_of(source, camera, methods, watch, night, calibration.deviations):
+            rows.show(result)
+            clip.add(result)
+            if drawn:
+                drawn.add(result)
             unusable += [result.picture.error] if result.picture.error else []
             progress.advance(task)
+    if rows.are_summed_up:
+        for line in clip.lines():
+            _say(line)
     if watch is not None:
-        _tell_signs(watch, as_json)
-    if overlay is not None:
-        stderr.print(f"overlay: {escape(overlay)}", soft_wrap=True)
+        _show_signs(watch, quiet=outputs.as_json or outputs.as_csv)
+    if outputs.plot is not None:
+        _write_plot(clip, outputs.plot, source)
+    if outputs.overlay is not None:
+        stderr.print(f"overlay: {escape(outputs.overlay)}", soft_wrap=True)
     if unusable:
         print_error(f"{len(unusable)} of the images could not be used:")
         for reason in unusable:
             stderr.print(f"  {escape(reason, in_one_line=True)}", soft_wrap=True)
         raise typer.Exit(BAD_INPUT)
+
+
+def _check_plot(outputs: _Outputs, source: "Source") -> None:
+    from fogsim.files.output_targets import refuse_unwritable
+
+    if outputs.plot is None:
+        return
+    if not source.temporal:
+        raise InputError("--plot draws over time, and stills have none: --sequence says that images follow one another")
+    if outputs.plot.suffix.lower() not in PLOTS:
+        raise InputError(f"--plot must end in {', '.join(PLOTS[:-1])} or {PLOTS[-1]}, got {outputs.plot}")
+    refuse_unwritable(outputs.plot, "--plot", overwrite=outputs.overwrite, read=source.paths)
+
+
+def _write_plot(clip: "Clip", path: Path, source: "Source") -> None:
+    from fogsim.files.atomic import write_bytes
+
+    content = io.BytesIO()
+    clip.plot(source.paths[0].name).savefig(content, format=path.suffix[1:].lower(), dpi=150)
+    write_bytes(path, content.getvalue())
+    stderr.print(f"plot: {escape(path)}", soft_wrap=True)
 
 
 def _watch(mapped: tuple[Path | None, Path | None, float], source: "Source", camera: "Camera") -> "SignWatch | None":
@@ -184,26 +283,44 @@ def _watch(mapped: tuple[Path | None, Path | None, float], source: "Source", cam
     return watch
 
 
-def _tell_signs(watch: "SignWatch", as_json: bool) -> None:
+def _show_signs(watch: "SignWatch", *, quiet: bool) -> None:
     from fogsim.offline import summary_rows
 
-    if not as_json:
+    if not quiet:
         for line in summary_rows(watch.summary()):
             _say(printable(line, in_one_line=True))
     print_remarks("signs", watch.remarks())
 
 
-def _show(
-    result: "FrameEstimates", source: "Source", methods: tuple[str, ...], as_json: bool, drawn: "OverlayFile | None"
-) -> None:
-    from fogsim.offline import record_lines, table_rows
+class _Rows:
+    """Results image by image: as JSON, as CSV, or for stills, each of which is an answer of its own, as a table."""
 
-    if result.picture.error:
-        print_remarks("passed over", (result.picture.error,))
-    for line in record_lines(result) if as_json else table_rows(source, methods, result):
-        _say(printable(line, in_one_line=True))
-    if drawn is not None:
-        drawn.add(result)
+    def __init__(self, source: "Source", methods: tuple[str, ...], outputs: _Outputs) -> None:
+        self._source, self._methods, self._outputs = source, methods, outputs
+        self.are_summed_up = source.temporal and not (outputs.as_json or outputs.as_csv)
+
+    def begin(self) -> None:
+        from fogsim.offline import csv_line, table_heading
+
+        if self._outputs.as_csv:
+            _say(csv_line())
+        elif not (self._outputs.as_json or self.are_summed_up):
+            _say(table_heading(self._source, self._methods))
+
+    def show(self, result: "FrameEstimates") -> None:
+        if result.picture.error:
+            print_remarks("passed over", (result.picture.error,))
+        for line in self._lines(result):
+            _say(printable(line, in_one_line=True))
+
+    def _lines(self, result: "FrameEstimates") -> "Iterator[str]":
+        from fogsim.offline import csv_lines, record_lines, table_rows
+
+        if self._outputs.as_json:
+            return record_lines(result)
+        if self._outputs.as_csv:
+            return csv_lines(result)
+        return iter(()) if self.are_summed_up else table_rows(self._source, self._methods, result)
 
 
 def _say(line: str) -> None:
@@ -212,24 +329,12 @@ def _say(line: str) -> None:
     sys.stdout.flush()
 
 
-def _guess(
-    source: "Source",
-    camera_file: Path,
-    overwrite: bool,
-    mount_height: float | None,
-    field_of_view: float | None,
-    horizon_row: float | None,
-) -> None:
+def _guess(source: "Source", camera_file: Path, overwrite: bool, guessing: _Guessing) -> None:
     from fogsim.files.output_targets import refuse_unwritable
-    from fogsim.offline import camera_text, guess_camera, write_camera
+    from fogsim.offline import camera_text, write_camera
 
     refuse_unwritable(camera_file, "--camera", overwrite=overwrite, read=source.paths)
-    guess = guess_camera(
-        source,
-        mount_height=mount_height,
-        field_of_view=None if field_of_view is None else math.radians(field_of_view),
-        horizon_row=horizon_row,
-    )
+    guess = guessing(source)
     write_camera(camera_file, guess, overwrite=overwrite)
     typer.echo(f"{printable(str(camera_file))}:\n\n{camera_text(guess)}", nl=False)
     print_remarks("uncertain", guess.warnings)

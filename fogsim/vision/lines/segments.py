@@ -57,8 +57,27 @@ class _Segments:
         return np.asarray(np.hypot(apart[..., 0], apart[..., 1]))
 
 
-def segment_vanishing_point(image: Pixels, response: Response, bits: int) -> VanishingPoint | None:
-    """Vanishing point of the road in an image.
+@dataclass(frozen=True, slots=True)
+class RoadSegments:
+    """Segments along the road, and the point where they meet.
+
+    Attributes
+    ----------
+    point : VanishingPoint
+        Their vanishing point.
+    slopes : (n,) float64
+        Columns per row below that point: lateral offset over the camera's height [-]; negative on the left.
+    length : (n,) float64
+        Their lengths [px].
+    """
+
+    point: VanishingPoint
+    slopes: Floats
+    length: Floats
+
+
+def road_segments(image: Pixels, response: Response, bits: int) -> RoadSegments | None:
+    """Line segments along the road in an image, and their vanishing point.
 
     Line segments (von Gioi et al. 2010, in OpenCV) that could lie along a road; the intersection of two that lean to
     either side at which the greatest length of segments points; then least squares over all that point there, each
@@ -75,7 +94,7 @@ def segment_vanishing_point(image: Pixels, response: Response, bits: int) -> Van
 
     Returns
     -------
-    VanishingPoint or None
+    RoadSegments or None
         None if no two segments that lean to either side meet between the image's top and its lower fifth.
     """
     segments = _segments(linear_luminance(image, response, bits))
@@ -121,7 +140,7 @@ def _both_ways(segments: _Segments, chosen: NDArray[np.bool_]) -> NDArray[np.boo
     return np.asarray(left.any(axis=-1) & right.any(axis=-1))
 
 
-def _fitted(segments: _Segments, point: Floats) -> VanishingPoint | None:
+def _fitted(segments: _Segments, point: Floats) -> RoadSegments | None:
     for _ in range(6):
         far = segments.distance(point)
         # A straight line through n pixels: 1/n for its place, 12 d²/n³ for its direction.
@@ -134,4 +153,6 @@ def _fitted(segments: _Segments, point: Floats) -> VanishingPoint | None:
     residual = (segments.lines.misses(point) / deviation)[pointing]
     spread = residual_scale(residual) * math.sqrt(float(covariance[1, 1]))
     support = float(segments.length[pointing].sum())
-    return VanishingPoint(float(point[0]), float(point[1]), spread, residual.size, support)
+    found = VanishingPoint(float(point[0]), float(point[1]), spread, residual.size, support)
+    apart = segments.middle[pointing] - point
+    return RoadSegments(found, apart[:, 0] / np.maximum(apart[:, 1], 1.0), segments.length[pointing])

@@ -5,11 +5,12 @@ import pytest
 from stripes import CENTRE, ROW, road_lines
 
 from fogsim.values import Response
-from fogsim.vision.lines.segments import segment_vanishing_point
+from fogsim.vision.lines.segments import road_segments
 
 
 def found(image):
-    return segment_vanishing_point(np.clip(np.rint(image), 0, 255).astype(np.uint8), Response.LINEAR, 8)
+    segments = road_segments(np.clip(np.rint(image), 0, 255).astype(np.uint8), Response.LINEAR, 8)
+    return None if segments is None else segments.point
 
 
 @pytest.mark.parametrize("offsets", [(-1.9, -1.75, 1.75, 1.9), (-5.4, -5.2, 1.7, 1.85), (-0.9, -0.75, 2.6, 2.75)])

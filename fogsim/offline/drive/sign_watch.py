@@ -13,10 +13,10 @@ from fogsim.estimators.signs.regions import PoseDeviation
 from fogsim.estimators.signs.track import SignTrack
 from fogsim.estimators.signs.watch import SignWatch as Watch
 from fogsim.estimators.signs.watch import sign_looks
+from fogsim.offline.drive.sign_file import SignFile, load_sign_file
+from fogsim.offline.drive.track_file import GeographicPose, Track, load_track, metres_per_radian
 from fogsim.offline.image_files import Pixels
-from fogsim.offline.sign_file import SignFile, load_sign_file
 from fogsim.offline.source import Source
-from fogsim.offline.track_file import GeographicPose, Track, load_track, metres_per_radian
 from fogsim.sensors import signs_ahead
 from fogsim.values import Camera, Frame, Observation, Sign, SignLook, SignMap, SignSighting
 
@@ -209,9 +209,9 @@ def watch_signs(
     Parameters
     ----------
     signs : Path
-        GeoJSON; see `fogsim.offline.sign_file.load_sign_file`.
+        GeoJSON; see `fogsim.offline.drive.sign_file.load_sign_file`.
     track : Path
-        GPX or CSV; see `fogsim.offline.track_file.load_track`.
+        GPX or CSV; see `fogsim.offline.drive.track_file.load_track`.
     source : Source
         The images; a sequence, a video or one image.
     camera : Camera

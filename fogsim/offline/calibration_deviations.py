@@ -1,0 +1,54 @@
+"""How uncertain a calibration is, and what that does to estimates."""
+
+import math
+from dataclasses import dataclass, replace
+
+from fogsim.values import Estimate
+from fogsim.values.estimate import OpticalDepths
+from fogsim.vision.lines.horizon import PITCH_DEVIATION
+
+ON_THE_ROAD = ("joint_road", "negru2013", "zhu2015", "huang2015", "huang2015_rough", "night_road")
+"""Methods that take distances from the calibration of the road plane: their extinction goes with the inverse of focal
+length × mount height."""
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationDeviations:
+    """Standard deviations of a calibration.
+
+    Attributes
+    ----------
+    focal_length, mount_height : float
+        Relative to the values [-].
+    pitch : float
+        Of the pitch [rad].
+    """
+
+    focal_length: float = 0.0
+    mount_height: float = 0.0
+    pitch: float = PITCH_DEVIATION
+
+    @property
+    def scale(self) -> float:
+        """Relative standard deviation of distances on the road [-]."""
+        return math.hypot(self.focal_length, self.mount_height)
+
+    def widened(self, estimate: Estimate) -> Estimate:
+        """Estimate with the uncertainty of distances on the road in its deviations."""
+        if not estimate.valid or self.scale == 0.0 or estimate.method not in ON_THE_ROAD:
+            return estimate
+        deviation = self._of(estimate.extinction, estimate.standard_deviation)
+        depths = estimate.optical_depths
+        if depths is not None:
+            both = zip(depths.depth, depths.standard_deviation, strict=True)
+            depths = OpticalDepths(depths.distance, depths.depth, tuple(self._of(*one) for one in both))
+        common = math.hypot(estimate.common_deviation, self.scale)
+        return replace(estimate, standard_deviation=deviation, optical_depths=depths, common_deviation=common)
+
+    def _of(self, value: float, deviation: float) -> float:
+        """Standard deviation of a value with its own deviation, times a factor of 1 ± `scale`."""
+        return math.hypot(deviation * math.hypot(1.0, self.scale), value * self.scale)
+
+
+EXACT = CalibrationDeviations()
+"""Of a calibration that is exact but for the pitch."""

@@ -12,6 +12,7 @@ from PIL import Image, UnidentifiedImageError
 
 from fogsim.errors import InputError
 from fogsim.offline.calibration_deviations import CalibrationDeviations
+from fogsim.offline.drive.road_scale import RoadMotion
 from fogsim.offline.image_files import Pixels
 from fogsim.offline.source import Picture, Source
 from fogsim.values import Camera, Response
@@ -89,6 +90,7 @@ def guess_camera(
     mount_height: float | None = None,
     field_of_view: float | None = None,
     horizon_row: float | None = None,
+    way: Callable[[float], float | None] | None = None,
     progress: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> CameraGuess:
     """Guess the calibration of the camera that made images.
@@ -107,6 +109,9 @@ def guess_camera(
         Horizontal field of view [rad]; None for the focal length in the first image's metadata, if present.
     horizon_row : float or None
         Row of the horizon [px], instead of the vanishing point.
+    way : callable or None
+        Length of the way that the camera has made [m] at a time from the first image [s]; how the road's texture moves
+        in the images then gives the product of focal length and height.
     progress : callable
         Called with the number of images that were read and that of the source.
 
@@ -133,6 +138,8 @@ def guess_camera(
     lines = [found for image in pictures if (found := _road_lines(image, response)) is not None]
     horizon = _horizon(lines, len(pictures), focal.value, cols, horizon_row)
     height = _mount_height(lines, mount_height)
+    if way is not None:
+        focal, height = _scaled(source, way, focal, height, horizon.value, (cols, rows), response)
     middle = (0.5 * (cols - 1), 0.5 * (rows - 1))
     pitch = math.atan((middle[1] - horizon.value) / focal.value)
     reasons = {
@@ -291,6 +298,38 @@ def _mount_height(lines: Sequence[RoadSegments], stated: float | None) -> _Guess
     reason = f"ASSUMED: a passenger car, and lanes of {LANE_WIDTH} m, which alone give {by_lane:.2f} m"
     warning = f"the mount height is assumed to be {height} m, also by the width of the lane: measure it and correct it"
     return _Guessed(height, LANE_DEVIATION * math.sqrt(share), reason, (warning,))
+
+
+def _scaled(
+    source: Source,
+    way: Callable[[float], float | None],
+    focal: _Guessed,
+    height: _Guessed,
+    horizon_row: float,
+    size: tuple[int, int],
+    response: Response,
+) -> tuple[_Guessed, _Guessed]:
+    """Focal length and height, the less certain of which follows from the camera's way, if the road's texture shows."""
+    cols, rows = size
+    middle = (0.5 * (cols - 1), 0.5 * (rows - 1))
+    pitch = math.atan((middle[1] - horizon_row) / focal.value)
+    motion = RoadMotion(Camera(cols, rows, focal.value, middle, height.value, pitch, response=response))
+    for picture in source.pictures():
+        at = way(picture.time)
+        if picture.image is not None and at is not None:
+            motion.add(picture.image, at)
+        if motion.pairs >= MOST_IMAGES:
+            break
+    scale = motion.scale()
+    if scale is None:
+        return focal, height
+    reason = f"the road moves {1.0 / scale.factor:.2f} times as far as the track does with an assumed {{}}"
+    if focal.deviation >= height.deviation:
+        focal = _Guessed(focal.value * scale.factor, scale.deviation, reason.format("focal length"))
+    else:
+        height = _Guessed(round(height.value * scale.factor, 3), scale.deviation, reason.format("height"))
+    # The track gives the product of the two, whose deviation is stated as the focal length's alone.
+    return replace(focal, deviation=scale.deviation), replace(height, deviation=0.0)
 
 
 def _lane_over_height(lines: RoadSegments) -> float | None:

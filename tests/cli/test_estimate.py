@@ -297,7 +297,7 @@ def test_signs_of_an_own_map_are_looked_for_and_what_became_of_them_is_told(esti
     assert [record["signs"][0]["detected"] for line in out.splitlines() if "signs" in (record := json.loads(line))] == [
         False
     ] * 3
-    for option, other in (("--signs", "--track"), ("--track", "--signs")):
+    for option, told in (("--signs", "--signs needs --track"), ("--track", "--track goes with --signs")):
         code, _, err = estimate(*drive, option, "track.csv")
         assert code == 2
-        assert f"--signs and --track go together, and {other} is missing" in err
+        assert told in err

@@ -23,6 +23,7 @@ class Drive:
     folder: Path
     frames: tuple[NDArray[np.uint8], ...]
     camera: Camera
+    speed: float
 
     @property
     def camera_yaml(self) -> str:
@@ -40,7 +41,8 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Drive:
     """``images/000.png`` …, ``drive.mp4`` and ``camera.yaml`` in a folder that no test may change."""
     folder = tmp_path_factory.mktemp("drive")
     scenario = fogsim.load_scenario("motorway_fog_bank", [f"fog.visibility_m={VISIBILITY}", "duration_s=0.7"])
-    seen = [step.observation.frame for step in fogsim.run(scenario, seed=1)]
+    observations = [step.observation for step in fogsim.run(scenario, seed=1)]
+    seen = [one.frame for one in observations]
     frames, camera = tuple(frame.image for frame in seen), seen[0].camera
     (folder / "images").mkdir()
     for index, frame in enumerate(frames):
@@ -49,6 +51,7 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Drive:
     for frame in frames:
         encoder.write(frame.tobytes())
     encoder.finish()
-    made = Drive(folder, frames, camera)
+    speed = float(np.mean([one.speed for one in observations]))
+    made = Drive(folder, frames, camera, speed)
     (folder / "camera.yaml").write_text(made.camera_yaml, encoding="utf-8")
     return made

@@ -58,7 +58,8 @@ def estimate_command(
     ] = False,
     signs: Annotated[Path | None, typer.Option(help="Map of signs: GeoJSON, points in WGS 84. With --track.")] = None,
     track: Annotated[
-        Path | None, typer.Option(help="Where the camera was: .gpx, or .csv with time_s, latitude, longitude.")
+        Path | None,
+        typer.Option(help="Where the camera was, for signs or a guess: .gpx, or .csv (time_s, latitude, longitude)."),
     ] = None,
     track_offset: Annotated[
         float, typer.Option(min=-1e9, max=1e9, help="Seconds of the track at the first image.")
@@ -95,7 +96,7 @@ def estimate_command(
     """Estimate the visibility in your own images or video (docs/how_to/estimate.md)."""
     from fogsim.offline import find_source
 
-    guessing = _Guessing(mount_height, field_of_view, horizon_row)
+    guessing = _Guessing(mount_height, field_of_view, horizon_row, track, track_offset)
     if guess_camera:
         if camera is None:
             raise InputError("--guess-camera writes a camera file and needs its name: --camera camera.yaml")
@@ -103,6 +104,8 @@ def estimate_command(
         return
     if camera is not None:
         guessing.refuse_all()
+        if track is not None and signs is None:
+            raise InputError("--track goes with --signs, or without --camera, for a guess of the camera")
     if as_json and as_csv:
         raise InputError("--json and --csv both go to stdout: give one of them")
     drive = _night_drive(night, lamps, setback, head_lamps, halos)
@@ -130,11 +133,13 @@ def _methods(named: list[str] | None, night: "NightDrive | None", *, mapped: boo
 
 @dataclass(frozen=True)
 class _Guessing:
-    """What is stated of an unknown camera: height [m], field of view [deg], row of the horizon [px]."""
+    """What is stated of an unknown camera: height [m], field of view [deg], row of the horizon [px], its way."""
 
     mount_height: float | None
     field_of_view: float | None
     horizon_row: float | None
+    track: Path | None
+    track_offset: float
 
     def refuse_all(self) -> None:
         for name in ("mount_height", "field_of_view", "horizon_row"):
@@ -143,6 +148,10 @@ class _Guessing:
 
     def __call__(self, source: "Source") -> "CameraGuess":
         from fogsim.offline import guess_camera
+        from fogsim.offline.drive.track_file import load_track
+
+        track = None if self.track is None else load_track(self.track)
+        way = None if track is None else lambda time: track.way_at(time + self.track_offset)
 
         with counting_bar(stderr, "looking for the camera's horizon and height") as progress:
             return guess_camera(
@@ -150,6 +159,7 @@ class _Guessing:
                 mount_height=self.mount_height,
                 field_of_view=None if self.field_of_view is None else math.radians(self.field_of_view),
                 horizon_row=self.horizon_row,
+                way=way,
                 progress=progress,
             )
 
@@ -271,13 +281,10 @@ def _watch(mapped: tuple[Path | None, Path | None, float], source: "Source", cam
     from fogsim.offline import watch_signs
 
     signs, track, offset = mapped
-    if signs is None and track is None:
+    if signs is None:
         return None
-    if signs is None or track is None:
-        lacking = "--signs" if signs is None else "--track"
-        raise InputError(
-            f"--signs and --track go together, and {lacking} is missing: a map says nothing without places"
-        )
+    if track is None:
+        raise InputError("--signs needs --track: a map says nothing without places")
     watch, remarks = watch_signs(signs, track, source, camera, offset)
     print_remarks("assumed", remarks)
     return watch

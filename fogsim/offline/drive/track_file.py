@@ -68,6 +68,14 @@ class Track:
         columns = (self.longitude, self.latitude, self.heading)
         return GeographicPose(*(float(np.interp(time, self.time, column)) for column in columns))
 
+    def way_at(self, time: float) -> float | None:
+        """Length of the track up to an instant of its time [m]; None outside the track."""
+        if self.pose_at(time) is None:
+            return None
+        east, north = metres_per_radian(float(self.latitude.mean()))
+        steps = np.hypot(east * np.diff(self.longitude), north * np.diff(self.latitude))
+        return float(np.interp(time, self.time, np.concatenate(([0.0], np.cumsum(steps)))))
+
 
 def metres_per_radian(latitude: float) -> tuple[float, float]:
     """Distance east and north per angle of longitude and latitude on the ellipsoid of WGS 84 [m/rad].

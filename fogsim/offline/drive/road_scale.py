@@ -1,0 +1,117 @@
+"""Distances on the road by the vehicle's own way: how far the road's texture moves from image to image."""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.offline.image_files import Pixels
+from fogsim.values import Camera
+
+Floats = NDArray[np.float64]
+
+NEAREST, FARTHEST, STEP = 4.0, 24.0, 0.1
+"""Ends of the piece of road that is compared, and its sampling [m by the assumed camera]."""
+
+HALF_WIDTH, COLUMNS = 2.2, 45
+"""Half of its width [m], which includes the lines of the lane, and samples across it."""
+
+SMOOTH = 3.0
+"""Standard deviation along the road of what is taken away as shading [m]."""
+
+KERNEL, LEAST_ROWS = 181, 40
+"""Rows of the kernel that smooths, and of the overlap of two images below which they are not compared."""
+
+LEAST_WAY, MOST_WAY = 1.5, 5.0
+"""Ways between two images that are compared [m]: shorter ones are inexact, longer ones leave less of the road in both
+and reach the period of the lane marks."""
+
+FACTORS = np.geomspace(0.5, 2.0, 139)
+"""Assumed over true distances that are tried [-], 1 % apart."""
+
+LEAST_PAIRS, LEAST_CORRELATION, CLOSE = 5, 0.3, 0.15
+"""Pairs of images and mean correlation below which nothing is said [-], and how close in ln to the best factor those of
+single pairs count [-]."""
+
+LEAST_DEVIATION = 0.03
+"""Relative standard deviation that the track's own speed leaves at least [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class RoadScale:
+    """True over assumed distances on the road, and the relative standard deviation of that [-]."""
+
+    factor: float
+    deviation: float
+
+
+class RoadMotion:
+    """Comparison of images along a drive, seen as from above by an assumed camera."""
+
+    def __init__(self, camera: Camera) -> None:
+        distance = np.arange(NEAREST, FARTHEST, STEP)
+        aside = np.linspace(-HALF_WIDTH, HALF_WIDTH, COLUMNS)
+        below = camera.row_distance / distance[:, None]
+        columns = camera.principal_point[0] + aside * below / camera.mount_height
+        rows = (camera.horizon_row + below) * np.ones_like(columns)
+        self._places = columns.astype(np.float32), rows.astype(np.float32)
+        self._shown = np.asarray(rows[:, 0] < camera.height - 1.0)
+        self._earlier: deque[tuple[float, Floats]] = deque(maxlen=60)
+        self._correlations: list[Floats] = []
+
+    def add(self, image: Pixels, way: float) -> None:
+        """Add an image that was taken after a way from the start of the drive [m]."""
+        texture = self._texture(image)
+        for before, seen in reversed(self._earlier):
+            if LEAST_WAY <= way - before <= MOST_WAY:
+                self._correlations.append(self._correlation(seen, texture, way - before))
+                break
+        self._earlier.append((way, texture))
+
+    @property
+    def pairs(self) -> int:
+        """Number of pairs of images that were compared."""
+        return len(self._correlations)
+
+    def scale(self) -> RoadScale | None:
+        """Scale in which the road moves as the vehicle does; None if too little moved."""
+        if len(self._correlations) < LEAST_PAIRS:
+            return None
+        correlations = np.stack(self._correlations)
+        mean = correlations.mean(axis=0)
+        best = math.log(FACTORS[int(mean.argmax())])
+        if mean.max() < LEAST_CORRELATION or not 0 < int(mean.argmax()) < FACTORS.size - 1:
+            return None
+        single = np.log(FACTORS[correlations.argmax(axis=1)])
+        single = single[np.abs(single - best) < CLOSE]
+        middle = float(np.median(single)) if single.size else best
+        scatter = 1.4826 * float(np.median(np.abs(single - middle))) if single.size else CLOSE
+        return RoadScale(math.exp(-middle), math.hypot(LEAST_DEVIATION, scatter / math.sqrt(max(single.size, 1))))
+
+    def _texture(self, image: Pixels) -> Floats:
+        """Road from above without its shading (n, columns); zero where the image does not show it."""
+        grey: Any = image if image.ndim == 2 else image[:, :, 1]
+        above = cv2.remap(np.asarray(grey, np.float32), *self._places, cv2.INTER_LINEAR)
+        smooth = cv2.GaussianBlur(above, (1, KERNEL), sigmaX=1.0, sigmaY=SMOOTH / STEP)
+        return np.asarray((above - smooth) * self._shown[:, None], np.float64)
+
+    def _correlation(self, before: Floats, after: Floats, way: float) -> Floats:
+        """Correlation of two textures by factor: what was at x + way is at x now."""
+        rows = np.arange(before.shape[0])
+        found = np.zeros(FACTORS.size)
+        for index, shift in enumerate(way * FACTORS / STEP):
+            place = rows[: max(before.shape[0] - math.ceil(shift) - 1, 0)] + shift
+            first = place.astype(int)
+            if first.size < LEAST_ROWS:
+                continue
+            share = (place - first)[:, None]
+            moved = (1.0 - share) * before[first] + share * before[first + 1]
+            now = after[: first.size] * (self._shown[first] & self._shown[: first.size])[:, None]
+            moved = moved * (now != 0.0)
+            power = float((now * now).sum()) * float((moved * moved).sum())
+            found[index] = float((now * moved).sum()) / math.sqrt(power) if power > 0.0 else 0.0
+        return found

@@ -7,8 +7,13 @@ from fogsim.restoration.picture import Floats, Light, Pixels, light_table
 from fogsim.units import LUMINANCE_WEIGHTS
 from fogsim.values.camera import Camera
 
-BAND = 0.15
-"""Rows above the horizon that the airlight is sought in, as a share of the image's: higher up sky may be brighter."""
+NEAR_BAND, BAND = 0.015, 0.15
+"""Rows above the horizon that the airlight is sought in, as shares of the image's: foggy skies brighten upward, and
+where trees or houses hide the horizon, only what is above them is sky."""
+
+HIDDEN = 0.5
+"""Luminance of the near band over the whole band's below which something hides the horizon [-]: real skies in fog
+darken less over it (docs/explanation/airlight.md)."""
 
 BRIGHTEST = 1 / 3
 """Share of the band, the brightest, whose median is taken: trees and vehicles are darker [-]."""
@@ -21,7 +26,9 @@ DARKEST = 0.001
 
 
 def horizon_airlight(pixels: Pixels, camera: Camera, full: int) -> Light:
-    """Airlight from what is just above the horizon: the median of its brightest third, of each channel.
+    """Airlight from what is just above the horizon, or from higher up where that is hidden.
+
+    The median of the brightest third of each band, of each channel.
 
     Parameters
     ----------
@@ -39,11 +46,19 @@ def horizon_airlight(pixels: Pixels, camera: Camera, full: int) -> Light:
     """
     rows = pixels.shape[0]
     bottom = round(min(max(camera.horizon_row, BAND * rows), rows))
-    band = max(round(BAND * rows), 1)
-    light = _blocks(pixels[max(bottom - band, 0) : max(bottom, 1)], camera, full)
+    near, whole = (
+        _brightest(pixels[max(bottom - max(round(band * rows), SIDE), 0) : max(bottom, 1)], camera, full)
+        for band in (NEAR_BAND, BAND)
+    )
+    hidden = _luminance(near[None])[0] < HIDDEN * _luminance(whole[None])[0]
+    return np.maximum(whole if hidden else near, DARKEST).astype(np.float64)
+
+
+def _brightest(pixels: Pixels, camera: Camera, full: int) -> Floats:
+    """Median light of the brightest third of the blocks of a band."""
+    light = _blocks(pixels, camera, full)
     brightness = _luminance(light)
-    brightest = light[brightness >= np.quantile(brightness, 1.0 - BRIGHTEST)]
-    return np.asarray(np.maximum(np.median(brightest, axis=0), DARKEST), np.float64)
+    return np.asarray(np.median(light[brightness >= np.quantile(brightness, 1.0 - BRIGHTEST)], axis=0), np.float32)
 
 
 def dark_channel_airlight(pixels: Pixels, camera: Camera, full: int) -> Light:

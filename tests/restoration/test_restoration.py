@@ -156,6 +156,17 @@ def test_the_airlight_is_that_above_the_horizon() -> None:
         assert restore_contrast(image, CAMERA, K, method=method).airlight == pytest.approx(airlight(), abs=2.0)
 
 
+def test_a_sky_that_brightens_upward_leaves_no_edge_below_the_horizon() -> None:
+    """Foggy skies do: with the light of the upper sky, the road near the horizon would pass for what stands on it."""
+    distance = road_distance(CAMERA)[0].astype(np.float64)
+    light = fogged(road(np.random.default_rng(3)), distance)
+    above = CAMERA.horizon_row - np.arange(CAMERA.height)[:, None, None]
+    light = np.where((distance == FARTHEST)[..., None], AIRLIGHT * (0.55 + 0.02 * np.maximum(above, 0.0)), 0.55 * light)
+    back = restore_contrast(image_of(light), CAMERA, K, most_gain=8.0)
+    expected = np.hypot(np.exp(-K * distance), 1.0 / 8.0)
+    assert np.abs(back.transmission - expected).max() < 0.02
+
+
 def test_the_tone_map_neither_blackens_nor_bleaches() -> None:
     distance = road_distance(CAMERA)[0].astype(np.float64)
     image = image_of(fogged(0.1 * road(np.random.default_rng(8)), distance))

@@ -360,6 +360,8 @@ class JointRoad:
             reach=uneven.reach,
             optical_depths=_optical_depths(uneven, unevenness),
             denser=None if front is None else DenserFog(*front),
+            # Fog that changes along the way is read with the same error until it has been passed.
+            common_deviation=math.sqrt(max(unevenness**2 - HARDLY_UNEVEN**2, 0.0)),
         )
 
 

@@ -18,7 +18,7 @@ from fogsim.values.observation import FogReport
 FARTHEST = CELL * AHEAD
 """How far ahead an estimate is taken to speak [m]."""
 
-CLEAR, UNSURE = 4e-4, 0.7
+CLEAR, UNSURE = 4e-4, 1.5
 """Extinction [1/m] and relative deviation [-] from which on an estimate only says that there is little fog."""
 
 STARTLED, CERTAIN, LEAST_LEAP = 3.0, 0.35, 0.3

@@ -23,6 +23,9 @@ LEVEL, LEVEL_DEVIATION = math.log(extinction_from_visibility(750.0)), 1.2
 GRAIN, GRAIN_LENGTH = 0.4, 50.0
 """Standard deviation of what else varies, from place to place [-], and the length over which it does [m]."""
 
+BELIEVED = 1.3
+"""Standard deviations by which the belief lies below a bound that says nothing new [-]."""
+
 SAMPLES = 48
 """Pairs of samples from which the visibility ahead is told."""
 
@@ -150,6 +153,8 @@ class RouteField:
     def learn_at_most(self, end: float, value: float, softness: float) -> None:
         """Take in that the mean extinction from the vehicle on is likely no more than a value.
 
+        Nothing changes where that is believed already: the errors of bounds that are repeated are alike.
+
         Parameters
         ----------
         end : float
@@ -158,7 +163,7 @@ class RouteField:
             Logarithm of the most, and the standard deviation of that [ln 1/m, -].
         """
         before, shared, variance = self._linearised(0.0, end)
-        if variance <= 0.0:
+        if variance <= 0.0 or before + BELIEVED * math.sqrt(variance) < value:
             return
         moved, left = route_field_kernels.moments_at_most(before, variance, value, softness)
         self._condition(shared, variance, moved, variance - left)

@@ -21,7 +21,11 @@ def write_network(
     """Write a network; `change` is called with the model before."""
     from onnx import TensorProto, helper, numpy_helper
 
-    constants = {"bias": np.array([bias], np.float32), "weight": np.array([weight], np.float32), "rows": np.array([1, 1])}
+    numbers = {
+        "bias": np.array([bias], np.float32),
+        "weight": np.array([weight], np.float32),
+        "rows": np.array([1, 1]),
+    }
     nodes = [
         helper.make_node("ReduceMean", ["frame"], ["mean"], keepdims=0),
         helper.make_node("Reshape", ["mean", "rows"], ["row"]),
@@ -33,7 +37,7 @@ def write_network(
         "tiny",
         [helper.make_tensor_value_info("frame", TensorProto.FLOAT, shape)],
         [helper.make_tensor_value_info("answer", TensorProto.FLOAT, None)],
-        [numpy_helper.from_array(value, name) for name, value in constants.items()],
+        [numpy_helper.from_array(value, name) for name, value in numbers.items()],
     )
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 13)], ir_version=8)
     helper.set_model_props(model, dict(metadata or {}))

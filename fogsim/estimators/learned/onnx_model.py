@@ -1,7 +1,6 @@
 """Networks in ONNX files: data that onnxruntime computes, never code, and no other file is read."""
 
 import functools
-import importlib
 import math
 import threading
 from collections.abc import Iterable, Iterator
@@ -102,11 +101,13 @@ def read_model(path: Path) -> OnnxModel:
 
 def _libraries() -> tuple[Any, Any]:
     try:
-        return importlib.import_module("onnx"), importlib.import_module("onnxruntime")
+        import onnx  # noqa: PLC0415 - an extra
+        import onnxruntime  # noqa: PLC0415 - an extra
     except ImportError as error:
         raise MissingDependencyError(
             f"an ONNX model needs onnx and onnxruntime ({error}): pip install 'fogsim[onnx]'"
         ) from error
+    return onnx, onnxruntime
 
 
 def _factor(path: Path, model: Any) -> float:
@@ -124,7 +125,7 @@ def _refuse_reach(path: Path, onnx: Any, model: Any) -> None:
             where = next((one.value for one in part.external_data if one.key == "location"), "")
             raise InputError(
                 f"{path}: expected all weights in the file, got tensor {shown(part.name)} with external data in "
-                f"{shown(where)}; save it with save_as_external_data=False"
+                f"{shown(where)}; export it with external_data=False"
             )
         if kind == "NodeProto" and part.domain not in STANDARD:
             raise InputError(

@@ -50,7 +50,7 @@ def _definition(call: Any) -> str:
 
 
 def guarded_call(call: Callable[..., Any], title: str, file: Path | None, limit: float | None) -> Callable[..., Any]:
-    """Call that raises only MethodError, with the line in `file` [s: limit], and KeyboardInterrupt."""
+    """A call that raises only MethodError, with the line in `file`, and KeyboardInterrupt; `limit` bounds it [s]."""
 
     @functools.wraps(call)
     def guard(*arguments: Any, **options: Any) -> Any:

@@ -300,6 +300,28 @@ expect: {{right: {{always: "estimate(onnx:n.onnx).error < 1 %"}}}}
 """
 
 
+def test_answers_of_another_shape_than_the_first_fail_as_a_method(tmp_path: Path) -> None:
+    def counts(model) -> None:
+        """Two numbers, and the places of white pixels."""
+        model.graph.initializer.append(helper.make_tensor("half", TensorProto.FLOAT, [1], [0.6]))
+        nodes = [
+            helper.make_node("Greater", ["frame", "half"], ["bright"]),
+            helper.make_node("NonZero", ["bright"], ["places"]),
+            helper.make_node("Cast", ["places"], ["numbers"], to=TensorProto.FLOAT),
+            helper.make_node("Flatten", ["numbers"], ["flat"]),
+            helper.make_node("Reshape", ["flat", "line"], ["all"]),
+            helper.make_node("Concat", ["answer", "all"], ["many"], axis=1),
+        ]
+        model.graph.initializer.append(helper.make_tensor("line", TensorProto.INT64, [2], [1, -1]))
+        model.graph.node.extend(nodes)
+        model.graph.output[0].name = "many"
+
+    network = make(f"onnx:{write_network(tmp_path / 'n.onnx', change=counts)}", CAMERA)
+    assert network.update(Observation(grey(100))).valid
+    with pytest.raises(MethodError, match=r"its model: expected one output, .*; got shape \(1, 2306\)"):
+        network.update(Observation(grey(255)))
+
+
 def test_a_network_lies_in_the_scenarios_folder(tmp_path: Path, command: Command) -> None:
     folder = tmp_path / "scenario"
     folder.mkdir()

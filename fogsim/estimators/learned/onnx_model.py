@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.errors import InputError, MissingDependencyError, shown
+from fogsim.errors import InputError, MethodError, MissingDependencyError, shown
 from fogsim.files.readers import number_in_text, read_bytes
 from fogsim.registry.guard import guarded_call
 from fogsim.registry.user_code import described
@@ -67,12 +67,16 @@ class OnnxModel:
         return found
 
     def read(self, image: NDArray[Any], full: int, name: str, time_limit: float | None) -> tuple[float, float]:
-        """The two numbers for a frame with values 0 … full, made smaller by averaging over areas."""
+        """The two numbers for a frame with values 0 … full, averaged over areas to its size; MethodError if none."""
         rows, cols = self.size
         scaled = cv2.resize(image.astype(np.float32) / full, (cols, rows), interpolation=cv2.INTER_AREA)
         pixels = np.repeat(scaled[..., None], 3, axis=2) if scaled.ndim == 2 else scaled
-        run = guarded_call(functools.partial(self.outputs), f"estimator {name!r}: its model", None, time_limit)
-        log_extinction, deviation = run(np.ascontiguousarray(pixels, np.float32))[0].ravel().tolist()
+        who = f"estimator {name!r}: its model"
+        # A partial, since the line of a function of FogSim's says nothing about a model's failure.
+        (found,) = guarded_call(functools.partial(self.outputs), who, None, time_limit)(pixels)
+        if found.size != 2:
+            raise MethodError(f"{who}: expected {OUTPUT}; got shape {found.shape}")
+        log_extinction, deviation = found.ravel().tolist()
         return log_extinction, deviation * self.factor
 
 

@@ -140,6 +140,7 @@ def entries() -> dict[str, Entry]:
     from fogsim.offline.camera_file import load_calibration  # noqa: PLC0415 - the parent needs none of them
     from fogsim.offline.drive.sign_file import load_sign_file  # noqa: PLC0415
     from fogsim.offline.drive.track_file import load_track  # noqa: PLC0415
+from fogsim.estimators.learned.onnx_model import read_model
     from fogsim.offline.input_paths import find_source  # noqa: PLC0415
     from fogsim.registry.user_code import import_nothing  # noqa: PLC0415
     from fogsim.scenario.loading import load_cases, load_scenario  # noqa: PLC0415
@@ -175,6 +176,7 @@ def entries() -> dict[str, Entry]:
         "track": Entry(".csv", [TRACK], load_track),
         "signs": Entry(".geojson", [GEOJSON], load_sign_file),
         "image": Entry(".png", [_image("PNG"), _image("JPEG"), _image("GIF"), _image("WEBP")], pictures),
+        "network": Entry(".onnx", _files("tests/data/mean_network.onnx"), read_model),
         "video": Entry(".mp4", [_video()], pictures),
         "module": Entry(".py", [MODULE], _use_module),
         "run": Entry(".json", [_run_file()], lambda p: read_run(p, STUDY_RUN)),

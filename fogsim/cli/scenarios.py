@@ -32,8 +32,8 @@ def list_command() -> None:
     stdout.print()
     stdout.print(f"[bold]study[/]: {escape(', '.join(shipped_studies()))}")
     for registry in (ESTIMATORS, FUSIONS, ADVISERS, LIGHTING_POLICIES, RENDERERS):
-        # FogSim's own in order, then those of installed packages.
-        names = ", ".join(dict.fromkeys((*registry, *registry.known)))
+        # FogSim's own in order, then those of installed packages, then those that are files.
+        names = ", ".join(dict.fromkeys((*registry, *registry.known, *(f"{kind}:FILE" for kind in registry.files))))
         stdout.print(f"[bold]{registry.kind}[/]: {escape(names)}")
 
 

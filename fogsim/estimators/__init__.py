@@ -10,6 +10,7 @@ from fogsim.estimators.huang2015_lead import Huang2015Lead
 from fogsim.estimators.huang2015_rough import Huang2015Rough
 from fogsim.estimators.joint_road import JointRoad
 from fogsim.estimators.lead_contrast import LeadContrast
+from fogsim.estimators.learned import OnnxGuest, conformal_factor, onnx_guest
 from fogsim.estimators.negru2013 import Negru2013
 from fogsim.estimators.night.gallen2014 import Gallen2014, Gallen2014Halo
 from fogsim.estimators.night.gallen2014_veil import Gallen2014Veil
@@ -54,8 +55,11 @@ ESTIMATORS: Registry[Callable[..., Estimator]] = Registry(
     },
     group="fogsim.estimators",
     methods=("update", "reset"),
+    files={"onnx": onnx_guest},
 )
-"""Every estimator by name: called with a camera and keyword parameters it gives an `Estimator`."""
+"""Every estimator by name: called with a camera and keyword parameters it gives an `Estimator`.
+
+``onnx:model.onnx`` is a network in a file (`OnnxGuest`)."""
 
 
 @checked_parameters
@@ -68,7 +72,7 @@ def make(name: str, camera: Camera, **options: object) -> Estimator:
     Parameters
     ----------
     name : str
-        Name in `ESTIMATORS`.
+        Name in `ESTIMATORS`, or ``onnx:FILE``.
     camera : Camera
         The assumed calibration.
     **options : object
@@ -88,4 +92,4 @@ def make(name: str, camera: Camera, **options: object) -> Estimator:
     return made
 
 
-__all__ = ["ESTIMATORS", "Estimator", "FoggyRoad", "extinction_bound", "make"]
+__all__ = ["ESTIMATORS", "Estimator", "FoggyRoad", "OnnxGuest", "conformal_factor", "extinction_bound", "make"]

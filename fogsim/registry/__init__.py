@@ -3,6 +3,7 @@
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 from fogsim.errors import InputError, UnknownNameError, shown
@@ -12,6 +13,7 @@ from fogsim.registry.user_code import (
     MayImport,
     announced,
     check_source,
+    digest_of,
     import_anything,
     import_class,
     is_class_name,
@@ -28,14 +30,23 @@ class Registry(Mapping[str, T]):
 
     It also finds users' classes: ``module:Class`` next to a scenario, and entry points of `group` in installed
     packages. They must have `methods` ("a|b" for either) and are guarded: they raise only `MethodError` and
-    KeyboardInterrupt.
+    KeyboardInterrupt. And it makes methods of files: ``onnx:model.onnx`` next to a scenario is made by `files["onnx"]`,
+    from its name, path and time limit.
     """
 
-    def __init__(self, kind: str, entries: Mapping[str, T], group: str = "", methods: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        kind: str,
+        entries: Mapping[str, T],
+        group: str = "",
+        methods: Sequence[str] = (),
+        files: Mapping[str, Callable[[str, Path, float | None], T]] = MappingProxyType({}),
+    ) -> None:
         self.kind = kind
         self._entries = dict(entries)
         self._group = group
         self._methods = tuple(methods)
+        self.files = dict(files)
 
     def register(self, name: str, factory: T) -> None:
         """Add a factory; ValueError if the name is taken."""
@@ -58,7 +69,7 @@ class Registry(Mapping[str, T]):
         return sorted({*self._entries, *(announced(self._group) if self._group else ())})
 
     def find(self, name: str, folder: Path | None = None, time_limit: float | None = None) -> T:
-        """The factory of a name, an entry point or ``module:Class`` in `folder` (None for the working directory).
+        """The factory of a name, an entry point, ``module:Class`` or a file in `folder` (None: the working directory).
 
         `time_limit` bounds each call of a user's method [s]. Raises UnknownNameError, or InputError if the import fails
         or the class does not fit.
@@ -67,6 +78,8 @@ class Registry(Mapping[str, T]):
             return self._entries[name]
         except (KeyError, TypeError):
             pass
+        if (file := self._file(name, folder)) is not None:
+            return self.files[name.partition(":")[0]](name, file, time_limit)
         if self._group and is_class_name(name):
             return self._guarded(name, import_class(name, folder), time_limit)
         further = announced(self._group) if self._group else {}
@@ -76,15 +89,23 @@ class Registry(Mapping[str, T]):
 
     def find_if_allowed(self, name: str, folder: Path | None, may_import: MayImport = import_anything) -> T | None:
         """As `find`, but None for a user's class whose file defines it and may not be imported."""
-        is_in_folder = bool(self._group) and name not in self._entries and is_class_name(name)
+        is_own = name in self._entries or self._file(name, folder) is not None
+        is_in_folder = bool(self._group) and not is_own and is_class_name(name)
         if is_in_folder and not may_import(module_file(name, folder)):
             check_source(name, folder)
             return None
         return self.find(name, folder)
 
     def version(self, name: str, folder: Path | None = None) -> str | None:
-        """Version of a user's method; None for FogSim's own and for registered ones."""
+        """Version of a user's method, a digest for a file; None for FogSim's own and for registered ones."""
+        if (file := self._file(name, folder)) is not None:
+            return digest_of(file)
         return None if name in self._entries else version_of(name, self._group, folder)
+
+    def _file(self, name: object, folder: Path | None) -> Path | None:
+        """File that a method is made of; None for a method of another type."""
+        kind, _, file = name.partition(":") if isinstance(name, str) else ("", "", "")
+        return (folder or Path.cwd()) / file if file and kind in self.files else None
 
     def _guarded(self, name: str, cls: Any, time_limit: float | None) -> T:
         if not inspect.isclass(cls):
@@ -112,7 +133,9 @@ class Registry(Mapping[str, T]):
         return len(self._entries)
 
     def __contains__(self, name: object) -> bool:
-        return name in self._entries or (bool(self._group) and (is_class_name(name) or name in announced(self._group)))
+        if name in self._entries or self._file(name, None) is not None:
+            return True
+        return bool(self._group) and (is_class_name(name) or name in announced(self._group))
 
 
 def _has_method(cls: type, name: str) -> bool:

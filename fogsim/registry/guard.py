@@ -18,7 +18,7 @@ def guarded(cls: type, who: str, methods: tuple[str, ...], limit: float | None =
     KeyboardInterrupt passes, so that Ctrl-C ends a run. SystemExit does not: exit codes come from the outcomes of runs.
     `who` names the class in messages ("estimator 'mine:Fade'"); `limit` bounds each call [s].
     """
-    guard = functools.partial(_guarded_call, file=_source(cls), limit=limit)
+    guard = functools.partial(guarded_call, file=_source(cls), limit=limit)
     # A named tuple, for example, is made by __new__ and inherits an __init__ without arguments.
     own = [name for name in ("__init__", "__new__") if getattr(cls, name) is not getattr(object, name)]
     constructor = own[0] if own else "__init__"
@@ -49,7 +49,9 @@ def _definition(call: Any) -> str:
     return "" if code is None else f"{code.co_filename}:{code.co_firstlineno}"
 
 
-def _guarded_call(call: Callable[..., Any], title: str, file: Path | None, limit: float | None) -> Callable[..., Any]:
+def guarded_call(call: Callable[..., Any], title: str, file: Path | None, limit: float | None) -> Callable[..., Any]:
+    """A call that raises only MethodError, with the line in `file`, and KeyboardInterrupt; `limit` bounds it [s]."""
+
     @functools.wraps(call)
     def guard(*arguments: Any, **options: Any) -> Any:
         try:

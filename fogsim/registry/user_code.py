@@ -185,6 +185,11 @@ def load_announced(point: metadata.EntryPoint) -> Any:
 def version_of(name: str, group: str, folder: Path | None = None) -> str | None:
     """Version of a user's method: of its package, or a digest of its file; None for FogSim's methods."""
     if is_class_name(name):
-        return f"sha256:{hashlib.sha256(module_file(name, folder).read_bytes()).hexdigest()[:16]}"
+        return digest_of(module_file(name, folder))
     point = announced(group).get(name)
     return None if point is None or point.dist is None else f"{point.dist.name} {point.dist.version}"
+
+
+def digest_of(file: Path) -> str:
+    """Version of a file: a digest of its content."""
+    return f"sha256:{hashlib.sha256(file.read_bytes()).hexdigest()[:16]}"

@@ -125,7 +125,8 @@ def _opened(value: dict[str, Any]) -> dict[str, Any]:
 
 def _methods(value: dict[str, Any], registry: Registry[Any]) -> dict[str, Any]:
     """What names a method, or several."""
-    names = [{"enum": registry.known}, {"type": "string", "pattern": r"^[\w.]+:\w+$|\$"}]
+    files = "".join(rf"|^{kind}:." for kind in registry.files)
+    names = [{"enum": registry.known}, {"type": "string", "pattern": rf"^[\w.]+:\w+$|\${files}"}]
     if value.get("type") == "array":
         return {**value, "items": {"anyOf": [*names, value["items"]]}}
     block = {key: part for key, part in value.items() if key != "description"}

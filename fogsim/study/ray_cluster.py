@@ -19,7 +19,7 @@ from typing import Any
 from fogsim.errors import FogSimError, InputError, MissingDependencyError, SimulationError, shown
 from fogsim.files.atomic import write_bytes, write_json
 from fogsim.recorders.manifest import versions
-from fogsim.scenario import Scenario
+from fogsim.scenario import Scenario, build
 from fogsim.study.engine import PROCESS_DIED, RunWatch, result_file
 from fogsim.study.execution import failure, run_outcome
 from fogsim.study.plan import StudyRun, file_digests
@@ -137,7 +137,7 @@ class _Tasks:
         limit = self._at_once or 2 * max(1, int(self._ray.cluster_resources().get("CPU", 1)))
         while self._waiting and len(self._under_way) < limit:
             run = self._waiting.pop()
-            task = self._task.remote(self._work, run.scenario, run.seed, file_digests(run.scenario), self._versions)
+            task = self._task.remote(self._work, run.scenario, run.seed, deciding_files(run.scenario), self._versions)
             self._under_way[task] = run
 
     def _result(self, task: Any, run: StudyRun) -> _Result | None:
@@ -185,7 +185,7 @@ def _unfitness(scenario: Scenario, files: Mapping[str, str], wanted: Mapping[str
         if version != wanted[name]:
             return f"{node} has {name} {version}, this machine {wanted[name]}; {_SAME}"
     try:
-        there = file_digests(scenario)
+        there = deciding_files(scenario)
     except (FogSimError, OSError) as error:
         return f"{node}: {error}; {_SAME}"
     for name, digest in files.items():
@@ -193,6 +193,11 @@ def _unfitness(scenario: Scenario, files: Mapping[str, str], wanted: Mapping[str
             how = "has another" if name in there else "does not have"
             return f"{node} {how} {scenario.directory / name}; {_SAME}"
     return None
+
+
+def deciding_files(scenario: Scenario) -> dict[str, str]:
+    """Digests of a scenario's SUMO files, and versions of its methods that are not FogSim's, by name."""
+    return {**file_digests(scenario), **build.own_methods(scenario)}
 
 
 def _running_versions() -> dict[str, str | None]:

@@ -144,7 +144,7 @@ def test_ctrl_c_keeps_what_is_done_and_ends_what_is_not(
 
 def test_a_node_with_other_files_is_refused(cluster: Cluster, study: Study, tmp_path: Path) -> None:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("fogsim.study.ray_cluster.file_digests", lambda _: {"grid.net.xml": "of old"})
+        patch.setattr("fogsim.study.ray_cluster.deciding_files", lambda _: {"grid.net.xml": "of old"})
         with pytest.raises(InputError, match=r"has another .*grid\.net\.xml; a study on Ray needs"):
             tabulated(study, on_cluster(cluster), tmp_path / "out")
 

@@ -93,6 +93,8 @@ def readers_folder(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Ca
             (made / text.split()[1]).write_text(text, encoding="utf-8")
         if "tests/data/openscenario" in page:
             shutil.copytree(CHECKOUT / "tests" / "data" / "openscenario", made / "tests" / "data" / "openscenario")
+        if "network.onnx" in page:
+            shutil.copy(CHECKOUT / "tests" / "data" / "mean_network.onnx", made / "network.onnx")
         if "my/scenario.yaml" in page:
             put_scenario(made)
         return made

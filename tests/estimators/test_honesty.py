@@ -6,12 +6,14 @@ import enum
 import pickle
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import grimp
 import numpy as np
 import pytest
 from early_motorway import EARLY
+from tiny_network import write_network
 
 import fogsim
 from fogsim.estimators import ESTIMATORS
@@ -32,7 +34,6 @@ from fogsim.values import (
     Truth,
 )
 
-METHODS = sorted(ESTIMATORS)
 HONEST = ("fogsim.estimators", "fogsim.vision")
 """What estimators are made of."""
 
@@ -45,18 +46,26 @@ UNSEEN = {"Truth", "Step", "View", "FogField", "FogBank", "FogChange", "FogPatch
 """Value types that hold it."""
 
 
-def drive() -> list[Step]:
-    """A few frames in traffic with every method that is registered."""
-    methods = ", ".join(f"{{method: {name}}}" for name in METHODS)
+@pytest.fixture(scope="module")
+def methods(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """Every method that is registered, and a network of the pixels' mean where its extra is installed."""
+    network = tmp_path_factory.mktemp("network") / "mean.onnx"
+    guests = [f"onnx:{write_network(network)}"] if find_spec("onnx") and find_spec("onnxruntime") else []
+    return sorted([*ESTIMATORS, *guests])
+
+
+def drive(methods: list[str]) -> list[Step]:
+    """A few frames in traffic with the methods."""
+    written = ", ".join(f"{{method: '{name}'}}" for name in methods)
     size = (EARLY, "camera.width=320", "camera.height=240", "duration_s=2", "fog.visibility_m=80")
     sensors = "sensors.scatterometer={}", "sensors.reports.roadside={camera: {}, every_m: 500, period_s: 1, delay_s: 0}"
-    scenario = fogsim.load_scenario("motorway_fog_bank", [*size, *sensors, f"estimators=[{methods}]"])
+    scenario = fogsim.load_scenario("motorway_fog_bank", [*size, *sensors, f"estimators=[{written}]"])
     return list(fogsim.run(scenario, seed=1))
 
 
 @pytest.fixture(scope="module")
-def as_it_is() -> list[Step]:
-    return drive()
+def as_it_is(methods: list[str]) -> list[Step]:
+    return drive(methods)
 
 
 def essence(estimate: Estimate) -> tuple[object, ...]:
@@ -76,23 +85,28 @@ def check_same(honest: list[Step], misled: list[Step]) -> None:
         assert a.command == b.command
 
 
-def test_the_drive_tells_each_method_apart(as_it_is: list[Step]) -> None:
+def test_the_drive_tells_each_method_apart(as_it_is: list[Step], methods: list[str]) -> None:
     """What follows would hold of methods that never say anything: most of these do."""
     telling = {estimate.method for step in as_it_is for estimate in step.estimates if estimate.valid}
-    assert [estimate.method for estimate in as_it_is[0].estimates] == METHODS
-    assert telling >= {"negru2013", "zhu2015", "huang2015", "huang2015_rough", "joint_road", "scatterometer"}
+    assert [estimate.method for estimate in as_it_is[0].estimates] == methods
+    guests = {name for name in methods if name.startswith("onnx:")}
+    assert telling >= {"negru2013", "zhu2015", "huang2015", "huang2015_rough", "joint_road", "scatterometer"} | guests
     assert as_it_is[-1].observation.lead is not None
     assert len({report.source for step in as_it_is for report in step.observation.reports}) >= 5
 
 
-def test_deleting_the_truth_changes_nothing(as_it_is: list[Step], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_deleting_the_truth_changes_nothing(
+    as_it_is: list[Step], methods: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("fogsim.ego.equipment.fog_truth", lambda *_: None)
-    blind = drive()
+    blind = drive(methods)
     assert all(step.truth is None for step in blind)
     check_same(as_it_is, blind)
 
 
-def test_a_false_truth_changes_nothing(as_it_is: list[Step], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_false_truth_changes_nothing(
+    as_it_is: list[Step], methods: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Another fog, visibility, calibration, place, distances, instances and leader than what was drawn and measured.
 
     Reports of roadside cameras stay the same too.
@@ -131,7 +145,7 @@ def test_a_false_truth_changes_nothing(as_it_is: list[Step], monkeypatch: pytest
     monkeypatch.setattr(FogReports, "heard", hear_in_another_fog)
     monkeypatch.setattr("fogsim.ego.measurements.measure_lead", measure_another)
     monkeypatch.setattr(ViewRenderer, "render", render_falsely)
-    misled = drive()
+    misled = drive(methods)
     assert misled[3].truth.visibility != as_it_is[3].truth.visibility
     assert not np.array_equal(misled[3].view.distance, as_it_is[3].view.distance)
     check_same(as_it_is, misled)
@@ -188,21 +202,25 @@ class Wall:
 sys.meta_path.insert(0, Wall())
 from fogsim.estimators import ESTIMATORS
 camera, observations = pickle.loads(Path(sys.argv[1]).read_bytes())
-estimators = [ESTIMATORS[name](camera) for name in sorted(ESTIMATORS)]
+estimators = [ESTIMATORS[name](camera) for name in {methods!r}]
 found = [[(e.method, e.extinction, e.standard_deviation, e.valid) for e in (m.update(o) for m in estimators)]
          for o in observations]
 Path(sys.argv[2]).write_bytes(pickle.dumps(found))
 """
 
 
-def test_observations_alone_give_the_same_where_no_truth_can_be_imported(as_it_is: list[Step], tmp_path: Path) -> None:
+def test_observations_alone_give_the_same_where_no_truth_can_be_imported(
+    as_it_is: list[Step], methods: list[str], tmp_path: Path
+) -> None:
     """In another process that cannot import renderer, traffic, fog or anything else that knows the truth."""
     observations = [step.observation for step in as_it_is]
     frame = observations[0].frame
     assert isinstance(frame, Frame)
     (tmp_path / "seen").write_bytes(pickle.dumps((frame.camera, observations)))
     program = REPLAY.format(
-        blocked=TRUTHFUL, blocked_libraries=("libsumo", "traci", "sumolib", "OpenGL", "highway_env")
+        blocked=TRUTHFUL,
+        blocked_libraries=("libsumo", "traci", "sumolib", "OpenGL", "highway_env"),
+        methods=methods,
     )
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", program, tmp_path / "seen", tmp_path / "found"],

@@ -16,6 +16,8 @@ BROUGHT_ALONG = {"OpenGL": "pyrender", "llvmlite": "numba", "pydantic_core": "py
 """Imports that a dependency pins to what it works with, and that one."""
 OPTIONAL = {
     "minari": ("rl", "minari"),
+    "onnx": ("onnx", "onnx"),
+    "onnxruntime": ("onnx", "onnxruntime"),
     "osi3": ("osi", "osi-python"),
     "pettingzoo": ("rl", "pettingzoo"),
     "ray": ("ray", "ray"),

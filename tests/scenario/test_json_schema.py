@@ -61,6 +61,7 @@ def test_editors_find_nothing_wrong_with_shipped_studies(study):
         ("fog: {visibility: $fog}", None),
         ("fog: {banks: [{start: 1 km, end_m: 1200, visibility: 50 m}], outside_visibility_m: 500}", None),
         ("fog: {visibility_m: 80}\nsut: {advice: 'mine:Cautious', estimators: [joint_road]}", None),
+        ("fog: {visibility_m: 80}\nestimators: ['onnx:networks/small.onnx']", None),
         ("fog: {visibility_m: 80}\ndrivers: {compliance: {rate: 60 %}, following: careful}", None),
         ("fog: {visibility: $v}\nvary: {v: [80 m], run: 9 seeds}\nverdict: {pass_rate: 80 %, confidence: 0.8}", None),
         ("fog: {visibility: $v}\nvary: [80 m]", "$.vary"),

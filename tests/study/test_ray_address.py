@@ -8,9 +8,9 @@ import pytest
 
 from fogsim.errors import InputError, MissingDependencyError
 from fogsim.scenario import load_scenario
+from fogsim.scenario.starting import begin_scenario
 from fogsim.study import RayCluster, StudyRun, run_study
-from fogsim.study.plan import file_digests
-from fogsim.study.ray_cluster import _running_versions, _unfitness
+from fogsim.study.ray_cluster import _running_versions, _unfitness, deciding_files
 from tests.conftest import Command
 
 SCENARIO = load_scenario("motorway_fog_bank")
@@ -47,7 +47,7 @@ def test_an_address_without_ray_is_refused(tmp_path: Path, command: Command) -> 
 
 
 def test_nodes_that_would_compute_something_else_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    files, here = file_digests(SCENARIO), _running_versions()
+    files, here = deciding_files(SCENARIO), _running_versions()
     assert files
     assert _unfitness(SCENARIO, files, here) is None
     name = next(iter(files))
@@ -56,6 +56,19 @@ def test_nodes_that_would_compute_something_else_are_named(monkeypatch: pytest.M
     )
     assert "does not have" in str(_unfitness(SCENARIO, {"more.xml": "0"}, here))
     assert "has fogsim" in str(_unfitness(SCENARIO, files, {**here, "fogsim": "0.0"}))
+
+
+def test_a_node_with_another_file_of_a_method_is_named(tmp_path: Path) -> None:
+    begin_scenario("mine", "motorway_fog_bank", tmp_path)
+    method = tmp_path / "mine" / "mine.py"
+    method.write_text("class Slow:\n    def advise(self, belief, speed_limit, time, previous): ...\n")
+    scenario = load_scenario(tmp_path / "mine", ["advice=mine:Slow"])
+    files, here = deciding_files(scenario), _running_versions()
+    assert _unfitness(scenario, files, here) is None
+    method.write_text(method.read_text() + "# other\n")
+    assert f"has another {tmp_path / 'mine' / 'mine:Slow'};" in str(_unfitness(scenario, files, here))
+    method.unlink()
+    assert "there is no mine.py in" in str(_unfitness(scenario, files, here))
 
 
 def test_processes_and_an_engine_are_one_too_many(tmp_path: Path) -> None:

@@ -203,7 +203,7 @@ def _driver_words(scenario: Scenario) -> str:
 
 def _cited(registry: Registry[Any], names: Iterable[str]) -> str:
     """Publications that the docstrings of registered methods cite, in parentheses; "" if there are none."""
-    docs = [" ".join((registry[name].__doc__ or "").split()) for name in names if name in registry]
+    docs = [" ".join((registry[name].__doc__ or "").split()) for name in names if name in registry.known]
     cited = dict.fromkeys(found for doc in docs for found in _CITATION.findall(doc))
     return f" ({'; '.join(cited)})" if cited else ""
 

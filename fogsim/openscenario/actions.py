@@ -11,7 +11,7 @@ from fogsim.openscenario.elements import HARMLESS, REFUSED
 from fogsim.openscenario.entities import Vehicle
 from fogsim.openscenario.environment import environment_of
 from fogsim.openscenario.findings import Findings
-from fogsim.openscenario.positions import Positions
+from fogsim.openscenario.positions import Positions, sense
 from fogsim.openscenario.xml_tree import Node
 from fogsim.traffic.road.opendrive_lanes import Spot
 from fogsim.units import KMH_PER_MPS
@@ -37,13 +37,16 @@ _UNLIT = ("licensePlateIllumination", "reversingLights", "specialPurposeLights")
 _STEEPEST = {"linear": 1.0, "sinusoidal": 0.5 * math.pi, "cubic": 1.5}  # Greatest rate of a shape, over its mean
 _STAY = 1e5  # Time for which a vehicle stays in the lane that it has changed to [s]
 _NEAR = 0.05  # Difference at which a speed has been reached [m/s]
+DISPLACEMENTS = ("any", "leadingReferencedEntity", "trailingReferencedEntity")
+"""Where a vehicle is to be, seen from the one to which it keeps a distance."""
 
 
 @dataclass
 class Effect:
     """What an event does: timeline blocks by subject, their known duration [s], and conditions that end the rest.
 
-    `routes` are edges through the waypoints of a vehicle's route; `ends_itself` if only the run shows its duration.
+    `routes` are edges through the waypoints of a vehicle's route; `ends_itself` if only the run shows its duration, and
+    `is_endless` if something of it goes on until something else ends it.
     """
 
     do: dict[str, dict[str, Any]] = field(default_factory=dict)
@@ -51,6 +54,7 @@ class Effect:
     ends: list[str] = field(default_factory=list)
     routes: dict[str, tuple[str, ...]] = field(default_factory=dict)
     ends_itself: bool = False
+    is_endless: bool = False
 
     def add(self, subject: str, **blocks: Any) -> None:
         """Add an action of a subject."""
@@ -66,12 +70,16 @@ class Effect:
 
 @dataclass
 class Actions:
-    """Reads actions; `called` gives a vehicle's name in conditions."""
+    """Reads actions; `called` gives a vehicle's name in conditions.
+
+    `offsets` are where vehicles are in their lanes after the actions so far, in the file's order.
+    """
 
     vehicles: Mapping[str, Vehicle]
     catalogs: Catalogs
     positions: Positions
     called: Callable[[str], str]
+    offsets: dict[str, float] = field(default_factory=dict)
 
     @property
     def findings(self) -> Findings:
@@ -129,6 +137,7 @@ class Actions:
         if "rate_mps2" in speed and "to_kmh" in speed:
             own, to = f"{self.called(actor)}.speed", speed["to_kmh"] / KMH_PER_MPS
             effect.ends.append(f"{own} > {to - _NEAR:.9g} m/s and {own} < {to + _NEAR:.9g} m/s")
+        effect.is_endless |= "continuous" in speed
         # At a rate of 0 a speed stays as it is.
         effect.add(actor, speed=self.held(actor) if speed.get("rate_mps2") == 0.0 else speed)
 
@@ -183,8 +192,6 @@ class Actions:
     def _lane_change(self, action: Node, actor: str, effect: Effect) -> None:
         """`change_lane`: absolute, or relative to a vehicle; by time, distance or rate."""
         dynamics, target = action.one("LaneChangeActionDynamics"), action.one("LaneChangeTarget")
-        if self.findings.number(action, "targetLaneOffset", 0.0):
-            self.findings.refuse(action, "targetLaneOffset: vehicles are in the middle of their lanes; write 0")
         if dynamics is None or target is None:
             self.findings.refuse(action, "expected LaneChangeActionDynamics and a LaneChangeTarget")
             return
@@ -199,7 +206,40 @@ class Actions:
         pace = {"distance_m": value} if by == "distance" else {"duration_s": min(value, 60.0)}
         effect.lasts = max(effect.lasts, pace.get("duration_s", 0.0))
         effect.ends_itself = by == "distance"
+        offset = sense(begins) * self.findings.number(action, "targetLaneOffset", 0.0)
+        if offset or self._offset(actor):
+            pace["offset_m"] = self.offsets[actor] = begins.shifted(offset).offset
         effect.add(actor, change_lane={**lanes, "stay_s": _STAY, **pace})
+
+    def _offset(self, vehicle: str) -> float:
+        """Where a vehicle is in its lane after the actions so far, to the left of its middle [m]."""
+        begins = self.positions.entities.get(vehicle)
+        return self.offsets.get(vehicle, begins.offset if begins else 0.0)
+
+    def _lane_offset(self, action: Node, actor: str, effect: Effect) -> None:
+        """`change_lane` with `offset_m`, along half a wave of a cosine whose greatest acceleration is `maxLateralAcc`."""
+        dynamics, target = action.one("LaneOffsetActionDynamics"), action.one("LaneOffsetTarget")
+        to = target.one("AbsoluteTargetLaneOffset", "RelativeTargetLaneOffset") if target else None
+        begins = self.positions.entities.get(actor)
+        if dynamics is None or to is None or begins is None:
+            raise ValueError("expected LaneOffsetActionDynamics and a LaneOffsetTarget, and a vehicle that has a place")
+        shape = self.findings.word(dynamics, "dynamicsShape", tuple(SHAPES))
+        most = self.findings.number(dynamics, "maxLateralAcc", math.inf, is_finite=False)
+        offset = sense(begins) * self.findings.number(to, "value")
+        lanes: dict[str, Any] = {"lanes": 0}
+        other = self.positions.entities.get(to.get("entityRef")) if to.tag.startswith("Relative") else begins
+        if to.tag.startswith("Relative"):
+            name, offset = self._other(to), offset + self._offset(to.get("entityRef"))
+            if other and other.lane != begins.lane:
+                lanes = {"to_lane_of": name, **lanes}
+        across = abs(offset - self._offset(actor))
+        if other and "to_lane_of" in lanes:
+            across += begins.lane.width * abs(other.lane.index - begins.lane.index)
+        lasts = 0.0 if shape == "step" else math.pi * math.sqrt(0.5 * across / max(most, _NEAR))
+        self.offsets[actor] = begins.shifted(offset).offset
+        effect.lasts = max(effect.lasts, lasts)
+        effect.is_endless |= self.findings.flag(action, "continuous")
+        effect.add(actor, change_lane={**lanes, "stay_s": _STAY, "offset_m": offset, "duration_s": min(lasts, 60.0)})
 
     def _across(self, target: Node, lanes: Mapping[str, Any], begins: Spot) -> float:
         """Way across of a change of lane, by the lanes on which the vehicles begin [m]."""
@@ -219,14 +259,20 @@ class Actions:
         if absolute is None or begins is None:
             self.findings.refuse(target, "expected an AbsoluteTargetLane or RelativeTargetLane")
             return None
-        road, wanted = (begins.lane.origins or ("",))[0].partition("_")[0], absolute.get("value")
-        found = [one for one in self.positions.lanes.lanes if f"{road}_{wanted}" in one.origins]
-        if not found:
-            self.findings.refuse(absolute, f"road {road!r}, where {actor} begins, has no lane {wanted!r} to drive on")
-            return None
-        if wanted.startswith("-") == begins.lane.origins[0].partition("_")[2].startswith("-"):
-            return {"to": found[0].index}
-        return self._oncoming(absolute, abs(int(wanted)))
+        wanted = absolute.get("value")
+        return self._absolute_lane(absolute, wanted, begins, self.positions.ways.get(actor, (begins.lane.edge,)))
+
+    def _absolute_lane(self, node: Node, wanted: str, begins: Spot, way: tuple[str, ...]) -> dict[str, Any]:
+        """A lane by its number along the way; ValueError where none has it, or lanes at different places across."""
+        lanes = self.positions.lanes.lanes
+        numbers = {one.index for one in lanes if one.edge in way for o in one.origins if o.rpartition("_")[2] == wanted}
+        if len(numbers) == 1:
+            return {"to": numbers.pop()}
+        road = (begins.lane.origins or ("",))[0].rpartition("_")[0]
+        if not numbers and any(f"{road}_{wanted}" in one.origins for one in lanes):
+            return self._oncoming(node, abs(int(wanted)))
+        what = f"is the lane {' or '.join(map(str, sorted(numbers)))} from the right, by road" if numbers else "is none"
+        raise ValueError(f"AbsoluteTargetLane: lane {wanted!r} {what} on the way from road {road!r}")
 
     def _oncoming(self, node: Node, number: int) -> dict[str, Any]:
         if number != 1:
@@ -261,16 +307,25 @@ class Actions:
         effect.add(actor, lamps=dict.fromkeys(LAMPS[kind], "off" if mode == "off" else "on"))
 
     def _keep_distance(self, action: Node, actor: str, effect: Effect) -> None:
-        """`follow`, by `timeGap` with `freespace` and `continuous`, of a vehicle ahead."""
-        headway = self.findings.number(action, "timeGap", 0.0)
-        if not headway or not self.findings.flag(action, "freespace"):
-            self.findings.refuse(action, "a distance is kept by a timeGap with freespace=true")
-            return
-        self.findings.word(action, "coordinateSystem", ("entity", "lane", "road"), "entity")
-        self.findings.word(action, "displacement", ("any", "trailingReferencedEntity"), "any")
+        """`follow`, by `timeGap` or `distance`, `continuous`, of a vehicle ahead; in `Init` also the place at once."""
+        headway, distance, is_between_bumpers = self.gap(action)
+        if self.findings.word(action, "displacement", DISPLACEMENTS, "any") == DISPLACEMENTS[1]:
+            raise ValueError("displacement: while it drives, a vehicle keeps a distance to one ahead, not behind")
         if not self.findings.flag(action, "continuous"):
-            self.findings.refuse(action, "continuous: a distance, once reached, is kept; write true")
-        effect.add(actor, follow={"vehicle": self._other(action), "headway_s": headway})
+            raise ValueError("continuous: while a vehicle drives, a distance, once reached, is kept; write true")
+        effect.is_endless = True
+        other = self.vehicles.get(action.get("entityRef"))
+        further = 0.0 if is_between_bumpers or other is None else self.vehicles[actor].front + other.rear
+        follow = {"vehicle": self._other(action), "headway_s": headway, "gap_m": distance - further}
+        effect.add(actor, follow=follow)
+
+    def gap(self, action: Node) -> tuple[float, float, bool]:
+        """Time gap [s] and distance [m] to keep, one of them 0, and whether it is between bumpers; ValueError if none."""
+        headway, distance = (self.findings.number(action, key, 0.0) for key in ("timeGap", "distance"))
+        if bool(action.get("timeGap")) == bool(action.get("distance")):
+            raise ValueError("expected a timeGap or a distance")
+        self.findings.word(action, "coordinateSystem", ("entity", "lane", "road"), "entity")
+        return headway, distance, self.findings.flag(action, "freespace")
 
     def _assign_route(self, action: Node, actor: str, effect: Effect) -> None:
         """In `Init`: the way through the waypoints, with changes of lane that it needs, and then straight on."""
@@ -288,6 +343,7 @@ class Actions:
 _PRIVATE: Mapping[str, Callable[[Actions, Node, str, Effect], None]] = {
     "SpeedAction": Actions._speed,
     "LaneChangeAction": Actions._lane_change,
+    "LaneOffsetAction": Actions._lane_offset,
     "LightStateAction": Actions._lights,
     "LongitudinalDistanceAction": Actions._keep_distance,
     "AssignRouteAction": Actions._assign_route,

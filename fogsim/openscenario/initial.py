@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from fogsim.openscenario.actions import Actions, Effect
+from fogsim.openscenario.actions import DISPLACEMENTS, Actions, Effect
 from fogsim.openscenario.entities import Vehicle
 from fogsim.openscenario.environment import Environment, environment_of
 from fogsim.openscenario.xml_tree import Node
@@ -17,17 +17,18 @@ from fogsim.units import KMH_PER_MPS
 class Beginning:
     """Initial state: reference points and ordered speeds of vehicles, fog and light, and further effects.
 
-    `names` are the vehicles by their names in the timeline, `fronts` the places of front bumpers, and `ways` the edges
-    from there on.
+    `names` are the vehicles by their names in the timeline, `fronts` the places of front bumpers, `ways` the edges
+    from there on, and `distances` the actions that place a vehicle at a distance to another one.
     """
 
     spots: dict[str, Spot]
     names: Mapping[str, str]
+    ways: dict[str, tuple[str, ...]]
     fronts: dict[str, Spot] = field(default_factory=dict)
-    ways: dict[str, tuple[str, ...]] = field(default_factory=dict)
     orders: dict[str, Mapping[str, Any]] = field(default_factory=dict)
     environment: Environment = field(default_factory=Environment)
     effect: Effect = field(default_factory=Effect)
+    distances: list[tuple[str, Node]] = field(default_factory=list)
 
     def speed(self, vehicle: str, *asked: str) -> float:
         """Initial speed of a vehicle [m/s]; one that is relative follows from another's."""
@@ -42,7 +43,8 @@ class Beginning:
 
 def read_beginning(init: Node | None, vehicles: Mapping[str, Vehicle], actions: Actions) -> Beginning:
     """Initial state from the element ``Init``."""
-    begin = Beginning(actions.positions.entities, {actions.called(name).strip('"'): name for name in vehicles})
+    names = {actions.called(name).strip('"'): name for name in vehicles}
+    begin = Beginning(actions.positions.entities, names, actions.positions.ways)
     blocks = init.all("Actions") if init else []
     for block in blocks:
         for action in block.all("GlobalAction"):
@@ -52,6 +54,11 @@ def read_beginning(init: Node | None, vehicles: Mapping[str, Vehicle], actions: 
     for one in private:
         for action in one.all("PrivateAction"):
             _take_private(action, one.get("entityRef"), begin, actions)
+    for name, action in begin.distances:
+        try:
+            begin.spots[name] = _at_distance(action, name, begin, actions)
+        except ValueError as error:
+            actions.findings.refuse(action, str(error))
     for name, vehicle in vehicles.items():
         if name not in begin.spots:
             if not actions.findings.refused:
@@ -111,6 +118,12 @@ def _place(private: list[Node], vehicles: Mapping[str, Vehicle], actions: Action
 def _take_private(action: Node, name: str, begin: Beginning, actions: Actions) -> None:
     if action.one("TeleportAction"):
         return
+    distance = action.within("LongitudinalAction", "LongitudinalDistanceAction")
+    if distance and distance.one("DynamicConstraints") is None and name in actions.vehicles:
+        # Without limits to its motion it is there at once.
+        begin.distances.append((name, distance))
+        if not actions.findings.flag(distance, "continuous"):
+            return
     effect = Effect()
     actions.take(action, [name], effect)
     begin.effect.routes.update(effect.routes)
@@ -125,6 +138,23 @@ def _take_private(action: Node, name: str, begin: Beginning, actions: Actions) -
         actions.findings.refuse(action, f"FogSim keeps a distance to a vehicle ahead; {leader} is not ahead of {name}")
     if done:
         begin.effect.add(name, **done)
+
+
+def _at_distance(action: Node, name: str, begin: Beginning, actions: Actions) -> Spot:
+    """Place at a distance to another vehicle, on the lane on which the vehicle is; ValueError if there is none."""
+    headway, distance, is_between_bumpers = actions.gap(action)
+    own, other, reference = begin.spots.get(name), begin.spots.get(action.get("entityRef")), action.get("entityRef")
+    if own is None or other is None:
+        raise ValueError(f"{name} or {reference} has no place")
+    where = actions.findings.word(action, "displacement", DISPLACEMENTS, "any")
+    is_ahead = _is_ahead(own, other) if where == "any" else where == DISPLACEMENTS[1]
+    ahead, behind = (name, reference) if is_ahead else (reference, name)
+    away = headway * begin.speed(behind) + distance
+    if is_between_bumpers:
+        away += actions.vehicles[behind].front + actions.vehicles[ahead].rear
+    lanes = actions.positions.lanes
+    spot = lanes.along(other, away if is_ahead else -away)
+    return lanes.beside(spot, own.lane.index - other.lane.index).shifted(own.offset)
 
 
 def _is_ahead(one: Spot | None, other: Spot | None) -> bool:
@@ -147,7 +177,7 @@ def along_route(route: tuple[str, ...], begin: Beginning, vehicles: Mapping[str,
         if isinstance(what, str):
             spot, further = begin.spots.get(what), vehicles[what].front
         else:
-            spot, further = actions.positions.spot(what), 0.0
+            spot, further = actions.positions.spot(what, is_of_vehicle=False), 0.0
         if spot is None or spot.lane.edge not in starts:
             return None
         return starts[spot.lane.edge] + spot.position + further

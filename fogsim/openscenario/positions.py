@@ -18,7 +18,7 @@ _ALONG = math.cos(0.3)
 
 @dataclass
 class Positions:
-    """Finds positions; relative ones refer to the known initial positions `entities`.
+    """Finds positions; relative ones refer to the known initial positions `entities`, whose ways are `ways`.
 
     `with_oncoming` if vehicles drive on the oncoming lane.
     """
@@ -27,6 +27,7 @@ class Positions:
     catalogs: Catalogs
     with_oncoming: bool = False
     entities: dict[str, Spot] = field(default_factory=dict)
+    ways: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def findings(self) -> Findings:
@@ -37,8 +38,8 @@ class Positions:
         """Entity to which a ``Position`` is relative; None for an absolute one."""
         return next((one.get("entityRef") or None for one in position.children), None)
 
-    def spot(self, position: Node) -> Spot | None:
-        """Place of a ``Position``; None, and a finding, if it cannot be placed."""
+    def spot(self, position: Node, *, is_of_vehicle: bool = True) -> Spot | None:
+        """Place of a ``Position``; None, and a finding, if it cannot be placed, or a vehicle cannot stand so there."""
         one = next(iter(position.all()), None)
         if one is None or one.tag not in _KINDS:
             message = REFUSED.get(one.tag, "") if one else "expected a position"
@@ -50,40 +51,41 @@ class Positions:
             return None
         try:
             found = _KINDS[one.tag](self, one)
-            return self._turned(one, found)
+            lane = found.world[2]
+            heading = self._heading(one, lane)
+            if is_of_vehicle and heading is not None and math.cos(heading - lane) < _ALONG:
+                left = math.degrees(heading - lane) % 360.0
+                message = f"it stands {left:.0f} degrees to the left of the direction of its lane"
+                raise ValueError(f"h: vehicles stand, and drive, along their lanes; {message}")
+            return found
         except ValueError as error:
             self.findings.refuse(one, str(error))
             return None
 
-    def _turned(self, node: Node, spot: Spot) -> Spot:
-        """Check an ``Orientation``, whose pitch and roll are the road's; ValueError unless the lane leads there."""
+    def _heading(self, node: Node, lane: float) -> float | None:
+        """Heading by an ``Orientation``, whose pitch and roll are the road's, or by `h` of the position [rad]."""
         orientation = node.one("Orientation")
         if orientation is None:
-            return spot
+            return self.findings.number(node, "h") if "h" in node.attributes else None
         kind = self.findings.word(orientation, "type", ("relative", "absolute"), "absolute")
         if not orientation.get("h"):
-            return spot
-        turn, lane = self.findings.number(orientation, "h"), spot.world[2]
-        if kind == "relative":
-            if node.tag == "RoadPosition" and turn:
-                turn += self.lanes.across(node.get("roadId"), self.findings.number(node, "s"), 0.0)[2]
-            else:
-                turn += self.entities[node.get("entityRef")].world[2] if node.get("entityRef") else lane
-        _check_heading(turn, lane)
-        return spot
+            return None
+        turn = self.findings.number(orientation, "h")
+        if kind == "absolute":
+            return turn
+        if node.tag == "RoadPosition":
+            return turn + self.lanes.across(node.get("roadId"), self.findings.number(node, "s"), 0.0)[2] if turn else lane
+        return turn + (self.entities[node.get("entityRef")].world[2] if node.get("entityRef") else lane)
 
     def world(self, node: Node) -> Spot:
-        """The nearest lane that leads there (by `h`, where it stands); the vehicle is in the lane's middle."""
+        """The nearest lane that leads there (by `h`, where it stands), and where in it."""
         x, y = self._numbers(node, "x", "y")
-        heading = self.findings.number(node, "h") if "h" in node.attributes else None
-        spot = self.lanes.at(x, y, heading)
-        _check_heading(heading, spot.world[2])
-        return spot
+        return self.lanes.at(x, y, self.findings.number(node, "h") if "h" in node.attributes else None)
 
     def lane(self, node: Node) -> Spot:
-        """That lane at s."""
-        self._no_offset(node)
-        return self.lanes.on_lane(node.get("roadId"), node.get("laneId"), self.findings.number(node, "s"))
+        """That lane at s, and `offset` from its middle."""
+        spot = self.lanes.on_lane(node.get("roadId"), node.get("laneId"), self.findings.number(node, "s"))
+        return self._shifted(spot, node)
 
     def road(self, node: Node) -> Spot:
         """The lane at s and t."""
@@ -92,14 +94,11 @@ class Positions:
 
     def relative_lane(self, node: Node) -> Spot:
         """The lane by an entity's number and `dLane`, along the road's line (`ds`), or ahead of it (`dsLane`)."""
-        self._no_offset(node)
         spot = self.entities[node.get("entityRef")]
-        # Numbers of lanes grow to the left of the road, on whose left side vehicles drive against it.
-        sense = 1.0 if all("_-" in one for one in spot.lane.origins) else -1.0
-        beside = self.lanes.beside(spot, int(sense * self.findings.number(node, "dLane")))
+        beside = self.lanes.beside(spot, int(sense(spot) * self.findings.number(node, "dLane")))
         if "dsLane" in node.attributes:
-            return self.lanes.along(beside, self.findings.number(node, "dsLane"))
-        return self.lanes.farther(beside, self.findings.number(node, "ds"))
+            return self._shifted(self.lanes.along(beside, self.findings.number(node, "dsLane")), node)
+        return self._shifted(self.lanes.farther(beside, self.findings.number(node, "ds")), node)
 
     def relative_world(self, node: Node) -> Spot:
         """The lane that is so far from an entity, along x and y."""
@@ -126,10 +125,9 @@ class Positions:
                 raise ValueError(f"there is no entity {entity!r} that has a place already")
             return self.entities[entity]
         spot, lane = self.lanes.along(first, self.findings.number(inner, "pathS"), edges), inner.get("laneId")
-        self._no_offset(inner, "laneOffset")
         for one in self.lanes.lanes:
             if one.edge == spot.lane.edge and any(origin.endswith(f"_{lane}") for origin in one.origins):
-                return Spot(one, spot.position * one.length / spot.lane.length)
+                return self._shifted(Spot(one, spot.position * one.length / spot.lane.length), inner, "laneOffset")
         raise ValueError(f"there is no lane {lane!r} to drive on there")
 
     def route(self, holder: Node) -> tuple[Spot, tuple[str, ...]]:
@@ -158,16 +156,14 @@ class Positions:
         first, second = (self.findings.number(node, key) for key in keys)
         return first, second
 
-    def _no_offset(self, node: Node, key: str = "offset") -> None:
-        if self.findings.number(node, key, 0.0):
-            self.findings.refuse(node, f"{key}: vehicles are in the middle of their lanes; write 0")
+    def _shifted(self, spot: Spot, node: Node, key: str = "offset") -> Spot:
+        """The place so far from its lane's middle, in the direction of t."""
+        return spot.shifted(sense(spot) * self.findings.number(node, key, 0.0))
 
 
-def _check_heading(heading: float | None, lane: float) -> None:
-    """ValueError if a heading is not that of its lane."""
-    if heading is not None and math.cos(heading - lane) < _ALONG:
-        message = f"{math.degrees(heading - lane) % 360.0:.0f} degrees to the left of the direction of its lane"
-        raise ValueError(f"h: vehicles stand, and drive, along their lanes; it stands {message}")
+def sense(spot: Spot) -> float:
+    """1 on a lane along its road, -1 against it: numbers of lanes, and t, grow to the left of the road."""
+    return 1.0 if all("_-" in one for one in spot.lane.origins) else -1.0
 
 
 _KINDS: Mapping[str, Callable[[Positions, Node], Spot]] = {

@@ -175,6 +175,8 @@ class Storyboard:
     def _played(self, entry: Entry, name: str) -> Trigger:
         """When an execution of an event is over."""
         effect, phrase = entry.effect, f"happened({name})"
+        if effect.is_endless:
+            return Trigger("time < 0 s", stays=True)
         if effect.ends_itself:
             if any(_MOTION & done.keys() for done in effect.do.values()):
                 self.findings.refuse(

@@ -33,6 +33,7 @@ def vehicles_text(vehicles: Mapping[str, Vehicle], begin: Beginning) -> str:
                 depart="0",
                 departLane=front.lane.index,
                 departPos=f"{front.position:.3f}",
+                departPosLat=f"{front.offset:.3f}",
                 departSpeed=f"{speed:.4f}",
                 # Exactly where the file has it, however near to the next vehicle.
                 insertionChecks="none",

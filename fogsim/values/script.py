@@ -90,12 +90,15 @@ class Follow:
         Gap, bumper to bumper, over the vehicle's own speed [s].
     hold : float
         Time until the driver drives by himself again [s].
+    gap : float
+        Gap at standstill, to which the headway adds [m].
     """
 
     vehicle: str
     leader: str
     headway: float
     hold: float = math.inf
+    gap: float = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,6 +141,8 @@ class ChangeLane:
         Time for which it indicates before [s]; the lamp goes out when it is over. 0 for no indicating.
     oncoming : bool
         Whether it goes to the lane beyond the left one, whose traffic comes towards it, whatever `lanes` is.
+    offset : float or None
+        Distance of its middle from the lane's middle afterwards, to the left [m]; None for the one that it has.
     """
 
     vehicle: str
@@ -146,6 +151,7 @@ class ChangeLane:
     duration: float | None = None
     indicator: float = 0.0
     oncoming: bool = False
+    offset: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -190,7 +190,7 @@ def _of_vehicle(subject: str, doing: VehicleActions, now: Situation) -> list[Tra
     if doing.follow:
         follow, leader = doing.follow, now.vehicle_id(doing.follow.vehicle)
         is_there = now.speed(follow.vehicle) is not None
-        moves.append(Follow(vehicle, leader, follow.headway_s, _endless(follow.for_s)) if is_there else None)
+        moves.append(Follow(vehicle, leader, follow.headway_s, _endless(follow.for_s), follow.gap_m) if is_there else None)
     if doing.stop:
         moves.append(_stopping(vehicle, doing.stop, now.position(subject)))
     if doing.change_lane:
@@ -277,7 +277,7 @@ def _lane_change(vehicle: str, action: LaneAction, subject: str, speed: float, n
     duration = action.duration_s
     if action.distance_m is not None:
         duration = min(action.distance_m / max(speed, _SLOWEST), LONGEST_CHANGE)
-    return ChangeLane(vehicle, lanes, action.stay_s, duration, action.indicator_s, oncoming)
+    return ChangeLane(vehicle, lanes, action.stay_s, duration, action.indicator_s, oncoming, action.offset_m)
 
 
 def _density(action: FogActions, reference: float) -> float:

@@ -113,8 +113,11 @@ class FollowAction(Section):
     vehicle: Id
     """The other one: its id, or `ego`."""
 
-    headway_s: Annotated[Period, Field(le=60)]
-    """Gap, bumper to bumper, over its own speed; 2 m at standstill."""
+    headway_s: Annotated[Time, Field(le=60)] = 0.0
+    """Gap, bumper to bumper, over its own speed."""
+
+    gap_m: Annotated[Number, Field(ge=-100, le=1000)] = 2.0
+    """Gap at standstill, to which the headway adds; negative between other points than the bumpers."""
 
     for_s: Period | None = None
     """How long; without it, to the end of the run."""
@@ -170,6 +173,9 @@ class LaneAction(Section):
 
     stay_s: Period = 60.0
     """How long it stays there."""
+
+    offset_m: Annotated[Number, Field(ge=-10, le=10)] | None = None
+    """Distance of its middle from the lane's middle afterwards, to the left; `lanes: 0` moves it in its own lane."""
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:

@@ -11,9 +11,6 @@ from fogsim.values import Lamp, TrafficState
 from fogsim.values.light import Side, dark_on, settled
 from fogsim.values.script import ChangeLane, ChangeSpeed, Follow, SetLamps, Shape, Stop, TrafficAction
 
-BESIDE_STANDSTILL = 2.0
-"""Gap that a following vehicle leaves when it stands [m]."""
-
 GAP_GAIN, SPEED_GAIN = 0.25, 0.8
 """Of the law by which a scripted vehicle follows: acceleration for a gap [1/s²] and for a difference of speeds [1/s].
 
@@ -105,7 +102,7 @@ class _FollowCourse:
         gap, own = motion.gap(follow.vehicle, follow.leader), motion.speed(follow.vehicle)
         if gap is None:
             return math.inf
-        excess = gap - BESIDE_STANDSTILL - follow.headway * own
+        excess = gap - follow.gap - follow.headway * own
         wanted = GAP_GAIN * excess + SPEED_GAIN * (motion.speed(follow.leader) - own)
         return max(own + min(max(wanted, LEAST_ACCELERATION), MOST_ACCELERATION) * motion.step, 0.0)
 

@@ -4,7 +4,7 @@ import heapq
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.etree.ElementTree import Element, fromstring
 
@@ -19,6 +19,7 @@ from fogsim.traffic.road.plan_view import PlanView, plan_view
 FARTHEST_ROUTE, LONGEST_LAPS = 50_000.0, 10_000.0
 """Lengths at which an endless route, and one that goes round and round, is cut off [m]."""
 
+_ROUNDING = 0.01  # of places across a lane [m]
 NEAR_JUNCTION = 2.0
 """Distance by which a place inside a junction is moved to its end [m]."""
 
@@ -46,10 +47,11 @@ class RoadLane:
 
 @dataclass(frozen=True, slots=True)
 class Spot:
-    """A place on a lane, by its distance from the start as SUMO counts it [m]."""
+    """A place on a lane, by its distance from the start as SUMO counts it, and to the left of its middle [m]."""
 
     lane: RoadLane
     position: float
+    offset: float = 0.0
 
     @property
     def world(self) -> tuple[float, float, float]:
@@ -61,7 +63,13 @@ class Spot:
         piece = min(int(np.searchsorted(ends, along)), len(lengths) - 1)
         left = along - (ends[piece] - lengths[piece])
         (x, y), (dx, dy) = self.lane.shape[piece], steps[piece] / lengths[piece]
-        return float(x + left * dx), float(y + left * dy), math.atan2(dy, dx)
+        return float(x + left * dx - self.offset * dy), float(y + left * dy + self.offset * dx), math.atan2(dy, dx)
+
+    def shifted(self, offset: float) -> "Spot":
+        """The place so far to the left of the lane's middle [m]; ValueError if it is not in the lane."""
+        if abs(offset) > 0.5 * self.lane.width + _ROUNDING:
+            raise ValueError(f"{abs(offset):g} m from the middle is not in its lane, {self.lane.width:g} m wide")
+        return replace(self, offset=offset)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,10 +109,11 @@ class OpenDriveLanes:
         feet = [_foot(one, x, y) for one in self.lanes]
         fit = [(d, spot) for d, spot in feet if heading is None or math.cos(spot.world[2] - heading) > 0.0]
         distance, spot = min(fit, key=lambda one: one[0], default=(math.inf, None))
-        if spot is None or distance > 0.5 * spot.lane.width + 0.01:
+        if spot is None or distance > 0.5 * spot.lane.width + _ROUNDING:
             away = "" if spot is None else f"; the nearest is {distance:.1f} m away"
             raise ValueError(f"({x:g}, {y:g}) is on no lane that leads there{away}")
-        return spot
+        middle_x, middle_y, along = spot.world
+        return replace(spot, offset=(y - middle_y) * math.cos(along) - (x - middle_x) * math.sin(along))
 
     def beside(self, spot: Spot, lanes: int) -> Spot:
         """Place on the lane that is `lanes` to the left on the same edge; ValueError if there is none."""
@@ -133,7 +142,7 @@ class OpenDriveLanes:
         lane, position = spot.lane, spot.position + distance
         for _ in range(len(self.lanes)):
             if 0.0 <= position <= lane.length:
-                return Spot(lane, position)
+                return Spot(lane, position, spot.offset)
             other, crossing = self._neighbour(lane, position > lane.length, route)
             beyond = position - lane.length if position > lane.length else -position
             if beyond < crossing:

@@ -7,6 +7,7 @@ from fogsim.traffic.sumo.claims import LANE_CHANGE_MODE, Claims
 from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
 from fogsim.traffic.sumo.link import Api, is_off_lanes
 from fogsim.traffic.sumo_behaviour.departures import depart, enter
+from fogsim.traffic.sumo_behaviour.lane_offsets import LaneOffsets
 from fogsim.traffic.sumo_behaviour.signal_control import SignalControl
 from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
@@ -51,6 +52,7 @@ class ScriptedActions:
         self._lane_changes = lane_changes
         self._signals = SignalControl(api)
         self._modes = Claims(api, LANE_CHANGE_MODE, f"{session}.script")
+        self._offsets = LaneOffsets(api)
         self._changing: dict[str, float] = {}
         self._oncoming: set[str] = set()
 
@@ -127,14 +129,23 @@ class ScriptedActions:
         """
         self._signals.update(time)
         self._end_changes(time, present)
-        if self._playing.is_idle:
-            return
+        if not self._playing.is_idle:
+            self._play(time, present)
+        self._offsets.play(time + self._step, present)
+
+    def _play(self, time: float, present: Collection[str]) -> None:
         motion = self._motion(time, present)
         self._speeds.impose(self._playing.speeds(motion), self._playing.following)
         for change in self._playing.changes(motion):
             self._change_lane(change, time)
 
     def _change_lane(self, change: ChangeLane, time: float) -> None:
+        is_in_lane = change.offset is not None and not change.lanes
+        if change.offset is not None:
+            # What is shown glides to another lane by itself.
+            self._offsets.begin(change.vehicle, change.offset, (change.duration or 0.0) * is_in_lane, time)
+        if is_in_lane:
+            return
         vehicle, mode = change.vehicle, int(self._modes.own_value(change.vehicle))
         self._modes.claim(vehicle, mode & ~_REGARD_OF_OTHERS | _NO_COLLISION)
         self._changing[vehicle] = time + min(change.stay, LONGEST_CHANGE)

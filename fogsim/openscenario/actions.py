@@ -12,6 +12,7 @@ from fogsim.openscenario.entities import Vehicle
 from fogsim.openscenario.environment import environment_of
 from fogsim.openscenario.findings import Findings
 from fogsim.openscenario.positions import Positions, sense
+from fogsim.openscenario.triggers import NEAR
 from fogsim.openscenario.xml_tree import Node
 from fogsim.traffic.road.opendrive_lanes import Spot
 from fogsim.units import KMH_PER_MPS
@@ -36,7 +37,7 @@ LAMPS = {
 _UNLIT = ("licensePlateIllumination", "reversingLights", "specialPurposeLights")
 _STEEPEST = {"linear": 1.0, "sinusoidal": 0.5 * math.pi, "cubic": 1.5}  # Greatest rate of a shape, over its mean
 _STAY = 1e5  # Time for which a vehicle stays in the lane that it has changed to [s]
-_NEAR = 0.05  # Difference at which a speed has been reached [m/s]
+_LEAST = 0.05  # Lateral acceleration of a move within a lane [m/s²]
 DISPLACEMENTS = ("any", "leadingReferencedEntity", "trailingReferencedEntity")
 """Where a vehicle is to be, seen from the one to which it keeps a distance."""
 
@@ -45,8 +46,9 @@ DISPLACEMENTS = ("any", "leadingReferencedEntity", "trailingReferencedEntity")
 class Effect:
     """What an event does: timeline blocks by subject, their known duration [s], and conditions that end the rest.
 
-    `routes` are edges through the waypoints of a vehicle's route; `ends_itself` if only the run shows its duration, and
-    `is_endless` if something of it goes on until something else ends it.
+    `routes` are edges through the waypoints of a vehicle's route, and `sets` values of parameters and variables. It
+    `ends_itself` if only the run shows its duration, `is_endless` if something else must end it, and `has_unknown_end`
+    if nothing shows it. `is_at_start` in ``Init``.
     """
 
     do: dict[str, dict[str, Any]] = field(default_factory=dict)
@@ -55,6 +57,9 @@ class Effect:
     routes: dict[str, tuple[str, ...]] = field(default_factory=dict)
     ends_itself: bool = False
     is_endless: bool = False
+    has_unknown_end: bool = False
+    sets: dict[str, str] = field(default_factory=dict)
+    is_at_start: bool = False
 
     def add(self, subject: str, **blocks: Any) -> None:
         """Add an action of a subject."""
@@ -65,7 +70,8 @@ class Effect:
     def changes_speed(self, subject: str) -> bool:
         """Whether a subject's speed changes, or goes by another vehicle's, for some time."""
         speed = self.do.get(subject, {}).get("speed", {})
-        return "follow" in self.do.get(subject, {}) or "continuous" in speed or speed.get("shape", "step") != "step"
+        is_gradual = "continuous" in speed or "profile" in speed or speed.get("shape", "step") != "step"
+        return "follow" in self.do.get(subject, {}) or is_gradual
 
 
 @dataclass
@@ -96,6 +102,8 @@ class Actions:
             elif one.tag == "OverrideControllerValueAction":
                 if any(self.findings.flag(input_, "active", "false") for input_ in one.all()):
                     self.findings.refuse(one, "speeds and lanes are ordered, not pedals; write active=false")
+            elif one.tag in ("ParameterAction", "VariableAction"):
+                self._set(one, effect)
             elif one.tag in HARMLESS:
                 self.findings.leave_out(one, HARMLESS[one.tag])
             elif one.tag not in _PRIVATE:
@@ -114,6 +122,14 @@ class Actions:
                 _PRIVATE[action.tag](self, action, actor, effect)
             except ValueError as error:
                 self.findings.refuse(action, str(error))
+
+    def _set(self, action: Node, effect: Effect) -> None:
+        """Nothing that can be seen: what conditions on a parameter or variable compare."""
+        to, name = action.one("SetAction"), action.get("parameterRef") or action.get("variableRef")
+        if to is None:
+            self.findings.refuse(action, "expected a SetAction: values are set, not changed by others")
+        else:
+            effect.sets[name] = to.get("value")
 
     def _environment(self, action: Node, effect: Effect) -> None:
         read = environment_of(action, self.catalogs, self.positions.lanes)
@@ -136,10 +152,34 @@ class Actions:
         speed = {**message, **(self._pace(dynamics, effect) if dynamics else {"shape": "step"})}
         if "rate_mps2" in speed and "to_kmh" in speed:
             own, to = f"{self.called(actor)}.speed", speed["to_kmh"] / KMH_PER_MPS
-            effect.ends.append(f"{own} > {to - _NEAR:.9g} m/s and {own} < {to + _NEAR:.9g} m/s")
+            effect.ends.append(f"{own} > {to - NEAR:.9g} m/s and {own} < {to + NEAR:.9g} m/s")
         effect.is_endless |= "continuous" in speed
         # At a rate of 0 a speed stays as it is.
         effect.add(actor, speed=self.held(actor) if speed.get("rate_mps2") == 0.0 else speed)
+
+    def _speed_profile(self, action: Node, actor: str, effect: Effect) -> None:
+        """`speed` by its `profile`; without a time as fast as `DynamicConstraints` or the vehicle allow."""
+        vehicle, limits, entries = (
+            self.vehicles[actor],
+            action.one("DynamicConstraints"),
+            action.all("SpeedProfileEntry"),
+        )
+        if action.get("entityRef") or not entries:
+            raise ValueError("expected SpeedProfileEntry elements whose speeds are absolute, without entityRef")
+        self.findings.word(action, "followingMode", ("position", "follow"))
+        profile: list[tuple[float, float]] = []
+        for entry in entries:
+            speed, time = self.findings.number(entry, "speed"), self.findings.number(entry, "time", -1.0)
+            before, last = profile[-1][::-1] if profile else (speed, 0.0)
+            if time < 0.0:
+                way, own = (
+                    ("Acceleration", vehicle.acceleration) if speed > before else ("Deceleration", vehicle.deceleration)
+                )
+                time = abs(speed - before) / (self.findings.number(limits, f"max{way}", own) if limits else own)
+            # SUMO counts milliseconds.
+            profile.append((last + max(time, 0.001 * bool(profile)), speed))
+        effect.lasts = max(effect.lasts, profile[-1][0])
+        effect.add(actor, speed={"profile": [[time, speed * KMH_PER_MPS] for time, speed in profile]})
 
     def _target(self, target: Node) -> dict[str, Any]:
         absolute, relative = target.one("AbsoluteTargetSpeed"), target.one("RelativeTargetSpeed")
@@ -217,7 +257,7 @@ class Actions:
         return self.offsets.get(vehicle, begins.offset if begins else 0.0)
 
     def _lane_offset(self, action: Node, actor: str, effect: Effect) -> None:
-        """`change_lane` with `offset_m`, along half a wave of a cosine whose greatest acceleration is `maxLateralAcc`."""
+        """`change_lane` with `offset_m`, along half a wave of a cosine with `maxLateralAcc` as its greatest acceleration."""
         dynamics, target = action.one("LaneOffsetActionDynamics"), action.one("LaneOffsetTarget")
         to = target.one("AbsoluteTargetLaneOffset", "RelativeTargetLaneOffset") if target else None
         begins = self.positions.entities.get(actor)
@@ -235,7 +275,7 @@ class Actions:
         across = abs(offset - self._offset(actor))
         if other and "to_lane_of" in lanes:
             across += begins.lane.width * abs(other.lane.index - begins.lane.index)
-        lasts = 0.0 if shape == "step" else math.pi * math.sqrt(0.5 * across / max(most, _NEAR))
+        lasts = 0.0 if shape == "step" else math.pi * math.sqrt(0.5 * across / max(most, _LEAST))
         self.offsets[actor] = begins.shifted(offset).offset
         effect.lasts = max(effect.lasts, lasts)
         effect.is_endless |= self.findings.flag(action, "continuous")
@@ -320,12 +360,48 @@ class Actions:
         effect.add(actor, follow=follow)
 
     def gap(self, action: Node) -> tuple[float, float, bool]:
-        """Time gap [s] and distance [m] to keep, one of them 0, and whether it is between bumpers; ValueError if none."""
+        """Time gap [s], distance [m], one of them 0, and whether it is between bumpers; ValueError unless one is given."""
         headway, distance = (self.findings.number(action, key, 0.0) for key in ("timeGap", "distance"))
         if bool(action.get("timeGap")) == bool(action.get("distance")):
             raise ValueError("expected a timeGap or a distance")
         self.findings.word(action, "coordinateSystem", ("entity", "lane", "road"), "entity")
         return headway, distance, self.findings.flag(action, "freespace")
+
+    def _trajectory(self, action: Node, actor: str, effect: Effect) -> None:
+        """`path`: a polyline, by its times or at the vehicle's speed, on the lanes or off them."""
+        holder = action.one("TrajectoryRef") or action
+        reference = holder.one("CatalogReference")
+        trajectory = self.catalogs.entry(reference) if reference else holder.one("Trajectory")
+        polyline = trajectory.within("Shape", "Polyline") if trajectory else None
+        if trajectory is None or polyline is None:
+            raise ValueError("expected a Trajectory with a Polyline")
+        self.findings.word(
+            action.one("TrajectoryFollowingMode") or action, "followingMode", ("position", "follow"), "follow"
+        )
+        reference_time, vertices = action.one("TimeReference"), polyline.all("Vertex")
+        timing = reference_time.one("Timing", "None") if reference_time else None
+        places = [self.positions.point(place) for one in vertices for place in one.all("Position")]
+        points = [[x, y] if heading is None else [x, y, math.degrees(heading)] for x, y, heading, _ in places]
+        if any(len(one) == 2 for one in points) and len(points) > 1:
+            points = [one[:2] for one in points]
+        path: dict[str, Any] = {"points": points, "ahead_m": self.vehicles[actor].front}
+        path |= {"stays": True} if self.vehicles[actor].body else {}
+        if timing and timing.tag == "Timing":
+            scale, offset = self.findings.number(timing, "scale"), self.findings.number(timing, "offset")
+            base = self.findings.word(timing, "domainAbsoluteRelative", ("absolute", "relative"))
+            if base == "absolute" and not effect.is_at_start:
+                raise ValueError("domainAbsoluteRelative: in a story, times count from the beginning of the action")
+            path["at_s"] = [scale * self.findings.number(one, "time") + offset for one in vertices]
+            effect.lasts = max(effect.lasts, path["at_s"][-1])
+        else:
+            for one in vertices:
+                one.get("time")
+            effect.has_unknown_end = True
+        if self.findings.flag(trajectory, "closed"):
+            raise ValueError("closed: write the first vertex again as the last one, and false")
+        if reference:
+            self.findings.look_for_unread(trajectory)
+        effect.add(actor, path=path)
 
     def _assign_route(self, action: Node, actor: str, effect: Effect) -> None:
         """In `Init`: the way through the waypoints, with changes of lane that it needs, and then straight on."""
@@ -342,10 +418,12 @@ class Actions:
 
 _PRIVATE: Mapping[str, Callable[[Actions, Node, str, Effect], None]] = {
     "SpeedAction": Actions._speed,
+    "SpeedProfileAction": Actions._speed_profile,
     "LaneChangeAction": Actions._lane_change,
     "LaneOffsetAction": Actions._lane_offset,
     "LightStateAction": Actions._lights,
     "LongitudinalDistanceAction": Actions._keep_distance,
+    "FollowTrajectoryAction": Actions._trajectory,
     "AssignRouteAction": Actions._assign_route,
     "AcquirePositionAction": Actions._acquire,
 }

@@ -27,7 +27,14 @@ Sun@elevation,illuminance,intensity Precipitation@intensity,precipitationIntensi
 RoadCondition@frictionScaleFactor,wetness
 SpeedAction SpeedActionDynamics@dynamicsDimension,dynamicsShape,value SpeedActionTarget AbsoluteTargetSpeed@value
 RelativeTargetSpeed@continuous,entityRef,speedTargetValueType,value
-LongitudinalDistanceAction@continuous,coordinateSystem,displacement,entityRef,freespace,timeGap
+LongitudinalDistanceAction@continuous,coordinateSystem,displacement,distance,entityRef,freespace,timeGap
+LaneOffsetAction@continuous LaneOffsetActionDynamics@dynamicsShape,maxLateralAcc LaneOffsetTarget
+AbsoluteTargetLaneOffset@value RelativeTargetLaneOffset@entityRef,value
+SpeedProfileAction@entityRef,followingMode SpeedProfileEntry@speed,time
+FollowTrajectoryAction Trajectory@closed,name TrajectoryRef TrajectoryFollowingMode@followingMode Shape Polyline Vertex@time
+TimeReference None Timing@domainAbsoluteRelative,offset,scale TrajectoryCatalog
+ParameterAction@parameterRef VariableAction@variableRef SetAction@value VariableDeclarations VariableDeclaration@name,value
+ParameterCondition@parameterRef,rule,value VariableCondition@rule,value,variableRef
 LaneChangeAction@targetLaneOffset LaneChangeActionDynamics@dynamicsDimension,dynamicsShape,value LaneChangeTarget
 AbsoluteTargetLane@value RelativeTargetLane@entityRef,value
 LightStateAction@transitionTime LightType VehicleLight@vehicleLightType LightState@mode
@@ -35,7 +42,7 @@ ControllerAction OverrideControllerValueAction Throttle@active Brake@active Clut
 SteeringWheel@active Gear@active
 WorldPosition@h,x,y LanePosition@laneId,offset,roadId,s RoadPosition@roadId,s,t Orientation@h,type
 RelativeLanePosition@dLane,ds,dsLane,entityRef,offset RelativeWorldPosition@dx,dy,entityRef
-RelativeObjectPosition@dx,dy,entityRef
+RelativeObjectPosition@dx,dy,entityRef RelativeRoadPosition@ds,dt,entityRef
 StartTrigger StopTrigger ConditionGroup Condition@conditionEdge,delay ByValueCondition ByEntityCondition EntityCondition
 TriggeringEntities@triggeringEntitiesRule SimulationTimeCondition@rule,value
 StoryboardElementStateCondition@state,storyboardElementRef,storyboardElementType
@@ -74,9 +81,8 @@ HARMLESS: Mapping[str, str] = _by_name(
         "Vehicle@role Pedestrian@role": "who has another role moves alike",
         "Pedestrian@mass Pedestrian@model Pedestrian@model3d MiscObject@mass MiscObject@model3d": "persons have "
         "figures of FogSim's, and everything else is a box",
-        "ParameterDeclaration@parameterType": "a value is checked where it is used",
-        "TrajectoryCatalog": "a folder; its entries may not be used",
-        "VariableDeclarations VariableDeclaration MonitorDeclarations MonitorDeclaration": "nothing may use them",
+        "ParameterDeclaration@parameterType VariableDeclaration@variableType": "a value is checked where it is used",
+        "MonitorDeclarations MonitorDeclaration": "nothing may use them",
         "UsedArea": "the whole network is there",
         "Condition@name": "a label",
         "ObjectController Controller AssignControllerAction ActivateControllerAction": "programs of "
@@ -108,15 +114,12 @@ REFUSED: Mapping[str, str] = _by_name(
         "are vehicles that are there from beginning to end",
         "RandomRouteAction": "who has no route goes straight on",
         "FromRoadCoordinates": "a place on a route has a lane; write FromLaneCoordinates",
-        "FollowTrajectoryAction Trajectory TrajectoryRef TrajectoryFollowingMode TrajectoryPosition Shape Polyline "
-        "Vertex Clothoid ClothoidSpline ClothoidSplineSegment PositionStart Nurbs ControlPoint Knot TimeReference None "
-        "Timing": "vehicles keep to their lanes; there are no trajectories",
-        "SpeedProfileAction SpeedProfileEntry SynchronizeAction TargetPosition TargetPositionMaster FinalSpeed "
+        "TrajectoryPosition Clothoid ClothoidSpline ClothoidSplineSegment PositionStart Nurbs ControlPoint Knot "
+        "FollowTrajectoryAction@initialDistanceOffset": "trajectories are polylines, from their first vertex on",
+        "SynchronizeAction TargetPosition TargetPositionMaster FinalSpeed "
         "AbsoluteSpeed RelativeSpeedToMaster TargetDistanceSteadyState TargetTimeSteadyState": "speeds change by time "
         "or rate",
-        "LongitudinalDistanceAction@distance": "a distance is kept by a timeGap",
-        "LaneOffsetAction LaneOffsetActionDynamics LaneOffsetTarget AbsoluteTargetLaneOffset RelativeTargetLaneOffset "
-        "LateralDistanceAction": "vehicles are in the middle of their lanes",
+        "LateralDistanceAction": "where vehicles are in their lanes does not depend on others",
         "VisibilityAction SensorReferenceSet SensorReference": "everything can be seen that the fog does not hide",
         "AnimationAction AnimationType AnimationState AnimationFile ComponentAnimation VehicleComponent "
         "UserDefinedComponent PedestrianAnimation PedestrianGesture UserDefinedAnimation": "nothing moves on a body",
@@ -130,11 +133,10 @@ REFUSED: Mapping[str, str] = _by_name(
         "RoadRange RoadCursor Lane Polygon VehicleCategoryDistribution VehicleCategoryDistributionEntry "
         "VehicleRoleDistribution VehicleRoleDistributionEntry ControllerDistribution ControllerDistributionEntry "
         "DirectionOfTravelDistribution": "there is no traffic but the entities",
-        "ParameterAction SetAction ModifyAction Rule AddValue MultiplyByValue ParameterCondition VariableAction "
-        "VariableCondition SetMonitorAction": "values do not change while a run lasts",
+        "ModifyAction Rule AddValue MultiplyByValue SetMonitorAction": "values are set, not changed by others",
         "UserDefinedAction CustomCommandAction UserDefinedValueCondition UserDefinedDistribution": "its meaning is "
         "another simulator's",
-        "GeoPosition RelativeRoadPosition": "places are by lane, by road, in the map's metres, or by an entity",
+        "GeoPosition": "places are by lane, by road, in the map's metres, or by an entity",
         "OffroadCondition AngleCondition RelativeAngleCondition RelativeClearanceCondition "
         "RelativeLaneRange TimeOfDayCondition": "FogSim has no such condition",
         "DistanceCondition@routingAlgorithm RelativeDistanceCondition@routingAlgorithm "

@@ -6,24 +6,28 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fogsim.openscenario.actions import DISPLACEMENTS, Actions, Effect
-from fogsim.openscenario.entities import Vehicle
+from fogsim.openscenario.entities import Vehicle, ego_of
 from fogsim.openscenario.environment import Environment, environment_of
+from fogsim.openscenario.positions import ALONG, Positions
 from fogsim.openscenario.xml_tree import Node
 from fogsim.traffic.road.opendrive_lanes import Spot
 from fogsim.units import KMH_PER_MPS
+
+_STRAIGHT = 1000.0  # Way of those off the lanes in the direction in which they stand [m]
 
 
 @dataclass
 class Beginning:
     """Initial state: reference points and ordered speeds of vehicles, fog and light, and further effects.
 
-    `names` are the vehicles by their names in the timeline, `fronts` the places of front bumpers, `ways` the edges
-    from there on, and `distances` the actions that place a vehicle at a distance to another one.
+    `names` are the vehicles by their names in the timeline, `ways` their edges, `off_lanes` the places of those on no
+    lane, `fronts` the places of front bumpers, and `distances` the actions that place one at a distance to another.
     """
 
     spots: dict[str, Spot]
     names: Mapping[str, str]
     ways: dict[str, tuple[str, ...]]
+    off_lanes: dict[str, tuple[float, float, float]]
     fronts: dict[str, Spot] = field(default_factory=dict)
     orders: dict[str, Mapping[str, Any]] = field(default_factory=dict)
     environment: Environment = field(default_factory=Environment)
@@ -43,8 +47,9 @@ class Beginning:
 
 def read_beginning(init: Node | None, vehicles: Mapping[str, Vehicle], actions: Actions) -> Beginning:
     """Initial state from the element ``Init``."""
+    positions = actions.positions
     names = {actions.called(name).strip('"'): name for name in vehicles}
-    begin = Beginning(actions.positions.entities, names, actions.positions.ways)
+    begin = Beginning(positions.entities, names, positions.ways, positions.off_lanes)
     blocks = init.all("Actions") if init else []
     for block in blocks:
         for action in block.all("GlobalAction"):
@@ -60,18 +65,34 @@ def read_beginning(init: Node | None, vehicles: Mapping[str, Vehicle], actions: 
         except ValueError as error:
             actions.findings.refuse(action, str(error))
     for name, vehicle in vehicles.items():
-        if name not in begin.spots:
-            if not actions.findings.refused:
-                actions.findings.refuse(vehicle.node, f"{name} has no place: Init needs a TeleportAction of it")
-            continue
+        _begin(name, vehicle, begin, vehicles, actions)
+    return begin
+
+
+def _begin(name: str, vehicle: Vehicle, begin: Beginning, vehicles: Mapping[str, Vehicle], actions: Actions) -> None:
+    """Find where a vehicle's front bumper begins, and its way, or its path off the lanes."""
+    if name in begin.off_lanes or (name not in begin.spots and "path" in begin.effect.do.get(name, {})):
+        _place_off_lanes(name, vehicle, begin)
+    elif name in begin.spots:
         try:
-            wanted = begin.effect.routes.get(name, ())
             begin.fronts[name] = _front(name, begin, vehicles, actions)
+            wanted = begin.effect.routes.get(name, ())
             begin.ways[name] = actions.positions.lanes.route(begin.fronts[name].lane.edge, wanted)
         except ValueError as error:
             actions.findings.refuse(vehicle.node, f"{name} cannot begin where it is to: {error}")
             del begin.spots[name]
-    return begin
+    elif not actions.findings.refused:
+        actions.findings.refuse(vehicle.node, f"{name} has no place: Init needs a TeleportAction of it")
+
+
+def _place_off_lanes(name: str, vehicle: Vehicle, begin: Beginning) -> None:
+    """Let a vehicle or body begin beside the lanes, or turned on one; it moves straight on unless it has a path."""
+    (x, y, heading), speed = begin.off_lanes.setdefault(name, (0.0, 0.0, 0.0)), begin.speed(name)
+    far, degrees = _STRAIGHT if speed or vehicle.body else 0.0, math.degrees(heading)
+    ends = [[x + way * math.cos(heading), y + way * math.sin(heading), degrees] for way in (0.0, far)]
+    path = {"points": ends, "ahead_m": vehicle.front, "stays": True}
+    done = begin.effect.do.setdefault(name, {})
+    done["path"] = {**done.get("path", path), "speed_kmh": speed * KMH_PER_MPS}
 
 
 def _front(name: str, begin: Beginning, vehicles: Mapping[str, Vehicle], actions: Actions) -> Spot:
@@ -110,9 +131,27 @@ def _place(private: list[Node], vehicles: Mapping[str, Vehicle], actions: Action
     while wanted:
         ready = [n for n, position in wanted.items() if positions.refers_to(position) not in wanted] or list(wanted)
         for name in ready:
-            spot = positions.spot(wanted.pop(name))
-            if spot is not None:
+            position = wanted.pop(name)
+            if (point := _off_lanes(position, vehicles[name], vehicles, positions)) is not None:
+                positions.off_lanes[name] = point
+            elif (spot := positions.spot(position)) is not None:
                 positions.entities[name] = spot
+
+
+def _off_lanes(
+    position: Node, vehicle: Vehicle, vehicles: Mapping[str, Vehicle], positions: Positions
+) -> tuple[float, float, float] | None:
+    """x, y [m] and heading [rad] of a place on no lane, or of a person or thing that is turned on one; else None."""
+    try:
+        x, y, heading, along = positions.point(position)
+        lane = positions.lanes.nearest(x, y)
+    except ValueError:
+        return None
+    facing = along if heading is None else heading
+    is_turned = lane is not None and facing is not None and math.cos(facing - lane.world[2]) < ALONG
+    if vehicle.name == ego_of(dict(vehicles)) or not (lane is None or (is_turned and vehicle.body)):
+        return None
+    return x, y, facing or 0.0
 
 
 def _take_private(action: Node, name: str, begin: Beginning, actions: Actions) -> None:
@@ -124,7 +163,7 @@ def _take_private(action: Node, name: str, begin: Beginning, actions: Actions) -
         begin.distances.append((name, distance))
         if not actions.findings.flag(distance, "continuous"):
             return
-    effect = Effect()
+    effect = Effect(is_at_start=True)
     actions.take(action, [name], effect)
     begin.effect.routes.update(effect.routes)
     done = effect.do.get(name, {})

@@ -4,7 +4,7 @@ import inspect
 import itertools
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from fogsim.openscenario.catalogs import Catalogs
 from fogsim.openscenario.elements import REFUSED
@@ -12,7 +12,10 @@ from fogsim.openscenario.findings import Findings
 from fogsim.openscenario.xml_tree import Node
 from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, Spot
 
-_ALONG = math.cos(0.3)
+Point = tuple[float, float, float | None]
+"""x, y [m] and heading [rad] of a place, None for any."""
+
+ALONG = math.cos(0.3)
 """Cosine of the angle to a lane at which a vehicle still stands along it."""
 
 
@@ -20,7 +23,8 @@ _ALONG = math.cos(0.3)
 class Positions:
     """Finds positions; relative ones refer to the known initial positions `entities`, whose ways are `ways`.
 
-    `with_oncoming` if vehicles drive on the oncoming lane.
+    `off_lanes` are x, y [m] and heading [rad] of those that begin on no lane, or turned on one; `with_oncoming` if
+    vehicles drive on the oncoming lane.
     """
 
     lanes: OpenDriveLanes
@@ -28,6 +32,7 @@ class Positions:
     with_oncoming: bool = False
     entities: dict[str, Spot] = field(default_factory=dict)
     ways: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    off_lanes: dict[str, tuple[float, float, float]] = field(default_factory=dict)
 
     @property
     def findings(self) -> Findings:
@@ -40,27 +45,39 @@ class Positions:
 
     def spot(self, position: Node, *, is_of_vehicle: bool = True) -> Spot | None:
         """Place of a ``Position``; None, and a finding, if it cannot be placed, or a vehicle cannot stand so there."""
+        try:
+            return self.on_lanes(position, is_of_vehicle=is_of_vehicle)
+        except ValueError as error:
+            self.findings.refuse(next(iter(position.children), position), str(error))
+            return None
+
+    def on_lanes(self, position: Node, *, is_of_vehicle: bool = True) -> Spot:
+        """Place of a ``Position`` on the lanes; ValueError if it has none, or a vehicle cannot stand so there."""
+        one, found = self._found(position)
+        spot = found if isinstance(found, Spot) else self.lanes.at(*found)
+        lane = spot.world[2]
+        heading = self._heading(one, lane)
+        if is_of_vehicle and heading is not None and math.cos(heading - lane) < ALONG:
+            left = math.degrees(heading - lane) % 360.0
+            message = f"it stands {left:.0f} degrees to the left of the direction of its lane"
+            raise ValueError(f"h: vehicles stand, and drive, along their lanes; {message}")
+        return spot
+
+    def point(self, position: Node) -> tuple[float, float, float | None, float | None]:
+        """x, y [m], heading and the road's direction [rad, None if not given] of a place anywhere; ValueError if none."""
+        one, found = self._found(position)
+        x, y, along = found.world if isinstance(found, Spot) else found
+        return x, y, self._heading(one, along or 0.0), along
+
+    def _found(self, position: Node) -> tuple[Node, Spot | Point]:
         one = next(iter(position.all()), None)
         if one is None or one.tag not in _KINDS:
             message = REFUSED.get(one.tag, "") if one else "expected a position"
-            self.findings.refuse(one or position, f"{message}; positions are {', '.join(_KINDS)}")
-            return None
+            raise ValueError(f"{message}; positions are {', '.join(_KINDS)}")
         reference = one.get("entityRef") if one.tag.startswith("Relative") else None
         if reference is not None and reference not in self.entities:
-            self.findings.refuse(one, f"there is no entity {reference!r} that has a place already")
-            return None
-        try:
-            found = _KINDS[one.tag](self, one)
-            lane = found.world[2]
-            heading = self._heading(one, lane)
-            if is_of_vehicle and heading is not None and math.cos(heading - lane) < _ALONG:
-                left = math.degrees(heading - lane) % 360.0
-                message = f"it stands {left:.0f} degrees to the left of the direction of its lane"
-                raise ValueError(f"h: vehicles stand, and drive, along their lanes; {message}")
-            return found
-        except ValueError as error:
-            self.findings.refuse(one, str(error))
-            return None
+            raise ValueError(f"there is no entity {reference!r} that has a place already")
+        return one, _KINDS[one.tag](self, one)
 
     def _heading(self, node: Node, lane: float) -> float | None:
         """Heading by an ``Orientation``, whose pitch and roll are the road's, or by `h` of the position [rad]."""
@@ -74,25 +91,30 @@ class Positions:
         if kind == "absolute":
             return turn
         if node.tag == "RoadPosition":
-            return turn + self.lanes.across(node.get("roadId"), self.findings.number(node, "s"), 0.0)[2] if turn else lane
+            return (
+                turn + self.lanes.across(node.get("roadId"), self.findings.number(node, "s"), 0.0)[2] if turn else lane
+            )
         return turn + (self.entities[node.get("entityRef")].world[2] if node.get("entityRef") else lane)
 
-    def world(self, node: Node) -> Spot:
+    def world(self, node: Node) -> Point:
         """The nearest lane that leads there (by `h`, where it stands), and where in it."""
         x, y = self._numbers(node, "x", "y")
-        return self.lanes.at(x, y, self.findings.number(node, "h") if "h" in node.attributes else None)
+        return x, y, self.findings.number(node, "h") if "h" in node.attributes else None
 
-    def lane(self, node: Node) -> Spot:
+    def lane(self, node: Node) -> Spot | Point:
         """That lane at s, and `offset` from its middle."""
-        spot = self.lanes.on_lane(node.get("roadId"), node.get("laneId"), self.findings.number(node, "s"))
-        return self._shifted(spot, node)
+        road, lane, s = node.get("roadId"), node.get("laneId"), self.findings.number(node, "s")
+        if any(f"{road}_{lane}" in one.origins for one in self.lanes.lanes) or road not in self.lanes.roads:
+            return self._shifted(self.lanes.on_lane(road, lane, s), node)
+        t = self.lanes.middle(road, lane, s) + self.findings.number(node, "offset", 0.0)
+        return self.lanes.across(road, s, t)
 
-    def road(self, node: Node) -> Spot:
+    def road(self, node: Node) -> Point:
         """The lane at s and t."""
         s, t = self._numbers(node, "s", "t")
-        return self.lanes.at(*self.lanes.across(node.get("roadId"), s, t))
+        return self.lanes.across(node.get("roadId"), s, t)
 
-    def relative_lane(self, node: Node) -> Spot:
+    def relative_lane(self, node: Node) -> Spot | Point:
         """The lane by an entity's number and `dLane`, along the road's line (`ds`), or ahead of it (`dsLane`)."""
         spot = self.entities[node.get("entityRef")]
         beside = self.lanes.beside(spot, int(sense(spot) * self.findings.number(node, "dLane")))
@@ -100,20 +122,35 @@ class Positions:
             return self._shifted(self.lanes.along(beside, self.findings.number(node, "dsLane")), node)
         return self._shifted(self.lanes.farther(beside, self.findings.number(node, "ds")), node)
 
-    def relative_world(self, node: Node) -> Spot:
+    def relative_world(self, node: Node) -> Point:
         """The lane that is so far from an entity, along x and y."""
         x, y, heading = self.entities[node.get("entityRef")].world
         dx, dy = self._numbers(node, "dx", "dy")
-        return self.lanes.at(x + dx, y + dy, heading)
+        return x + dx, y + dy, heading
 
-    def relative_object(self, node: Node) -> Spot:
+    def relative_object(self, node: Node) -> Point:
         """The lane that is so far from an entity, along its own axes."""
         x, y, heading = self.entities[node.get("entityRef")].world
         dx, dy = self._numbers(node, "dx", "dy")
         cosine, sine = math.cos(heading), math.sin(heading)
-        return self.lanes.at(x + dx * cosine - dy * sine, y + dx * sine + dy * cosine, heading)
+        return x + dx * cosine - dy * sine, y + dx * sine + dy * cosine, heading
 
-    def on_route(self, node: Node) -> Spot:
+    def relative_road(self, node: Node) -> Point:
+        """The lane that is `ds` and `dt` from an entity, along and across its road's reference line."""
+        spot = self.entities[node.get("entityRef")]
+        road, (x, y, _), (ds, dt) = (
+            (spot.lane.origins or ("_",))[0].rpartition("_")[0],
+            spot.world,
+            self._numbers(node, "ds", "dt"),
+        )
+        if road not in self.lanes.roads:
+            raise ValueError(f"{node.get('entityRef')} is on no road of an OpenDRIVE file")
+        s = self.lanes.roads[road].nearest(x, y)
+        middle_x, middle_y, along = self.lanes.roads[road].at(s)
+        t = (y - middle_y) * math.cos(along) - (x - middle_x) * math.sin(along)
+        return self.lanes.across(road, s + ds, t + dt)
+
+    def on_route(self, node: Node) -> Spot | Point:
         """So far along a route from its first waypoint, on the lane of `laneId`; or where an entity is."""
         reference, place = node.one("RouteRef"), node.one("InRoutePosition")
         inner = place.one("FromLaneCoordinates", "FromCurrentEntity") if place else None
@@ -156,9 +193,13 @@ class Positions:
         first, second = (self.findings.number(node, key) for key in keys)
         return first, second
 
-    def _shifted(self, spot: Spot, node: Node, key: str = "offset") -> Spot:
-        """The place so far from its lane's middle, in the direction of t."""
-        return spot.shifted(sense(spot) * self.findings.number(node, key, 0.0))
+    def _shifted(self, spot: Spot, node: Node, key: str = "offset") -> Spot | Point:
+        """The place so far from its lane's middle, in the direction of t; beyond the lane a point."""
+        offset = sense(spot) * self.findings.number(node, key, 0.0)
+        try:
+            return spot.shifted(offset)
+        except ValueError:
+            return replace(spot, offset=offset).world
 
 
 def sense(spot: Spot) -> float:
@@ -166,13 +207,14 @@ def sense(spot: Spot) -> float:
     return 1.0 if all("_-" in one for one in spot.lane.origins) else -1.0
 
 
-_KINDS: Mapping[str, Callable[[Positions, Node], Spot]] = {
+_KINDS: Mapping[str, Callable[[Positions, Node], Spot | Point]] = {
     "WorldPosition": Positions.world,
     "LanePosition": Positions.lane,
     "RoadPosition": Positions.road,
     "RelativeLanePosition": Positions.relative_lane,
     "RelativeWorldPosition": Positions.relative_world,
     "RelativeObjectPosition": Positions.relative_object,
+    "RelativeRoadPosition": Positions.relative_road,
     "RoutePosition": Positions.on_route,
 }
 

@@ -15,6 +15,9 @@ from fogsim.openscenario.xml_tree import Node
 _DISTANCES = ("longitudinal", "cartesianDistance", "euclidianDistance")
 _EDGES = ("none", "rising", "falling", "risingOrFalling")
 _WORD = re.compile(r"[A-Za-z_][\w:#@\-]*")
+NEAR = 0.05
+"""Difference up to which speeds are equal [m/s]."""
+
 _STILL = 0.1  # Speed below which a vehicle counts as stopped [m/s]
 
 
@@ -60,7 +63,7 @@ class Triggers:
     """Reads triggers.
 
     `along` is the position of an entity or position along the ego's route [m], None off the route; `states` gives the
-    trigger of a storyboard state condition; `end` is where the ego's road ends [m]; `marks` become timeline entries
+    trigger of a storyboard state condition, `values` of one on a parameter or variable; `end` is where the ego's road ends [m]; `marks` become timeline entries
     without action.
     """
 
@@ -69,6 +72,7 @@ class Triggers:
     positions: Positions
     along: Callable[[str | Node], float | None]
     states: Callable[[Node], Trigger]
+    values: Callable[[Node], Trigger]
     end: float = math.inf
     marks: list[Mark] = field(default_factory=list)
 
@@ -140,6 +144,8 @@ class Triggers:
             if found.at is not None:
                 return at_time(max(found.at, 0.0) + delay) if delay else found
             return replace(found, delay=found.delay + delay)
+        if node.tag in ("ParameterCondition", "VariableCondition"):
+            return replace(self.values(node), delay=delay)
         self.findings.refuse(node, "FogSim has no such condition")
         return NEVER
 
@@ -191,8 +197,11 @@ class Triggers:
     def _compared(self, node: Node, signal: str, unit: str, shift: float = 0.0) -> _Test:
         value = self.findings.number(node, "value") + shift
         rule = RULES[self.findings.word(node, "rule", tuple(RULES))]
+        if rule in ("==", "!=") and unit == "m/s":
+            about = f"{signal} > {value - NEAR:.9g} {unit} and {signal} < {value + NEAR:.9g} {unit}"
+            return _Test(about if rule == "==" else f"not ({about})")
         if rule in ("==", "!="):
-            self.findings.refuse(node, "rule: quantities of traffic are never exactly equal; take less or greater")
+            self.findings.refuse(node, "rule: places and times are never exactly equal; take less or greater")
         return _Test(f"{signal} {rule} {value:.9g} {unit}", signal, rule, f"{value:.9g} {unit}")
 
     def _along(self, node: Node, signal: str, unit: str) -> _Test:
@@ -348,6 +357,8 @@ _TESTS: Mapping[str, Callable[[Triggers, Node, str], _Test | None]] = {
 
 CONDITIONS: Mapping[str, str] = {
     "SimulationTimeCondition": "`time`.",
+    "ParameterCondition": "`happened(EVENT)` that sets it, if that makes a difference; otherwise always or never.",
+    "VariableCondition": "Likewise.",
     "StoryboardElementStateCondition": "`happened(EVENT)`, for states of beginning, and of being over by the time that "
     "the actions take.",
     **{tag: inspect.getdoc(test) or "" for tag, test in _TESTS.items()},

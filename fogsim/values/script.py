@@ -66,6 +66,8 @@ class ChangeSpeed:
     like : str
         Another vehicle, whose speed, times `factor`, plus `plus` [m/s], it comes to at each moment while that one is on
         the road; "" for `speed`.
+    profile : tuple of (float, float)
+        Times from the beginning [s] and speeds then [m/s], evenly in between; empty for `shape`.
     """
 
     vehicle: str
@@ -76,6 +78,7 @@ class ChangeSpeed:
     like: str = ""
     factor: float = 1.0
     plus: float = 0.0
+    profile: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,6 +155,34 @@ class ChangeLane:
     indicator: float = 0.0
     oncoming: bool = False
     offset: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class FollowPath:
+    """A vehicle or body moves along a path, on the lanes or off them; it comes onto the road there if it is not on it.
+
+    Attributes
+    ----------
+    vehicle : str
+        Its id.
+    points : tuple of (float, float, float)
+        x, y [m] and heading [rad], NaN for that of the path.
+    times : tuple of float
+        When it is at each point, from the beginning [s]; empty for a speed of its own.
+    ahead : float
+        How far its front bumper is ahead of the point that follows the path [m].
+    speed : float or None
+        Speed with which it begins, without times [m/s]; None for the one that it has.
+    stays : bool
+        Whether it stays at the end also on a lane.
+    """
+
+    vehicle: str
+    points: tuple[tuple[float, float, float], ...]
+    times: tuple[float, ...] = ()
+    ahead: float = 0.0
+    speed: float | None = None
+    stays: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,7 +305,7 @@ class Walk:
     speed: float
 
 
-TrafficAction = ChangeSpeed | Follow | Stop | ChangeLane | SetLamps | SetSignal | Depart | Enter | Walk
+TrafficAction = ChangeSpeed | Follow | Stop | ChangeLane | FollowPath | SetLamps | SetSignal | Depart | Enter | Walk
 """What a traffic simulation can be told to do at once."""
 
 

@@ -14,6 +14,7 @@ from fogsim.scenario.timeline.schema import (
     FogActions,
     LaneAction,
     LightActions,
+    PathAction,
     SignalActions,
     SpeedAction,
     StopAction,
@@ -32,6 +33,7 @@ from fogsim.values.script import (
     Depart,
     Enter,
     Follow,
+    FollowPath,
     SetLamps,
     SetSignal,
     Shape,
@@ -175,11 +177,13 @@ def _of_vehicle(subject: str, doing: VehicleActions, now: Situation) -> list[Tra
     vehicle, speed = now.vehicle_id(subject), now.speed(subject)
     if doing.depart:
         return _departure(vehicle, doing.depart, now) if speed is None else None
+    if doing.path and doing.model_fields_set == {"path"}:
+        return [_path(vehicle, doing.path)]
     if speed is None:
         return None
     if doing.walk:
         return [Walk(vehicle, doing.walk.speed_kmh / KMH_PER_MPS)]
-    moves: list[TrafficAction | None] = []
+    moves: list[TrafficAction | None] = [_path(vehicle, doing.path)] if doing.path else []
     if doing.speed:
         moves.append(_speed_change(vehicle, doing.speed, speed, now))
     if doing.brake:
@@ -190,7 +194,9 @@ def _of_vehicle(subject: str, doing: VehicleActions, now: Situation) -> list[Tra
     if doing.follow:
         follow, leader = doing.follow, now.vehicle_id(doing.follow.vehicle)
         is_there = now.speed(follow.vehicle) is not None
-        moves.append(Follow(vehicle, leader, follow.headway_s, _endless(follow.for_s), follow.gap_m) if is_there else None)
+        moves.append(
+            Follow(vehicle, leader, follow.headway_s, _endless(follow.for_s), follow.gap_m) if is_there else None
+        )
     if doing.stop:
         moves.append(_stopping(vehicle, doing.stop, now.position(subject)))
     if doing.change_lane:
@@ -222,6 +228,9 @@ def departing_vehicles(entries: Sequence[TimelineEntry]) -> frozenset[str]:
 
 
 def _speed_change(vehicle: str, action: SpeedAction, begin: float, now: Situation) -> ChangeSpeed | None:
+    if action.profile:
+        profile = tuple((time, speed / KMH_PER_MPS) for time, speed in action.profile)
+        return ChangeSpeed(vehicle, profile[-1][1], hold=_endless(action.for_s), profile=profile)
     other = None if action.like is None else now.speed(action.like)
     if action.to_kmh is not None:
         speed = action.to_kmh / KMH_PER_MPS
@@ -252,6 +261,12 @@ def _switches(vehicle: str, doing: VehicleActions) -> Iterator[SetLamps]:
     if doing.hazard_lights is not None:
         lit, own = (_HAZARD, Lamp.NONE) if doing.hazard_lights else (Lamp.NONE, _HAZARD)
         yield SetLamps(vehicle, lit=lit, automatic=own)
+
+
+def _path(vehicle: str, action: PathAction) -> FollowPath:
+    headed = [(*point[:2], math.radians(point[2]) if len(point) > 2 else math.nan) for point in action.points]
+    speed = None if action.speed_kmh is None else action.speed_kmh / KMH_PER_MPS
+    return FollowPath(vehicle, tuple(headed), action.at_s, action.ahead_m, speed, action.stays)
 
 
 def _stopping(vehicle: str, action: StopAction, now: float | None) -> Stop | None:

@@ -48,6 +48,9 @@ class SpeedAction(Section):
     like: Id | None = None
     """Or another vehicle (its id, or `ego`) whose speed at the beginning of the action it comes to."""
 
+    profile: tuple[tuple[Time, SpeedKmh], ...] = ()
+    """Or times from the beginning, and the speeds that it has then [km/h]; evenly in between, and the last one on."""
+
     factor: Annotated[Number, Field(ge=0, le=100)] = 1.0
     """Factor on that speed."""
 
@@ -71,13 +74,15 @@ class SpeedAction(Section):
 
     @model_validator(mode="after")
     def _one_pace(self) -> Self:
-        if (self.to_kmh is None) == (self.like is None):
-            raise ValueError("say which speed: to_kmh or like (another vehicle), and not both")
+        if [self.to_kmh is None, self.like is None, not self.profile].count(False) != 1:
+            raise ValueError("say which speed: to_kmh, like (another vehicle) or profile, and only one of them")
+        if [time for time, _ in self.profile] != sorted({time for time, _ in self.profile}):
+            raise ValueError("profile: each time must be later than the one before")
         if self.continuous and self.like is None:
             raise ValueError("continuous goes with like, the vehicle whose speed it follows")
         given = [key for key in ("over_s", "rate_mps2") if getattr(self, key) is not None]
-        if len(given) > 1 or (given and self.shape is Shape.STEP):
-            raise ValueError("give over_s, rate_mps2 or shape: step, not two of them")
+        if len(given) > 1 or (given and (self.profile or self.shape is Shape.STEP)):
+            raise ValueError("give over_s, rate_mps2, profile or shape: step, not two of them")
         return self
 
 
@@ -237,6 +242,34 @@ class DepartAction(Section):
         return self
 
 
+class PathAction(Section):
+    """A vehicle, or a body, moves along a path, on the lanes or off them, whoever is there."""
+
+    points: Annotated[tuple[tuple[Place, Place] | tuple[Place, Place, Number], ...], Field(min_length=1)]
+    """x and y of its points in the network's coordinates [m], each with a heading [deg, to the left of x] or none:
+    then it faces the way that it goes."""
+
+    at_s: tuple[Time, ...] = ()
+    """When it is at each point, from the beginning; without these it moves at its speed, which other entries order."""
+
+    ahead_m: Distance = 0.0
+    """How far its front bumper is ahead of the point that follows the path."""
+
+    speed_kmh: SpeedKmh | None = None
+    """Speed with which it begins; without it, the one that it has."""
+
+    stays: Flag = False
+    """Whether it stays at the end also on a lane, where a vehicle otherwise drives on; off the lanes all stay."""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if self.at_s and (len(self.at_s) != len(self.points) or list(self.at_s) != sorted({*self.at_s})):
+            raise ValueError("at_s has a time for each of points, each later than the one before")
+        if len({len(point) for point in self.points}) > 1 or len(self.points[0]) + len(self.points) < 4:
+            raise ValueError("give a heading with each of points or with none, and with a single one")
+        return self
+
+
 class WalkAction(Section):
     """A person who waits, or walks, walks on at a speed."""
 
@@ -273,6 +306,9 @@ class VehicleActions(Section):
 
     depart: DepartAction | None = None
     """Come onto the road, for an id that is in no file."""
+
+    path: PathAction | None = None
+    """Move along a path, also onto the road, for a vehicle of a route file that waits (`depart="triggered"`)."""
 
     walk: WalkAction | None = None
     """Walk, for a person."""

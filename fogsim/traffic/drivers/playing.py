@@ -83,6 +83,9 @@ def speed_on_the_way(action: ChangeSpeed, first: float, passed: float) -> float:
     passed : float
         Time since then [s].
     """
+    if action.profile:
+        times, speeds = zip(*action.profile, strict=True)
+        return float(np.interp(passed, (0.0, *times), (first, *speeds)))
     at_once = action.shape is Shape.STEP or action.duration <= 0.0
     share = 1.0 if at_once else min(max(passed / action.duration, 0.0), 1.0)
     if action.shape is Shape.SINUSOIDAL:

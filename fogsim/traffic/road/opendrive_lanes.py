@@ -3,7 +3,7 @@
 import heapq
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.etree.ElementTree import Element, fromstring
@@ -72,6 +72,44 @@ class Spot:
         return replace(self, offset=offset)
 
 
+class RoadWidths:
+    """Widths of all lanes of a road, for driving or not, along it."""
+
+    def __init__(self, road: Element) -> None:
+        self._road = road
+
+    def middle(self, lane: str, s: float) -> float:
+        """t of the middle of a lane at s [m]; ValueError if there is no such lane."""
+        section = _last_before(self._road.iterfind("lanes/laneSection"), "s", s)
+        side = "right" if lane.startswith("-") else "left"
+        inner = [] if section is None else [one for one in section.iterfind(f"{side}/lane")]
+        numbers = {int(one.get("id", "0")): one for one in inner}
+        if section is None or (lane != "0" and (not lane.lstrip("-").isdecimal() or int(lane) not in numbers)):
+            known = ", ".join(map(str, sorted(numbers))) or "none"
+            raise ValueError(f"the {side} side of its road has no lane {lane!r}; it has {known}")
+        sign, along = (-1 if side == "right" else 1), s - float(section.get("s", "0"))
+        widths = [
+            _polynomial(numbers[sign * i].iterfind("width"), "sOffset", along) for i in range(1, abs(int(lane)) + 1)
+        ]
+        t = _polynomial(self._road.iterfind("lanes/laneOffset"), "s", s)
+        return t + sign * (math.fsum(widths) - 0.5 * widths[-1]) if widths else t
+
+
+def _last_before(elements: Iterable[Element], key: str, s: float) -> Element | None:
+    """The last of elements that begin at or before s, otherwise the first."""
+    found = list(elements)
+    return next((one for one in reversed(found) if float(one.get(key, "0")) <= s), found[0] if found else None)
+
+
+def _polynomial(elements: Iterable[Element], key: str, s: float) -> float:
+    """Value at s of the cubic that holds there [m]; 0 without one."""
+    piece = _last_before(elements, key, s)
+    if piece is None:
+        return 0.0
+    ds = s - float(piece.get(key, "0"))
+    return math.fsum(float(piece.get(name, "0")) * ds**power for power, name in enumerate("abcd"))
+
+
 @dataclass(frozen=True, slots=True)
 class OpenDriveLanes:
     """Lanes for vehicles and their connections.
@@ -86,6 +124,7 @@ class OpenDriveLanes:
     latitude: float | None
     longitude: float | None
     crossings: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    widths: Mapping[str, "RoadWidths"] = field(default_factory=dict)
 
     def on_lane(self, road: str, lane: str, s: float) -> Spot:
         """Place on a lane by OpenDRIVE's road, lane and s [m]; ValueError if it is not on the road."""
@@ -104,6 +143,11 @@ class OpenDriveLanes:
         x, y, heading = self._reference(road, s)
         return x - t * math.sin(heading), y + t * math.cos(heading), heading + (math.pi if t > 0.0 else 0.0)
 
+    def middle(self, road: str, lane: str, s: float) -> float:
+        """t of the middle of any lane, be it for driving or not, at s along its road [m]; ValueError if it has none."""
+        self._reference(road, s)
+        return self.widths[road].middle(lane, s)
+
     def at(self, x: float, y: float, heading: float | None) -> Spot:
         """Place on the nearest lane that leads in the direction `heading` [rad] (None for any); ValueError if none."""
         feet = [_foot(one, x, y) for one in self.lanes]
@@ -114,6 +158,11 @@ class OpenDriveLanes:
             raise ValueError(f"({x:g}, {y:g}) is on no lane that leads there{away}")
         middle_x, middle_y, along = spot.world
         return replace(spot, offset=(y - middle_y) * math.cos(along) - (x - middle_x) * math.sin(along))
+
+    def nearest(self, x: float, y: float) -> Spot | None:
+        """Place on the nearest lane, whatever its direction; None off the lanes."""
+        distance, spot = min((_foot(one, x, y) for one in self.lanes), key=lambda one: one[0])
+        return spot if distance <= 0.5 * spot.lane.width + _ROUNDING else None
 
     def beside(self, spot: Spot, lanes: int) -> Spot:
         """Place on the lane that is `lanes` to the left on the same edge; ValueError if there is none."""
@@ -242,14 +291,15 @@ def read_opendrive_lanes(net: str, opendrive: Path) -> OpenDriveLanes:
     if not is_opendrive(opendrive):
         return OpenDriveLanes(lanes, followers, {}, None, None, _crossings(root))
     source = read_opendrive(opendrive)
-    roads = {}
+    roads, widths = {}, {}
     for road in source.iter("road"):
         try:
             roads[road.get("id", "")] = plan_view(road.iterfind("planView/geometry"))
+            widths[road.get("id", "")] = RoadWidths(road)
         except ValueError as error:
             raise InputError(f"{opendrive}: road {road.get('id')!r}: {error}") from None
     latitude, longitude = _origin(source.findtext("header/geoReference", ""))
-    return OpenDriveLanes(lanes, followers, roads, latitude, longitude, _crossings(root))
+    return OpenDriveLanes(lanes, followers, roads, latitude, longitude, _crossings(root), widths)
 
 
 def _lanes(root: Element) -> Iterator[RoadLane]:

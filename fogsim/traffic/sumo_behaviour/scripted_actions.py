@@ -8,11 +8,12 @@ from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
 from fogsim.traffic.sumo.link import Api, is_off_lanes
 from fogsim.traffic.sumo_behaviour.departures import depart, enter
 from fogsim.traffic.sumo_behaviour.lane_offsets import LaneOffsets
+from fogsim.traffic.sumo_behaviour.paths import Paths
 from fogsim.traffic.sumo_behaviour.signal_control import SignalControl
 from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
 from fogsim.traffic.sumo_lanes.route_position import GapToEgo
-from fogsim.values.script import ChangeLane, Depart, Enter, SetSignal, TrafficAction, Walk
+from fogsim.values.script import ChangeLane, Depart, Enter, FollowPath, SetSignal, TrafficAction, Walk
 
 _REGARD_OF_OTHERS, _NO_COLLISION = 3 << 8, 1 << 8
 """Bits of SUMO's lane-change mode on what of others a change that is asked for regards, and those for as much as does
@@ -53,6 +54,7 @@ class ScriptedActions:
         self._signals = SignalControl(api)
         self._modes = Claims(api, LANE_CHANGE_MODE, f"{session}.script")
         self._offsets = LaneOffsets(api)
+        self._paths = Paths(api)
         self._changing: dict[str, float] = {}
         self._oncoming: set[str] = set()
 
@@ -88,6 +90,8 @@ class ScriptedActions:
                 refused += [] if depart(self._api, action, present) else [action]
             elif isinstance(action, Enter):
                 refused += [] if enter(self._api, action, present) else [action]
+            elif isinstance(action, FollowPath):
+                self._paths.begin(action, time, present)
             elif isinstance(action, Walk):
                 refused += [] if self._walk(action) else [action]
             elif action.vehicle not in present or not self._has_lane(action):
@@ -129,13 +133,16 @@ class ScriptedActions:
         """
         self._signals.update(time)
         self._end_changes(time, present)
-        if not self._playing.is_idle:
+        if not self._playing.is_idle or self._paths.vehicles:
             self._play(time, present)
         self._offsets.play(time + self._step, present)
 
     def _play(self, time: float, present: Collection[str]) -> None:
         motion = self._motion(time, present)
-        self._speeds.impose(self._playing.speeds(motion), self._playing.following)
+        speeds = self._playing.speeds(motion)
+        self._paths.play(time, self._step, speeds, present)
+        free = {vehicle: speed for vehicle, speed in speeds.items() if vehicle not in self._paths.vehicles}
+        self._speeds.impose(free, self._playing.following)
         for change in self._playing.changes(motion):
             self._change_lane(change, time)
 
@@ -176,6 +183,7 @@ class ScriptedActions:
             Vehicles on the road.
         """
         self._signals.release()
+        self._paths.release(present)
         for vehicle in self._changing.keys() & set(present):
             self._modes.withdraw(vehicle)
         self._changing.clear()

@@ -1,0 +1,110 @@
+"""Vehicles and persons that a script moves along paths of their own, on and off the lanes."""
+
+import math
+from collections.abc import Collection, Mapping
+
+import numpy as np
+
+from fogsim.traffic.sumo.link import Api, is_off_lanes
+from fogsim.values.script import FollowPath
+
+_ANYWHERE = 2
+"""SUMO's `keepRoute` for a vehicle that is exactly where it is put, on a lane or off the lanes."""
+
+_UNCHECKED, _SUMO_DRIVES = 0, -1.0
+
+
+class _Path:
+    """A path under way: how far its vehicle has come [m], and how fast it is [m/s]."""
+
+    def __init__(self, action: FollowPath, begun: float, speed: float) -> None:
+        self.action, self.begun, self.speed, self.driven = action, begun, speed, 0.0
+        points = np.array(action.points, dtype=np.float64)
+        self._points, steps = points[:, :2], np.diff(points[:, :2], axis=0)
+        self._ends = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
+        # Who stands keeps the heading with which it came; a path of no length has that of its point.
+        given = np.unwrap(points[:, 2])
+        self._headings = None if np.isnan(given).any() else given
+        self._steps = steps
+        self.length = float(self._ends[-1])
+
+    def move(self, time: float, step: float, wanted: float) -> None:
+        """Move until a time [s], a step later, at a speed that is wanted [m/s]; ``inf`` for the present one."""
+        before = self.driven
+        if self.action.times:
+            self.driven = float(np.interp(time - self.begun, self.action.times, self._ends))
+            self.speed = (self.driven - before) / step
+        else:
+            self.speed = self.speed if math.isinf(wanted) else wanted
+            self.driven = min(before + self.speed * step, self.length)
+
+    def is_over(self, time: float) -> bool:
+        """Whether its end is reached at a time [s]."""
+        return time - self.begun >= self.action.times[-1] if self.action.times else self.driven >= self.length
+
+    def place(self) -> tuple[float, float, float]:
+        """Where the front bumper is [m], and the heading [rad]."""
+        x, y = (float(np.interp(self.driven, self._ends, self._points[:, axis])) for axis in (0, 1))
+        if self._headings is not None:
+            heading = float(np.interp(self.driven, self._ends, self._headings))
+        else:
+            piece = min(int(np.searchsorted(self._ends, self.driven, side="right")), len(self._steps)) - 1
+            heading = math.atan2(self._steps[piece, 1], self._steps[piece, 0])
+        ahead = self.action.ahead
+        return x + ahead * math.cos(heading), y + ahead * math.sin(heading), heading
+
+
+class Paths:
+    """Moves those on paths; who reaches the end on a lane drives on, and all others stay there."""
+
+    def __init__(self, api: Api) -> None:
+        self._api = api
+        self._paths: dict[str, _Path] = {}
+        self._modes: dict[str, int] = {}
+
+    @property
+    def vehicles(self) -> Collection[str]:
+        """Who is on a path."""
+        return self._paths.keys()
+
+    def begin(self, action: FollowPath, time: float, present: Collection[str]) -> None:
+        """Begin a path; who is not on the road yet appears at its first point."""
+        vehicle, get = action.vehicle, self._api.vehicle
+        speed = action.speed
+        if vehicle in present and speed is None:
+            earlier = self._paths.get(vehicle)
+            speed = float(get.getSpeed(vehicle)) if earlier is None else earlier.speed
+        if vehicle in present and vehicle not in self._paths:
+            self._modes[vehicle] = int(get.getSpeedMode(vehicle))
+            get.setSpeedMode(vehicle, _UNCHECKED)
+        self._paths[vehicle] = _Path(action, time, speed or 0.0)
+
+    def play(self, time: float, step: float, speeds: Mapping[str, float], present: Collection[str]) -> None:
+        """Move all for the step after a time [s]; `speeds` are those that they are to have [m/s]."""
+        get = self._api.vehicle
+        for vehicle, path in list(self._paths.items()):
+            if (
+                vehicle in present
+                and path.is_over(time)
+                and not (path.action.stays or is_off_lanes(self._api, vehicle))
+            ):
+                self._end(vehicle)
+                continue
+            path.move(time + step, step, speeds.get(vehicle, math.inf))
+            x, y, heading = path.place()
+            get.moveToXY(vehicle, "", -1, x, y, 90.0 - math.degrees(heading), _ANYWHERE)
+            if vehicle in present:
+                get.setPreviousSpeed(vehicle, path.speed)
+                get.setSpeed(vehicle, path.speed)
+
+    def _end(self, vehicle: str) -> None:
+        del self._paths[vehicle]
+        if vehicle in self._modes:
+            self._api.vehicle.setSpeed(vehicle, _SUMO_DRIVES)
+            self._api.vehicle.setSpeedMode(vehicle, self._modes.pop(vehicle))
+
+    def release(self, present: Collection[str]) -> None:
+        """Let all go."""
+        for vehicle in self._paths.keys() & set(present):
+            self._end(vehicle)
+        self._paths.clear()

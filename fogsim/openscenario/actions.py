@@ -116,6 +116,9 @@ class Actions:
         if not actors:
             self.findings.refuse(action, "no vehicle does it: the Actors of the maneuver group name no entity")
         for actor in actors:
+            if actor in self.positions.off_lanes and action.tag not in _ANYWHERE:
+                self.findings.refuse(action, f"{actor} is on no lane, or turned on one: {', '.join(_ANYWHERE)} move it")
+                continue
             if effect.do.get(actor, {}).keys() & orders:
                 self.findings.refuse(action, f"another action of this event orders the motion of {actor} as well")
             try:
@@ -257,7 +260,7 @@ class Actions:
         return self.offsets.get(vehicle, begins.offset if begins else 0.0)
 
     def _lane_offset(self, action: Node, actor: str, effect: Effect) -> None:
-        """`change_lane` with `offset_m`, along half a wave of a cosine with `maxLateralAcc` as its greatest acceleration."""
+        """`change_lane` with `offset_m`, along half a wave of a cosine, at `maxLateralAcc` at most."""
         dynamics, target = action.one("LaneOffsetActionDynamics"), action.one("LaneOffsetTarget")
         to = target.one("AbsoluteTargetLaneOffset", "RelativeTargetLaneOffset") if target else None
         begins = self.positions.entities.get(actor)
@@ -360,7 +363,7 @@ class Actions:
         effect.add(actor, follow=follow)
 
     def gap(self, action: Node) -> tuple[float, float, bool]:
-        """Time gap [s], distance [m], one of them 0, and whether it is between bumpers; ValueError unless one is given."""
+        """Time gap [s] or distance [m], the other 0, and whether it is between bumpers; ValueError if none."""
         headway, distance = (self.findings.number(action, key, 0.0) for key in ("timeGap", "distance"))
         if bool(action.get("timeGap")) == bool(action.get("distance")):
             raise ValueError("expected a timeGap or a distance")
@@ -427,6 +430,7 @@ _PRIVATE: Mapping[str, Callable[[Actions, Node, str, Effect], None]] = {
     "AssignRouteAction": Actions._assign_route,
     "AcquirePositionAction": Actions._acquire,
 }
+_ANYWHERE = ("SpeedAction", "SpeedProfileAction", "FollowTrajectoryAction", "LightStateAction")
 _ORDERS = {"LongitudinalAction": {"speed", "follow"}, "LateralAction": {"change_lane"}}
 _GROUPS = [
     f"{kind}Action" for kind in ("Private", "Global", "Controller", "Longitudinal", "Lateral", "Appearance", "Routing")

@@ -72,7 +72,7 @@ def read_beginning(init: Node | None, vehicles: Mapping[str, Vehicle], actions: 
 def _begin(name: str, vehicle: Vehicle, begin: Beginning, vehicles: Mapping[str, Vehicle], actions: Actions) -> None:
     """Find where a vehicle's front bumper begins, and its way, or its path off the lanes."""
     if name in begin.off_lanes or (name not in begin.spots and "path" in begin.effect.do.get(name, {})):
-        _place_off_lanes(name, vehicle, begin)
+        _place_off_lanes(name, vehicle, begin, actions.positions)
     elif name in begin.spots:
         try:
             begin.fronts[name] = _front(name, begin, vehicles, actions)
@@ -85,12 +85,13 @@ def _begin(name: str, vehicle: Vehicle, begin: Beginning, vehicles: Mapping[str,
         actions.findings.refuse(vehicle.node, f"{name} has no place: Init needs a TeleportAction of it")
 
 
-def _place_off_lanes(name: str, vehicle: Vehicle, begin: Beginning) -> None:
-    """Let a vehicle or body begin beside the lanes, or turned on one; it moves straight on unless it has a path."""
-    (x, y, heading), speed = begin.off_lanes.setdefault(name, (0.0, 0.0, 0.0)), begin.speed(name)
+def _place_off_lanes(name: str, vehicle: Vehicle, begin: Beginning, positions: Positions) -> None:
+    """Let one begin off the lanes, or turned on one; without a path it moves straight on, a vehicle along its lane."""
+    (x, y, heading), speed = begin.off_lanes.setdefault(name, (math.inf, 0.0, 0.0)), begin.speed(name)
     far, degrees = _STRAIGHT if speed or vehicle.body else 0.0, math.degrees(heading)
     ends = [[x + way * math.cos(heading), y + way * math.sin(heading), degrees] for way in (0.0, far)]
-    path = {"points": ends, "ahead_m": vehicle.front, "stays": True}
+    lane = None if vehicle.body else positions.lanes.nearest(x, y)
+    path = {"points": positions.lanes.backwards(lane) if lane else ends, "ahead_m": vehicle.front, "stays": True}
     done = begin.effect.do.setdefault(name, {})
     done["path"] = {**done.get("path", path), "speed_kmh": speed * KMH_PER_MPS}
 
@@ -141,15 +142,16 @@ def _place(private: list[Node], vehicles: Mapping[str, Vehicle], actions: Action
 def _off_lanes(
     position: Node, vehicle: Vehicle, vehicles: Mapping[str, Vehicle], positions: Positions
 ) -> tuple[float, float, float] | None:
-    """x, y [m] and heading [rad] of a place on no lane, or of a person or thing that is turned on one; else None."""
+    """x, y [m] and heading [rad] of one on no lane, of a body turned on one, or of a vehicle against one; else None."""
     try:
         x, y, heading, along = positions.point(position)
         lane = positions.lanes.nearest(x, y)
     except ValueError:
         return None
     facing = along if heading is None else heading
-    is_turned = lane is not None and facing is not None and math.cos(facing - lane.world[2]) < ALONG
-    if vehicle.name == ego_of(dict(vehicles)) or not (lane is None or (is_turned and vehicle.body)):
+    along_lane = 1.0 if lane is None or facing is None else math.cos(facing - lane.world[2])
+    is_turned = along_lane < (ALONG if vehicle.body else -ALONG)
+    if vehicle.name == ego_of(dict(vehicles)) or not (lane is None or is_turned):
         return None
     return x, y, facing or 0.0
 

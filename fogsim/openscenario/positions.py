@@ -64,7 +64,7 @@ class Positions:
         return spot
 
     def point(self, position: Node) -> tuple[float, float, float | None, float | None]:
-        """x, y [m], heading and the road's direction [rad, None if not given] of a place anywhere; ValueError if none."""
+        """x, y [m], heading and the road's direction [rad, None if not given] anywhere; ValueError if none."""
         one, found = self._found(position)
         x, y, along = found.world if isinstance(found, Spot) else found
         return x, y, self._heading(one, along or 0.0), along

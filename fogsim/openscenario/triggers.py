@@ -63,8 +63,8 @@ class Triggers:
     """Reads triggers.
 
     `along` is the position of an entity or position along the ego's route [m], None off the route; `states` gives the
-    trigger of a storyboard state condition, `values` of one on a parameter or variable; `end` is where the ego's road ends [m]; `marks` become timeline entries
-    without action.
+    trigger of a storyboard state condition, `values` of one on a parameter or variable; `end` is where the ego's road
+    ends [m]; `marks` become timeline entries without action.
     """
 
     vehicles: Mapping[str, Vehicle]
@@ -298,8 +298,12 @@ class Triggers:
         place, around = self._place_along(node), self.findings.number(node, "tolerance")
         if place is None:
             return None
-        front, signal = self.vehicles[name].front, f"{self.called(name)}.position"
-        return _Test(f"{signal} >= {place + front - around:.3f} m and {signal} <= {place + front + around:.3f} m")
+        signal, near = f"{self.called(name)}.position", place + self.vehicles[name].front - around
+        begins = self.along(name)
+        if begins is not None and begins < near:
+            # However far it drives between two looks, it has been there.
+            return _Test(f"{signal} >= {near:.3f} m", signal, ">=", f"{near:.3f} m")
+        return _Test(f"{signal} >= {near:.3f} m and {signal} <= {near + 2.0 * around:.3f} m")
 
     def _place_along(self, node: Node) -> float | None:
         position = node.one("Position")

@@ -67,7 +67,7 @@ def _entry(data: dict[str, Any], name: str) -> dict[str, Any]:
         (
             '<ReachPositionCondition tolerance="2"><Position><LanePosition roadId="7" laneId="-2" s="200"/></Position>'
             "</ReachPositionCondition>",
-            "ego.position >= 201.671 m and ego.position <= 205.671 m",
+            "ego.position >= 201.671 m",
         ),
         (
             '<DistanceCondition value="50" freespace="false" rule="greaterThan"><Position><RoadPosition roadId="7" '
@@ -145,7 +145,7 @@ def test_an_act_that_is_stopped_keeps_back_its_events(read: Callable[..., dict[s
         ),
         (
             '<LongitudinalDistanceAction entityRef="Lead" timeGap="1.5" freespace="true" continuous="true"/>',
-            {"follow": {"vehicle": "Lead", "headway_s": 1.5}},
+            {"follow": {"vehicle": "Lead", "headway_s": 1.5, "gap_m": 0.0}},
         ),
     ],
 )

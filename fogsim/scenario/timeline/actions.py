@@ -177,13 +177,12 @@ def _of_vehicle(subject: str, doing: VehicleActions, now: Situation) -> list[Tra
     vehicle, speed = now.vehicle_id(subject), now.speed(subject)
     if doing.depart:
         return _departure(vehicle, doing.depart, now) if speed is None else None
-    if doing.path and doing.model_fields_set == {"path"}:
-        return [_path(vehicle, doing.path)]
+    moves: list[TrafficAction | None] = [_path(vehicle, doing.path)] if doing.path else []
     if speed is None:
-        return None
+        # A path may bring a vehicle onto the road.
+        return [_path(vehicle, doing.path)] if doing.path and doing.model_fields_set == {"path"} else None
     if doing.walk:
         return [Walk(vehicle, doing.walk.speed_kmh / KMH_PER_MPS)]
-    moves: list[TrafficAction | None] = [_path(vehicle, doing.path)] if doing.path else []
     if doing.speed:
         moves.append(_speed_change(vehicle, doing.speed, speed, now))
     if doing.brake:

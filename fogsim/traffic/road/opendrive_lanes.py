@@ -79,10 +79,10 @@ class RoadWidths:
         self._road = road
 
     def middle(self, lane: str, s: float) -> float:
-        """t of the middle of a lane at s [m]; ValueError if there is no such lane."""
+        """The t of the middle of a lane at s [m]; ValueError if there is no such lane."""
         section = _last_before(self._road.iterfind("lanes/laneSection"), "s", s)
         side = "right" if lane.startswith("-") else "left"
-        inner = [] if section is None else [one for one in section.iterfind(f"{side}/lane")]
+        inner = [] if section is None else list(section.iterfind(f"{side}/lane"))
         numbers = {int(one.get("id", "0")): one for one in inner}
         if section is None or (lane != "0" and (not lane.lstrip("-").isdecimal() or int(lane) not in numbers)):
             known = ", ".join(map(str, sorted(numbers))) or "none"
@@ -144,7 +144,7 @@ class OpenDriveLanes:
         return x - t * math.sin(heading), y + t * math.cos(heading), heading + (math.pi if t > 0.0 else 0.0)
 
     def middle(self, road: str, lane: str, s: float) -> float:
-        """t of the middle of any lane, be it for driving or not, at s along its road [m]; ValueError if it has none."""
+        """The t of the middle of any lane, for driving or not, at s of its road [m]; ValueError if there is none."""
         self._reference(road, s)
         return self.widths[road].middle(lane, s)
 
@@ -212,6 +212,24 @@ class OpenDriveLanes:
             raise ValueError(f"the road {'ends' if ahead else 'begins'} before that")
         other = min(lanes, key=lambda one: abs(one.index - lane.index))
         return other, self.crossings.get((lane.edge, edge) if ahead else (edge, lane.edge), 0.0)
+
+    def backwards(self, spot: Spot) -> list[tuple[float, float]]:
+        """Points from a place against its lane's direction, straight on until the road ends [m]."""
+        found, lane, position, length = [spot.world[:2]], spot.lane, spot.position, 0.0
+        while length < LONGEST_LAPS:
+            steps = np.diff(lane.shape, axis=0)
+            lengths = np.hypot(steps[:, 0], steps[:, 1])
+            along = np.concatenate([[0.0], np.cumsum(lengths)]) * lane.length / lengths.sum()
+            to_left = np.column_stack([-steps[:, 1], steps[:, 0]]) / lengths[:, None]
+            points = lane.shape + spot.offset * np.vstack([to_left, to_left[-1:]])
+            found += [(float(x), float(y)) for x, y in points[along < position][::-1]]
+            length += lane.length
+            try:
+                lane, _ = self._neighbour(lane, ahead=False, route=())
+            except ValueError:
+                break
+            position = math.inf
+        return found
 
     def route(self, edge: str, wanted: Sequence[str] = ()) -> tuple[str, ...]:
         """Edges from one on through the `wanted`, and straight ahead until the road ends; ValueError without a way.

@@ -38,9 +38,11 @@ class _Path:
             self.speed = self.speed if math.isinf(wanted) else wanted
             self.driven = min(before + self.speed * step, self.length)
 
-    def is_over(self, time: float) -> bool:
-        """Whether its end is reached at a time [s]."""
-        return time - self.begun >= self.action.times[-1] if self.action.times else self.driven >= self.length
+    def is_over(self, time: float, step: float) -> bool:
+        """Whether its end is reached within a step after a time [s]."""
+        if self.action.times:
+            return time - self.begun >= self.action.times[-1]
+        return self.driven + self.speed * step >= self.length
 
     def place(self) -> tuple[float, float, float]:
         """Where the front bumper is [m], and the heading [rad]."""
@@ -83,12 +85,9 @@ class Paths:
         """Move all for the step after a time [s]; `speeds` are those that they are to have [m/s]."""
         get = self._api.vehicle
         for vehicle, path in list(self._paths.items()):
-            if (
-                vehicle in present
-                and path.is_over(time)
-                and not (path.action.stays or is_off_lanes(self._api, vehicle))
-            ):
-                self._end(vehicle)
+            stays = path.action.stays or vehicle not in present or is_off_lanes(self._api, vehicle)
+            if path.is_over(time, step) and not stays:
+                self._drive_on(vehicle, path)
                 continue
             path.move(time + step, step, speeds.get(vehicle, math.inf))
             x, y, heading = path.place()
@@ -96,6 +95,14 @@ class Paths:
             if vehicle in present:
                 get.setPreviousSpeed(vehicle, path.speed)
                 get.setSpeed(vehicle, path.speed)
+
+    def _drive_on(self, vehicle: str, path: _Path) -> None:
+        """Turn a vehicle into its lane, about the point that followed the path."""
+        get = self._api.vehicle
+        lane = self._api.lane.getAngle(get.getLaneID(vehicle), get.getLanePosition(vehicle))
+        turn = path.place()[2] - math.radians(90.0 - lane)
+        get.setLateralLanePosition(vehicle, get.getLateralLanePosition(vehicle) - path.action.ahead * math.sin(turn))
+        self._end(vehicle)
 
     def _end(self, vehicle: str) -> None:
         del self._paths[vehicle]

@@ -116,13 +116,14 @@ class Actions:
         if not actors:
             self.findings.refuse(action, "no vehicle does it: the Actors of the maneuver group name no entity")
         for actor in actors:
-            if actor in self.positions.off_lanes and action.tag not in _ANYWHERE:
+            across = actor in self.positions.against and action.tag in _ACROSS
+            if actor in self.positions.off_lanes and not across and action.tag not in _ANYWHERE:
                 self.findings.refuse(action, f"{actor} is on no lane, or turned on one: {', '.join(_ANYWHERE)} move it")
                 continue
             if effect.do.get(actor, {}).keys() & orders:
                 self.findings.refuse(action, f"another action of this event orders the motion of {actor} as well")
             try:
-                _PRIVATE[action.tag](self, action, actor, effect)
+                (Actions._aside if across else _PRIVATE[action.tag])(self, action, actor, effect)
             except ValueError as error:
                 self.findings.refuse(action, str(error))
 
@@ -266,8 +267,6 @@ class Actions:
         begins = self.positions.entities.get(actor)
         if dynamics is None or to is None or begins is None:
             raise ValueError("expected LaneOffsetActionDynamics and a LaneOffsetTarget, and a vehicle that has a place")
-        shape = self.findings.word(dynamics, "dynamicsShape", tuple(SHAPES))
-        most = self.findings.number(dynamics, "maxLateralAcc", math.inf, is_finite=False)
         offset = sense(begins) * self.findings.number(to, "value")
         lanes: dict[str, Any] = {"lanes": 0}
         other = self.positions.entities.get(to.get("entityRef")) if to.tag.startswith("Relative") else begins
@@ -278,11 +277,54 @@ class Actions:
         across = abs(offset - self._offset(actor))
         if other and "to_lane_of" in lanes:
             across += begins.lane.width * abs(other.lane.index - begins.lane.index)
-        lasts = 0.0 if shape == "step" else math.pi * math.sqrt(0.5 * across / max(most, _LEAST))
+        lasts = self._offset_time(dynamics, across)
         self.offsets[actor] = begins.shifted(offset).offset
         effect.lasts = max(effect.lasts, lasts)
         effect.is_endless |= self.findings.flag(action, "continuous")
         effect.add(actor, change_lane={**lanes, "stay_s": _STAY, "offset_m": offset, "duration_s": min(lasts, 60.0)})
+
+    def _aside(self, action: Node, actor: str, effect: Effect) -> None:
+        """`change_lane` of a vehicle that drives against a lane: from its path to a lane, as they lie at first."""
+        dynamics, target = action.one(f"{action.tag}Dynamics"), action.one(f"{action.tag[:-6]}Target")
+        to = next(iter(target.all()), None) if target else None
+        base = self.positions.against[actor]
+        if dynamics is None or to is None:
+            raise ValueError(f"expected {action.tag}Dynamics and a {action.tag[:-6]}Target")
+        spot = self.positions.entities.get(to.get("entityRef")) if to.tag.startswith("Relative") else base
+        if spot is None:
+            raise ValueError(
+                f"{actor} drives against its lane: give a lane, or one by a vehicle that drives along its own"
+            )
+        value = self.findings.number(to, "value")
+        offset = sense(spot) * self.findings.number(action, "targetLaneOffset", 0.0)
+        if to.tag.endswith("Offset"):
+            offset = sense(spot) * value
+        elif to.tag == "RelativeTargetLane":
+            spot = self.positions.lanes.beside(spot, int(value))
+        else:
+            road = base.lane.origins[0].rpartition("_")[0]
+            spot = next(
+                (Spot(one, 0.0) for one in self.positions.lanes.lanes if f"{road}_{value:g}" in one.origins), spot
+            )
+        x, y, heading = self.positions.off_lanes[actor]
+        to_x, to_y, _ = self.positions.lanes.foot(spot.lane, x, y).shifted(offset).world
+        aside = (to_y - y) * math.cos(heading) - (to_x - x) * math.sin(heading)
+        if action.tag == "LaneOffsetAction":
+            lasts = self._offset_time(dynamics, abs(aside - self.offsets.get(actor, 0.0)))
+            effect.is_endless |= self.findings.flag(action, "continuous")
+        else:
+            shape, by, value = self._dynamics(dynamics) or ("step", "time", 0.0)
+            if by == "distance":
+                raise ValueError(f"dynamicsDimension: {actor} drives against its lane; give a time or rate")
+            lasts = value if by == "time" else _STEEPEST[shape] * abs(aside) / (value or 1.0)
+        self.offsets[actor], effect.lasts = aside, max(effect.lasts, lasts)
+        effect.add(actor, change_lane={"lanes": 0, "stay_s": _STAY, "offset_m": aside, "duration_s": min(lasts, 60.0)})
+
+    def _offset_time(self, dynamics: Node, across: float) -> float:
+        """Time that so wide a move [m] takes along half a wave of a cosine at `maxLateralAcc` at most [s]."""
+        shape = self.findings.word(dynamics, "dynamicsShape", tuple(SHAPES))
+        most = self.findings.number(dynamics, "maxLateralAcc", math.inf, is_finite=False)
+        return 0.0 if shape == "step" else math.pi * math.sqrt(0.5 * across / max(most, _LEAST))
 
     def _across(self, target: Node, lanes: Mapping[str, Any], begins: Spot) -> float:
         """Way across of a change of lane, by the lanes on which the vehicles begin [m]."""
@@ -430,6 +472,7 @@ _PRIVATE: Mapping[str, Callable[[Actions, Node, str, Effect], None]] = {
     "AssignRouteAction": Actions._assign_route,
     "AcquirePositionAction": Actions._acquire,
 }
+_ACROSS = ("LaneChangeAction", "LaneOffsetAction")
 _ANYWHERE = ("SpeedAction", "SpeedProfileAction", "FollowTrajectoryAction", "LightStateAction")
 _ORDERS = {"LongitudinalAction": {"speed", "follow"}, "LateralAction": {"change_lane"}}
 _GROUPS = [

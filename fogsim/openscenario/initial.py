@@ -153,6 +153,8 @@ def _off_lanes(
     is_turned = along_lane < (ALONG if vehicle.body else -ALONG)
     if vehicle.name == ego_of(dict(vehicles)) or not (lane is None or is_turned):
         return None
+    if lane is not None and not vehicle.body:
+        positions.against[vehicle.name] = positions.named(position) or lane
     return x, y, facing or 0.0
 
 

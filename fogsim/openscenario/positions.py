@@ -23,8 +23,8 @@ ALONG = math.cos(0.3)
 class Positions:
     """Finds positions; relative ones refer to the known initial positions `entities`, whose ways are `ways`.
 
-    `off_lanes` are x, y [m] and heading [rad] of those that begin on no lane, or turned on one; `with_oncoming` if
-    vehicles drive on the oncoming lane.
+    `off_lanes` are x, y [m] and heading [rad] of those that begin on no lane, or turned on one; of these, vehicles that
+    drive `against` a lane have the place that the file names. `with_oncoming` if vehicles drive on the oncoming lane.
     """
 
     lanes: OpenDriveLanes
@@ -33,6 +33,7 @@ class Positions:
     entities: dict[str, Spot] = field(default_factory=dict)
     ways: dict[str, tuple[str, ...]] = field(default_factory=dict)
     off_lanes: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+    against: dict[str, Spot] = field(default_factory=dict)
 
     @property
     def findings(self) -> Findings:
@@ -68,6 +69,13 @@ class Positions:
         one, found = self._found(position)
         x, y, along = found.world if isinstance(found, Spot) else found
         return x, y, self._heading(one, along or 0.0), along
+
+    def named(self, position: Node) -> Spot | None:
+        """Place in the middle of the lane that a ``LanePosition`` names, whatever its offset."""
+        one = next(iter(position.children), position)
+        if one.tag != "LanePosition":
+            return None
+        return self.lanes.on_lane(one.get("roadId"), one.get("laneId"), self.findings.number(one, "s"))
 
     def _found(self, position: Node) -> tuple[Node, Spot | Point]:
         one = next(iter(position.all()), None)

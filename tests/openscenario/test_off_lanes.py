@@ -10,6 +10,7 @@ import fogsim
 from fogsim.errors import InputError
 from fogsim.openscenario import read_openscenario
 from fogsim.values import Step
+from tests.openscenario.test_story import _changes_lane
 from tests.openscenario.writing import CAR, after, box, event, lane, speed, write
 
 CASES = Path(__file__).parents[1] / "data" / "openscenario" / "cases"
@@ -250,3 +251,47 @@ def test_who_is_off_the_lanes_changes_no_lane(tmp_path: Path) -> None:
 def test_the_ego_needs_a_lane(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="is on no lane that leads there"):
         read_openscenario(write(tmp_path, {"Ego": CAR}, {"Ego": _world(150, -6)}))
+
+
+@pytest.mark.parametrize(
+    ("place", "action", "lasts"),
+    [
+        (
+            '<LanePosition roadId="7" laneId="-1" s="20" offset="3.5"/>',
+            _offset('<RelativeTargetLaneOffset entityRef="Ego" value="0"/>'),
+            math.pi * math.sqrt(0.5 * 3.5),
+        ),
+        (
+            '<LanePosition roadId="7" laneId="-1" s="20" offset="3.5"/>',
+            _offset(_absolute(0.0), 4.0),
+            math.pi * math.sqrt(0.5 * 3.5 / 4.0),
+        ),
+        (
+            '<LanePosition roadId="7" laneId="1" s="20"><Orientation type="relative" h="3.14159"/></LanePosition>',
+            _changes_lane(-1, "time", 2.0).replace(
+                '<AbsoluteTargetLane value="-1"/>', '<RelativeTargetLane entityRef="Ego" value="0"/>'
+            ),
+            2.0,
+        ),
+        (
+            '<LanePosition roadId="7" laneId="1" s="20"><Orientation type="relative" h="3.14159"/></LanePosition>',
+            _changes_lane(-1, "rate", 2.0),
+            1.5 * 3.5 / 2.0,
+        ),
+    ],
+)
+def test_who_overtakes_on_the_oncoming_lane_from_the_beginning_cuts_in(
+    tmp_path: Path, place: str, action: str, lasts: float
+) -> None:
+    events = event("in", action, after(4.0)) + event("slow", speed(12), _over("in"))
+    begin = {"Ego": f"{lane(40)}\n{speed(8)}", "Fast": f"<Position>{place}</Position>\n{speed(16)}"}
+    file = write(tmp_path, {"Ego": CAR, "Fast": CAR}, begin, {"Fast": events}, stop=after(10.0))
+    steps = _run(file)
+    # It comes at the end of the first period, with its reference point where the file has it.
+    assert _at(steps, 3.0, "Fast") == pytest.approx((20.0 + 3.7 + 16.0 * 3.0, 1.75, 16.0), abs=0.02)
+    assert _at(steps, 4.0 + 0.5 * lasts, "Fast")[1] == pytest.approx(0.0, abs=1.0)
+    assert _at(steps, 4.1 + lasts, "Fast")[1] == pytest.approx(-1.75, abs=0.02)
+    assert _at(steps, 4.0, "Ego")[0] == pytest.approx(40.0 + 3.7 + 8.0 * 4.0, abs=0.1)
+    begun = {one.name: one.time for step in steps for one in step.begun if not one.is_over}
+    assert begun["slow"] - begun["in"] == pytest.approx(lasts, abs=0.21)
+    assert _at(steps, 9.9, "Fast")[1:] == pytest.approx((-1.75, 12.0), abs=0.02)

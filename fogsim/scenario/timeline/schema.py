@@ -180,7 +180,8 @@ class LaneAction(Section):
     """How long it stays there."""
 
     offset_m: Annotated[Number, Field(ge=-10, le=10)] | None = None
-    """Distance of its middle from the lane's middle afterwards, to the left; `lanes: 0` moves it in its own lane."""
+    """Distance of its middle from the lane's middle afterwards, to the left; `lanes: 0` moves it in its own lane, or,
+    on a `path`, to the left of that."""
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:

@@ -164,6 +164,10 @@ class OpenDriveLanes:
         distance, spot = min((_foot(one, x, y) for one in self.lanes), key=lambda one: one[0])
         return spot if distance <= 0.5 * spot.lane.width + _ROUNDING else None
 
+    def foot(self, lane: RoadLane, x: float, y: float) -> Spot:
+        """Place in the middle of a lane that is nearest to a point [m]."""
+        return _foot(lane, x, y)[1]
+
     def beside(self, spot: Spot, lanes: int) -> Spot:
         """Place on the lane that is `lanes` to the left on the same edge; ValueError if there is none."""
         index = spot.lane.index + lanes

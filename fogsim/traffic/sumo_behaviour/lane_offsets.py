@@ -8,8 +8,8 @@ from fogsim.traffic.sumo.link import Api, is_off_lanes
 
 
 @dataclass(frozen=True, slots=True)
-class _Glide:
-    """A move within the lane along half a wave of a cosine, from one offset to the left to another [m]."""
+class Glide:
+    """A move across the lane along half a wave of a cosine, from one offset to the left to another [m]."""
 
     begun: float
     duration: float
@@ -27,12 +27,12 @@ class LaneOffsets:
 
     def __init__(self, api: Api) -> None:
         self._api = api
-        self._glides: dict[str, _Glide] = {}
+        self._glides: dict[str, Glide] = {}
 
     def begin(self, vehicle: str, offset: float, duration: float, time: float) -> None:
         """Begin a move to an offset to the left of the lane's middle [m]."""
         now = 0.0 if is_off_lanes(self._api, vehicle) else float(self._api.vehicle.getLateralLanePosition(vehicle))
-        self._glides[vehicle] = _Glide(time, duration, now, offset)
+        self._glides[vehicle] = Glide(time, duration, now, offset)
 
     def play(self, time: float, present: Collection[str]) -> None:
         """Move those under way to where they are at a time [s]."""

@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from fogsim.traffic.sumo.link import Api, is_off_lanes
+from fogsim.traffic.sumo_behaviour.lane_offsets import Glide
 from fogsim.values.script import FollowPath
 
 _ANYWHERE = 2
@@ -19,6 +20,7 @@ class _Path:
 
     def __init__(self, action: FollowPath, begun: float, speed: float) -> None:
         self.action, self.begun, self.speed, self.driven = action, begun, speed, 0.0
+        self.aside = Glide(begun, 0.0, 0.0, 0.0)
         points = np.array(action.points, dtype=np.float64)
         self._points, steps = points[:, :2], np.diff(points[:, :2], axis=0)
         self._ends = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
@@ -44,15 +46,18 @@ class _Path:
             return time - self.begun >= self.action.times[-1]
         return self.driven + self.speed * step >= self.length
 
-    def place(self) -> tuple[float, float, float]:
-        """Where the front bumper is [m], and the heading [rad]."""
+    def place(self, time: float, step: float) -> tuple[float, float, float]:
+        """Where the front bumper is at a time [m], and the heading [rad]."""
         x, y = (float(np.interp(self.driven, self._ends, self._points[:, axis])) for axis in (0, 1))
         if self._headings is not None:
             heading = float(np.interp(self.driven, self._ends, self._headings))
         else:
             piece = min(int(np.searchsorted(self._ends, self.driven, side="right")), len(self._steps)) - 1
             heading = math.atan2(self._steps[piece, 1], self._steps[piece, 0])
-        ahead = self.action.ahead
+        ahead, aside = self.action.ahead, self.aside.offset(time)
+        x, y = x - aside * math.sin(heading), y + aside * math.cos(heading)
+        if self.speed > 0.0:
+            heading += math.atan2(aside - self.aside.offset(time - step), self.speed * step)
         return x + ahead * math.cos(heading), y + ahead * math.sin(heading), heading
 
 
@@ -87,20 +92,25 @@ class Paths:
         for vehicle, path in list(self._paths.items()):
             stays = path.action.stays or vehicle not in present or is_off_lanes(self._api, vehicle)
             if path.is_over(time, step) and not stays:
-                self._drive_on(vehicle, path)
+                self._drive_on(vehicle, path, path.place(time, step)[2])
                 continue
             path.move(time + step, step, speeds.get(vehicle, math.inf))
-            x, y, heading = path.place()
+            x, y, heading = path.place(time + step, step)
             get.moveToXY(vehicle, "", -1, x, y, 90.0 - math.degrees(heading), _ANYWHERE)
             if vehicle in present:
                 get.setPreviousSpeed(vehicle, path.speed)
                 get.setSpeed(vehicle, path.speed)
 
-    def _drive_on(self, vehicle: str, path: _Path) -> None:
+    def shift(self, vehicle: str, aside: float, duration: float, time: float) -> None:
+        """Let one move to the left of its path [m], along half a wave of a cosine."""
+        path = self._paths[vehicle]
+        path.aside = Glide(time, duration, path.aside.offset(time), aside)
+
+    def _drive_on(self, vehicle: str, path: _Path, heading: float) -> None:
         """Turn a vehicle into its lane, about the point that followed the path."""
         get = self._api.vehicle
         lane = self._api.lane.getAngle(get.getLaneID(vehicle), get.getLanePosition(vehicle))
-        turn = path.place()[2] - math.radians(90.0 - lane)
+        turn = heading - math.radians(90.0 - lane)
         get.setLateralLanePosition(vehicle, get.getLateralLanePosition(vehicle) - path.action.ahead * math.sin(turn))
         self._end(vehicle)
 

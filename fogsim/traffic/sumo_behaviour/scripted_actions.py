@@ -110,6 +110,8 @@ class ScriptedActions:
     def _has_lane(self, action: TrafficAction) -> bool:
         if not isinstance(action, ChangeLane) or action.oncoming or action.vehicle in self._oncoming:
             return True
+        if action.vehicle in self._paths.vehicles and not action.lanes:
+            return True
         return has_lane(self._api, action.vehicle, action.lanes)
 
     def _motion(self, time: float, present: Collection[str]) -> Motion:
@@ -147,6 +149,9 @@ class ScriptedActions:
             self._change_lane(change, time)
 
     def _change_lane(self, change: ChangeLane, time: float) -> None:
+        if change.vehicle in self._paths.vehicles:
+            self._paths.shift(change.vehicle, change.offset or 0.0, change.duration or 0.0, time)
+            return
         is_in_lane = change.offset is not None and not change.lanes
         if change.offset is not None:
             # What is shown glides to another lane by itself.

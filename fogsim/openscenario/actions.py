@@ -404,6 +404,41 @@ class Actions:
         follow = {"vehicle": self._other(action), "headway_s": headway, "gap_m": distance - further}
         effect.add(actor, follow=follow)
 
+    def _synchronize(self, action: Node, actor: str, effect: Effect) -> None:
+        """`arrive`: at its target when another vehicle is at its own, each on the way that it has from `Init` on."""
+        master, final = action.get("masterEntityRef"), action.one("FinalSpeed")
+        own, other = action.one("TargetPosition"), action.one("TargetPositionMaster")
+        if master not in self.vehicles or own is None or other is None:
+            raise ValueError(f"expected TargetPosition, TargetPositionMaster and a vehicle, got {master!r}")
+        (place, begins), (its_place, its_begins) = self._on_the_way(own, actor), self._on_the_way(other, master)
+        name = self.called(master).strip('"')
+        arrive = {"vehicle": name, "distance_m": place - begins, "its_distance_m": its_place - its_begins}
+        speed = final.one("AbsoluteSpeed", "RelativeSpeedToMaster") if final else None
+        if speed is not None:
+            value = self.findings.number(speed, "value")
+            how = (
+                "delta"
+                if speed.tag == "AbsoluteSpeed"
+                else self.findings.word(speed, "speedTargetValueType", ("delta", "factor"))
+            )
+            arrive["to_kmh"] = 0.0 if how == "factor" else value * KMH_PER_MPS
+            arrive["factor"] = value if how == "factor" else float(speed.tag != "AbsoluteSpeed")
+        near = self.findings.number(action, "targetToleranceMaster", 0.0)
+        effect.has_unknown_end = name != "ego"
+        effect.ends.append(f"ego.position >= {its_place - near + self.vehicles[master].front:.3f} m")
+        effect.add(actor, arrive=arrive)
+
+    def _on_the_way(self, position: Node, vehicle: str) -> tuple[float, float]:
+        """Where along a vehicle's way a position is, and where the vehicle begins [m]; ValueError unless ahead on it."""
+        begins, way = self.positions.entities.get(vehicle), self.positions.ways.get(vehicle, ())
+        if begins is None or not way:
+            raise ValueError(f"{vehicle} has no way along lanes")
+        place, front = self.positions.along_way(position, way), self.vehicles[vehicle].front
+        start = self.positions.lanes.along(begins, front, way).position - front
+        if place <= start:
+            raise ValueError(f"{position.tag}: it lies behind {vehicle}")
+        return place, start
+
     def gap(self, action: Node) -> tuple[float, float, bool]:
         """Time gap [s] or distance [m], the other 0, and whether it is between bumpers; ValueError if none."""
         headway, distance = (self.findings.number(action, key, 0.0) for key in ("timeGap", "distance"))
@@ -468,13 +503,14 @@ _PRIVATE: Mapping[str, Callable[[Actions, Node, str, Effect], None]] = {
     "LaneOffsetAction": Actions._lane_offset,
     "LightStateAction": Actions._lights,
     "LongitudinalDistanceAction": Actions._keep_distance,
+    "SynchronizeAction": Actions._synchronize,
     "FollowTrajectoryAction": Actions._trajectory,
     "AssignRouteAction": Actions._assign_route,
     "AcquirePositionAction": Actions._acquire,
 }
 _ACROSS = ("LaneChangeAction", "LaneOffsetAction")
 _ANYWHERE = ("SpeedAction", "SpeedProfileAction", "FollowTrajectoryAction", "LightStateAction")
-_ORDERS = {"LongitudinalAction": {"speed", "follow"}, "LateralAction": {"change_lane"}}
+_ORDERS = {"LongitudinalAction": {"speed", "follow"}, "PrivateAction": {"arrive"}, "LateralAction": {"change_lane"}}
 _GROUPS = [
     f"{kind}Action" for kind in ("Private", "Global", "Controller", "Longitudinal", "Lateral", "Appearance", "Routing")
 ]

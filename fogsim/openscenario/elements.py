@@ -31,6 +31,8 @@ LongitudinalDistanceAction@continuous,coordinateSystem,displacement,distance,ent
 LaneOffsetAction@continuous LaneOffsetActionDynamics@dynamicsShape,maxLateralAcc LaneOffsetTarget
 AbsoluteTargetLaneOffset@value RelativeTargetLaneOffset@entityRef,value
 SpeedProfileAction@entityRef,followingMode SpeedProfileEntry@speed,time
+SynchronizeAction@masterEntityRef,targetToleranceMaster TargetPosition TargetPositionMaster FinalSpeed
+AbsoluteSpeed@value RelativeSpeedToMaster@speedTargetValueType,value
 FollowTrajectoryAction Trajectory@closed,name TrajectoryRef TrajectoryFollowingMode@followingMode Shape Polyline
 Vertex@time TimeReference None Timing@domainAbsoluteRelative,offset,scale TrajectoryCatalog
 ParameterAction@parameterRef VariableAction@variableRef SetAction@value VariableDeclarations
@@ -93,6 +95,7 @@ HARMLESS: Mapping[str, str] = _by_name(
         "Gear@number": "nothing while inactive",
         "TimeOfDay@animation": "in minutes the sun hardly moves",
         "Sun@azimuth": "daylight is the illuminance of the ground, without shadows",
+        "SynchronizeAction@targetTolerance": "it arrives where and when it is to, within a step",
         "Wind": "even fog does not drift, and boxes of fog stand still",
         "Weather@atmosphericPressure Weather@temperature": "FogSim's light and fog do not depend on them",
         "WorldPosition@z WorldPosition@p WorldPosition@r RelativeWorldPosition@dz RelativeObjectPosition@dz "
@@ -117,9 +120,7 @@ REFUSED: Mapping[str, str] = _by_name(
         "FromRoadCoordinates": "a place on a route has a lane; write FromLaneCoordinates",
         "TrajectoryPosition Clothoid ClothoidSpline ClothoidSplineSegment PositionStart Nurbs ControlPoint Knot "
         "FollowTrajectoryAction@initialDistanceOffset": "trajectories are polylines, from their first vertex on",
-        "SynchronizeAction TargetPosition TargetPositionMaster FinalSpeed "
-        "AbsoluteSpeed RelativeSpeedToMaster TargetDistanceSteadyState TargetTimeSteadyState": "speeds change by time "
-        "or rate",
+        "TargetDistanceSteadyState TargetTimeSteadyState": "the final speed is reached at the target",
         "LateralDistanceAction": "where vehicles are in their lanes does not depend on others",
         "VisibilityAction SensorReferenceSet SensorReference": "everything can be seen that the fog does not hide",
         "AnimationAction AnimationType AnimationState AnimationFile ComponentAnimation VehicleComponent "

@@ -70,6 +70,21 @@ class Positions:
         x, y, along = found.world if isinstance(found, Spot) else found
         return x, y, self._heading(one, along or 0.0), along
 
+    def along_way(self, position: Node, way: tuple[str, ...]) -> float:
+        """How far along a way a ``Position`` is, also inside a junction if it is on a route [m]; ValueError if not."""
+        starts, one = self.lanes.starts(way), position.one("RoutePosition")
+        inner = one.within("InRoutePosition", "FromLaneCoordinates") if one else None
+        reference = one.one("RouteRef") if one and inner else None
+        edges: tuple[str, ...] = ()
+        if inner and reference:
+            (spot, edges), further = self.route(reference), self.findings.number(inner, "pathS")
+            inner.read.update(inner.attributes)
+        else:
+            spot, further = self.on_lanes(position, is_of_vehicle=False), 0.0
+        if not {spot.lane.edge, *edges} <= {*way}:
+            raise ValueError(f"{position.tag}: it is not on the way of its vehicle")
+        return starts[way.index(spot.lane.edge)] + spot.position + further
+
     def named(self, position: Node) -> Spot | None:
         """Place in the middle of the lane that a ``LanePosition`` names, whatever its offset."""
         one = next(iter(position.children), position)

@@ -13,7 +13,7 @@ from fogsim.openscenario.xml_tree import Node
 
 _BEGUN, _OVER = ("startTransition", "runningState"), ("endTransition", "completeState")
 _MOST_TIMES = 100
-_MOTION = {"speed", "follow"}
+_MOTION = {"speed", "follow", "arrive"}
 _PARTS = ("Story", "Act", "ManeuverGroup", "Maneuver", "Event", "Action")
 
 

@@ -88,7 +88,7 @@ class Triggers:
         if node is None or len(times) == len(groups):
             return at_time(min(times)) if times else None
         if len({group.delay for group in groups}) > 1:
-            groups = [self._marked(group, node) if group.delay else group for group in groups]
+            groups = [_delayed(group) for group in groups]
         phrase = groups[0].condition if len(groups) == 1 else " or ".join(f"({group.condition})" for group in groups)
         return Trigger(phrase, groups[0].delay)
 
@@ -99,21 +99,11 @@ class Triggers:
         if not others:
             return at_time(latest)
         if len({trigger.delay for trigger in others}) > 1:
-            others = [self._marked(one, group) if one.stays and one.delay else one for one in others]
-            if any(one.delay for one in others):
-                delays = [trigger.delay for trigger in read]
-                why = "of conditions with different delays, those that may become false again must have none"
-                self.findings.refuse(group, f"{why}; got {delays}")
+            others = [_delayed(one) for one in others]
         delay = others[0].delay
         phrase = [f"time >= {latest - delay:g} s"] if latest > delay else []
         parts = list(dict.fromkeys(one.condition for one in others))
         return Trigger(" and ".join([*phrase, *(_bracketed(one, len(parts) + len(phrase)) for one in parts)]), delay)
-
-    def _marked(self, trigger: Trigger, node: Node) -> Trigger:
-        """A trigger with its delay as a mark that has begun."""
-        name = f"delayed_{len(self.marks)}"
-        self.mark(name, trigger, node)
-        return Trigger(f"happened({name})", stays=True)
 
     def _condition(self, node: Node) -> Trigger:
         delay = self.findings.number(node, "delay", 0.0)
@@ -384,6 +374,13 @@ def both(first: Trigger, then: Trigger) -> Trigger:
     if first.at is not None and first.at <= 0.0:
         return then
     return Trigger(f"{_bracketed(first.condition, 2)} and {_bracketed(then.condition, 2)}", then.delay)
+
+
+def _delayed(trigger: Trigger) -> Trigger:
+    """A trigger with its delay in its condition."""
+    if not trigger.delay or not trigger.condition:
+        return trigger
+    return Trigger(f"({trigger.condition}) delayed {trigger.delay:g} s", stays=trigger.stays)
 
 
 def _bracketed(condition: str, count: int) -> str:

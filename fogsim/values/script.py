@@ -105,6 +105,30 @@ class Follow:
 
 
 @dataclass(frozen=True, slots=True)
+class Arrive:
+    """A vehicle is at a place when another one is at a place of its own.
+
+    Attributes
+    ----------
+    vehicle, other : str
+        Their ids.
+    distance, other_distance : float
+        How far each has driven by then since it came onto the road [m].
+    speed : float or None
+        Speed that the vehicle has there, added to `factor` times the other's [m/s]; None for any.
+    factor : float
+        Share of the other's speed in that.
+    """
+
+    vehicle: str
+    other: str
+    distance: float
+    other_distance: float
+    speed: float | None = None
+    factor: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Stop:
     """A vehicle stops at a place ahead, stands there, and drives on.
 
@@ -305,7 +329,9 @@ class Walk:
     speed: float
 
 
-TrafficAction = ChangeSpeed | Follow | Stop | ChangeLane | FollowPath | SetLamps | SetSignal | Depart | Enter | Walk
+TrafficAction = (
+    ChangeSpeed | Follow | Arrive | Stop | ChangeLane | FollowPath | SetLamps | SetSignal | Depart | Enter | Walk
+)
 """What a traffic simulation can be told to do at once."""
 
 

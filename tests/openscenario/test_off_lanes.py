@@ -206,6 +206,33 @@ def test_conditions_on_values_hold_once_an_event_has_set_them(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(
+    ("final", "speed_there"),
+    [
+        ('<FinalSpeed><AbsoluteSpeed value="6"/></FinalSpeed>', 6.0),
+        ('<FinalSpeed><RelativeSpeedToMaster value="0.5" speedTargetValueType="factor"/></FinalSpeed>', 5.0),
+        ('<FinalSpeed><RelativeSpeedToMaster value="-2" speedTargetValueType="delta"/></FinalSpeed>', 8.0),
+        ("", None),
+    ],
+)
+def test_a_vehicle_arrives_when_the_ego_does(tmp_path: Path, final: str, speed_there: float | None) -> None:
+    meets = (
+        '<PrivateAction><SynchronizeAction masterEntityRef="Ego" targetToleranceMaster="1"><TargetPositionMaster>'
+        '<LanePosition roadId="7" laneId="-1" s="110"/></TargetPositionMaster><TargetPosition>'
+        f'<LanePosition roadId="7" laneId="1" s="330"/></TargetPosition>{final}</SynchronizeAction></PrivateAction>'
+    )
+    events = event("meet", meets, after(1.0)) + event("next", speed(3), _over("meet"))
+    begin = {"Ego": f"{lane(30)}\n{speed(10)}", "Other": f"{lane(420, 1)}\n{speed(9)}"}
+    file = write(tmp_path, {"Ego": CAR, "Other": CAR}, begin, {"Other": events}, stop=after(9.0))
+    steps = _run(file)
+    # The ego drives 80 m in 8 s, the other one 90 m against the road, 8.9 m of it before it begins to synchronise.
+    x, _, speed_then = _at(steps, 8.0, "Other")
+    assert (x, _at(steps, 8.0, "Ego")[0]) == pytest.approx((330.0 - 3.7, 110.0 + 3.7), abs=1.0)
+    assert speed_there is None or speed_then == pytest.approx(speed_there, abs=0.6)
+    begun = {one.name: one.time for step in steps for one in step.begun if not one.is_over}
+    assert begun["next"] == pytest.approx(7.9, abs=0.21)
+
+
+@pytest.mark.parametrize(
     ("action", "told"),
     [
         (_follows(("0", _world(100, 0)), ("", _world(120, 0))), "expected a number for time, got 'nothing'"),

@@ -9,6 +9,7 @@ from fogsim.scenario.sensors.faults import fault_of
 from fogsim.scenario.timeline.lamps import lamp_switches
 from fogsim.scenario.timeline.schema import (
     LONGEST_CHANGE,
+    ArriveAction,
     DepartAction,
     Doing,
     FogActions,
@@ -26,6 +27,7 @@ from fogsim.values import Fault, FogChange, FogField, Lamp
 from fogsim.values.light import ALL_LAMPS
 from fogsim.values.script import (
     Actions,
+    Arrive,
     ChangeFog,
     ChangeLane,
     ChangeLight,
@@ -161,6 +163,7 @@ def vehicles_of(entry: TimelineEntry) -> tuple[str, ...]:
         if isinstance(doing, VehicleActions):
             others = [
                 doing.follow.vehicle if doing.follow else None,
+                doing.arrive.vehicle if doing.arrive else None,
                 doing.speed.like if doing.speed else None,
                 doing.change_lane.to_lane_of if doing.change_lane else None,
                 doing.depart.like if doing.depart else None,
@@ -177,32 +180,39 @@ def _of_vehicle(subject: str, doing: VehicleActions, now: Situation) -> list[Tra
     vehicle, speed = now.vehicle_id(subject), now.speed(subject)
     if doing.depart:
         return _departure(vehicle, doing.depart, now) if speed is None else None
-    moves: list[TrafficAction | None] = [_path(vehicle, doing.path)] if doing.path else []
     if speed is None:
         # A path may bring a vehicle onto the road.
         return [_path(vehicle, doing.path)] if doing.path and doing.model_fields_set == {"path"} else None
     if doing.walk:
         return [Walk(vehicle, doing.walk.speed_kmh / KMH_PER_MPS)]
-    if doing.speed:
-        moves.append(_speed_change(vehicle, doing.speed, speed, now))
-    if doing.brake:
-        brake = doing.brake
-        moves.append(_braking(vehicle, speed, brake.to_kmh / KMH_PER_MPS, brake.deceleration_mps2, brake.hold_s))
-    if doing.break_down:
-        moves.append(_braking(vehicle, speed, 0.0, doing.break_down.deceleration_mps2, None))
-    if doing.follow:
-        follow, leader = doing.follow, now.vehicle_id(doing.follow.vehicle)
-        is_there = now.speed(follow.vehicle) is not None
-        moves.append(
-            Follow(vehicle, leader, follow.headway_s, _endless(follow.for_s), follow.gap_m) if is_there else None
-        )
-    if doing.stop:
-        moves.append(_stopping(vehicle, doing.stop, now.position(subject)))
+    moves: list[TrafficAction | None] = [_path(vehicle, doing.path)] if doing.path else []
+    moves += _motions(vehicle, doing, subject, speed, now)
     if doing.change_lane:
         moves.append(_lane_change(vehicle, doing.change_lane, subject, speed, now))
     moves += _switches(vehicle, doing)
     whole = [move for move in moves if move is not None]
     return whole if len(whole) == len(moves) else None
+
+
+def _motions(
+    vehicle: str, doing: VehicleActions, subject: str, speed: float, now: Situation
+) -> Iterator[TrafficAction | None]:
+    """What changes the speed of a vehicle; None for what cannot begin yet."""
+    if doing.speed:
+        yield _speed_change(vehicle, doing.speed, speed, now)
+    if doing.brake:
+        brake = doing.brake
+        yield _braking(vehicle, speed, brake.to_kmh / KMH_PER_MPS, brake.deceleration_mps2, brake.hold_s)
+    if doing.break_down:
+        yield _braking(vehicle, speed, 0.0, doing.break_down.deceleration_mps2, None)
+    if doing.follow:
+        follow, leader = doing.follow, now.vehicle_id(doing.follow.vehicle)
+        action = Follow(vehicle, leader, follow.headway_s, _endless(follow.for_s), follow.gap_m)
+        yield action if now.speed(follow.vehicle) is not None else None
+    if doing.arrive:
+        yield _arrival(vehicle, doing.arrive, now)
+    if doing.stop:
+        yield _stopping(vehicle, doing.stop, now.position(subject))
 
 
 def _departure(vehicle: str, action: DepartAction, now: Situation) -> list[TrafficAction] | None:
@@ -260,6 +270,12 @@ def _switches(vehicle: str, doing: VehicleActions) -> Iterator[SetLamps]:
     if doing.hazard_lights is not None:
         lit, own = (_HAZARD, Lamp.NONE) if doing.hazard_lights else (Lamp.NONE, _HAZARD)
         yield SetLamps(vehicle, lit=lit, automatic=own)
+
+
+def _arrival(vehicle: str, action: ArriveAction, now: Situation) -> Arrive:
+    other = now.vehicle_id(action.vehicle)
+    speed = None if action.to_kmh is None else action.to_kmh / KMH_PER_MPS
+    return Arrive(vehicle, other, action.distance_m, action.its_distance_m, speed, action.factor)
 
 
 def _path(vehicle: str, action: PathAction) -> FollowPath:

@@ -128,6 +128,25 @@ class FollowAction(Section):
     """How long; without it, to the end of the run."""
 
 
+class ArriveAction(Section):
+    """A vehicle drives so that it is at a place when another one is at a place of its own."""
+
+    vehicle: Id
+    """The other one: its id, or `ego`."""
+
+    distance_m: Distance
+    """How far it has driven by then since it came onto the road."""
+
+    its_distance_m: Distance
+    """How far the other one has."""
+
+    to_kmh: Annotated[Number, Field(ge=-500, le=500)] | None = None
+    """Speed that it has there, and keeps; any if it is not given."""
+
+    factor: Annotated[Number, Field(ge=0, le=100)] = 0.0
+    """Factor on the other one's speed, to which `to_kmh` is added."""
+
+
 class StopAction(Section):
     """A vehicle stops at a place, stands there, and drives on."""
 
@@ -290,6 +309,9 @@ class VehicleActions(Section):
     follow: FollowAction | None = None
     """Keep a headway to another vehicle."""
 
+    arrive: ArriveAction | None = None
+    """Be at a place when another vehicle is at one."""
+
     stop: StopAction | None = None
     """Stop at a place."""
 
@@ -316,7 +338,7 @@ class VehicleActions(Section):
 
     @model_validator(mode="after")
     def _one_motion(self) -> Self:
-        motions = ("speed", "brake", "follow", "stop", "break_down")
+        motions = ("speed", "brake", "follow", "arrive", "stop", "break_down")
         given = [key for key in motions if getattr(self, key) is not None]
         if len(given) > 1:
             raise ValueError(f"{' and '.join(given)} cannot begin together: each sets the speed; take two entries")

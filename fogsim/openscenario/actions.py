@@ -429,7 +429,7 @@ class Actions:
         effect.add(actor, arrive=arrive)
 
     def _on_the_way(self, position: Node, vehicle: str) -> tuple[float, float]:
-        """Where along a vehicle's way a position is, and where the vehicle begins [m]; ValueError unless ahead on it."""
+        """Where on a vehicle's way a position is, and where it begins [m]; ValueError unless that is behind."""
         begins, way = self.positions.entities.get(vehicle), self.positions.ways.get(vehicle, ())
         if begins is None or not way:
             raise ValueError(f"{vehicle} has no way along lanes")

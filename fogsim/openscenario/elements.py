@@ -52,7 +52,7 @@ StoryboardElementStateCondition@state,storyboardElementRef,storyboardElementType
 SpeedCondition@direction,rule,value AccelerationCondition@direction,rule,value StandStillCondition@duration
 RelativeSpeedCondition@direction,entityRef,rule,value TraveledDistanceCondition@value
 RelativeDistanceCondition@coordinateSystem,entityRef,freespace,relativeDistanceType,rule,value
-DistanceCondition@coordinateSystem,freespace,relativeDistanceType,rule,value ReachPositionCondition@tolerance
+DistanceCondition@alongRoute,coordinateSystem,freespace,relativeDistanceType,rule,value ReachPositionCondition@tolerance
 TimeHeadwayCondition@coordinateSystem,entityRef,freespace,relativeDistanceType,rule,value
 TimeToCollisionCondition@coordinateSystem,freespace,relativeDistanceType,rule,value TimeToCollisionConditionTarget
 CollisionCondition ByType@type EndOfRoadCondition@duration
@@ -104,8 +104,7 @@ HARMLESS: Mapping[str, str] = _by_name(
         "DynamicConstraints": "FogSim's law of following has limits of its own",
         "Color ColorRgb ColorCmyk": "lamps have the colours that the law requires",
         "LightState@flashingOnDuration LightState@flashingOffDuration": "indicators flash as the law requires",
-        "DistanceCondition@alongRoute TimeHeadwayCondition@alongRoute TimeToCollisionCondition@alongRoute": "distances "
-        "are along the road, which coordinateSystem decides in 1.1 and later",
+        "TimeHeadwayCondition@alongRoute TimeToCollisionCondition@alongRoute": "times are of distances along the road",
     }
 )
 """Elements and attributes that could not change a run, and why."""

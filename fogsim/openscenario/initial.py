@@ -220,7 +220,10 @@ def along_route(route: tuple[str, ...], begin: Beginning, vehicles: Mapping[str,
         if isinstance(what, str):
             spot, further = begin.spots.get(what), vehicles[what].front
         else:
-            spot, further = actions.positions.spot(what, is_of_vehicle=False), 0.0
+            try:
+                spot, further = actions.positions.on_lanes(what, is_of_vehicle=False), 0.0
+            except ValueError:
+                return None
         if spot is None or spot.lane.edge not in starts:
             return None
         return starts[spot.lane.edge] + spot.position + further

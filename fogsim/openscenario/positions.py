@@ -44,10 +44,10 @@ class Positions:
         """Entity to which a ``Position`` is relative; None for an absolute one."""
         return next((one.get("entityRef") or None for one in position.children), None)
 
-    def spot(self, position: Node, *, is_of_vehicle: bool = True) -> Spot | None:
+    def spot(self, position: Node) -> Spot | None:
         """Place of a ``Position``; None, and a finding, if it cannot be placed, or a vehicle cannot stand so there."""
         try:
-            return self.on_lanes(position, is_of_vehicle=is_of_vehicle)
+            return self.on_lanes(position)
         except ValueError as error:
             self.findings.refuse(next(iter(position.children), position), str(error))
             return None

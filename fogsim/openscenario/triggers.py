@@ -242,17 +242,17 @@ class Triggers:
         return _Test(f"{signal} >= {value}", signal, ">=", value)
 
     def _relative_distance(self, node: Node, name: str) -> _Test | None:
-        """`gap(X, Y)`, ahead or behind, without `freespace` between rear axles; or straight: `distance(X, Y)`."""
+        """`gap(X, Y)`, ahead or behind; straight `clearance(X, Y)`; without `freespace` between rear axles."""
         other = node.get("entityRef")
         if not self._is_known(node, other):
             return None
         if self._is_along(node):
             return self._along_the_road(node, name, other)
+        pair = f"{self.called(name)}, {self.called(other)}"
         if self.findings.flag(node, "freespace"):
-            self.findings.refuse(
-                node, "freespace: straight distances are from front bumper to front bumper; write false"
-            )
-        return self._compared(node, f"distance({self.called(name)}, {self.called(other)})", "m")
+            return self._compared(node, f"clearance({pair})", "m")
+        rear = f"{self.vehicles[name].front:g} m, {self.vehicles[other].front:g} m"
+        return self._compared(node, f"distance({pair}, {rear})", "m")
 
     def _is_along(self, node: Node, default: str = "euclidianDistance") -> bool:
         """Whether a distance is along the road, not straight; entities' own axes are taken as along the road."""
@@ -271,9 +271,16 @@ class Triggers:
         return _Test(f"{gap} > {near[0]:.9g} m or {gap} < {near[1]:.9g} m")
 
     def _distance(self, node: Node, name: str) -> _Test | None:
-        """`X.position` about a position on the ego's route, without `freespace` of the rear axle."""
-        self._is_along(node)
-        place, free, vehicle = self._place_along(node), self.findings.flag(node, "freespace"), self.vehicles[name]
+        """`distance_to` a position; along the road `X.position` about it; without `freespace` of the rear axle."""
+        is_along, is_free = self._is_along(node), self.findings.flag(node, "freespace")
+        if not (is_along or self.findings.flag(node, "alongRoute", "false")):
+            if is_free:
+                self.findings.refuse(
+                    node, "freespace: straight distances to a position are of the rear axle; write false"
+                )
+            signal = self._distance_to(node, name)
+            return None if signal is None else self._compared(node, signal, "m")
+        place, free, vehicle = self._place_along(node), is_free, self.vehicles[name]
         if place is None:
             return None
         value, signal = self.findings.number(node, "value"), f"{self.called(name)}.position"
@@ -284,16 +291,27 @@ class Triggers:
         return _Test(f"{signal} < {near:.3f} m or {signal} > {far:.3f} m")
 
     def _reaches(self, node: Node, name: str) -> _Test | None:
-        """`X.position` within the tolerance of a position on the ego's route."""
-        place, around = self._place_along(node), self.findings.number(node, "tolerance")
-        if place is None:
+        """`distance_to` a position; on the ego's route, ahead of the vehicle, `X.position` from its tolerance on."""
+        position, around = node.one("Position"), self.findings.number(node, "tolerance")
+        place, begins = None if position is None else self.along(position), self.along(name)
+        if place is not None and begins is not None:
+            near = place + self.vehicles[name].front - around
+            if begins < near:
+                # However far it drives between two looks, it has been there.
+                signal = f"{self.called(name)}.position"
+                return _Test(f"{signal} >= {near:.3f} m", signal, ">=", f"{near:.3f} m")
+        reached = self._distance_to(node, name)
+        return None if reached is None else _Test(f"{reached} <= {around:.9g} m", reached, "<=", f"{around:.9g} m")
+
+    def _distance_to(self, node: Node, name: str) -> str | None:
+        """Straight distance of a vehicle's rear axle to a position."""
+        position = node.one("Position")
+        try:
+            x, y, *_ = self.positions.point(position if position else node)
+        except ValueError as error:
+            self.findings.refuse(position or node, str(error))
             return None
-        signal, near = f"{self.called(name)}.position", place + self.vehicles[name].front - around
-        begins = self.along(name)
-        if begins is not None and begins < near:
-            # However far it drives between two looks, it has been there.
-            return _Test(f"{signal} >= {near:.3f} m", signal, ">=", f"{near:.3f} m")
-        return _Test(f"{signal} >= {near:.3f} m and {signal} <= {near + 2.0 * around:.3f} m")
+        return f"distance_to({self.called(name)}, {self.vehicles[name].front:g} m, {x:.3f} m, {y:.3f} m)"
 
     def _place_along(self, node: Node) -> float | None:
         position = node.one("Position")

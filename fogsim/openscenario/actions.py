@@ -48,7 +48,7 @@ class Effect:
 
     `routes` are edges through the waypoints of a vehicle's route, and `sets` values of parameters and variables. It
     `ends_itself` if only the run shows its duration, `is_endless` if something else must end it, and `has_unknown_end`
-    if nothing shows it. `is_at_start` in ``Init``.
+    if nothing shows it. `is_at_start` in ``Init``. Vehicles that it brings onto the road do what `once_there` has.
     """
 
     do: dict[str, dict[str, Any]] = field(default_factory=dict)
@@ -59,6 +59,7 @@ class Effect:
     is_endless: bool = False
     has_unknown_end: bool = False
     sets: dict[str, str] = field(default_factory=dict)
+    once_there: dict[str, dict[str, Any]] = field(default_factory=dict)
     is_at_start: bool = False
 
     def add(self, subject: str, **blocks: Any) -> None:
@@ -102,8 +103,11 @@ class Actions:
             elif one.tag == "OverrideControllerValueAction":
                 if any(self.findings.flag(input_, "active", "false") for input_ in one.all()):
                     self.findings.refuse(one, "speeds and lanes are ordered, not pedals; write active=false")
-            elif one.tag in ("ParameterAction", "VariableAction"):
-                self._set(one, effect)
+            elif one.tag in _GLOBAL:
+                try:
+                    _GLOBAL[one.tag](self, one, effect)
+                except ValueError as error:
+                    self.findings.refuse(one, str(error))
             elif one.tag in HARMLESS:
                 self.findings.leave_out(one, HARMLESS[one.tag])
             elif one.tag not in _PRIVATE:
@@ -131,9 +135,29 @@ class Actions:
         """Nothing that can be seen: what conditions on a parameter or variable compare."""
         to, name = action.one("SetAction"), action.get("parameterRef") or action.get("variableRef")
         if to is None:
-            self.findings.refuse(action, "expected a SetAction: values are set, not changed by others")
-        else:
-            effect.sets[name] = to.get("value")
+            raise ValueError("expected a SetAction: values are set, not changed by others")
+        effect.sets[name] = to.get("value")
+
+    def _entity(self, action: Node, effect: Effect) -> None:
+        """`path` to the place where a vehicle comes onto the road, and there it stands; or `leave`."""
+        name, position = action.get("entityRef"), action.within("AddEntityAction", "Position")
+        if name not in self.vehicles or self.called(name) == "ego":
+            raise ValueError(f"expected a vehicle other than the ego, got {name!r}")
+        if position is None:
+            if action.one("DeleteEntityAction") is None:
+                raise ValueError("expected an AddEntityAction with a Position, or a DeleteEntityAction")
+            effect.add(name, leave=True)
+            return
+        if self.positions.refers_to(position):
+            raise ValueError(
+                "AddEntityAction: in a story, where others are by then is not known; give a place on the map"
+            )
+        x, y, heading, along = self.positions.point(position)
+        degrees = math.degrees(heading if heading is not None else along or 0.0)
+        vehicle = self.vehicles[name]
+        path = {"points": [[x, y, degrees]], "ahead_m": vehicle.front, "speed_kmh": 0.0, "stays": bool(vehicle.body)}
+        effect.add(name, path=path)
+        effect.once_there[name] = {"speed": {"to_kmh": 0.0, "shape": "step"}}
 
     def _environment(self, action: Node, effect: Effect) -> None:
         read = environment_of(action, self.catalogs, self.positions.lanes)
@@ -243,7 +267,9 @@ class Actions:
         if by == "rate" and value == 0.0:
             self.findings.refuse(dynamics, "value: expected a rate above 0")
         lanes, begins = self._lanes(target, actor), self.positions.entities.get(actor)
-        if lanes is None or begins is None:
+        if begins is None:
+            raise ValueError(f"{actor} has no place on a lane in Init")
+        if lanes is None:
             return
         if by == "rate":
             value = _STEEPEST[shape] * self._across(target, lanes, begins) / (value or 1.0)
@@ -510,12 +536,18 @@ _PRIVATE: Mapping[str, Callable[[Actions, Node, str, Effect], None]] = {
 }
 _ACROSS = ("LaneChangeAction", "LaneOffsetAction")
 _ANYWHERE = ("SpeedAction", "SpeedProfileAction", "FollowTrajectoryAction", "LightStateAction")
+_GLOBAL: Mapping[str, Callable[[Actions, Node, Effect], None]] = {
+    "ParameterAction": Actions._set,
+    "VariableAction": Actions._set,
+    "EntityAction": Actions._entity,
+}
 _ORDERS = {"LongitudinalAction": {"speed", "follow"}, "PrivateAction": {"arrive"}, "LateralAction": {"change_lane"}}
 _GROUPS = [
     f"{kind}Action" for kind in ("Private", "Global", "Controller", "Longitudinal", "Lateral", "Appearance", "Routing")
 ]
 ACTIONS: Mapping[str, str] = {
     "EnvironmentAction": "`fog` and `light`.",
+    **{tag: inspect.getdoc(action) or "" for tag, action in _GLOBAL.items()},
     **{tag: inspect.getdoc(action) or "" for tag, action in _PRIVATE.items()},
 }
 """Actions that are read, and their translation."""

@@ -21,6 +21,7 @@ Entities ScenarioObject@name Vehicle@name,vehicleCategory Performance@maxAcceler
 BoundingBox Center@x,y,z Dimensions@height,length,width Trailer TrailerRef@entityRef
 Storyboard Init Actions Private@entityRef Story@name Act@name ManeuverGroup@maximumExecutionCount,name
 Actors@selectTriggeringEntities EntityRef@entityRef Maneuver@name Event@maximumExecutionCount,name,priority Action@name
+EntityAction@entityRef AddEntityAction DeleteEntityAction
 GlobalAction PrivateAction TeleportAction Position LongitudinalAction LateralAction AppearanceAction
 EnvironmentAction Environment@name TimeOfDay@dateTime Weather@cloudState,fractionalCloudCover Fog@visualRange
 Sun@elevation,illuminance,intensity Precipitation@intensity,precipitationIntensity,precipitationType
@@ -112,9 +113,8 @@ HARMLESS: Mapping[str, str] = _by_name(
 REFUSED: Mapping[str, str] = _by_name(
     {
         "OpenScenario": "the root is written OpenSCENARIO",
-        "ExternalObjectReference EntitySelection Members AddEntityAction "
-        "DeleteEntityAction EntityAction ScenarioObjectTemplate EntityDistribution EntityDistributionEntry": "entities "
-        "are vehicles that are there from beginning to end",
+        "ExternalObjectReference EntitySelection Members ScenarioObjectTemplate EntityDistribution "
+        "EntityDistributionEntry": "entities are vehicles, persons and things that the file describes one by one",
         "RandomRouteAction": "who has no route goes straight on",
         "FromRoadCoordinates": "a place on a route has a lane; write FromLaneCoordinates",
         "TrajectoryPosition Clothoid ClothoidSpline ClothoidSplineSegment PositionStart Nurbs ControlPoint Knot "

@@ -55,18 +55,26 @@ def read_beginning(init: Node | None, vehicles: Mapping[str, Vehicle], actions: 
         for action in block.all("GlobalAction"):
             _take_global(action, begin, actions)
     private = [one for block in blocks for one in block.all("Private")]
-    _place(private, vehicles, actions)
+    added = {one.get("entityRef"): one for block in blocks for one in _entity_actions(block, "AddEntityAction")}
+    _place(_positions(private, added, vehicles, actions), vehicles, actions)
     for one in private:
         for action in one.all("PrivateAction"):
             _take_private(action, one.get("entityRef"), begin, actions)
-    for name, action in begin.distances:
-        try:
-            begin.spots[name] = _at_distance(action, name, begin, actions)
-        except ValueError as error:
-            actions.findings.refuse(action, str(error))
+    _move_by_distances(begin, actions)
+    absent = {one.get("entityRef") for block in blocks for one in _entity_actions(block, "DeleteEntityAction")}
+    for name in absent:
+        begin.spots.pop(name, None)
+    if init and init.above:
+        absent |= {one.get("entityRef") for one in _entity_actions(init.above, "AddEntityAction")} - {*added}
     for name, vehicle in vehicles.items():
-        _begin(name, vehicle, begin, vehicles, actions)
+        if name not in absent or name == ego_of(dict(vehicles)):
+            _begin(name, vehicle, begin, vehicles, actions)
     return begin
+
+
+def _entity_actions(node: Node, kind: str) -> list[Node]:
+    """All elements within that add an entity, or delete one."""
+    return [one for one in node.walk() if one.tag == "EntityAction" and any(c.tag == kind for c in one.children)]
 
 
 def _begin(name: str, vehicle: Vehicle, begin: Beginning, vehicles: Mapping[str, Vehicle], actions: Actions) -> None:
@@ -109,25 +117,31 @@ def _front(name: str, begin: Beginning, vehicles: Mapping[str, Vehicle], actions
 
 def _take_global(action: Node, begin: Beginning, actions: Actions) -> None:
     for one in action.all():
-        if one.tag == "EnvironmentAction":
+        if one.tag == "EntityAction":
+            # `read_beginning` has seen to it.
+            one.all("AddEntityAction", "DeleteEntityAction")
+        elif one.tag == "EnvironmentAction":
             begin.environment = environment_of(one, actions.catalogs, actions.positions.lanes)
         else:
             actions.take(action, [], begin.effect)
 
 
-def _place(private: list[Node], vehicles: Mapping[str, Vehicle], actions: Actions) -> None:
-    """Place vehicles; those relative to another one last."""
-    wanted: dict[str, Node] = {}
+def _positions(
+    private: list[Node], added: Mapping[str, Node], vehicles: Mapping[str, Vehicle], actions: Actions
+) -> dict[str, Node]:
+    """Positions at which vehicles are added, or put, at the beginning."""
+    holders = [(name, one.all("AddEntityAction")) for name, one in added.items() if name in vehicles]
     for one in private:
         name = one.get("entityRef")
-        if name not in vehicles:
+        if name in vehicles:
+            holders.append((name, [t for action in one.all("PrivateAction") for t in action.all("TeleportAction")]))
+        else:
             actions.findings.refuse(one, f"there is no vehicle {name!r}")
-            continue
-        for action in one.all("PrivateAction"):
-            teleport = action.one("TeleportAction")
-            position = teleport.one("Position") if teleport else None
-            if position is not None:
-                wanted[name] = position
+    return {name: position for name, inside in holders for one in inside for position in one.all("Position")}
+
+
+def _place(wanted: dict[str, Node], vehicles: Mapping[str, Vehicle], actions: Actions) -> None:
+    """Place vehicles; those relative to another one last."""
     positions = actions.positions
     while wanted:
         ready = [n for n, position in wanted.items() if positions.refers_to(position) not in wanted] or list(wanted)
@@ -181,6 +195,15 @@ def _take_private(action: Node, name: str, begin: Beginning, actions: Actions) -
         actions.findings.refuse(action, f"FogSim keeps a distance to a vehicle ahead; {leader} is not ahead of {name}")
     if done:
         begin.effect.add(name, **done)
+
+
+def _move_by_distances(begin: Beginning, actions: Actions) -> None:
+    """Put those at a distance to another vehicle there."""
+    for name, action in begin.distances:
+        try:
+            begin.spots[name] = _at_distance(action, name, begin, actions)
+        except ValueError as error:
+            actions.findings.refuse(action, str(error))
 
 
 def _at_distance(action: Node, name: str, begin: Beginning, actions: Actions) -> Spot:

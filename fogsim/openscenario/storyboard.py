@@ -102,6 +102,9 @@ class Storyboard:
                         # It is played again once it is over and its own trigger holds.
                         trigger = both(self._played(entry, entry.names[number - 1]), entry.trigger)
                     written.append((event, _written(entry, name, trigger, until)))
+                    if entry.effect.once_there:
+                        then = Entry([f"{name}_once_there"], event, [], Effect(entry.effect.once_there))
+                        written.append((event, _written(then, then.names[0], Trigger(f"happened({name})"), until)))
                     ends = self._end_others(entry, name, trigger)
                     written += [(event, _written(one, one.names[0], one.trigger, until)) for one in ends]
         return written

@@ -23,7 +23,7 @@ def vehicles_text(vehicles: Mapping[str, Vehicle], begin: Beginning) -> str:
     for name, vehicle in vehicles.items():
         front, speed, way = begin.fronts.get(name), begin.speed(name), begin.ways.get(name)
         # Who begins off the lanes comes when its path begins.
-        place = {"depart": "triggered"} if front is None else _departure(front, speed)
+        place = {"depart": "triggered", "departSpeed": f"{speed:.4f}"} if front is None else _departure(front, speed)
         own = _FOR_THE_ROUTE_ALONE if name in begin.effect.routes else {}
         lines += [
             "  "

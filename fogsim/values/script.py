@@ -314,6 +314,19 @@ class Enter:
 
 
 @dataclass(frozen=True, slots=True)
+class Leave:
+    """A vehicle leaves the road at once.
+
+    Attributes
+    ----------
+    vehicle : str
+        Its id.
+    """
+
+    vehicle: str
+
+
+@dataclass(frozen=True, slots=True)
 class Walk:
     """A person on foot walks at another speed from now on.
 
@@ -330,7 +343,18 @@ class Walk:
 
 
 TrafficAction = (
-    ChangeSpeed | Follow | Arrive | Stop | ChangeLane | FollowPath | SetLamps | SetSignal | Depart | Enter | Walk
+    ChangeSpeed
+    | Follow
+    | Arrive
+    | Stop
+    | ChangeLane
+    | FollowPath
+    | SetLamps
+    | SetSignal
+    | Depart
+    | Enter
+    | Leave
+    | Walk
 )
 """What a traffic simulation can be told to do at once."""
 

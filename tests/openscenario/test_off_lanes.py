@@ -205,6 +205,44 @@ def test_conditions_on_values_hold_once_an_event_has_set_them(tmp_path: Path) ->
     assert "brake" not in begun
 
 
+def _entity(name: str, inside: str) -> str:
+    return f'<GlobalAction><EntityAction entityRef="{name}">{inside}</EntityAction></GlobalAction>'
+
+
+def test_vehicles_come_onto_the_road_and_leave_it(tmp_path: Path) -> None:
+    comes = event("come", _entity("Late", f"<AddEntityAction>{lane(300)}</AddEntityAction>"), after(2.0))
+    drives = event("drive", speed(6), after(4.0))
+    goes = event("go", _entity("Lead", "<DeleteEntityAction/>"), after(3.0))
+    begin = {"Ego": EGO, "Lead": f"{lane(90)}\n{speed(10)}"}
+    file = write(
+        tmp_path, {"Ego": CAR, "Lead": CAR, "Late": CAR, "Never": CAR}, begin, {"Lead": comes + goes, "Late": drives}
+    )
+    text = file.read_text(encoding="utf-8")
+    gone = _entity("Never", "<DeleteEntityAction/>")
+    (file := tmp_path / "changed.xosc").write_text(text.replace("<Actions>", f"<Actions>{gone}", 1), encoding="utf-8")
+    steps = _run(file)
+    there = {name: [step.time for step in steps if name in step.traffic.ids] for name in ("Lead", "Late", "Never")}
+    assert (there["Lead"][0], there["Lead"][-1]) == pytest.approx((0.0, 3.0), abs=0.11)
+    assert (there["Late"][0], there["Late"][-1]) == pytest.approx((2.1, steps[-1].time), abs=0.11)
+    assert there["Never"] == []
+    assert _at(steps, 3.9, "Late") == pytest.approx((303.7, -1.75, 0.0), abs=0.05)
+    assert _at(steps, 9.9, "Late")[0] == pytest.approx(303.7 + 6.0 * (9.9 - 4.0) - 0.5 * 6.0**2 / 4.0, abs=0.7)
+
+
+@pytest.mark.parametrize(
+    "inside",
+    [
+        '<AddEntityAction><Position><RelativeRoadPosition entityRef="Ego" ds="9" dt="0"/></Position></AddEntityAction>',
+        "<AddEntityAction/>",
+    ],
+)
+def test_where_a_vehicle_comes_must_be_known(tmp_path: Path, inside: str) -> None:
+    events = event("come", _entity("Late", inside), after(2.0))
+    file = write(tmp_path, {"Ego": CAR, "Late": CAR}, {"Ego": EGO}, {"Ego": events})
+    with pytest.raises(InputError, match=r"EntityAction.*(give a place on the map|with a Position)"):
+        read_openscenario(file)
+
+
 @pytest.mark.parametrize(
     ("final", "speed_there"),
     [

@@ -36,6 +36,7 @@ from fogsim.values.script import (
     Enter,
     Follow,
     FollowPath,
+    Leave,
     SetLamps,
     SetSignal,
     Shape,
@@ -185,6 +186,8 @@ def _of_vehicle(subject: str, doing: VehicleActions, now: Situation) -> list[Tra
         return [_path(vehicle, doing.path)] if doing.path and doing.model_fields_set == {"path"} else None
     if doing.walk:
         return [Walk(vehicle, doing.walk.speed_kmh / KMH_PER_MPS)]
+    if doing.leave:
+        return [Leave(vehicle)]
     moves: list[TrafficAction | None] = [_path(vehicle, doing.path)] if doing.path else []
     moves += _motions(vehicle, doing, subject, speed, now)
     if doing.change_lane:

@@ -327,6 +327,9 @@ class VehicleActions(Section):
     hazard_lights: Flag | None = None
     """Whether both indicators are lit."""
 
+    leave: Literal[True] | None = None
+    """Leave the road at once."""
+
     depart: DepartAction | None = None
     """Come onto the road, for an id that is in no file."""
 
@@ -344,6 +347,8 @@ class VehicleActions(Section):
             raise ValueError(f"{' and '.join(given)} cannot begin together: each sets the speed; take two entries")
         if self.walk and len(self.model_fields_set) > 1:
             raise ValueError("walk stands by itself: a person does nothing else")
+        if self.leave and len(self.model_fields_set) > 1:
+            raise ValueError("leave stands by itself: the vehicle is gone")
         if self.depart and len(self.model_fields_set) > 1:
             raise ValueError("depart stands by itself: what the vehicle does then is another entry")
         return self

@@ -90,11 +90,14 @@ class Paths:
         """Move all for the step after a time [s]; `speeds` are those that they are to have [m/s]."""
         get = self._api.vehicle
         for vehicle, path in list(self._paths.items()):
-            stays = path.action.stays or vehicle not in present or is_off_lanes(self._api, vehicle)
+            wanted = speeds.get(vehicle, math.inf)
+            # Who has come to stand there waits for a speed.
+            waits = vehicle not in present or (path.speed == 0.0 and math.isinf(wanted))
+            stays = waits or path.action.stays or is_off_lanes(self._api, vehicle)
             if path.is_over(time, step) and not stays:
                 self._drive_on(vehicle, path, path.place(time, step)[2])
                 continue
-            path.move(time + step, step, speeds.get(vehicle, math.inf))
+            path.move(time + step, step, wanted)
             x, y, heading = path.place(time + step, step)
             get.moveToXY(vehicle, "", -1, x, y, 90.0 - math.degrees(heading), _ANYWHERE)
             if vehicle in present:
@@ -106,9 +109,15 @@ class Paths:
         path = self._paths[vehicle]
         path.aside = Glide(time, duration, path.aside.offset(time), aside)
 
+    def leave(self, vehicle: str) -> None:
+        """Forget one that leaves the road."""
+        self._paths.pop(vehicle, None)
+        self._modes.pop(vehicle, None)
+
     def _drive_on(self, vehicle: str, path: _Path, heading: float) -> None:
         """Turn a vehicle into its lane, about the point that followed the path."""
         get = self._api.vehicle
+        get.setPreviousSpeed(vehicle, path.speed)
         lane = self._api.lane.getAngle(get.getLaneID(vehicle), get.getLanePosition(vehicle))
         turn = heading - math.radians(90.0 - lane)
         get.setLateralLanePosition(vehicle, get.getLateralLanePosition(vehicle) - path.action.ahead * math.sin(turn))

@@ -13,7 +13,7 @@ from fogsim.traffic.sumo_behaviour.signal_control import SignalControl
 from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
 from fogsim.traffic.sumo_lanes.route_position import GapToEgo
-from fogsim.values.script import ChangeLane, Depart, Enter, FollowPath, SetSignal, TrafficAction, Walk
+from fogsim.values.script import ChangeLane, Depart, Enter, FollowPath, Leave, SetSignal, TrafficAction, Walk
 
 _REGARD_OF_OTHERS, _NO_COLLISION = 3 << 8, 1 << 8
 """Bits of SUMO's lane-change mode on what of others a change that is asked for regards, and those for as much as does
@@ -96,6 +96,9 @@ class ScriptedActions:
                 refused += [] if self._walk(action) else [action]
             elif action.vehicle not in present or not self._has_lane(action):
                 refused.append(action)
+            elif isinstance(action, Leave):
+                self._paths.leave(action.vehicle)
+                self._api.vehicle.remove(action.vehicle)
             else:
                 self._playing.begin(action, motion)
         return tuple(refused)

@@ -24,7 +24,8 @@ class Positions:
     """Finds positions; relative ones refer to the known initial positions `entities`, whose ways are `ways`.
 
     `off_lanes` are x, y [m] and heading [rad] of those that begin on no lane, or turned on one; of these, vehicles that
-    drive `against` a lane have the place that the file names. `with_oncoming` if vehicles drive on the oncoming lane.
+    drive `against` a lane have the place that the file names. Those `moving` are elsewhere later. `with_oncoming` if
+    vehicles drive on the oncoming lane.
     """
 
     lanes: OpenDriveLanes
@@ -34,6 +35,7 @@ class Positions:
     ways: dict[str, tuple[str, ...]] = field(default_factory=dict)
     off_lanes: dict[str, tuple[float, float, float]] = field(default_factory=dict)
     against: dict[str, Spot] = field(default_factory=dict)
+    moving: set[str] = field(default_factory=set)
 
     @property
     def findings(self) -> Findings:
@@ -100,7 +102,12 @@ class Positions:
         reference = one.get("entityRef") if one.tag.startswith("Relative") else None
         if reference is not None and reference not in self.entities:
             raise ValueError(f"there is no entity {reference!r} that has a place already")
+        self._check_standing(reference)
         return one, _KINDS[one.tag](self, one)
+
+    def _check_standing(self, entity: str | None) -> None:
+        if entity in self.moving:
+            raise ValueError(f"outside Init, where {entity} is by then is not known; give a place on the map")
 
     def _heading(self, node: Node, lane: float) -> float | None:
         """Heading by an ``Orientation``, whose pitch and roll are the road's, or by `h` of the position [rad]."""
@@ -183,6 +190,7 @@ class Positions:
         if inner.tag == "FromCurrentEntity":
             if (entity := inner.get("entityRef")) not in self.entities:
                 raise ValueError(f"there is no entity {entity!r} that has a place already")
+            self._check_standing(entity)
             return self.entities[entity]
         spot, lane = self.lanes.along(first, self.findings.number(inner, "pathS"), edges), inner.get("laneId")
         for one in self.lanes.lanes:

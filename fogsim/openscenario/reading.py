@@ -130,6 +130,8 @@ class _Reader:
                 self.root, f"no vehicle that could be the ego has a place; there are {len(self.vehicles)}"
             )
             self.findings.close(self.path)
+        actors = {n.get("entityRef") for one in self.storyboard.walk() if one.tag == "Actors" for n in one.children}
+        positions.moving |= {ego, *actors, *(name for name in self.vehicles if begin.speed(name))}
         story.find_events(self.storyboard)
         if positions.with_oncoming and not self.with_oncoming:
             return None

@@ -98,6 +98,10 @@ class Storyboard:
                 entry.trigger = self._begins(entry, act)
                 until, trigger = _until(stop, self.triggers, event), entry.trigger
                 for number, name in enumerate(entry.names):
+                    if number and entry.effect.is_endless:
+                        self.findings.refuse(
+                            event, "maximumExecutionCount: what is never over by itself is played once"
+                        )
                     if number:
                         # It is played again once it is over and its own trigger holds.
                         trigger = both(self._played(entry, entry.names[number - 1]), entry.trigger)

@@ -239,7 +239,7 @@ def test_vehicles_come_onto_the_road_and_leave_it(tmp_path: Path) -> None:
 def test_where_a_vehicle_comes_must_be_known(tmp_path: Path, inside: str) -> None:
     events = event("come", _entity("Late", inside), after(2.0))
     file = write(tmp_path, {"Ego": CAR, "Late": CAR}, {"Ego": EGO}, {"Ego": events})
-    with pytest.raises(InputError, match=r"EntityAction.*(give a place on the map|with a Position)"):
+    with pytest.raises(InputError, match=r"Action.*(give a place on the map|with a Position)"):
         read_openscenario(file)
 
 
@@ -274,6 +274,10 @@ def test_a_vehicle_arrives_when_the_ego_does(tmp_path: Path, final: str, speed_t
     ("action", "told"),
     [
         (_follows(("0", _world(100, 0)), ("", _world(120, 0))), "expected a number for time, got 'nothing'"),
+        (
+            _follows(("0", '<Position><RelativeObjectPosition entityRef="Ego" dx="0" dy="0"/></Position>')),
+            "outside Init, where Ego is by then is not known",
+        ),
         (
             _follows(("0", _world(100, 0)), ("4", _world(120, 0)), reference=TIMES.replace("relative", "absolute")),
             "in a story, times count from the beginning of the action",

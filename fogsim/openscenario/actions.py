@@ -37,6 +37,7 @@ LAMPS = {
 _UNLIT = ("licensePlateIllumination", "reversingLights", "specialPurposeLights")
 _STEEPEST = {"linear": 1.0, "sinusoidal": 0.5 * math.pi, "cubic": 1.5}  # Greatest rate of a shape, over its mean
 _STAY = 1e5  # Time for which a vehicle stays in the lane that it has changed to [s]
+_AT_THE_END = 1.5  # Distance at which the end of a trajectory is reached [m]
 _LEAST = 0.05  # Lateral acceleration of a move within a lane [m/s²]
 DISPLACEMENTS = ("any", "leadingReferencedEntity", "trailingReferencedEntity")
 """Where a vehicle is to be, seen from the one to which it keeps a distance."""
@@ -486,11 +487,11 @@ class Actions:
         )
         reference_time, vertices = action.one("TimeReference"), polyline.all("Vertex")
         timing = reference_time.one("Timing", "None") if reference_time else None
-        places = [self.positions.point(place) for one in vertices for place in one.all("Position")]
-        points = [[x, y] if heading is None else [x, y, math.degrees(heading)] for x, y, heading, _ in places]
+        places = [place for one in vertices for place in one.all("Position")]
+        origin, points = self._own_points(places, actor, effect) or ("map", [self._point(place) for place in places])
         if any(len(one) == 2 for one in points) and len(points) > 1:
             points = [one[:2] for one in points]
-        path: dict[str, Any] = {"points": points, "ahead_m": self.vehicles[actor].front}
+        path: dict[str, Any] = {"points": points, "ahead_m": self.vehicles[actor].front, "origin": origin}
         path |= {"stays": True} if self.vehicles[actor].body else {}
         if timing and timing.tag == "Timing":
             scale, offset = self.findings.number(timing, "scale"), self.findings.number(timing, "offset")
@@ -502,12 +503,30 @@ class Actions:
         else:
             for one in vertices:
                 one.get("time")
-            effect.has_unknown_end = True
+            (x, y), front = points[-1][:2], self.vehicles[actor].front
+            effect.has_unknown_end = origin != "map" or math.dist(points[0][:2], (x, y)) < 2.0 * _AT_THE_END
+            end = f"distance_to({self.called(actor)}, {front:g} m, {x:.3f} m, {y:.3f} m)"
+            effect.ends.append(f"{end} < {_AT_THE_END} m")
         if self.findings.flag(trajectory, "closed"):
             raise ValueError("closed: write the first vertex again as the last one, and false")
         if reference:
             self.findings.look_for_unread(trajectory)
         effect.add(actor, path=path)
+
+    def _point(self, place: Node) -> list[float]:
+        x, y, heading, _ = self.positions.point(place)
+        return [x, y] if heading is None else [x, y, math.degrees(heading)]
+
+    def _own_points(self, places: list[Node], actor: str, effect: Effect) -> tuple[str, list[list[float]]] | None:
+        """Points from the place that the actor itself has when it begins, and along which axes; None if not all are."""
+        inner = [one for place in places for one in place.all()]
+        kinds = {one.tag for one in inner if one.get("entityRef") == actor and not one.children}
+        if effect.is_at_start or len(kinds) != 1 or any(one.tag not in kinds for one in inner):
+            return None
+        origin = {"RelativeWorldPosition": "place", "RelativeObjectPosition": "vehicle"}.get(kinds.pop())
+        if origin is None:
+            return None
+        return origin, [[self.findings.number(one, key) for key in ("dx", "dy")] for one in inner]
 
     def _assign_route(self, action: Node, actor: str, effect: Effect) -> None:
         """In `Init`: the way through the waypoints, with changes of lane that it needs, and then straight on."""

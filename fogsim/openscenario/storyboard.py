@@ -206,7 +206,7 @@ class Storyboard:
         """When an execution of an event is over."""
         effect, phrase = entry.effect, f"happened({name})"
         if effect.has_unknown_end:
-            self.findings.refuse(entry.node, "when a trajectory without times is over is not known")
+            self.findings.refuse(entry.node, "when a trajectory without times or places is over is not known")
         if effect.is_endless:
             return Trigger("time < 0 s", stays=True)
         if effect.ends_itself:

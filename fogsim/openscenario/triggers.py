@@ -306,10 +306,17 @@ class Triggers:
     def _distance_to(self, node: Node, name: str) -> str | None:
         """Straight distance of a vehicle's rear axle to a position."""
         position = node.one("Position")
+        relative = position.one("RelativeObjectPosition") if position else None
+        if relative and not relative.children and not self.findings.number(relative, "dy", 0.0):
+            other = relative.get("entityRef")
+            if not self._is_known(relative, other):
+                return None
+            behind = self.vehicles[other].front - self.findings.number(relative, "dx", 0.0)
+            return f"distance({self.called(name)}, {self.called(other)}, {self.vehicles[name].front:g} m, {behind:g} m)"
         try:
             x, y, *_ = self.positions.point(position if position else node)
         except ValueError as error:
-            self.findings.refuse(position or node, str(error))
+            self.findings.refuse(node, str(error))
             return None
         return f"distance_to({self.called(name)}, {self.vehicles[name].front:g} m, {x:.3f} m, {y:.3f} m)"
 

@@ -199,6 +199,9 @@ class FollowPath:
         Speed with which it begins, without times [m/s]; None for the one that it has.
     stays : bool
         Whether it stays at the end also on a lane.
+    origin : str
+        ``map`` if points are the network's coordinates; from the vehicle's point at the beginning they are along the
+        network's axes (``place``) or ahead of the vehicle and to its left (``vehicle``).
     """
 
     vehicle: str
@@ -207,6 +210,7 @@ class FollowPath:
     ahead: float = 0.0
     speed: float | None = None
     stays: bool = False
+    origin: str = "map"
 
 
 @dataclass(frozen=True, slots=True)

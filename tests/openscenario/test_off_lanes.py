@@ -105,16 +105,32 @@ def test_who_stands_beside_the_road_walks_straight_on_at_the_speed_that_is_order
 
 def test_a_trajectory_without_times_is_followed_at_the_vehicles_speed_and_a_car_drives_on(tmp_path: Path) -> None:
     line = _follows(("", _world(100, -1.75)), ("", _world(130, 1.75)), ("", _world(160, -1.75)), reference="<None/>")
-    begin = {"Ego": EGO, "Lead": f"{lane(100)}\n{speed(10)}\n{line}"}
-    steps = _run(write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin))
+    begin = {"Ego": EGO, "Lead": f"{lane(100)}\n{speed(10)}"}
+    events = event("line", line, after(0)) + event("next", speed(10), _over("line"))
+    steps = _run(write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": events}))
     # 2 sides of 30.2 m; the front bumper is 3.7 m ahead of the middle of the rear axle.
     side = math.hypot(30.0, 3.5)
     along = 30.0 / side
     x, y, _ = _at(steps, 3.0, "Lead")
     assert (x, y) == pytest.approx((100.0 + 30.0 * along + 3.7 * 30.0 / side, -1.75 + 3.5 * along + 0.43), abs=0.15)
+    begun = next(one.time for step in steps for one in step.begun if one.name == "next")
+    assert begun == pytest.approx(2.0 * side / 10.0, abs=0.21)
     x, y, now = _at(steps, 9.0, "Lead")
     # Beyond the end it drives on in its lane, 90 m from the beginning.
     assert (x, y, now) == pytest.approx((160.0 + 3.7 + 90.0 - 2.0 * side, -1.75, 10.0), abs=0.3)
+
+
+@pytest.mark.parametrize(("kind", "sense"), [("RelativeWorldPosition", 1.0), ("RelativeObjectPosition", -1.0)])
+def test_a_trajectory_may_begin_where_the_vehicle_is(tmp_path: Path, kind: str, sense: float) -> None:
+    own = [f'<Position><{kind} entityRef="Other" dx="{dx}" dy="{dy}"/></Position>' for dx, dy in ((0, 0), (20, 1))]
+    begin = {"Ego": EGO, "Other": f"{lane(400, 1)}\n{speed(10)}"}
+    moves = event("move", _follows(("0", own[0]), ("2", own[1])), after(1.0))
+    steps = _run(write(tmp_path, {"Ego": CAR, "Other": CAR}, begin, {"Other": moves}, stop=after(3.0)))
+    # It drives against x; its front bumper is 3.7 m ahead of the point that moves 20 m ahead or along x, and 1 m aside.
+    x, y, _ = _at(steps, 2.9, "Other")
+    share, length = 0.95, math.hypot(20.0, 1.0)
+    wanted = (390.0 + sense * (20.0 * share + 3.7 * 20.0 / length), 1.75 + sense * (share + 3.7 / length))
+    assert (x, y) == pytest.approx(wanted, abs=0.05)
 
 
 @pytest.mark.parametrize(
@@ -275,7 +291,7 @@ def test_a_vehicle_arrives_when_the_ego_does(tmp_path: Path, final: str, speed_t
     [
         (_follows(("0", _world(100, 0)), ("", _world(120, 0))), "expected a number for time, got 'nothing'"),
         (
-            _follows(("0", '<Position><RelativeObjectPosition entityRef="Ego" dx="0" dy="0"/></Position>')),
+            _follows(("0", '<Position><RelativeLanePosition entityRef="Ego" dLane="0" ds="0"/></Position>')),
             "outside Init, where Ego is by then is not known",
         ),
         (
@@ -299,9 +315,10 @@ def test_what_cannot_be_followed_is_refused(tmp_path: Path, action: str, told: s
 def test_what_waits_for_a_trajectory_without_times_is_refused_and_for_what_does_not_end_never_comes(
     tmp_path: Path,
 ) -> None:
-    line = _follows(("", _world(100, -1.75)), ("", _world(130, -1.75)), reference="<None/>")
+    here = '<Position><RelativeObjectPosition entityRef="Ego" dx="{}" dy="0"/></Position>'
+    line = _follows(("", here.format(0)), ("", here.format(30)), reference="<None/>")
     events = event("line", line, after(1.0)) + event("next", speed(5), _over("line"))
-    with pytest.raises(InputError, match="when a trajectory without times is over is not known"):
+    with pytest.raises(InputError, match="when a trajectory without times or places is over is not known"):
         read_openscenario(write(tmp_path, {"Ego": CAR}, {"Ego": EGO}, {"Ego": events}))
     events = event("line", _offset(_absolute(0.5), continuous="true"), after(1.0)) + event(
         "next", speed(9), _over("line")

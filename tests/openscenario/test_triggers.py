@@ -76,6 +76,11 @@ def _entry(data: dict[str, Any], name: str) -> dict[str, Any]:
             "ego.position >= 201.671 m",
         ),
         (
+            '<DistanceCondition value="9" freespace="false" rule="lessThan"><Position><RelativeObjectPosition '
+            'entityRef="Lead" dx="2" dy="0"/></Position></DistanceCondition>',
+            "distance(ego, Lead, 3.8 m, 5 m) < 9 m",
+        ),
+        (
             '<ReachPositionCondition tolerance="2"><Position><WorldPosition x="300" y="40" h="1"/></Position>'
             "</ReachPositionCondition>",
             "distance_to(ego, 3.8 m, 300.000 m, 40.000 m) <= 2 m",

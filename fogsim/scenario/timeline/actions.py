@@ -284,7 +284,7 @@ def _arrival(vehicle: str, action: ArriveAction, now: Situation) -> Arrive:
 def _path(vehicle: str, action: PathAction) -> FollowPath:
     headed = [(*point[:2], math.radians(point[2]) if len(point) > 2 else math.nan) for point in action.points]
     speed = None if action.speed_kmh is None else action.speed_kmh / KMH_PER_MPS
-    return FollowPath(vehicle, tuple(headed), action.at_s, action.ahead_m, speed, action.stays)
+    return FollowPath(vehicle, tuple(headed), action.at_s, action.ahead_m, speed, action.stays, action.origin)
 
 
 def _stopping(vehicle: str, action: StopAction, now: float | None) -> Stop | None:

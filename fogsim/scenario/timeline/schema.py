@@ -281,6 +281,10 @@ class PathAction(Section):
     stays: Flag = False
     """Whether it stays at the end also on a lane, where a vehicle otherwise drives on; off the lanes all stay."""
 
+    origin: Literal["map", "place", "vehicle"] = "map"
+    """Where points and headings count from: the network's origin; the vehicle's point at the beginning, along the
+    network's axes (`place`), or ahead of it and to its left (`vehicle`)."""
+
     @model_validator(mode="after")
     def _one_way(self) -> Self:
         if self.at_s and (len(self.at_s) != len(self.points) or list(self.at_s) != sorted({*self.at_s})):

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -84,7 +85,18 @@ class Paths:
         if vehicle in present and vehicle not in self._paths:
             self._modes[vehicle] = int(get.getSpeedMode(vehicle))
             get.setSpeedMode(vehicle, _UNCHECKED)
-        self._paths[vehicle] = _Path(action, time, speed or 0.0)
+        moved = action if action.origin == "map" else self._from_here(action)
+        self._paths[vehicle] = _Path(moved, time, speed or 0.0)
+
+    def _from_here(self, action: FollowPath) -> FollowPath:
+        """The path with its points on the map."""
+        (x, y), get = self._api.vehicle.getPosition(action.vehicle), self._api.vehicle
+        heading = math.radians(90.0 - get.getAngle(action.vehicle))
+        x, y = x - action.ahead * math.cos(heading), y - action.ahead * math.sin(heading)
+        turn = heading if action.origin == "vehicle" else 0.0
+        cosine, sine = math.cos(turn), math.sin(turn)
+        points = ((x + u * cosine - v * sine, y + u * sine + v * cosine, h + turn) for u, v, h in action.points)
+        return replace(action, points=tuple(points), origin="map")
 
     def play(self, time: float, step: float, speeds: Mapping[str, float], present: Collection[str]) -> None:
         """Move all for the step after a time [s]; `speeds` are those that they are to have [m/s]."""

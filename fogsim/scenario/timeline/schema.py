@@ -127,6 +127,12 @@ class FollowAction(Section):
     for_s: Period | None = None
     """How long; without it, to the end of the run."""
 
+    @model_validator(mode="after")
+    def _some_gap(self) -> Self:
+        if not {"headway_s", "gap_m"} & self.model_fields_set:
+            raise ValueError("say how far behind: headway_s, gap_m or both")
+        return self
+
 
 class ArriveAction(Section):
     """A vehicle drives so that it is at a place when another one is at a place of its own."""

@@ -3,22 +3,16 @@
 import inspect
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
-from fogsim.openscenario.catalogs import Catalogs
+from fogsim.openscenario.effects import SHAPES, Effect
 from fogsim.openscenario.elements import HARMLESS, REFUSED
-from fogsim.openscenario.entities import Vehicle
 from fogsim.openscenario.environment import environment_of
-from fogsim.openscenario.findings import Findings
-from fogsim.openscenario.positions import Positions, sense
+from fogsim.openscenario.lateral import LateralActions
 from fogsim.openscenario.triggers import NEAR
 from fogsim.openscenario.xml_tree import Node
-from fogsim.traffic.road.opendrive_lanes import Spot
 from fogsim.units import KMH_PER_MPS
-
-SHAPES = {"step": "step", "linear": "linear", "sinusoidal": "sinusoidal", "cubic": "sinusoidal"}
-"""Shapes of dynamics, and the nearest one in FogSim."""
 
 LAMPS = {
     "daytimeRunningLights": ("daytime",),
@@ -35,64 +29,14 @@ LAMPS = {
 """Lamps of each type of light."""
 
 _UNLIT = ("licensePlateIllumination", "reversingLights", "specialPurposeLights")
-_STEEPEST = {"linear": 1.0, "sinusoidal": 0.5 * math.pi, "cubic": 1.5}  # Greatest rate of a shape, over its mean
-_STAY = 1e5  # Time for which a vehicle stays in the lane that it has changed to [s]
 _AT_THE_END = 1.5  # Distance at which the end of a trajectory is reached [m]
-_LEAST = 0.05  # Lateral acceleration of a move within a lane [m/s²]
 DISPLACEMENTS = ("any", "leadingReferencedEntity", "trailingReferencedEntity")
 """Where a vehicle is to be, seen from the one to which it keeps a distance."""
 
 
 @dataclass
-class Effect:
-    """What an event does: timeline blocks by subject, their known duration [s], and conditions that end the rest.
-
-    `routes` are edges through the waypoints of a vehicle's route, and `sets` values of parameters and variables. It
-    `ends_itself` if only the run shows its duration, `is_endless` if something else must end it, and `has_unknown_end`
-    if nothing shows it. `is_at_start` in ``Init``. Vehicles that it brings onto the road do what `once_there` has.
-    """
-
-    do: dict[str, dict[str, Any]] = field(default_factory=dict)
-    lasts: float = 0.0
-    ends: list[str] = field(default_factory=list)
-    routes: dict[str, tuple[str, ...]] = field(default_factory=dict)
-    ends_itself: bool = False
-    is_endless: bool = False
-    has_unknown_end: bool = False
-    sets: dict[str, str] = field(default_factory=dict)
-    once_there: dict[str, dict[str, Any]] = field(default_factory=dict)
-    is_at_start: bool = False
-
-    def add(self, subject: str, **blocks: Any) -> None:
-        """Add an action of a subject."""
-        mine = self.do.setdefault(subject, {})
-        for key, block in blocks.items():
-            mine[key] = {**mine.get(key, {}), **block} if key == "lamps" else block
-
-    def changes_speed(self, subject: str) -> bool:
-        """Whether a subject's speed changes, or goes by another vehicle's, for some time."""
-        speed = self.do.get(subject, {}).get("speed", {})
-        is_gradual = "continuous" in speed or "profile" in speed or speed.get("shape", "step") != "step"
-        return "follow" in self.do.get(subject, {}) or is_gradual
-
-
-@dataclass
-class Actions:
-    """Reads actions; `called` gives a vehicle's name in conditions.
-
-    `offsets` are where vehicles are in their lanes after the actions so far, in the file's order.
-    """
-
-    vehicles: Mapping[str, Vehicle]
-    catalogs: Catalogs
-    positions: Positions
-    called: Callable[[str], str]
-    offsets: dict[str, float] = field(default_factory=dict)
-
-    @property
-    def findings(self) -> Findings:
-        """Receives what cannot be done."""
-        return self.catalogs.findings
+class Actions(LateralActions):
+    """Reads all actions."""
 
     def take(self, action: Node, actors: list[str], effect: Effect) -> None:
         """Add an action (``PrivateAction``, ``GlobalAction``, or their parent) of some actors to an effect."""
@@ -128,7 +72,7 @@ class Actions:
             if effect.do.get(actor, {}).keys() & orders:
                 self.findings.refuse(action, f"another action of this event orders the motion of {actor} as well")
             try:
-                (Actions._aside if across else _PRIVATE[action.tag])(self, action, actor, effect)
+                (Actions.aside if across else _PRIVATE[action.tag])(self, action, actor, effect)
             except ValueError as error:
                 self.findings.refuse(action, str(error))
 
@@ -224,21 +168,14 @@ class Actions:
         how = self.findings.word(relative, "speedTargetValueType", ("delta", "factor"))
         share = {"factor": value} if how == "factor" else {"plus_kmh": value * KMH_PER_MPS}
         follows = {"continuous": True} if self.findings.flag(relative, "continuous", "false") else {}
-        return {"like": self._other(relative), **share, **follows}
-
-    def _other(self, node: Node) -> str:
-        """The vehicle that an element refers to, as the timeline names it."""
-        name = node.get("entityRef")
-        if name not in self.vehicles:
-            self.findings.refuse(node, f"there is no vehicle {name!r}")
-        return self.called(name).strip('"')
+        return {"like": self.other(relative), **share, **follows}
 
     def held(self, actor: str) -> dict[str, Any]:
         """The order to keep the speed of that moment."""
         return {"like": self.called(actor).strip('"'), "shape": "step"}
 
     def _pace(self, dynamics: Node, effect: Effect) -> dict[str, Any]:
-        message = self._dynamics(dynamics)
+        message = self.dynamics(dynamics)
         if message is None:
             return {"shape": "step"}
         shape, by, value = message
@@ -248,155 +185,6 @@ class Actions:
         if by == "time":
             effect.lasts = max(effect.lasts, value)
         return {"shape": SHAPES[shape], "over_s" if by == "time" else "rate_mps2": value}
-
-    def _dynamics(self, node: Node) -> tuple[str, str, float] | None:
-        """Shape, dimension and value of a change; None if it happens at once, whatever its dimension."""
-        shape, by = self.findings.word(node, "dynamicsShape", tuple(SHAPES)), node.get("dynamicsDimension")
-        value = self.findings.number(node, "value", 0.0 if shape == "step" else None, is_finite=by != "rate")
-        if shape != "step":
-            by = self.findings.word(node, "dynamicsDimension", ("time", "rate", "distance"))
-        is_at_once = shape == "step" or math.isinf(value) or (value == 0.0 and by != "rate")
-        return None if is_at_once else (shape, by, abs(value))
-
-    def _lane_change(self, action: Node, actor: str, effect: Effect) -> None:
-        """`change_lane`: absolute, or relative to a vehicle; by time, distance or rate."""
-        dynamics, target = action.one("LaneChangeActionDynamics"), action.one("LaneChangeTarget")
-        if dynamics is None or target is None:
-            self.findings.refuse(action, "expected LaneChangeActionDynamics and a LaneChangeTarget")
-            return
-        shape, by, value = self._dynamics(dynamics) or ("step", "time", 0.0)
-        if by == "rate" and value == 0.0:
-            self.findings.refuse(dynamics, "value: expected a rate above 0")
-        lanes, begins = self._lanes(target, actor), self.positions.entities.get(actor)
-        if begins is None:
-            raise ValueError(f"{actor} has no place on a lane in Init")
-        if lanes is None:
-            return
-        if by == "rate":
-            value = _STEEPEST[shape] * self._across(target, lanes, begins) / (value or 1.0)
-        pace = {"distance_m": value} if by == "distance" else {"duration_s": min(value, 60.0)}
-        effect.lasts = max(effect.lasts, pace.get("duration_s", 0.0))
-        effect.ends_itself = by == "distance"
-        offset = sense(begins) * self.findings.number(action, "targetLaneOffset", 0.0)
-        if offset or self._offset(actor):
-            pace["offset_m"] = self.offsets[actor] = begins.shifted(offset).offset
-        effect.add(actor, change_lane={**lanes, "stay_s": _STAY, **pace})
-
-    def _offset(self, vehicle: str) -> float:
-        """Where a vehicle is in its lane after the actions so far, to the left of its middle [m]."""
-        begins = self.positions.entities.get(vehicle)
-        return self.offsets.get(vehicle, begins.offset if begins else 0.0)
-
-    def _lane_offset(self, action: Node, actor: str, effect: Effect) -> None:
-        """`change_lane` with `offset_m`, along half a wave of a cosine, at `maxLateralAcc` at most."""
-        dynamics, target = action.one("LaneOffsetActionDynamics"), action.one("LaneOffsetTarget")
-        to = target.one("AbsoluteTargetLaneOffset", "RelativeTargetLaneOffset") if target else None
-        begins = self.positions.entities.get(actor)
-        if dynamics is None or to is None or begins is None:
-            raise ValueError("expected LaneOffsetActionDynamics and a LaneOffsetTarget, and a vehicle that has a place")
-        offset = sense(begins) * self.findings.number(to, "value")
-        lanes: dict[str, Any] = {"lanes": 0}
-        other = self.positions.entities.get(to.get("entityRef")) if to.tag.startswith("Relative") else begins
-        if to.tag.startswith("Relative"):
-            name, offset = self._other(to), offset + self._offset(to.get("entityRef"))
-            if other and other.lane != begins.lane:
-                lanes = {"to_lane_of": name, **lanes}
-        across = abs(offset - self._offset(actor))
-        if other and "to_lane_of" in lanes:
-            across += begins.lane.width * abs(other.lane.index - begins.lane.index)
-        lasts = self._offset_time(dynamics, across)
-        self.offsets[actor] = begins.shifted(offset).offset
-        effect.lasts = max(effect.lasts, lasts)
-        effect.is_endless |= self.findings.flag(action, "continuous")
-        effect.add(actor, change_lane={**lanes, "stay_s": _STAY, "offset_m": offset, "duration_s": min(lasts, 60.0)})
-
-    def _aside(self, action: Node, actor: str, effect: Effect) -> None:
-        """`change_lane` of a vehicle that drives against a lane: from its path to a lane, as they lie at first."""
-        dynamics, target = action.one(f"{action.tag}Dynamics"), action.one(f"{action.tag[:-6]}Target")
-        to = next(iter(target.all()), None) if target else None
-        base = self.positions.against[actor]
-        if dynamics is None or to is None:
-            raise ValueError(f"expected {action.tag}Dynamics and a {action.tag[:-6]}Target")
-        spot = self.positions.entities.get(to.get("entityRef")) if to.tag.startswith("Relative") else base
-        if spot is None:
-            raise ValueError(
-                f"{actor} drives against its lane: give a lane, or one by a vehicle that drives along its own"
-            )
-        value = self.findings.number(to, "value")
-        offset = sense(spot) * self.findings.number(action, "targetLaneOffset", 0.0)
-        if to.tag.endswith("Offset"):
-            offset = sense(spot) * value
-        elif to.tag == "RelativeTargetLane":
-            spot = self.positions.lanes.beside(spot, int(value))
-        else:
-            road = base.lane.origins[0].rpartition("_")[0]
-            spot = next(
-                (Spot(one, 0.0) for one in self.positions.lanes.lanes if f"{road}_{value:g}" in one.origins), spot
-            )
-        x, y, heading = self.positions.off_lanes[actor]
-        to_x, to_y, _ = self.positions.lanes.foot(spot.lane, x, y).shifted(offset).world
-        aside = (to_y - y) * math.cos(heading) - (to_x - x) * math.sin(heading)
-        if action.tag == "LaneOffsetAction":
-            lasts = self._offset_time(dynamics, abs(aside - self.offsets.get(actor, 0.0)))
-            effect.is_endless |= self.findings.flag(action, "continuous")
-        else:
-            shape, by, value = self._dynamics(dynamics) or ("step", "time", 0.0)
-            if by == "distance":
-                raise ValueError(f"dynamicsDimension: {actor} drives against its lane; give a time or rate")
-            lasts = value if by == "time" else _STEEPEST[shape] * abs(aside) / (value or 1.0)
-        self.offsets[actor], effect.lasts = aside, max(effect.lasts, lasts)
-        effect.add(actor, change_lane={"lanes": 0, "stay_s": _STAY, "offset_m": aside, "duration_s": min(lasts, 60.0)})
-
-    def _offset_time(self, dynamics: Node, across: float) -> float:
-        """Time that so wide a move [m] takes along half a wave of a cosine at `maxLateralAcc` at most [s]."""
-        shape = self.findings.word(dynamics, "dynamicsShape", tuple(SHAPES))
-        most = self.findings.number(dynamics, "maxLateralAcc", math.inf, is_finite=False)
-        return 0.0 if shape == "step" else math.pi * math.sqrt(0.5 * across / max(most, _LEAST))
-
-    def _across(self, target: Node, lanes: Mapping[str, Any], begins: Spot) -> float:
-        """Way across of a change of lane, by the lanes on which the vehicles begin [m]."""
-        relative = target.one("RelativeTargetLane")
-        other = self.positions.entities.get(relative.get("entityRef")) if relative else None
-        to = lanes["to"] if "to" in lanes else (other or begins).lane.index + lanes["lanes"]
-        return begins.lane.width * (1 if to == "oncoming" else max(abs(to - begins.lane.index), 1))
-
-    def _lanes(self, target: Node, actor: str) -> dict[str, Any] | None:
-        absolute, relative = target.one("AbsoluteTargetLane"), target.one("RelativeTargetLane")
-        begins = self.positions.entities.get(actor)
-        if relative is not None:
-            other, lanes = self._other(relative), int(self.findings.number(relative, "value"))
-            if lanes > 0 and self._has_one_lane(self.positions.entities.get(relative.get("entityRef"))):
-                return self._oncoming(relative, lanes)
-            return {"lanes": lanes} if relative.get("entityRef") == actor else {"to_lane_of": other, "lanes": lanes}
-        if absolute is None or begins is None:
-            self.findings.refuse(target, "expected an AbsoluteTargetLane or RelativeTargetLane")
-            return None
-        wanted = absolute.get("value")
-        return self._absolute_lane(absolute, wanted, begins, self.positions.ways.get(actor, (begins.lane.edge,)))
-
-    def _absolute_lane(self, node: Node, wanted: str, begins: Spot, way: tuple[str, ...]) -> dict[str, Any]:
-        """A lane by its number along the way; ValueError where none has it, or lanes at different places across."""
-        lanes = self.positions.lanes.lanes
-        numbers = {one.index for one in lanes if one.edge in way for o in one.origins if o.rpartition("_")[2] == wanted}
-        if len(numbers) == 1:
-            return {"to": numbers.pop()}
-        road = (begins.lane.origins or ("",))[0].rpartition("_")[0]
-        if not numbers and any(f"{road}_{wanted}" in one.origins for one in lanes):
-            return self._oncoming(node, abs(int(wanted)))
-        what = f"is the lane {' or '.join(map(str, sorted(numbers)))} from the right, by road" if numbers else "is none"
-        raise ValueError(f"AbsoluteTargetLane: lane {wanted!r} {what} on the way from road {road!r}")
-
-    def _oncoming(self, node: Node, number: int) -> dict[str, Any]:
-        if number != 1:
-            self.findings.refuse(node, "of the oncoming lanes, vehicles drive on the nearest; write 1 or -1")
-        self.positions.with_oncoming = True
-        return {"to": "oncoming"}
-
-    def _has_one_lane(self, spot: Spot | None) -> bool:
-        """Whether a road has one lane each way, so that the lane to the left is that of oncoming traffic."""
-        road = spot.lane.origins[0].rpartition("_")[0] if spot and spot.lane.origins else ""
-        there = {name for one in self.positions.lanes.lanes for name in one.origins if name.startswith(f"{road}_")}
-        return there == {f"{road}_1", f"{road}_-1"}
 
     def _lights(self, action: Node, actor: str, effect: Effect) -> None:
         """`lamps`; a flashing lamp is an indicator, or on."""
@@ -428,7 +216,7 @@ class Actions:
         effect.is_endless = True
         other = self.vehicles.get(action.get("entityRef"))
         further = 0.0 if is_between_bumpers or other is None else self.vehicles[actor].front + other.rear
-        follow = {"vehicle": self._other(action), "headway_s": headway, "gap_m": distance - further}
+        follow = {"vehicle": self.other(action), "headway_s": headway, "gap_m": distance - further}
         effect.add(actor, follow=follow)
 
     def _synchronize(self, action: Node, actor: str, effect: Effect) -> None:
@@ -544,8 +332,8 @@ class Actions:
 _PRIVATE: Mapping[str, Callable[[Actions, Node, str, Effect], None]] = {
     "SpeedAction": Actions._speed,
     "SpeedProfileAction": Actions._speed_profile,
-    "LaneChangeAction": Actions._lane_change,
-    "LaneOffsetAction": Actions._lane_offset,
+    "LaneChangeAction": Actions.lane_change,
+    "LaneOffsetAction": Actions.lane_offset,
     "LightStateAction": Actions._lights,
     "LongitudinalDistanceAction": Actions._keep_distance,
     "SynchronizeAction": Actions._synchronize,

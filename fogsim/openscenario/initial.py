@@ -5,7 +5,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from fogsim.openscenario.actions import DISPLACEMENTS, Actions, Effect
+from fogsim.openscenario.actions import DISPLACEMENTS, Actions
+from fogsim.openscenario.effects import Effect
 from fogsim.openscenario.entities import Vehicle, ego_of
 from fogsim.openscenario.environment import Environment, environment_of
 from fogsim.openscenario.positions import ALONG, Positions

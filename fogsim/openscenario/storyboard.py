@@ -4,8 +4,9 @@ import re
 from dataclasses import dataclass, field
 from typing import Any
 
-from fogsim.openscenario.actions import Actions, Effect
+from fogsim.openscenario.actions import Actions
 from fogsim.openscenario.catalogs import Catalogs
+from fogsim.openscenario.effects import Effect
 from fogsim.openscenario.findings import Findings
 from fogsim.openscenario.parameters import fits
 from fogsim.openscenario.triggers import AT_ONCE, NEVER, Trigger, Triggers, both

@@ -26,7 +26,7 @@ from fogsim.openscenario.positions import Positions
 from fogsim.openscenario.storyboard import Storyboard
 from fogsim.openscenario.triggers import Trigger, Triggers
 from fogsim.openscenario.vehicles_file import STANDS, vehicles_text
-from fogsim.openscenario.xml_tree import Node, read_xml
+from fogsim.openscenario.xml_tree import Node, read_xml, sumo_name
 from fogsim.traffic.road.netconvert import map_net
 from fogsim.traffic.road.opendrive import is_opendrive
 from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, read_opendrive_lanes
@@ -130,7 +130,8 @@ class _Reader:
                 self.root, f"no vehicle that could be the ego has a place; there are {len(self.vehicles)}"
             )
             self.findings.close(self.path)
-        actors = {n.get("entityRef") for one in self.storyboard.walk() if one.tag == "Actors" for n in one.children}
+        groups = [one for one in self.storyboard.walk() if one.tag == "Actors"]
+        actors = {sumo_name(one.attributes.get("entityRef", "")) for group in groups for one in group.children}
         positions.moving |= {ego, *actors, *(name for name in self.vehicles if begin.speed(name))}
         story.find_events(self.storyboard)
         if positions.with_oncoming and not self.with_oncoming:

@@ -135,7 +135,9 @@ def _positions(
     for one in private:
         name = one.get("entityRef")
         if name in vehicles:
-            holders.append((name, [t for action in one.all("PrivateAction") for t in action.all("TeleportAction")]))
+            places = [t for action in one.all("PrivateAction") for t in action.all("TeleportAction")]
+            # Who only follows a trajectory begins at its first vertex.
+            holders.append((name, places or [vertex for vertex in one.walk() if vertex.tag == "Vertex"][:1]))
         else:
             actions.findings.refuse(one, f"there is no vehicle {name!r}")
     return {name: position for name, inside in holders for one in inside for position in one.all("Position")}

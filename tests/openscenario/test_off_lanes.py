@@ -334,6 +334,18 @@ def test_who_is_off_the_lanes_changes_no_lane(tmp_path: Path) -> None:
         read_openscenario(file)
 
 
+def test_who_only_follows_a_trajectory_begins_at_its_first_vertex(tmp_path: Path) -> None:
+    across = _follows(("", _world(80, -6)), ("", _world(80, 6)), reference="<None/>")
+    along = _follows(("", _world(60, -1.75)), ("", _world(160, 1.75)), reference="<None/>")
+    begin = {"Ego": f"{along}\n{speed(10)}", "Ann": f"{across}\n{speed(1)}"}
+    steps = _run(write(tmp_path, {"Ego": CAR, "Ann": PERSON}, begin, stop=after(5.0)))
+    length = math.hypot(100.0, 3.5)
+    wanted = (60.0 + (40.0 + 3.7) * 100.0 / length, -1.75 + (40.0 + 3.7) * 3.5 / length)
+    assert _at(steps, 0.0, "Ego")[:2] == pytest.approx((63.7, -1.75), abs=0.01)
+    assert _at(steps, 4.0, "Ego")[:2] == pytest.approx(wanted, abs=0.02)
+    assert _at(steps, 4.0, "Ann")[:2] == pytest.approx((80.0, -6.0 + 0.25 + 4.0), abs=0.11)
+
+
 def test_the_ego_needs_a_lane(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="is on no lane that leads there"):
         read_openscenario(write(tmp_path, {"Ego": CAR}, {"Ego": _world(150, -6)}))

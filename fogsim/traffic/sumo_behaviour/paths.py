@@ -13,6 +13,12 @@ from fogsim.values.script import FollowPath
 _ANYWHERE = 2
 """SUMO's `keepRoute` for a vehicle that is exactly where it is put, on a lane or off the lanes."""
 
+_LANES_FROM = 100.0
+"""Distance from which SUMO looks for a lane [m]; at 0 none is found, and a vehicle is off the lanes."""
+
+_NEAR = 50.0
+"""Distance up to which others are regarded [m]."""
+
 _UNCHECKED, _SUMO_DRIVES = 0, -1.0
 
 
@@ -111,10 +117,32 @@ class Paths:
                 continue
             path.move(time + step, step, wanted)
             x, y, heading = path.place(time + step, step)
-            get.moveToXY(vehicle, "", -1, x, y, 90.0 - math.degrees(heading), _ANYWHERE)
+            aside = path.action.stays and self._is_passed(vehicle, (x, y), heading, step, present)
+            get.moveToXY(vehicle, "", -1, x, y, 90.0 - math.degrees(heading), _ANYWHERE, 0.0 if aside else _LANES_FROM)
             if vehicle in present:
                 get.setPreviousSpeed(vehicle, path.speed)
                 get.setSpeed(vehicle, path.speed)
+
+    def _is_passed(
+        self, vehicle: str, front: tuple[float, float], heading: float, step: float, present: Collection[str]
+    ) -> bool:
+        """Whether another vehicle passes in its lane without touching it, which SUMO would take for a collision."""
+        get = self._api.vehicle
+        length, width = float(get.getLength(vehicle)), float(get.getWidth(vehicle))
+        middle = front[0] - 0.5 * length * math.cos(heading), front[1] - 0.5 * length * math.sin(heading)
+        for other in present:
+            (x, y), angle = get.getPosition(other), math.radians(90.0 - get.getAngle(other))
+            if other == vehicle or math.dist((x, y), middle) > _NEAR:
+                continue
+            cosine, sine, turn = math.cos(angle), math.sin(angle), heading - angle
+            ahead = (middle[0] - x) * cosine + (middle[1] - y) * sine
+            left = abs((middle[1] - y) * cosine - (middle[0] - x) * sine)
+            along = 0.5 * (length * abs(math.cos(turn)) + width * abs(math.sin(turn)))
+            across = 0.5 * (length * abs(math.sin(turn)) + width * abs(math.cos(turn)) + get.getWidth(other))
+            gap = get.getMinGap(other) + get.getSpeed(other) * step
+            if left >= across and -get.getLength(other) - get.getMinGap(vehicle) < ahead + along < gap + 2.0 * along:
+                return True
+        return False
 
     def shift(self, vehicle: str, aside: float, duration: float, time: float) -> None:
         """Let one move to the left of its path [m], along half a wave of a cosine."""

@@ -317,16 +317,30 @@ class Actions(LateralActions):
         return origin, [[self.findings.number(one, key) for key in ("dx", "dy")] for one in inner]
 
     def _assign_route(self, action: Node, actor: str, effect: Effect) -> None:
-        """In `Init`: the way through the waypoints, with changes of lane that it needs, and then straight on."""
-        effect.routes[actor] = self.positions.route(action)[1]
+        """The way through the waypoints, with changes of lane as needed, and then straight on; the ego's in `Init`."""
+        self._drive(self.positions.route(action)[1], actor, effect)
 
     def _acquire(self, action: Node, actor: str, effect: Effect) -> None:
-        """In `Init`: the shortest way there, and then straight on."""
+        """The shortest way there, and then straight on; the ego's in `Init`."""
         position, begins = action.one("Position"), self.positions.entities.get(actor)
         spot = None if position is None else self.positions.spot(position)
         if begins is None or spot is None:
             raise ValueError("expected a Position, and a vehicle that has one")
-        effect.routes[actor] = self.positions.lanes.way(begins.lane.edge, spot.lane.edge)
+        edge, lanes = spot.lane.edge, self.positions.lanes
+        self._drive(lanes.way(begins.lane.edge, edge) if effect.is_at_start else (edge,), actor, effect)
+
+    def _drive(self, edges: tuple[str, ...], actor: str, effect: Effect) -> None:
+        """Give a vehicle its way, at the beginning or later."""
+        if effect.is_at_start:
+            effect.routes[actor] = edges
+        elif self.called(actor) == "ego":
+            raise ValueError(
+                "the ego's route, along which positions count, is known from the beginning; write it in Init"
+            )
+        else:
+            self.positions.rerouted.add(actor)
+            onward = self.positions.lanes.route(edges[-1])[1:]
+            effect.add(actor, take_route=[*edges, *onward])
 
 
 _PRIVATE: Mapping[str, Callable[[Actions, Node, str, Effect], None]] = {

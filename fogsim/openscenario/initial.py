@@ -29,11 +29,17 @@ class Beginning:
     names: Mapping[str, str]
     ways: dict[str, tuple[str, ...]]
     off_lanes: dict[str, tuple[float, float, float]]
+    rerouted: set[str]
     fronts: dict[str, Spot] = field(default_factory=dict)
     orders: dict[str, Mapping[str, Any]] = field(default_factory=dict)
     environment: Environment = field(default_factory=Environment)
     effect: Effect = field(default_factory=Effect)
     distances: list[tuple[str, Node]] = field(default_factory=list)
+
+    @property
+    def routed(self) -> set[str]:
+        """Vehicles that have a route, from the beginning or later, for which they change lane."""
+        return {*self.effect.routes, *self.rerouted}
 
     def speed(self, vehicle: str, *asked: str) -> float:
         """Initial speed of a vehicle [m/s]; one that is relative follows from another's."""
@@ -50,7 +56,7 @@ def read_beginning(init: Node | None, vehicles: Mapping[str, Vehicle], actions: 
     """Initial state from the element ``Init``."""
     positions = actions.positions
     names = {actions.called(name).strip('"'): name for name in vehicles}
-    begin = Beginning(positions.entities, names, positions.ways, positions.off_lanes)
+    begin = Beginning(positions.entities, names, positions.ways, positions.off_lanes, positions.rerouted)
     blocks = init.all("Actions") if init else []
     for block in blocks:
         for action in block.all("GlobalAction"):

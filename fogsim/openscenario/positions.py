@@ -24,7 +24,8 @@ class Positions:
     """Finds positions; relative ones refer to the known initial positions `entities`, whose ways are `ways`.
 
     `off_lanes` are x, y [m] and heading [rad] of those that begin on no lane, or turned on one; of these, vehicles that
-    drive `against` a lane have the place that the file names. Those `moving` are elsewhere later. `with_oncoming` if
+    drive `against` a lane have the place that the file names. Those `moving` are elsewhere later, those `rerouted` on
+    another way. `with_oncoming` if
     vehicles drive on the oncoming lane.
     """
 
@@ -36,6 +37,7 @@ class Positions:
     off_lanes: dict[str, tuple[float, float, float]] = field(default_factory=dict)
     against: dict[str, Spot] = field(default_factory=dict)
     moving: set[str] = field(default_factory=set)
+    rerouted: set[str] = field(default_factory=set)
 
     @property
     def findings(self) -> Findings:

@@ -182,7 +182,7 @@ class _Reader:
             "name": re.sub(r"[^A-Za-z0-9_.-]", "_", self.path.stem)[:100],
             "traffic": {
                 "ego": ego,
-                "keep_lane": [name for name in self.vehicles if name not in begin.effect.routes],
+                "keep_lane": [name for name in self.vehicles if name not in begin.routed],
                 "stop_before_end_m": NEAR_THE_END,
             },
             "fog": fog_block(

@@ -85,8 +85,6 @@ class Storyboard:
         self.entries[id(event)] = entry
         for action in event.all("Action"):
             self.actions.take(action, actors, entry.effect)
-            if entry.effect.routes:
-                self.findings.refuse(action, "routes are known from the beginning; move this into Init")
 
     def timeline(self) -> list[tuple[Node, dict[str, Any]]]:
         """Entries of the timeline, each with its element."""

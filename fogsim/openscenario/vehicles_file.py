@@ -24,7 +24,7 @@ def vehicles_text(vehicles: Mapping[str, Vehicle], begin: Beginning) -> str:
         front, speed, way = begin.fronts.get(name), begin.speed(name), begin.ways.get(name)
         # Who begins off the lanes comes when its path begins.
         place = {"depart": "triggered", "departSpeed": f"{speed:.4f}"} if front is None else _departure(front, speed)
-        own = _FOR_THE_ROUTE_ALONE if name in begin.effect.routes else {}
+        own = _FOR_THE_ROUTE_ALONE if name in begin.routed else {}
         lines += [
             "  "
             + element(

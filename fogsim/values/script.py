@@ -318,6 +318,22 @@ class Enter:
 
 
 @dataclass(frozen=True, slots=True)
+class TakeRoute:
+    """A vehicle drives to the first of some edges, on the way that SUMO finds, and then along them.
+
+    Attributes
+    ----------
+    vehicle : str
+        Its id.
+    edges : tuple of str
+        The edges.
+    """
+
+    vehicle: str
+    edges: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Leave:
     """A vehicle leaves the road at once.
 
@@ -353,6 +369,7 @@ TrafficAction = (
     | Stop
     | ChangeLane
     | FollowPath
+    | TakeRoute
     | SetLamps
     | SetSignal
     | Depart

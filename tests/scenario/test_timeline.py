@@ -48,6 +48,7 @@ def mistake(entry: str, *settings: str) -> str:
             "{lead: {path: {points: [[1, 2], [3, 4]], at_s: [1, 1]}}}",
             "do.lead.path: at_s has a time for each of points",
         ),
+        ("{ego: {take_route: [bank]}}", "do.ego: take_route: positions count along the ego's route"),
         ("{lead: {leave: true, brake: {}}}", "do.lead: leave stands by itself"),
         ("{lead: {change_lane: {to: 1, to_lane_of: ego}}}", "do.lead.change_lane: say where: lanes"),
         ("{lead: {speed: {like: nobody}}}", "there is no vehicle 'nobody' in "),

@@ -41,6 +41,7 @@ from fogsim.values.script import (
     SetSignal,
     Shape,
     Stop,
+    TakeRoute,
     TrafficAction,
     Walk,
 )
@@ -190,6 +191,8 @@ def _of_vehicle(subject: str, doing: VehicleActions, now: Situation) -> list[Tra
         return [Leave(vehicle)]
     moves: list[TrafficAction | None] = [_path(vehicle, doing.path)] if doing.path else []
     moves += _motions(vehicle, doing, subject, speed, now)
+    if doing.take_route:
+        moves.append(TakeRoute(vehicle, doing.take_route))
     if doing.change_lane:
         moves.append(_lane_change(vehicle, doing.change_lane, subject, speed, now))
     moves += _switches(vehicle, doing)

@@ -343,6 +343,9 @@ class VehicleActions(Section):
     depart: DepartAction | None = None
     """Come onto the road, for an id that is in no file."""
 
+    take_route: tuple[Id, ...] | None = None
+    """Drive to the first of these edges, on the way that SUMO finds, and then along them; not for the ego."""
+
     path: PathAction | None = None
     """Move along a path, also onto the road, for a vehicle of a route file that waits (`depart="triggered"`)."""
 

@@ -13,7 +13,7 @@ from fogsim.traffic.sumo_behaviour.signal_control import SignalControl
 from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
 from fogsim.traffic.sumo_lanes.route_position import GapToEgo
-from fogsim.values.script import ChangeLane, Depart, Enter, FollowPath, Leave, SetSignal, TrafficAction, Walk
+from fogsim.values.script import ChangeLane, Depart, Enter, FollowPath, Leave, SetSignal, TakeRoute, TrafficAction, Walk
 
 _REGARD_OF_OTHERS, _NO_COLLISION = 3 << 8, 1 << 8
 """Bits of SUMO's lane-change mode on what of others a change that is asked for regards, and those for as much as does
@@ -96,6 +96,8 @@ class ScriptedActions:
                 refused += [] if self._walk(action) else [action]
             elif action.vehicle not in present or not self._has_lane(action):
                 refused.append(action)
+            elif isinstance(action, TakeRoute):
+                refused += [] if self._take_route(action) else [action]
             elif isinstance(action, Leave):
                 self._paths.leave(action.vehicle)
                 self._api.vehicle.remove(action.vehicle)
@@ -109,6 +111,20 @@ class ScriptedActions:
             return False
         person.setSpeed(action.person, action.speed)
         return True
+
+    def _take_route(self, action: TakeRoute) -> bool:
+        vehicle = self._api.vehicle
+        route, index = vehicle.getRoute(action.vehicle), vehicle.getRouteIndex(action.vehicle)
+        if index < 0 or action.vehicle in self._paths.vehicles:
+            return False
+        here, edges = route[index], list(action.edges)
+        if here in edges:
+            vehicle.setRoute(action.vehicle, edges[edges.index(here) :])
+            return True
+        found = self._api.simulation.findRoute(here, edges[0], vehicle.getTypeID(action.vehicle)).edges
+        if found:
+            vehicle.setRoute(action.vehicle, [*found, *edges[1:]])
+        return bool(found)
 
     def _has_lane(self, action: TrafficAction) -> bool:
         if not isinstance(action, ChangeLane) or action.oncoming or action.vehicle in self._oncoming:

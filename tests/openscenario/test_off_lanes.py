@@ -393,3 +393,10 @@ def test_who_overtakes_on_the_oncoming_lane_from_the_beginning_cuts_in(
     begun = {one.name: one.time for step in steps for one in step.begun if not one.is_over}
     assert begun["slow"] - begun["in"] == pytest.approx(lasts, abs=0.21)
     assert _at(steps, 9.9, "Fast")[1:] == pytest.approx((-1.75, 12.0), abs=0.02)
+
+
+def test_a_person_may_stand_far_from_the_road(tmp_path: Path) -> None:
+    begin = {"Ego": EGO, "Ann": _world(60, -150)}
+    steps = _run(write(tmp_path, {"Ego": CAR, "Ann": PERSON}, begin, stop=after(2.0)))
+    row = steps[-1].traffic.ids.index("Ann")
+    assert steps[-1].traffic.position[row].tolist() == pytest.approx([60.25, -150.0, 0.0])

@@ -13,11 +13,11 @@ from fogsim.values.script import FollowPath
 _ANYWHERE = 2
 """SUMO's `keepRoute` for a vehicle that is exactly where it is put, on a lane or off the lanes."""
 
-_LANES_FROM = 100.0
+_LANES_FROM = 10_000.0
 """Distance from which SUMO looks for a lane [m]; at 0 none is found, and a vehicle is off the lanes."""
 
-_NEAR = 50.0
-"""Distance up to which others are regarded [m]."""
+_NEAR, _EDGE = 50.0, 1.0
+"""Distance up to which others are regarded, and beyond a lane up to which SUMO may take one for in it [m]."""
 
 _UNCHECKED, _SUMO_DRIVES = 0, -1.0
 
@@ -117,7 +117,9 @@ class Paths:
                 continue
             path.move(time + step, step, wanted)
             x, y, heading = path.place(time + step, step)
-            aside = path.action.stays and self._is_passed(vehicle, (x, y), heading, step, present)
+            aside = (
+                vehicle in present and path.action.stays and self._is_passed(vehicle, (x, y), heading, step, present)
+            )
             get.moveToXY(vehicle, "", -1, x, y, 90.0 - math.degrees(heading), _ANYWHERE, 0.0 if aside else _LANES_FROM)
             if vehicle in present:
                 get.setPreviousSpeed(vehicle, path.speed)
@@ -132,15 +134,18 @@ class Paths:
         middle = front[0] - 0.5 * length * math.cos(heading), front[1] - 0.5 * length * math.sin(heading)
         for other in present:
             (x, y), angle = get.getPosition(other), math.radians(90.0 - get.getAngle(other))
-            if other == vehicle or math.dist((x, y), middle) > _NEAR:
+            if other == vehicle or math.dist((x, y), middle) > _NEAR or is_off_lanes(self._api, other):
                 continue
             cosine, sine, turn = math.cos(angle), math.sin(angle), heading - angle
             ahead = (middle[0] - x) * cosine + (middle[1] - y) * sine
-            left = abs((middle[1] - y) * cosine - (middle[0] - x) * sine)
+            left = (middle[1] - y) * cosine - (middle[0] - x) * sine
             along = 0.5 * (length * abs(math.cos(turn)) + width * abs(math.sin(turn)))
             across = 0.5 * (length * abs(math.sin(turn)) + width * abs(math.cos(turn)) + get.getWidth(other))
             gap = get.getMinGap(other) + get.getSpeed(other) * step
-            if left >= across and -get.getLength(other) - get.getMinGap(vehicle) < ahead + along < gap + 2.0 * along:
+            from_middle = left + get.getLateralLanePosition(other)
+            is_in_lane = abs(from_middle) <= 0.5 * self._api.lane.getWidth(get.getLaneID(other)) + _EDGE
+            is_next_to = -get.getLength(other) - get.getMinGap(vehicle) < ahead + along < gap + 2.0 * along
+            if is_in_lane and is_next_to and abs(left) >= across:
                 return True
         return False
 

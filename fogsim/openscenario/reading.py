@@ -88,9 +88,9 @@ def _check_version(root: Node) -> None:
     header = root.one("FileHeader")
     major = header.get("revMajor") if header else ""
     if major != "1":
-        raise InputError(
-            f"{root.file}:{root.line}: expected OpenSCENARIO XML 1.x (FileHeader's revMajor), got {major or 'none'!r}"
-        )
+        hint = "; ASAM's package of 1.0 has a stylesheet that migrates files of 0.9" if major == "0" else ""
+        message = f"expected OpenSCENARIO XML 1.x (FileHeader's revMajor), got {major or 'none'!r}{hint}"
+        raise InputError(f"{root.file}:{root.line}: {message}")
 
 
 def _opendrive(root: Node, path: Path) -> Path:

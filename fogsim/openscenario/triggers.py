@@ -377,7 +377,7 @@ _TESTS: Mapping[str, Callable[[Triggers, Node, str], _Test | None]] = {
 CONDITIONS: Mapping[str, str] = {
     "SimulationTimeCondition": "`time`.",
     "ParameterCondition": "`happened(EVENT)` that sets it, if that makes a difference; otherwise always or never.",
-    "VariableCondition": "Likewise.",
+    "VariableCondition": "As `ParameterCondition`.",
     "StoryboardElementStateCondition": "`happened(EVENT)`, for states of beginning, and of being over by the time that "
     "the actions take.",
     **{tag: inspect.getdoc(test) or "" for tag, test in _TESTS.items()},

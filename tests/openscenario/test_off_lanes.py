@@ -1,4 +1,4 @@
-"""Trajectories, persons beside the road, and vehicles off the middle of their lanes: where each is at each moment."""
+"""Trajectories, persons next to the road, and vehicles off the middle of their lanes: where each is at each moment."""
 
 import math
 from collections.abc import Sequence
@@ -81,7 +81,7 @@ def test_a_car_turned_round_comes_along_its_lane() -> None:
     assert _at(steps, 3.0, "Oncoming")[0] == pytest.approx(x - speed_then, abs=0.01)
 
 
-def test_a_person_waits_beside_the_road_and_crosses_it_by_times(tmp_path: Path) -> None:
+def test_a_person_waits_next_to_the_road_and_crosses_it_by_times(tmp_path: Path) -> None:
     walks = event("walk", _follows(("0", _world(150, -6)), ("4", _world(150, 2)), ("6", _world(154, 2))), after(2.0))
     begin = {"Ego": EGO, "Ann": _world(150, -6, "1.5708")}
     steps = _run(write(tmp_path, {"Ego": CAR, "Ann": PERSON}, begin, {"Ann": walks}))
@@ -96,7 +96,7 @@ def test_a_person_waits_beside_the_road_and_crosses_it_by_times(tmp_path: Path) 
     assert _heading(steps, 9.9, "Ann") == pytest.approx(0.0, abs=1e-6)
 
 
-def test_who_stands_beside_the_road_walks_straight_on_at_the_speed_that_is_ordered(tmp_path: Path) -> None:
+def test_who_stands_next_to_the_road_walks_straight_on_at_the_speed_that_is_ordered(tmp_path: Path) -> None:
     begin = {"Ego": EGO, "Ann": _world(150, -6, "1.5708")}
     steps = _run(write(tmp_path, {"Ego": CAR, "Ann": PERSON}, begin, {"Ann": event("walk", speed(1.5), after(2.0))}))
     begun = next(step.time for step in steps for one in step.begun if one.name == "walk" and not one.is_over)

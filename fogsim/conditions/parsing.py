@@ -12,6 +12,7 @@ from fogsim.conditions.syntax import (
     AnyOf,
     Comparison,
     Condition,
+    Delayed,
     Edge,
     Flag,
     Held,
@@ -25,7 +26,7 @@ from fogsim.errors import shown, suggest
 from fogsim.units.quantities import example_of, parse_quantity
 
 _NUMBER = re.compile(r"[-+]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?|inf\b)")
-_UNIT_PART = r"(?!(?:and|or|not|for)\b)[^\W\d_]+(?:\^?-?\d+)?"
+_UNIT_PART = r"(?!(?:and|or|not|for|delayed)\b)[^\W\d_]+(?:\^?-?\d+)?"
 _UNIT = re.compile(rf"\s*(%|°|{_UNIT_PART}(?:\s*[/*·]\s*{_UNIT_PART})*)")
 _NAME = re.compile(r"[^\W\d][\w:#@.\-]*")
 _QUOTED = re.compile(r"\"([^\"]+)\"|'([^']+)'")
@@ -33,7 +34,7 @@ _ARGUMENT = re.compile(r"[^\s,()\"'][^,()\"']*")
 _OPERATOR = re.compile(r"<=|>=|==|!=|<|>|is\s+not\b|is\b")
 _SPELLED = {"is": "==", "is not": "!="}
 _HOW = re.compile(r"(falls\s+below|rises\s+above|becomes|changes|includes?)\b")
-_AGAIN = re.compile(r"(and|or|not|for)\b")
+_AGAIN = re.compile(r"(and|or|not|for|delayed)\b")
 
 OPERATORS = ("<", "<=", ">", ">=", "==", "!=")
 """Operators of comparisons."""
@@ -122,7 +123,7 @@ class _Text:
         """Parse all of it."""
         result = self._any()
         if self._rest():
-            raise self._wrong("'and', 'or', 'for' or the end")
+            raise self._wrong("'and', 'or', 'for', 'delayed' or the end")
         return result
 
     def _any(self) -> Condition:
@@ -143,6 +144,8 @@ class _Text:
         part = self._single()
         if self._take(re.compile(r"for\b")):
             return Held(part, self._quantity("s"))
+        if self._take(re.compile(r"delayed\b")):
+            return Delayed(part, self._quantity("s"))
         return part
 
     def _single(self) -> Condition:

@@ -12,6 +12,7 @@ from fogsim.conditions.signals import SIGNALS
 from fogsim.conditions.syntax import (
     Comparison,
     Condition,
+    Delayed,
     Edge,
     Flag,
     Held,
@@ -65,9 +66,10 @@ def pointless_parts(condition: Condition, limits: Limits = NO_LIMITS, ego: str =
         match part:
             case Comparison(left, _, right) | Edge(left, _, right) if left == right:
                 yield f"{part} compares {left} with itself"
-            case Held(_, duration) if not 0.0 < duration.value < math.inf:
-                yield f"{part}: the time after 'for' must be longer than 0 s and finite"
-            case Held(_, duration) if duration.value > _range(_TIME, limits)[1]:
+            case Held(_, duration) | Delayed(_, duration) if not 0.0 < duration.value < math.inf:
+                word = "for" if isinstance(part, Held) else "delayed"
+                yield f"{part}: the time after '{word}' must be longer than 0 s and finite"
+            case Held(_, duration) | Delayed(_, duration) if duration.value > _range(_TIME, limits)[1]:
                 yield f"{part} is never true: {_range_text(_TIME, limits)}"
             case Comparison() | Edge() if outcomes(part, limits) == {False}:
                 yield f"{part} is never true: {_range_text(part.left, limits)}"
@@ -95,12 +97,14 @@ def _measured(asked: Sequence[Comparison | Edge | Flag]) -> tuple[Reference, ...
 
 def _is_free(part: Condition) -> bool:
     """Whether a part's outcome depends on more than a signal's current value."""
-    return isinstance(part, Edge | Held) or (isinstance(part, Comparison) and isinstance(part.right, Reference))
+    return isinstance(part, Edge | Held | Delayed) or (
+        isinstance(part, Comparison) and isinstance(part.right, Reference)
+    )
 
 
 def _free(part: Condition, limits: Limits) -> Iterator[bool]:
     match part:
-        case Held(inner, duration):
+        case Held(inner, duration) | Delayed(inner, duration):
             yield from (False,) if duration.value > _range(_TIME, limits)[1] else outcomes(inner, limits)
         case Comparison(left, relation, right) if left == right:
             yield relation in ("<=", ">=", "==")

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeVar
 
+from fogsim.conditions.bodies import Body, body_of, clearance
 from fogsim.conditions.moment import Moment
 from fogsim.conditions.route_places import Extent, gap_between, headway_between, time_to_meet
 from fogsim.conditions.signal import Kind, LanePlace, Need, Place, Signal
@@ -152,12 +153,29 @@ def _time_to_collision(leader: Leader, speed: float) -> float:
     return max(leader.gap, 0.0) / approach if approach > 0.0 else math.inf
 
 
-def _straight_distance(moment: Moment, one: str, other: str) -> float | None:
-    first, second = moment.row(one), moment.row(other)
+def _body(moment: Moment, vehicle: str) -> Body | None:
+    row = moment.row(vehicle)
+    return None if row is None else body_of(moment.traffic, row)
+
+
+def _straight_distance(
+    moment: Moment, one: str, other: str, behind: str = "0 m", other_behind: str = "0 m"
+) -> float | None:
+    first, second = _body(moment, one), _body(moment, other)
     if first is None or second is None:
         return None
-    position = moment.traffic.position
-    return math.dist(position[second], position[first])
+    return math.dist(first.behind(parse_quantity(behind, "m")), second.behind(parse_quantity(other_behind, "m")))
+
+
+def _distance_to(moment: Moment, vehicle: str, behind: str, x: str, y: str) -> float | None:
+    if (body := _body(moment, vehicle)) is None:
+        return None
+    return math.dist(body.behind(parse_quantity(behind, "m")), (parse_quantity(x, "m"), parse_quantity(y, "m")))
+
+
+def _clearance(moment: Moment, one: str, other: str) -> float | None:
+    first, second = _body(moment, one), _body(moment, other)
+    return None if first is None or second is None else clearance(first, second)
 
 
 def _is_in_bank(moment: Moment, number: str, vehicle: str = "ego") -> bool | None:
@@ -282,6 +300,17 @@ _OF_VEHICLES = {
         needs=_ROUTE,
     ),
     "distance(X, Y)": _metres("straight distance between the front bumpers", _straight_distance, places=_PAIR),
+    "distance(X, Y, LENGTH, LENGTH)": _metres(
+        "straight distance between the points that are a length behind each one's front bumper",
+        _straight_distance,
+        places=(*_PAIR_AND_LENGTH, Place.LENGTH),
+    ),
+    "distance_to(X, LENGTH, LENGTH, LENGTH)": _metres(
+        "straight distance between the point that is a length behind X's front bumper and the place x, y of the map",
+        _distance_to,
+        places=(Place.VEHICLE, *[Place.LENGTH] * 3),
+    ),
+    "clearance(X, Y)": _metres("straight distance between the bodies, 0 where they touch", _clearance, places=_PAIR),
     "ttc(X, Y)": Signal(
         "time until X and Y are beside one another at constant speeds, whatever the lane: inf if they do not approach",
         _of_pair(time_to_meet),

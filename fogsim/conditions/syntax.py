@@ -107,6 +107,18 @@ class Held:
 
 
 @dataclass(frozen=True, slots=True)
+class Delayed:
+    """A condition that was true a time [s] ago."""
+
+    part: "Condition"
+    duration: Quantity
+
+    def __str__(self) -> str:
+        inside = f"({self.part})" if isinstance(self.part, Not) else _bracketed(self.part)
+        return f"{inside} delayed {self.duration}"
+
+
+@dataclass(frozen=True, slots=True)
 class Not:
     """A condition that is not true."""
 
@@ -136,12 +148,12 @@ class AnyOf:
         return " or ".join(map(_bracketed, self.parts))
 
 
-Condition = Comparison | Edge | Flag | Held | Not | AllOf | AnyOf
+Condition = Comparison | Edge | Flag | Held | Delayed | Not | AllOf | AnyOf
 """A condition on a run."""
 
 
 def _bracketed(part: Condition) -> str:
-    return f"({part})" if isinstance(part, AllOf | AnyOf | Held) else str(part)
+    return f"({part})" if isinstance(part, AllOf | AnyOf | Held | Delayed) else str(part)
 
 
 def parts_of(condition: Condition) -> Iterator[Condition]:
@@ -150,7 +162,7 @@ def parts_of(condition: Condition) -> Iterator[Condition]:
         case AllOf(parts) | AnyOf(parts):
             for part in parts:
                 yield from parts_of(part)
-        case Not(part) | Held(part):
+        case Not(part) | Held(part) | Delayed(part):
             yield from parts_of(part)
     yield condition
 

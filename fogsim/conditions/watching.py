@@ -1,6 +1,7 @@
 """Evaluates a condition over the steps of a run: true, false, or unknown."""
 
 import math
+from collections import deque
 from collections.abc import Mapping
 
 from fogsim.conditions.logic import combined, compared, passed
@@ -10,6 +11,7 @@ from fogsim.conditions.signals import SIGNALS
 from fogsim.conditions.syntax import (
     Comparison,
     Condition,
+    Delayed,
     Edge,
     Flag,
     Held,
@@ -40,6 +42,7 @@ class Watch:
         self._signals = signals_of(condition)
         self._before: dict[Edge, Value] = {}
         self._since: dict[Held, float] = {}
+        self._earlier: dict[Delayed, deque[tuple[float, bool | None]]] = {}
         self._history = History()
         self._units = _shown_units(self._parts)
         self.values: Mapping[Reference, Value] = {}
@@ -76,6 +79,8 @@ class Watch:
                 return self._passed(part)
             case Held(inner, duration):
                 return self._held(part, results[inner], time, duration.value)
+            case Delayed(inner, duration):
+                return self._delayed(part, results[inner], time - duration.value)
             case _:
                 return combined(part, results.__getitem__)
 
@@ -103,6 +108,14 @@ class Watch:
             self._since.pop(part, None)
             return inside
         return time - self._since.setdefault(part, time) >= duration - _TICK
+
+    def _delayed(self, part: Delayed, inside: bool | None, then: float) -> bool | None:
+        """What a condition was at a time [s]; false before the first step."""
+        earlier = self._earlier.setdefault(part, deque([(-math.inf, False)]))
+        earlier.append((then + part.duration.value, inside))
+        while len(earlier) > 1 and earlier[1][0] <= then + _TICK:
+            earlier.popleft()
+        return earlier[0][1]
 
 
 def _shown_units(parts: tuple[Condition, ...]) -> dict[Reference, str]:

@@ -18,6 +18,7 @@ LOCATIONS = (
     "ControllerCatalog",
     "ManeuverCatalog",
     "RouteCatalog",
+    "TrajectoryCatalog",
 )
 """Types of catalogs that are read."""
 
@@ -64,7 +65,7 @@ class Catalogs:
             if file not in self._read:
                 try:
                     self._read[file] = read_xml(file)
-                    to_standard(self._read[file])
+                    to_standard(self._read[file], self.findings)
                 except InputError as error:
                     self.findings.refused.append(str(error))
                     self._read[file] = Node("", {}, file, 1)

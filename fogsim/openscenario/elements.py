@@ -21,13 +21,24 @@ Entities ScenarioObject@name Vehicle@name,vehicleCategory Performance@maxAcceler
 BoundingBox Center@x,y,z Dimensions@height,length,width Trailer TrailerRef@entityRef
 Storyboard Init Actions Private@entityRef Story@name Act@name ManeuverGroup@maximumExecutionCount,name
 Actors@selectTriggeringEntities EntityRef@entityRef Maneuver@name Event@maximumExecutionCount,name,priority Action@name
+EntityAction@entityRef AddEntityAction DeleteEntityAction
 GlobalAction PrivateAction TeleportAction Position LongitudinalAction LateralAction AppearanceAction
 EnvironmentAction Environment@name TimeOfDay@dateTime Weather@cloudState,fractionalCloudCover Fog@visualRange
 Sun@elevation,illuminance,intensity Precipitation@intensity,precipitationIntensity,precipitationType
 RoadCondition@frictionScaleFactor,wetness
 SpeedAction SpeedActionDynamics@dynamicsDimension,dynamicsShape,value SpeedActionTarget AbsoluteTargetSpeed@value
 RelativeTargetSpeed@continuous,entityRef,speedTargetValueType,value
-LongitudinalDistanceAction@continuous,coordinateSystem,displacement,entityRef,freespace,timeGap
+LongitudinalDistanceAction@continuous,coordinateSystem,displacement,distance,entityRef,freespace,timeGap
+LaneOffsetAction@continuous LaneOffsetActionDynamics@dynamicsShape,maxLateralAcc LaneOffsetTarget
+AbsoluteTargetLaneOffset@value RelativeTargetLaneOffset@entityRef,value
+SpeedProfileAction@entityRef,followingMode SpeedProfileEntry@speed,time
+SynchronizeAction@masterEntityRef,targetToleranceMaster TargetPosition TargetPositionMaster FinalSpeed
+AbsoluteSpeed@value RelativeSpeedToMaster@speedTargetValueType,value
+FollowTrajectoryAction Trajectory@closed,name TrajectoryRef TrajectoryFollowingMode@followingMode Shape Polyline
+Vertex@time TimeReference None Timing@domainAbsoluteRelative,offset,scale TrajectoryCatalog
+ParameterAction@parameterRef VariableAction@variableRef SetAction@value VariableDeclarations
+VariableDeclaration@name,value
+ParameterCondition@parameterRef,rule,value VariableCondition@rule,value,variableRef
 LaneChangeAction@targetLaneOffset LaneChangeActionDynamics@dynamicsDimension,dynamicsShape,value LaneChangeTarget
 AbsoluteTargetLane@value RelativeTargetLane@entityRef,value
 LightStateAction@transitionTime LightType VehicleLight@vehicleLightType LightState@mode
@@ -35,14 +46,14 @@ ControllerAction OverrideControllerValueAction Throttle@active Brake@active Clut
 SteeringWheel@active Gear@active
 WorldPosition@h,x,y LanePosition@laneId,offset,roadId,s RoadPosition@roadId,s,t Orientation@h,type
 RelativeLanePosition@dLane,ds,dsLane,entityRef,offset RelativeWorldPosition@dx,dy,entityRef
-RelativeObjectPosition@dx,dy,entityRef
+RelativeObjectPosition@dx,dy,entityRef RelativeRoadPosition@ds,dt,entityRef
 StartTrigger StopTrigger ConditionGroup Condition@conditionEdge,delay ByValueCondition ByEntityCondition EntityCondition
 TriggeringEntities@triggeringEntitiesRule SimulationTimeCondition@rule,value
 StoryboardElementStateCondition@state,storyboardElementRef,storyboardElementType
 SpeedCondition@direction,rule,value AccelerationCondition@direction,rule,value StandStillCondition@duration
 RelativeSpeedCondition@direction,entityRef,rule,value TraveledDistanceCondition@value
 RelativeDistanceCondition@coordinateSystem,entityRef,freespace,relativeDistanceType,rule,value
-DistanceCondition@coordinateSystem,freespace,relativeDistanceType,rule,value ReachPositionCondition@tolerance
+DistanceCondition@alongRoute,coordinateSystem,freespace,relativeDistanceType,rule,value ReachPositionCondition@tolerance
 TimeHeadwayCondition@coordinateSystem,entityRef,freespace,relativeDistanceType,rule,value
 TimeToCollisionCondition@coordinateSystem,freespace,relativeDistanceType,rule,value TimeToCollisionConditionTarget
 CollisionCondition ByType@type EndOfRoadCondition@duration
@@ -74,9 +85,8 @@ HARMLESS: Mapping[str, str] = _by_name(
         "Vehicle@role Pedestrian@role": "who has another role moves alike",
         "Pedestrian@mass Pedestrian@model Pedestrian@model3d MiscObject@mass MiscObject@model3d": "persons have "
         "figures of FogSim's, and everything else is a box",
-        "ParameterDeclaration@parameterType": "a value is checked where it is used",
-        "TrajectoryCatalog": "a folder; its entries may not be used",
-        "VariableDeclarations VariableDeclaration MonitorDeclarations MonitorDeclaration": "nothing may use them",
+        "ParameterDeclaration@parameterType VariableDeclaration@variableType": "a value is checked where it is used",
+        "MonitorDeclarations MonitorDeclaration": "nothing may use them",
         "UsedArea": "the whole network is there",
         "Condition@name": "a label",
         "ObjectController Controller AssignControllerAction ActivateControllerAction": "programs of "
@@ -86,6 +96,7 @@ HARMLESS: Mapping[str, str] = _by_name(
         "Gear@number": "nothing while inactive",
         "TimeOfDay@animation": "in minutes the sun hardly moves",
         "Sun@azimuth": "daylight is the illuminance of the ground, without shadows",
+        "SynchronizeAction@targetTolerance": "it arrives where and when it is to, within a step",
         "Wind": "even fog does not drift, and boxes of fog stand still",
         "Weather@atmosphericPressure Weather@temperature": "FogSim's light and fog do not depend on them",
         "WorldPosition@z WorldPosition@p WorldPosition@r RelativeWorldPosition@dz RelativeObjectPosition@dz "
@@ -94,8 +105,7 @@ HARMLESS: Mapping[str, str] = _by_name(
         "DynamicConstraints": "FogSim's law of following has limits of its own",
         "Color ColorRgb ColorCmyk": "lamps have the colours that the law requires",
         "LightState@flashingOnDuration LightState@flashingOffDuration": "indicators flash as the law requires",
-        "DistanceCondition@alongRoute TimeHeadwayCondition@alongRoute TimeToCollisionCondition@alongRoute": "distances "
-        "are along the road, which coordinateSystem decides in 1.1 and later",
+        "TimeHeadwayCondition@alongRoute TimeToCollisionCondition@alongRoute": "times are of distances along the road",
     }
 )
 """Elements and attributes that could not change a run, and why."""
@@ -103,20 +113,14 @@ HARMLESS: Mapping[str, str] = _by_name(
 REFUSED: Mapping[str, str] = _by_name(
     {
         "OpenScenario": "the root is written OpenSCENARIO",
-        "ExternalObjectReference EntitySelection Members AddEntityAction "
-        "DeleteEntityAction EntityAction ScenarioObjectTemplate EntityDistribution EntityDistributionEntry": "entities "
-        "are vehicles that are there from beginning to end",
+        "ExternalObjectReference EntitySelection Members ScenarioObjectTemplate EntityDistribution "
+        "EntityDistributionEntry": "entities are vehicles, persons and things that the file describes one by one",
         "RandomRouteAction": "who has no route goes straight on",
         "FromRoadCoordinates": "a place on a route has a lane; write FromLaneCoordinates",
-        "FollowTrajectoryAction Trajectory TrajectoryRef TrajectoryFollowingMode TrajectoryPosition Shape Polyline "
-        "Vertex Clothoid ClothoidSpline ClothoidSplineSegment PositionStart Nurbs ControlPoint Knot TimeReference None "
-        "Timing": "vehicles keep to their lanes; there are no trajectories",
-        "SpeedProfileAction SpeedProfileEntry SynchronizeAction TargetPosition TargetPositionMaster FinalSpeed "
-        "AbsoluteSpeed RelativeSpeedToMaster TargetDistanceSteadyState TargetTimeSteadyState": "speeds change by time "
-        "or rate",
-        "LongitudinalDistanceAction@distance": "a distance is kept by a timeGap",
-        "LaneOffsetAction LaneOffsetActionDynamics LaneOffsetTarget AbsoluteTargetLaneOffset RelativeTargetLaneOffset "
-        "LateralDistanceAction": "vehicles are in the middle of their lanes",
+        "TrajectoryPosition Clothoid ClothoidSpline ClothoidSplineSegment PositionStart Nurbs ControlPoint Knot "
+        "FollowTrajectoryAction@initialDistanceOffset": "trajectories are polylines, from their first vertex on",
+        "TargetDistanceSteadyState TargetTimeSteadyState": "the final speed is reached at the target",
+        "LateralDistanceAction": "where vehicles are in their lanes does not depend on others",
         "VisibilityAction SensorReferenceSet SensorReference": "everything can be seen that the fog does not hide",
         "AnimationAction AnimationType AnimationState AnimationFile ComponentAnimation VehicleComponent "
         "UserDefinedComponent PedestrianAnimation PedestrianGesture UserDefinedAnimation": "nothing moves on a body",
@@ -130,11 +134,10 @@ REFUSED: Mapping[str, str] = _by_name(
         "RoadRange RoadCursor Lane Polygon VehicleCategoryDistribution VehicleCategoryDistributionEntry "
         "VehicleRoleDistribution VehicleRoleDistributionEntry ControllerDistribution ControllerDistributionEntry "
         "DirectionOfTravelDistribution": "there is no traffic but the entities",
-        "ParameterAction SetAction ModifyAction Rule AddValue MultiplyByValue ParameterCondition VariableAction "
-        "VariableCondition SetMonitorAction": "values do not change while a run lasts",
+        "ModifyAction Rule AddValue MultiplyByValue SetMonitorAction": "values are set, not changed by others",
         "UserDefinedAction CustomCommandAction UserDefinedValueCondition UserDefinedDistribution": "its meaning is "
         "another simulator's",
-        "GeoPosition RelativeRoadPosition": "places are by lane, by road, in the map's metres, or by an entity",
+        "GeoPosition": "places are by lane, by road, in the map's metres, or by an entity",
         "OffroadCondition AngleCondition RelativeAngleCondition RelativeClearanceCondition "
         "RelativeLaneRange TimeOfDayCondition": "FogSim has no such condition",
         "DistanceCondition@routingAlgorithm RelativeDistanceCondition@routingAlgorithm "

@@ -51,7 +51,9 @@ class Findings:
         """Word of an attribute; one that is not allowed becomes a finding."""
         text = node.get(key) or default
         if text not in allowed:
-            self._add(self.refused, f"{node.where}: {key}: FogSim has no {shown(text)} here; {suggest(text, allowed)}")
+            known = f"FogSim has no {shown(text)} here; {suggest(text, allowed)}"
+            missing = f"this attribute is missing; expected {' or '.join(allowed)}"
+            self._add(self.refused, f"{node.where}: {key}: {known if text else missing}")
             return allowed[0]
         return text
 

@@ -5,29 +5,41 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from fogsim.openscenario.actions import Actions, Effect
-from fogsim.openscenario.entities import Vehicle
+from fogsim.openscenario.actions import DISPLACEMENTS, Actions
+from fogsim.openscenario.effects import Effect
+from fogsim.openscenario.entities import Vehicle, ego_of
 from fogsim.openscenario.environment import Environment, environment_of
+from fogsim.openscenario.positions import ALONG, Positions
 from fogsim.openscenario.xml_tree import Node
 from fogsim.traffic.road.opendrive_lanes import Spot
 from fogsim.units import KMH_PER_MPS
+
+_STRAIGHT = 1000.0  # Way of those off the lanes in the direction in which they stand [m]
 
 
 @dataclass
 class Beginning:
     """Initial state: reference points and ordered speeds of vehicles, fog and light, and further effects.
 
-    `names` are the vehicles by their names in the timeline, `fronts` the places of front bumpers, and `ways` the edges
-    from there on.
+    `names` are the vehicles by their names in the timeline, `ways` their edges, `off_lanes` the places of those on no
+    lane, `fronts` the places of front bumpers, and `distances` the actions that place one at a distance to another.
     """
 
     spots: dict[str, Spot]
     names: Mapping[str, str]
+    ways: dict[str, tuple[str, ...]]
+    off_lanes: dict[str, tuple[float, float, float]]
+    rerouted: set[str]
     fronts: dict[str, Spot] = field(default_factory=dict)
-    ways: dict[str, tuple[str, ...]] = field(default_factory=dict)
     orders: dict[str, Mapping[str, Any]] = field(default_factory=dict)
     environment: Environment = field(default_factory=Environment)
     effect: Effect = field(default_factory=Effect)
+    distances: list[tuple[str, Node]] = field(default_factory=list)
+
+    @property
+    def routed(self) -> set[str]:
+        """Vehicles that have a route, from the beginning or later, for which they change lane."""
+        return {*self.effect.routes, *self.rerouted}
 
     def speed(self, vehicle: str, *asked: str) -> float:
         """Initial speed of a vehicle [m/s]; one that is relative follows from another's."""
@@ -42,29 +54,61 @@ class Beginning:
 
 def read_beginning(init: Node | None, vehicles: Mapping[str, Vehicle], actions: Actions) -> Beginning:
     """Initial state from the element ``Init``."""
-    begin = Beginning(actions.positions.entities, {actions.called(name).strip('"'): name for name in vehicles})
+    positions = actions.positions
+    names = {actions.called(name).strip('"'): name for name in vehicles}
+    begin = Beginning(positions.entities, names, positions.ways, positions.off_lanes, positions.rerouted)
     blocks = init.all("Actions") if init else []
     for block in blocks:
         for action in block.all("GlobalAction"):
             _take_global(action, begin, actions)
     private = [one for block in blocks for one in block.all("Private")]
-    _place(private, vehicles, actions)
+    added = {one.get("entityRef"): one for block in blocks for one in _entity_actions(block, "AddEntityAction")}
+    _place(_positions(private, added, vehicles, actions), vehicles, actions)
     for one in private:
         for action in one.all("PrivateAction"):
             _take_private(action, one.get("entityRef"), begin, actions)
+    _move_by_distances(begin, actions)
+    absent = {one.get("entityRef") for block in blocks for one in _entity_actions(block, "DeleteEntityAction")}
+    for name in absent:
+        begin.spots.pop(name, None)
+    if init and init.above:
+        absent |= {one.get("entityRef") for one in _entity_actions(init.above, "AddEntityAction")} - {*added}
     for name, vehicle in vehicles.items():
-        if name not in begin.spots:
-            if not actions.findings.refused:
-                actions.findings.refuse(vehicle.node, f"{name} has no place: Init needs a TeleportAction of it")
-            continue
+        if name not in absent or name == ego_of(dict(vehicles)):
+            _begin(name, vehicle, begin, vehicles, actions)
+    return begin
+
+
+def _entity_actions(node: Node, kind: str) -> list[Node]:
+    """All elements within that add an entity, or delete one."""
+    return [one for one in node.walk() if one.tag == "EntityAction" and any(c.tag == kind for c in one.children)]
+
+
+def _begin(name: str, vehicle: Vehicle, begin: Beginning, vehicles: Mapping[str, Vehicle], actions: Actions) -> None:
+    """Find where a vehicle's front bumper begins, and its way, or its path off the lanes."""
+    if name in begin.off_lanes or (name not in begin.spots and "path" in begin.effect.do.get(name, {})):
+        _place_off_lanes(name, vehicle, begin, actions.positions)
+    elif name in begin.spots:
         try:
-            wanted = begin.effect.routes.get(name, ())
             begin.fronts[name] = _front(name, begin, vehicles, actions)
+            wanted = begin.effect.routes.get(name, ())
             begin.ways[name] = actions.positions.lanes.route(begin.fronts[name].lane.edge, wanted)
         except ValueError as error:
             actions.findings.refuse(vehicle.node, f"{name} cannot begin where it is to: {error}")
             del begin.spots[name]
-    return begin
+    elif not actions.findings.refused:
+        actions.findings.refuse(vehicle.node, f"{name} has no place: Init needs a TeleportAction of it")
+
+
+def _place_off_lanes(name: str, vehicle: Vehicle, begin: Beginning, positions: Positions) -> None:
+    """Let one begin off the lanes, or turned on one; without a path it moves straight on, a vehicle along its lane."""
+    (x, y, heading), speed = begin.off_lanes.setdefault(name, (math.inf, 0.0, 0.0)), begin.speed(name)
+    far, degrees = _STRAIGHT if speed or vehicle.body else 0.0, math.degrees(heading)
+    ends = [[x + way * math.cos(heading), y + way * math.sin(heading), degrees] for way in (0.0, far)]
+    lane = None if vehicle.body else positions.lanes.nearest(x, y)
+    path = {"points": positions.lanes.backwards(lane) if lane else ends, "ahead_m": vehicle.front, "stays": True}
+    done = begin.effect.do.setdefault(name, {})
+    done["path"] = {**done.get("path", path), "speed_kmh": speed * KMH_PER_MPS}
 
 
 def _front(name: str, begin: Beginning, vehicles: Mapping[str, Vehicle], actions: Actions) -> Spot:
@@ -80,38 +124,73 @@ def _front(name: str, begin: Beginning, vehicles: Mapping[str, Vehicle], actions
 
 def _take_global(action: Node, begin: Beginning, actions: Actions) -> None:
     for one in action.all():
-        if one.tag == "EnvironmentAction":
+        if one.tag == "EntityAction":
+            # `read_beginning` has seen to it.
+            one.all("AddEntityAction", "DeleteEntityAction")
+        elif one.tag == "EnvironmentAction":
             begin.environment = environment_of(one, actions.catalogs, actions.positions.lanes)
         else:
             actions.take(action, [], begin.effect)
 
 
-def _place(private: list[Node], vehicles: Mapping[str, Vehicle], actions: Actions) -> None:
-    """Place vehicles; those relative to another one last."""
-    wanted: dict[str, Node] = {}
+def _positions(
+    private: list[Node], added: Mapping[str, Node], vehicles: Mapping[str, Vehicle], actions: Actions
+) -> dict[str, Node]:
+    """Positions at which vehicles are added, or put, at the beginning."""
+    holders = [(name, one.all("AddEntityAction")) for name, one in added.items() if name in vehicles]
     for one in private:
         name = one.get("entityRef")
-        if name not in vehicles:
+        if name in vehicles:
+            places = [t for action in one.all("PrivateAction") for t in action.all("TeleportAction")]
+            # Who only follows a trajectory begins at its first vertex.
+            holders.append((name, places or [vertex for vertex in one.walk() if vertex.tag == "Vertex"][:1]))
+        else:
             actions.findings.refuse(one, f"there is no vehicle {name!r}")
-            continue
-        for action in one.all("PrivateAction"):
-            teleport = action.one("TeleportAction")
-            position = teleport.one("Position") if teleport else None
-            if position is not None:
-                wanted[name] = position
+    return {name: position for name, inside in holders for one in inside for position in one.all("Position")}
+
+
+def _place(wanted: dict[str, Node], vehicles: Mapping[str, Vehicle], actions: Actions) -> None:
+    """Place vehicles; those relative to another one last."""
     positions = actions.positions
     while wanted:
         ready = [n for n, position in wanted.items() if positions.refers_to(position) not in wanted] or list(wanted)
         for name in ready:
-            spot = positions.spot(wanted.pop(name))
-            if spot is not None:
+            position = wanted.pop(name)
+            if (point := _off_lanes(position, vehicles[name], vehicles, positions)) is not None:
+                positions.off_lanes[name] = point
+            elif (spot := positions.spot(position)) is not None:
                 positions.entities[name] = spot
+
+
+def _off_lanes(
+    position: Node, vehicle: Vehicle, vehicles: Mapping[str, Vehicle], positions: Positions
+) -> tuple[float, float, float] | None:
+    """x, y [m] and heading [rad] of one on no lane, of a body turned on one, or of a vehicle against one; else None."""
+    try:
+        x, y, heading, along = positions.point(position)
+        lane = positions.lanes.nearest(x, y)
+    except ValueError:
+        return None
+    facing = along if heading is None else heading
+    along_lane = 1.0 if lane is None or facing is None else math.cos(facing - lane.world[2])
+    is_turned = along_lane < (ALONG if vehicle.body else -ALONG)
+    if vehicle.name == ego_of(dict(vehicles)) or not (lane is None or is_turned):
+        return None
+    if lane is not None and not vehicle.body:
+        positions.against[vehicle.name] = positions.named(position) or lane
+    return x, y, facing or 0.0
 
 
 def _take_private(action: Node, name: str, begin: Beginning, actions: Actions) -> None:
     if action.one("TeleportAction"):
         return
-    effect = Effect()
+    distance = action.within("LongitudinalAction", "LongitudinalDistanceAction")
+    if distance and distance.one("DynamicConstraints") is None and name in actions.vehicles:
+        # Without limits to its motion it is there at once.
+        begin.distances.append((name, distance))
+        if not actions.findings.flag(distance, "continuous"):
+            return
+    effect = Effect(is_at_start=True)
     actions.take(action, [name], effect)
     begin.effect.routes.update(effect.routes)
     done = effect.do.get(name, {})
@@ -125,6 +204,32 @@ def _take_private(action: Node, name: str, begin: Beginning, actions: Actions) -
         actions.findings.refuse(action, f"FogSim keeps a distance to a vehicle ahead; {leader} is not ahead of {name}")
     if done:
         begin.effect.add(name, **done)
+
+
+def _move_by_distances(begin: Beginning, actions: Actions) -> None:
+    """Put those at a distance to another vehicle there."""
+    for name, action in begin.distances:
+        try:
+            begin.spots[name] = _at_distance(action, name, begin, actions)
+        except ValueError as error:
+            actions.findings.refuse(action, str(error))
+
+
+def _at_distance(action: Node, name: str, begin: Beginning, actions: Actions) -> Spot:
+    """Place at a distance to another vehicle, on the lane on which the vehicle is; ValueError if there is none."""
+    headway, distance, is_between_bumpers = actions.gap(action)
+    own, other, reference = begin.spots.get(name), begin.spots.get(action.get("entityRef")), action.get("entityRef")
+    if own is None or other is None:
+        raise ValueError(f"{name} or {reference} has no place")
+    where = actions.findings.word(action, "displacement", DISPLACEMENTS, "any")
+    is_ahead = _is_ahead(own, other) if where == "any" else where == DISPLACEMENTS[1]
+    ahead, behind = (name, reference) if is_ahead else (reference, name)
+    away = headway * begin.speed(behind) + distance
+    if is_between_bumpers:
+        away += actions.vehicles[behind].front + actions.vehicles[ahead].rear
+    lanes = actions.positions.lanes
+    spot = lanes.along(other, away if is_ahead else -away)
+    return lanes.beside(spot, own.lane.index - other.lane.index).shifted(own.offset)
 
 
 def _is_ahead(one: Spot | None, other: Spot | None) -> bool:
@@ -147,7 +252,10 @@ def along_route(route: tuple[str, ...], begin: Beginning, vehicles: Mapping[str,
         if isinstance(what, str):
             spot, further = begin.spots.get(what), vehicles[what].front
         else:
-            spot, further = actions.positions.spot(what), 0.0
+            try:
+                spot, further = actions.positions.on_lanes(what, is_of_vehicle=False), 0.0
+            except ValueError:
+                return None
         if spot is None or spot.lane.edge not in starts:
             return None
         return starts[spot.lane.edge] + spot.position + further

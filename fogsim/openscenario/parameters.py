@@ -104,13 +104,14 @@ def _check_constraints(declaration: Node, findings: Findings) -> None:
     """Refuse a value that fits none of its groups of constraints; it fits a group by fitting all of it."""
     groups = [group.all("ValueConstraint") for group in declaration.all("ConstraintGroup")]
     value = declaration.get("value")
-    broken = [next((one for one in group if not _fits(value, one, findings)), None) for group in groups]
+    broken = [next((one for one in group if not fits(value, one, findings)), None) for group in groups]
     if broken and all(broken):
         message = " or ".join(f"{one.get('rule')} {one.get('value')}" for one in broken if one)
         findings.refuse(declaration, f"value: its ConstraintGroup wants {message}, got {value!r}")
 
 
-def _fits(value: str, constraint: Node, findings: Findings) -> bool:
+def fits(value: str, constraint: Node, findings: Findings) -> bool:
+    """Whether a value fits the `rule` and `value` of a constraint or condition."""
     rule, limit = findings.word(constraint, "rule", tuple(RULES)), constraint.get("value")
     try:
         return bool(_HOLDS[rule](float(value), float(limit)))

@@ -26,7 +26,7 @@ from fogsim.openscenario.positions import Positions
 from fogsim.openscenario.storyboard import Storyboard
 from fogsim.openscenario.triggers import Trigger, Triggers
 from fogsim.openscenario.vehicles_file import STANDS, vehicles_text
-from fogsim.openscenario.xml_tree import Node, read_xml
+from fogsim.openscenario.xml_tree import Node, read_xml, sumo_name
 from fogsim.traffic.road.netconvert import map_net
 from fogsim.traffic.road.opendrive import is_opendrive
 from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, read_opendrive_lanes
@@ -71,7 +71,7 @@ def read_openscenario(
         for one in block.children:
             one.attributes["value"] = values.get(one.attributes.get("name", ""), one.attributes.get("value", ""))
     put_parameters(root, {}, findings)
-    to_standard(root)
+    to_standard(root, findings)
     catalogs = Catalogs(path.parent, root.one("CatalogLocations"), findings)
     entities, storyboard = root.one("Entities"), root.one("Storyboard")
     if entities is None or storyboard is None:
@@ -88,9 +88,9 @@ def _check_version(root: Node) -> None:
     header = root.one("FileHeader")
     major = header.get("revMajor") if header else ""
     if major != "1":
-        raise InputError(
-            f"{root.file}:{root.line}: expected OpenSCENARIO XML 1.x (FileHeader's revMajor), got {major or 'none'!r}"
-        )
+        hint = "; ASAM's package of 1.0 has a stylesheet that migrates files of 0.9" if major == "0" else ""
+        message = f"expected OpenSCENARIO XML 1.x (FileHeader's revMajor), got {major or 'none'!r}{hint}"
+        raise InputError(f"{root.file}:{root.line}: {message}")
 
 
 def _opendrive(root: Node, path: Path) -> Path:
@@ -119,7 +119,9 @@ class _Reader:
         """None if vehicles drive on the oncoming lane, and the network has no way to it."""
         ego = ego_of(dict(self.vehicles))
         positions = Positions(self.lanes, catalogs)
-        story = Storyboard(catalogs, Actions(self.vehicles, catalogs, positions, lambda name: _called(name, ego)))
+        story = Storyboard(
+            catalogs, Actions(self.vehicles, catalogs, positions, lambda name: _called(name, ego)), self.root
+        )
         actions = story.actions
         begin = read_beginning(self.storyboard.one("Init"), self.vehicles, actions)
         if ego not in begin.spots:
@@ -128,13 +130,16 @@ class _Reader:
                 self.root, f"no vehicle that could be the ego has a place; there are {len(self.vehicles)}"
             )
             self.findings.close(self.path)
+        groups = [one for one in self.storyboard.walk() if one.tag == "Actors"]
+        actors = {sumo_name(one.attributes.get("entityRef", "")) for group in groups for one in group.children}
+        positions.moving |= {ego, *actors, *(name for name in self.vehicles if begin.speed(name))}
         story.find_events(self.storyboard)
         if positions.with_oncoming and not self.with_oncoming:
             return None
         route = begin.ways[ego]
         along = along_route(route, begin, self.vehicles, actions)
         end = math.inf if self.lanes.followers.get(route[-1]) else self.lanes.starts(route)[-1] - NEAR_THE_END
-        story.triggers = triggers = Triggers(self.vehicles, ego, positions, along, story.state, end)
+        story.triggers = triggers = Triggers(self.vehicles, ego, positions, along, story.state, story.value, end)
         entries = story.timeline()
         stop = triggers.trigger(self.storyboard.one("StopTrigger"))
         header = self.root.one("FileHeader")
@@ -150,15 +155,14 @@ class _Reader:
             message = f"{self.path}: the BoundingBox of the fog lies beside the ego's way: the air is clear there"
             warnings.warn(message, LeftOutWarning, stacklevel=2)
         lines: dict[Key, int] = {}
-        timeline = [_initial(begin, ego), *(block for _, block in entries)]
-        for place, (node, _) in enumerate(entries, start=1):
+        first = _initial(begin, ego)
+        timeline = [*first, *(block for _, block in entries)]
+        for place, (node, _) in enumerate(entries, start=len(first)):
             lines["timeline", place] = node.line
         for mark in triggers.marks:
             lines["timeline", len(timeline)] = mark.node.line
             timeline.append(_mark(mark.name, mark.trigger))
-        data["timeline"] = [one for one in timeline if one]
-        if not timeline[0]:
-            lines = {("timeline", int(place) - 1): line for (_, place), line in lines.items()}
+        data["timeline"] = timeline
         data |= _ending(stop, data["timeline"])
         data["expect"] = {entry.names[0]: {"happened": entry.names[0]} for entry in story.entries.values()}
         files = write_generated(
@@ -178,7 +182,7 @@ class _Reader:
             "name": re.sub(r"[^A-Za-z0-9_.-]", "_", self.path.stem)[:100],
             "traffic": {
                 "ego": ego,
-                "keep_lane": [name for name in self.vehicles if name not in begin.effect.routes],
+                "keep_lane": [name for name in self.vehicles if name not in begin.routed],
                 "stop_before_end_m": NEAR_THE_END,
             },
             "fog": fog_block(
@@ -201,14 +205,18 @@ def begin_at_once(entries: list[tuple[Node, dict[str, Any]]], begin: Beginning) 
                 begin.orders.setdefault(vehicle, speed)
 
 
-def _initial(begin: Beginning, ego: str) -> dict[str, Any]:
-    """Entry of the timeline for the initial state: the speeds of all vehicles but the ego, and lamps."""
+def _initial(begin: Beginning, ego: str) -> list[dict[str, Any]]:
+    """Entries of the timeline for the initial state: speeds of all but the ego, lamps, and who comes off the lanes."""
     for name in begin.spots:
         speed = begin.speed(name)
         moves = begin.effect.do.get(name, {}).keys() & {"speed", "follow"}
         if not moves and (name != ego or speed <= STANDS):
             begin.effect.add(name, speed={"to_kmh": speed * KMH_PER_MPS, "shape": "step"})
-    return {"name": "Init", "when": "time >= 0 s", "do": begin.effect.do} if begin.effect.do else {}
+    there = {name: done for name, done in begin.effect.do.items() if name not in begin.off_lanes}
+    comes = {name: {"path": begin.effect.do[name].pop("path")} for name in begin.off_lanes}
+    later = {name: done for name in begin.off_lanes if (done := begin.effect.do[name])}
+    parts = {"Init": there, "Init_off_the_lanes": comes, "Init_once_there": later}
+    return [{"name": name, "when": "time >= 0 s", "do": done} for name, done in parts.items() if done]
 
 
 def _mark(name: str, trigger: Trigger) -> dict[str, Any]:

@@ -4,15 +4,17 @@ import re
 from dataclasses import dataclass, field
 from typing import Any
 
-from fogsim.openscenario.actions import Actions, Effect
+from fogsim.openscenario.actions import Actions
 from fogsim.openscenario.catalogs import Catalogs
+from fogsim.openscenario.effects import Effect
 from fogsim.openscenario.findings import Findings
+from fogsim.openscenario.parameters import fits
 from fogsim.openscenario.triggers import AT_ONCE, NEVER, Trigger, Triggers, both
 from fogsim.openscenario.xml_tree import Node
 
 _BEGUN, _OVER = ("startTransition", "runningState"), ("endTransition", "completeState")
 _MOST_TIMES = 100
-_MOTION = {"speed", "follow"}
+_MOTION = {"speed", "follow", "arrive"}
 _PARTS = ("Story", "Act", "ManeuverGroup", "Maneuver", "Event", "Action")
 
 
@@ -33,6 +35,7 @@ class Storyboard:
 
     catalogs: Catalogs
     actions: Actions
+    root: Node
     triggers: Triggers = field(init=False)
     entries: dict[int, Entry] = field(default_factory=dict)
     _acts: dict[int, Trigger] = field(default_factory=dict)
@@ -82,8 +85,6 @@ class Storyboard:
         self.entries[id(event)] = entry
         for action in event.all("Action"):
             self.actions.take(action, actors, entry.effect)
-            if entry.effect.routes:
-                self.findings.refuse(action, "routes are known from the beginning; move this into Init")
 
     def timeline(self) -> list[tuple[Node, dict[str, Any]]]:
         """Entries of the timeline, each with its element."""
@@ -95,12 +96,20 @@ class Storyboard:
                 entry = self.entries[id(event)]
                 entry.trigger = self._begins(entry, act)
                 until, trigger = _until(stop, self.triggers, event), entry.trigger
-                for name in entry.names:
+                for number, name in enumerate(entry.names):
+                    if number and entry.effect.is_endless:
+                        self.findings.refuse(
+                            event, "maximumExecutionCount: what is never over by itself is played once"
+                        )
+                    if number:
+                        # It is played again once it is over and its own trigger holds.
+                        trigger = both(self._played(entry, entry.names[number - 1]), entry.trigger)
                     written.append((event, _written(entry, name, trigger, until)))
+                    if entry.effect.once_there:
+                        then = Entry([f"{name}_once_there"], event, [], Effect(entry.effect.once_there))
+                        written.append((event, _written(then, then.names[0], Trigger(f"happened({name})"), until)))
                     ends = self._end_others(entry, name, trigger)
                     written += [(event, _written(one, one.names[0], one.trigger, until)) for one in ends]
-                    # It is played again once it is over and its own trigger holds.
-                    trigger = both(self._played(entry, name), entry.trigger)
         return written
 
     def _end_others(self, entry: Entry, name: str, trigger: Trigger) -> list[Entry]:
@@ -149,6 +158,26 @@ class Storyboard:
         finally:
             self._open.pop()
 
+    def value(self, node: Node) -> Trigger:
+        """Trigger for a condition on a parameter or variable, which events may set."""
+        kind = node.tag.removesuffix("Condition")
+        name = node.get(f"{kind.lower()}Ref")
+        declared = [
+            one for block in self.root.all(f"{kind}Declarations") for one in block.all() if one.get("name") == name
+        ]
+        setters = [entry for entry in self.entries.values() if name in entry.effect.sets]
+        if not declared:
+            self.findings.refuse(node, f"there is no {kind.lower()} {name!r}")
+            return NEVER
+        holds = fits(declared[0].get("value"), node, self.findings)
+        later = {fits(entry.effect.sets[name], node, self.findings) for entry in setters}
+        if later <= {holds}:
+            return AT_ONCE if holds else Trigger("time < 0 s", stays=True)
+        if len(setters) > 1:
+            self.findings.refuse(node, f"{len(setters)} events set {name!r}; a condition may wait for one")
+        happened = f"happened({setters[0].names[0]})"
+        return Trigger(f"not {happened}" if holds else happened, stays=not holds)
+
     def _begun(self, part: Node) -> Trigger:
         if part.tag in ("Event", "Action"):
             return Trigger(f"happened({self._entry(part).names[0]})", stays=True)
@@ -175,6 +204,10 @@ class Storyboard:
     def _played(self, entry: Entry, name: str) -> Trigger:
         """When an execution of an event is over."""
         effect, phrase = entry.effect, f"happened({name})"
+        if effect.has_unknown_end:
+            self.findings.refuse(entry.node, "when a trajectory without times or places is over is not known")
+        if effect.is_endless:
+            return Trigger("time < 0 s", stays=True)
         if effect.ends_itself:
             if any(_MOTION & done.keys() for done in effect.do.values()):
                 self.findings.refuse(

@@ -15,6 +15,9 @@ from fogsim.openscenario.xml_tree import Node
 _DISTANCES = ("longitudinal", "cartesianDistance", "euclidianDistance")
 _EDGES = ("none", "rising", "falling", "risingOrFalling")
 _WORD = re.compile(r"[A-Za-z_][\w:#@\-]*")
+NEAR = 0.05
+"""Difference up to which speeds are equal [m/s]."""
+
 _STILL = 0.1  # Speed below which a vehicle counts as stopped [m/s]
 
 
@@ -60,8 +63,8 @@ class Triggers:
     """Reads triggers.
 
     `along` is the position of an entity or position along the ego's route [m], None off the route; `states` gives the
-    trigger of a storyboard state condition; `end` is where the ego's road ends [m]; `marks` become timeline entries
-    without action.
+    trigger of a storyboard state condition, `values` of one on a parameter or variable; `end` is where the ego's road
+    ends [m]; `marks` become timeline entries without action.
     """
 
     vehicles: Mapping[str, Vehicle]
@@ -69,6 +72,7 @@ class Triggers:
     positions: Positions
     along: Callable[[str | Node], float | None]
     states: Callable[[Node], Trigger]
+    values: Callable[[Node], Trigger]
     end: float = math.inf
     marks: list[Mark] = field(default_factory=list)
 
@@ -84,7 +88,7 @@ class Triggers:
         if node is None or len(times) == len(groups):
             return at_time(min(times)) if times else None
         if len({group.delay for group in groups}) > 1:
-            groups = [self._marked(group, node) if group.delay else group for group in groups]
+            groups = [_delayed(group) for group in groups]
         phrase = groups[0].condition if len(groups) == 1 else " or ".join(f"({group.condition})" for group in groups)
         return Trigger(phrase, groups[0].delay)
 
@@ -95,21 +99,11 @@ class Triggers:
         if not others:
             return at_time(latest)
         if len({trigger.delay for trigger in others}) > 1:
-            others = [self._marked(one, group) if one.stays and one.delay else one for one in others]
-            if any(one.delay for one in others):
-                delays = [trigger.delay for trigger in read]
-                why = "of conditions with different delays, those that may become false again must have none"
-                self.findings.refuse(group, f"{why}; got {delays}")
+            others = [_delayed(one) for one in others]
         delay = others[0].delay
         phrase = [f"time >= {latest - delay:g} s"] if latest > delay else []
         parts = list(dict.fromkeys(one.condition for one in others))
         return Trigger(" and ".join([*phrase, *(_bracketed(one, len(parts) + len(phrase)) for one in parts)]), delay)
-
-    def _marked(self, trigger: Trigger, node: Node) -> Trigger:
-        """A trigger with its delay as a mark that has begun."""
-        name = f"delayed_{len(self.marks)}"
-        self.mark(name, trigger, node)
-        return Trigger(f"happened({name})", stays=True)
 
     def _condition(self, node: Node) -> Trigger:
         delay = self.findings.number(node, "delay", 0.0)
@@ -140,6 +134,8 @@ class Triggers:
             if found.at is not None:
                 return at_time(max(found.at, 0.0) + delay) if delay else found
             return replace(found, delay=found.delay + delay)
+        if node.tag in ("ParameterCondition", "VariableCondition"):
+            return replace(self.values(node), delay=delay)
         self.findings.refuse(node, "FogSim has no such condition")
         return NEVER
 
@@ -191,8 +187,11 @@ class Triggers:
     def _compared(self, node: Node, signal: str, unit: str, shift: float = 0.0) -> _Test:
         value = self.findings.number(node, "value") + shift
         rule = RULES[self.findings.word(node, "rule", tuple(RULES))]
+        if rule in ("==", "!=") and unit == "m/s":
+            about = f"{signal} > {value - NEAR:.9g} {unit} and {signal} < {value + NEAR:.9g} {unit}"
+            return _Test(about if rule == "==" else f"not ({about})")
         if rule in ("==", "!="):
-            self.findings.refuse(node, "rule: quantities of traffic are never exactly equal; take less or greater")
+            self.findings.refuse(node, "rule: places and times are never exactly equal; take less or greater")
         return _Test(f"{signal} {rule} {value:.9g} {unit}", signal, rule, f"{value:.9g} {unit}")
 
     def _along(self, node: Node, signal: str, unit: str) -> _Test:
@@ -243,17 +242,17 @@ class Triggers:
         return _Test(f"{signal} >= {value}", signal, ">=", value)
 
     def _relative_distance(self, node: Node, name: str) -> _Test | None:
-        """`gap(X, Y)`, ahead or behind, without `freespace` between rear axles; or straight: `distance(X, Y)`."""
+        """`gap(X, Y)`, ahead or behind; straight `clearance(X, Y)`; without `freespace` between rear axles."""
         other = node.get("entityRef")
         if not self._is_known(node, other):
             return None
         if self._is_along(node):
             return self._along_the_road(node, name, other)
+        pair = f"{self.called(name)}, {self.called(other)}"
         if self.findings.flag(node, "freespace"):
-            self.findings.refuse(
-                node, "freespace: straight distances are from front bumper to front bumper; write false"
-            )
-        return self._compared(node, f"distance({self.called(name)}, {self.called(other)})", "m")
+            return self._compared(node, f"clearance({pair})", "m")
+        rear = f"{self.vehicles[name].front:g} m, {self.vehicles[other].front:g} m"
+        return self._compared(node, f"distance({pair}, {rear})", "m")
 
     def _is_along(self, node: Node, default: str = "euclidianDistance") -> bool:
         """Whether a distance is along the road, not straight; entities' own axes are taken as along the road."""
@@ -272,9 +271,16 @@ class Triggers:
         return _Test(f"{gap} > {near[0]:.9g} m or {gap} < {near[1]:.9g} m")
 
     def _distance(self, node: Node, name: str) -> _Test | None:
-        """`X.position` about a position on the ego's route, without `freespace` of the rear axle."""
-        self._is_along(node)
-        place, free, vehicle = self._place_along(node), self.findings.flag(node, "freespace"), self.vehicles[name]
+        """`distance_to` a position; along the road `X.position` about it; without `freespace` of the rear axle."""
+        is_along, is_free = self._is_along(node), self.findings.flag(node, "freespace")
+        if not (is_along or self.findings.flag(node, "alongRoute", "false")):
+            if is_free:
+                self.findings.refuse(
+                    node, "freespace: straight distances to a position are of the rear axle; write false"
+                )
+            signal = self._distance_to(node, name)
+            return None if signal is None else self._compared(node, signal, "m")
+        place, free, vehicle = self._place_along(node), is_free, self.vehicles[name]
         if place is None:
             return None
         value, signal = self.findings.number(node, "value"), f"{self.called(name)}.position"
@@ -285,12 +291,34 @@ class Triggers:
         return _Test(f"{signal} < {near:.3f} m or {signal} > {far:.3f} m")
 
     def _reaches(self, node: Node, name: str) -> _Test | None:
-        """`X.position` within the tolerance of a position on the ego's route."""
-        place, around = self._place_along(node), self.findings.number(node, "tolerance")
-        if place is None:
+        """`distance_to` a position; on the ego's route, ahead of the vehicle, `X.position` from its tolerance on."""
+        position, around = node.one("Position"), self.findings.number(node, "tolerance")
+        place, begins = None if position is None else self.along(position), self.along(name)
+        if place is not None and begins is not None:
+            near = place + self.vehicles[name].front - around
+            if begins < near:
+                # However far it drives between two looks, it has been there.
+                signal = f"{self.called(name)}.position"
+                return _Test(f"{signal} >= {near:.3f} m", signal, ">=", f"{near:.3f} m")
+        reached = self._distance_to(node, name)
+        return None if reached is None else _Test(f"{reached} <= {around:.9g} m", reached, "<=", f"{around:.9g} m")
+
+    def _distance_to(self, node: Node, name: str) -> str | None:
+        """Straight distance of a vehicle's rear axle to a position."""
+        position = node.one("Position")
+        relative = position.one("RelativeObjectPosition") if position else None
+        if relative and not relative.children and not self.findings.number(relative, "dy", 0.0):
+            other = relative.get("entityRef")
+            if not self._is_known(relative, other):
+                return None
+            behind = self.vehicles[other].front - self.findings.number(relative, "dx", 0.0)
+            return f"distance({self.called(name)}, {self.called(other)}, {self.vehicles[name].front:g} m, {behind:g} m)"
+        try:
+            x, y, *_ = self.positions.point(position if position else node)
+        except ValueError as error:
+            self.findings.refuse(node, str(error))
             return None
-        front, signal = self.vehicles[name].front, f"{self.called(name)}.position"
-        return _Test(f"{signal} >= {place + front - around:.3f} m and {signal} <= {place + front + around:.3f} m")
+        return f"distance_to({self.called(name)}, {self.vehicles[name].front:g} m, {x:.3f} m, {y:.3f} m)"
 
     def _place_along(self, node: Node) -> float | None:
         position = node.one("Position")
@@ -348,6 +376,8 @@ _TESTS: Mapping[str, Callable[[Triggers, Node, str], _Test | None]] = {
 
 CONDITIONS: Mapping[str, str] = {
     "SimulationTimeCondition": "`time`.",
+    "ParameterCondition": "`happened(EVENT)` that sets it, if that makes a difference; otherwise always or never.",
+    "VariableCondition": "As `ParameterCondition`.",
     "StoryboardElementStateCondition": "`happened(EVENT)`, for states of beginning, and of being over by the time that "
     "the actions take.",
     **{tag: inspect.getdoc(test) or "" for tag, test in _TESTS.items()},
@@ -369,6 +399,13 @@ def both(first: Trigger, then: Trigger) -> Trigger:
     if first.at is not None and first.at <= 0.0:
         return then
     return Trigger(f"{_bracketed(first.condition, 2)} and {_bracketed(then.condition, 2)}", then.delay)
+
+
+def _delayed(trigger: Trigger) -> Trigger:
+    """A trigger with its delay in its condition."""
+    if not trigger.delay or not trigger.condition:
+        return trigger
+    return Trigger(f"({trigger.condition}) delayed {trigger.delay:g} s", stays=trigger.stays)
 
 
 def _bracketed(condition: str, count: int) -> str:

@@ -48,7 +48,7 @@ class Node:
         self.is_read = True
         self.read.add(key)
         value = self.attributes.get(key, default).strip()
-        return sumo_name(value) if key == "entityRef" else value
+        return sumo_name(value) if key in ("entityRef", "masterEntityRef") else value
 
     def all(self, *tags: str) -> list["Node"]:
         """Child elements with one of these tags, or all."""

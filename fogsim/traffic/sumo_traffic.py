@@ -63,7 +63,7 @@ from fogsim.values import (
     TrafficState,
     Unplayed,
 )
-from fogsim.values.script import TrafficAction
+from fogsim.values.script import Leave, TrafficAction
 
 _NO_ADVICE = Command()
 _P = ParamSpec("_P")
@@ -329,7 +329,10 @@ class SumoTraffic:
         """
         run = self._running
         run.roster.update()
-        return run.actions.begin(actions, self._elapsed(run), run.roster.present)
+        refused = run.actions.begin(actions, self._elapsed(run), run.roster.present)
+        if any(isinstance(action, Leave) for action in actions):
+            run.roster.check_count()
+        return refused
 
     def _elapsed(self, run: _Run) -> float:
         """Time since the ego appeared [s]."""

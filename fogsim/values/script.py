@@ -66,6 +66,8 @@ class ChangeSpeed:
     like : str
         Another vehicle, whose speed, times `factor`, plus `plus` [m/s], it comes to at each moment while that one is on
         the road; "" for `speed`.
+    profile : tuple of (float, float)
+        Times from the beginning [s] and speeds then [m/s], evenly in between; empty for `shape`.
     """
 
     vehicle: str
@@ -76,6 +78,7 @@ class ChangeSpeed:
     like: str = ""
     factor: float = 1.0
     plus: float = 0.0
+    profile: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,12 +93,39 @@ class Follow:
         Gap, bumper to bumper, over the vehicle's own speed [s].
     hold : float
         Time until the driver drives by himself again [s].
+    gap : float
+        Gap at standstill, to which the headway adds [m].
     """
 
     vehicle: str
     leader: str
     headway: float
     hold: float = math.inf
+    gap: float = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Arrive:
+    """A vehicle is at a place when another one is at a place of its own.
+
+    Attributes
+    ----------
+    vehicle, other : str
+        Their ids.
+    distance, other_distance : float
+        How far each has driven by then since it came onto the road [m].
+    speed : float or None
+        Speed that the vehicle has there, added to `factor` times the other's [m/s]; None for any.
+    factor : float
+        Share of the other's speed in that.
+    """
+
+    vehicle: str
+    other: str
+    distance: float
+    other_distance: float
+    speed: float | None = None
+    factor: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,6 +168,8 @@ class ChangeLane:
         Time for which it indicates before [s]; the lamp goes out when it is over. 0 for no indicating.
     oncoming : bool
         Whether it goes to the lane beyond the left one, whose traffic comes towards it, whatever `lanes` is.
+    offset : float or None
+        Distance of its middle from the lane's middle afterwards, to the left [m]; None for the one that it has.
     """
 
     vehicle: str
@@ -146,6 +178,39 @@ class ChangeLane:
     duration: float | None = None
     indicator: float = 0.0
     oncoming: bool = False
+    offset: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class FollowPath:
+    """A vehicle or body moves along a path, on the lanes or off them; it comes onto the road there if it is not on it.
+
+    Attributes
+    ----------
+    vehicle : str
+        Its id.
+    points : tuple of (float, float, float)
+        x, y [m] and heading [rad], NaN for that of the path.
+    times : tuple of float
+        When it is at each point, from the beginning [s]; empty for a speed of its own.
+    ahead : float
+        How far its front bumper is ahead of the point that follows the path [m].
+    speed : float or None
+        Speed with which it begins, without times [m/s]; None for the one that it has.
+    stays : bool
+        Whether it stays at the end also on a lane.
+    origin : str
+        ``map`` if points are the network's coordinates; from the vehicle's point at the beginning they are along the
+        network's axes (``place``) or ahead of the vehicle and to its left (``vehicle``).
+    """
+
+    vehicle: str
+    points: tuple[tuple[float, float, float], ...]
+    times: tuple[float, ...] = ()
+    ahead: float = 0.0
+    speed: float | None = None
+    stays: bool = False
+    origin: str = "map"
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,6 +318,35 @@ class Enter:
 
 
 @dataclass(frozen=True, slots=True)
+class TakeRoute:
+    """A vehicle drives to the first of some edges, on the way that SUMO finds, and then along them.
+
+    Attributes
+    ----------
+    vehicle : str
+        Its id.
+    edges : tuple of str
+        The edges.
+    """
+
+    vehicle: str
+    edges: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Leave:
+    """A vehicle leaves the road at once.
+
+    Attributes
+    ----------
+    vehicle : str
+        Its id.
+    """
+
+    vehicle: str
+
+
+@dataclass(frozen=True, slots=True)
 class Walk:
     """A person on foot walks at another speed from now on.
 
@@ -268,7 +362,21 @@ class Walk:
     speed: float
 
 
-TrafficAction = ChangeSpeed | Follow | Stop | ChangeLane | SetLamps | SetSignal | Depart | Enter | Walk
+TrafficAction = (
+    ChangeSpeed
+    | Follow
+    | Arrive
+    | Stop
+    | ChangeLane
+    | FollowPath
+    | TakeRoute
+    | SetLamps
+    | SetSignal
+    | Depart
+    | Enter
+    | Leave
+    | Walk
+)
 """What a traffic simulation can be told to do at once."""
 
 

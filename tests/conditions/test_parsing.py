@@ -4,7 +4,7 @@ import pytest
 
 from fogsim.conditions import parse_condition, signals_of
 from fogsim.conditions.parsing import DEEPEST, mended
-from fogsim.conditions.syntax import AllOf, AnyOf, Comparison, Edge, Flag, Held, Not, Quantity, Reference, Word
+from fogsim.conditions.syntax import AllOf, AnyOf, Comparison, Delayed, Edge, Flag, Held, Not, Quantity, Reference, Word
 
 EGO_SPEED = Reference("X.speed", ("ego",))
 
@@ -35,6 +35,7 @@ EGO_SPEED = Reference("X.speed", ("ego",))
         ("happened(timeline.0)", Flag(Reference("happened(EVENT)", ("timeline.0",)))),
         ("estimate(a.b:C).valid", Flag(Reference("estimate(METHOD).valid", ("a.b:C",)))),
         ("belief.error > 20 %", Comparison(Reference("belief.error"), ">", Quantity(0.2, "20", "%"))),
+        ("ego.collision delayed 2 s", Delayed(Flag(Reference("X.collision", ("ego",))), Quantity(2.0, "2", "s"))),
         ("ego.collision for 2 s", Held(Flag(Reference("X.collision", ("ego",))), Quantity(2.0, "2", "s"))),
     ],
 )
@@ -92,7 +93,7 @@ def test_what_yaml_tears_apart_is_mended() -> None:
         ("ego.speed > ", "got the end"),
         ("time > 3 s and", "expected a signal"),
         ("(time > 3 s", r"expected '\)'"),
-        ("time > 3 s time > 4 s", "expected 'and', 'or', 'for' or the end"),
+        ("time > 3 s time > 4 s", "expected 'and', 'or', 'for', 'delayed' or the end"),
         ("fog.bank(first)", "named by its number"),
         ("gap(a b", "expected ',' or"),
         ("gap(,", "expected a name"),

@@ -12,7 +12,7 @@ from fogsim.conditions import Condition, Need, RunContent, Watch, condition_mist
 from fogsim.conditions.logic import combined
 from fogsim.conditions.signal import Kind
 from fogsim.conditions.signals import SIGNALS
-from fogsim.conditions.syntax import AllOf, AnyOf, Comparison, Edge, Flag, Held, Not, Quantity, Reference, Word
+from fogsim.conditions.syntax import AllOf, AnyOf, Comparison, Delayed, Edge, Flag, Held, Not, Quantity, Reference, Word
 from tests.recorders.synthetic import make_step
 
 
@@ -173,6 +173,7 @@ def joined(inner: st.SearchStrategy[Condition]) -> st.SearchStrategy[Condition]:
     return st.one_of(
         inner.map(Not),
         inner.map(lambda part: Held(part, Quantity(2.0, "2", "s"))),
+        inner.map(lambda part: Delayed(part, Quantity(2.0, "2", "s"))),
         st.lists(inner.filter(lambda part: not isinstance(part, AllOf)), min_size=2, max_size=3).map(
             lambda parts: AllOf(tuple(parts))
         ),

@@ -122,12 +122,6 @@ def test_a_hitch_without_a_trailer_is_nothing(tmp_path: Path) -> None:
     ("name", "told"),
     [
         ("left_hand_road", r"road_left\.xodr: road '7': rule=\"LHT\": expected right-hand traffic"),
-        (
-            "turned_round",
-            r"\.xosc:77: \S+/LanePosition: h: vehicles stand, and drive, along their lanes; it stands 180 deg",
-        ),
-        ("speed_and_distance_at_once", r"\.xosc:94: \S+/LongitudinalDistanceAction\[Ego\]: continuous: "),
-        ("speed_and_distance_at_once", r"keeps a distance to a vehicle ahead; Ego is not ahead of Lead"),
     ],
 )
 def test_what_would_run_as_something_else_is_refused(name: str, told: str) -> None:
@@ -141,8 +135,8 @@ def test_what_would_run_as_something_else_is_refused(name: str, told: str) -> No
         ('<LanePosition roadId="7" laneId="-1" s="500"><Orientation type="relative" h="6.28"/></LanePosition>', True),
         ('<LanePosition roadId="7" laneId="-1" s="500"><Orientation type="absolute" h="0"/></LanePosition>', True),
         ('<LanePosition roadId="7" laneId="1" s="500"><Orientation type="absolute" h="3.14"/></LanePosition>', True),
-        ('<LanePosition roadId="7" laneId="1" s="500"><Orientation type="absolute" h="0"/></LanePosition>', False),
-        ('<LanePosition roadId="7" laneId="1" s="500"><Orientation type="relative" h="3.14"/></LanePosition>', False),
+        ('<LanePosition roadId="7" laneId="1" s="500"><Orientation type="absolute" h="0"/></LanePosition>', None),
+        ('<LanePosition roadId="7" laneId="1" s="500"><Orientation type="relative" h="3.14"/></LanePosition>', None),
         ('<RoadPosition roadId="7" t="1.7" s="500"><Orientation type="relative" h="3.14"/></RoadPosition>', True),
         ('<LanePosition roadId="7" laneId="-1" s="500"><Orientation type="relative" h="1.2"/></LanePosition>', False),
         ('<WorldPosition x="500" y="-1.7" h="0.9"/>', False),
@@ -150,13 +144,16 @@ def test_what_would_run_as_something_else_is_refused(name: str, told: str) -> No
         ('<RelativeLanePosition entityRef="Ego" dLane="0" ds="9"><Orientation p="1"/></RelativeLanePosition>', True),
     ],
 )
-def test_a_vehicle_stands_along_its_lane_or_is_refused(tmp_path: Path, position: str, is_along: bool) -> None:
+def test_a_vehicle_stands_along_its_lane_or_against_it_or_is_refused(
+    tmp_path: Path, position: str, is_along: bool | None
+) -> None:
     text = (CASES / "turned_round.xosc").read_text(encoding="utf-8")
     begin = text.index('<LanePosition roadId="7" laneId="-1" s="500">')
     old = text[begin : text.index("</LanePosition>", begin) + len("</LanePosition>")]
     file = _changed(tmp_path, "turned_round", (old, position))
-    if is_along:
-        assert _loaded(file).traffic.ego == "Ego"
+    if is_along or is_along is None:
+        first = _loaded(file).timeline[0].name
+        assert (first == "Init_off_the_lanes") == (is_along is None)
     else:
         with pytest.raises(InputError, match="h: vehicles stand, and drive, along their lanes"):
             _loaded(file)
@@ -208,20 +205,25 @@ def test_files_of_carla_have_their_own_axes(tmp_path: Path) -> None:
     file = _changed(tmp_path, "sun_between_0_and_1", ('description="', 'description="CARLA:'), *texts)
     with pytest.warns(LeftOutWarning, match="read as the share"):
         step = _run(file, 0.1)[0]
-    assert [float(step.traffic.position[row, 1]) for row in range(2)] == pytest.approx([-1.75, -1.75], abs=0.1)
+    assert [float(step.traffic.position[row, 1]) for row in range(2)] == pytest.approx([-1.7, -1.3], abs=0.01)
 
 
-def test_an_initial_speed_and_a_distance_go_together(tmp_path: Path) -> None:
-    action = '<LongitudinalDistanceAction entityRef="Ego" timeGap="2" freespace="true" continuous="false"/>'
+@pytest.mark.parametrize("begins", [(70.0, 33.7 + 30.0 + 4.6), (10.0, 33.7 - 4.6 - 30.0 + 40.0)])
+@pytest.mark.parametrize("continuous", ["true", "false"])
+def test_an_initial_distance_is_a_place(tmp_path: Path, begins: tuple[float, float], continuous: str) -> None:
+    ahead, behind = ("30", "70") if begins[0] > 30.0 else ("70", "10")
+    texts = [('laneId="-1" s="30"', f'laneId="-1" s="{ahead}"'), ('laneId="-1" s="70"', f'laneId="-1" s="{behind}"')]
+    texts = texts if begins[0] > 30.0 else texts[::-1]
     file = _changed(
-        tmp_path,
-        "speed_and_distance_at_once",
-        (action, action.replace("false", "true")),
-        ('laneId="-1" s="30"', 'laneId="-1" s="300"'),
+        tmp_path, "speed_and_distance_at_once", *texts, ('continuous="false"', f'continuous="{continuous}"')
     )
-    steps = _run(file, 5.0)
-    assert _x_and_speed(steps[0], "Lead")[1] == pytest.approx(15.0, abs=0.3)
-    assert max(_x_and_speed(step, "Lead")[1] for step in steps) > 20.0
+    if continuous == "true" and begins[0] > 30.0:
+        with pytest.raises(InputError, match="keeps a distance to a vehicle ahead; Ego is not ahead of Lead"):
+            _loaded(file)
+        return
+    # 2 s at 15 m/s between bumpers.
+    step = _run(file, 3.0)[-1]
+    assert _x_and_speed(step, "Lead") == pytest.approx((begins[1] + 15.0 * step.time, 15.0), abs=0.1)
 
 
 def test_two_actions_of_an_event_on_the_same_motion_are_refused(tmp_path: Path) -> None:

@@ -69,6 +69,7 @@ def test_unknown_and_refused_attributes_are_refused_on_every_element(tmp_path: P
 USES = {f"catalogs/{kind}.xosc": "everything.xosc" for kind in ("vehicles", "environments", "maneuvers")} | {
     f"catalogs/{kind}.xosc": "on_foot_and_on_routes.xosc" for kind in ("persons", "things", "routes")
 }
+USES["catalogs/trajectories.xosc"] = "off_the_lanes.xosc"
 """Catalogs, and files that use them."""
 
 
@@ -100,8 +101,8 @@ def corpus(tmp_path: Path) -> dict[str, Node]:
     """Elements of the files whose attributes are changed one at a time, by their names in a folder of copies."""
     shutil.copytree(DATA / "openscenario", tmp_path, dirs_exist_ok=True)
     turns = ("speeds_in_turn.xosc", "speeds_at_random.xosc", "counts_at_random.xosc")
-    names = ("everything.xosc", "slow_lead.xosc", "on_foot_and_on_routes.xosc", *turns, *USES)
-    return {name: read_xml(tmp_path / name) for name in names}
+    files = ("everything.xosc", "slow_lead.xosc", "on_foot_and_on_routes.xosc", "off_the_lanes.xosc")
+    return {name: read_xml(tmp_path / name) for name in (*files, *turns, *USES)}
 
 
 def test_every_attribute_that_is_honoured_changes_the_scenario(tmp_path: Path, corpus: dict[str, Node]) -> None:

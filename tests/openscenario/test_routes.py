@@ -8,7 +8,7 @@ import pytest
 import fogsim
 from fogsim.errors import InputError
 from fogsim.openscenario import read_openscenario
-from tests.openscenario.writing import CAR, after, speed, write
+from tests.openscenario.writing import CAR, after, event, speed, write
 
 FORK = Path(__file__).parents[1] / "data" / "openscenario" / "fork.xodr"
 QUIET = ["renderer=none", "estimators=[]", "drivers.see_through_fog=true"]
@@ -65,6 +65,23 @@ def test_vehicles_drive_their_routes(tmp_path: Path, routing: str, ends_north: b
     assert np.all(np.hypot(*np.diff(places, axis=0).T) < 1.2)
 
 
+@pytest.mark.parametrize("routing", [_routing(NORTH), _routing(_on(3, 50), "AcquirePositionAction")])
+def test_routes_change_while_vehicles_drive(tmp_path: Path, routing: str) -> None:
+    begin = {"Ego": f"{_on(2, 40)}\n{speed(1)}", "Other": f"{_on(1, 30)}\n{speed(10)}"}
+    story = {"Other": event("turn", routing, after(2.0))}
+    file = write(tmp_path, {"Ego": CAR, "Other": CAR}, begin, story, stop=after(15), visibility=5000.0, road=FORK)
+    steps = list(fogsim.run(fogsim.load_scenario(file, QUIET)))
+    place = steps[-1].traffic.position[steps[-1].traffic.ids.index("Other"), :2]
+    assert place == pytest.approx((121.75, 20.0 + 183.7 - 100.0 - 34.2), abs=2.0)
+
+
+def test_the_egos_route_is_known_from_the_beginning(tmp_path: Path) -> None:
+    story = {"Ego": event("turn", _routing(NORTH), after(2.0))}
+    file = write(tmp_path, {"Ego": CAR}, {"Ego": _on(1, 30)}, story, road=FORK)
+    with pytest.raises(InputError, match="AssignRouteAction: the ego's route, along which positions count"):
+        read_openscenario(file)
+
+
 def test_positions_on_a_route_and_conditions_count_the_junction(tmp_path: Path) -> None:
     # From the first waypoint 80 m to the road's end, 35.1 across the junction, and 40 m up the road to the north.
     begin = {"Ego": f"{_on(1, 30)}\n{_routing(NORTH)}\n{speed(10)}", "Other": _on_route(NORTH, 155.1)}
@@ -83,7 +100,7 @@ def test_positions_on_a_route_and_conditions_count_the_junction(tmp_path: Path) 
         (_routing(_route(_on(1, 20), _on(3, 10), strategy="random")), "routeStrategy: FogSim has no 'random' here"),
         (_routing(_route(_on(1, 20), _on(3, 10), closed="true")), "closed: write the waypoints of each lap"),
         (_routing("<Route/>"), "expected a Route of Waypoints"),
-        (_routing("<TrajectoryRef/>", "FollowTrajectoryAction"), "vehicles keep to their lanes"),
+        (_routing("<TrajectoryRef/>", "FollowTrajectoryAction"), "expected a Trajectory with a Polyline"),
         (_routing(FROM_CATALOG), "there is no catalog 'Ways'"),
     ],
 )

@@ -58,8 +58,14 @@ def _entry(data: dict[str, Any], name: str) -> dict[str, Any]:
         (
             '<RelativeDistanceCondition entityRef="Lead" relativeDistanceType="cartesianDistance" value="20"'
             ' freespace="false" rule="greaterThan"/>',
-            "distance(ego, Lead) > 20 m",
+            "distance(ego, Lead, 3.8 m, 7 m) > 20 m",
         ),
+        (
+            '<RelativeDistanceCondition entityRef="Lead" relativeDistanceType="euclidianDistance" value="20"'
+            ' freespace="true" rule="greaterThan"/>',
+            "clearance(ego, Lead) > 20 m",
+        ),
+        ('<SpeedCondition value="0" rule="equalTo"/>', "ego.speed > -0.05 m/s and ego.speed < 0.05 m/s"),
         (
             '<TimeHeadwayCondition entityRef="Lead" value="1" freespace="true" rule="lessThan"/>',
             "headway(ego, Lead, 0 m) < 1 s",
@@ -67,11 +73,26 @@ def _entry(data: dict[str, Any], name: str) -> dict[str, Any]:
         (
             '<ReachPositionCondition tolerance="2"><Position><LanePosition roadId="7" laneId="-2" s="200"/></Position>'
             "</ReachPositionCondition>",
-            "ego.position >= 201.671 m and ego.position <= 205.671 m",
+            "ego.position >= 201.671 m",
+        ),
+        (
+            '<DistanceCondition value="9" freespace="false" rule="lessThan"><Position><RelativeObjectPosition '
+            'entityRef="Lead" dx="2" dy="0"/></Position></DistanceCondition>',
+            "distance(ego, Lead, 3.8 m, 5 m) < 9 m",
+        ),
+        (
+            '<ReachPositionCondition tolerance="2"><Position><WorldPosition x="300" y="40" h="1"/></Position>'
+            "</ReachPositionCondition>",
+            "distance_to(ego, 3.8 m, 300.000 m, 40.000 m) <= 2 m",
         ),
         (
             '<DistanceCondition value="50" freespace="false" rule="greaterThan"><Position><RoadPosition roadId="7" '
             's="200" t="-5"/></Position></DistanceCondition>',
+            "distance_to(ego, 3.8 m, 300.000 m, -25.000 m) > 50 m",
+        ),
+        (
+            '<DistanceCondition value="50" freespace="false" alongRoute="true" rule="greaterThan"><Position>'
+            '<RoadPosition roadId="7" s="200" t="-5"/></Position></DistanceCondition>',
             "ego.position < 153.671 m or ego.position > 253.671 m",
         ),
         ('<CollisionCondition><EntityRef entityRef="Lead"/></CollisionCondition>', "ego.collision"),
@@ -145,7 +166,7 @@ def test_an_act_that_is_stopped_keeps_back_its_events(read: Callable[..., dict[s
         ),
         (
             '<LongitudinalDistanceAction entityRef="Lead" timeGap="1.5" freespace="true" continuous="true"/>',
-            {"follow": {"vehicle": "Lead", "headway_s": 1.5}},
+            {"follow": {"vehicle": "Lead", "headway_s": 1.5, "gap_m": 0.0}},
         ),
     ],
 )

@@ -215,3 +215,27 @@ def test_without_actions_a_run_is_as_before(motorway: SumoTraffic) -> None:
     seen = drive(motorway, 20)
     motorway.start(1)
     assert [one["speed"] for one in drive(motorway, 20)] == [one["speed"] for one in seen]
+
+
+def across(traffic: SumoTraffic, steps: int) -> list[float]:
+    """How far the lead has moved to the left of where and whither it drives now, after each step [m]."""
+    angle = math.radians(90.0 - load_libsumo().vehicle.getAngle("lead"))
+    begin = np.array(load_libsumo().vehicle.getPosition("lead"))
+    moved = np.array([one["place"][:2] for one in drive(traffic, steps)]) - begin
+    return list(moved @ np.array([-math.sin(angle), math.cos(angle)]))
+
+
+def test_a_vehicle_moves_within_its_lane_along_half_a_cosine_and_stays_there(motorway: SumoTraffic) -> None:
+    drive(motorway, 1)
+    motorway.begin([ChangeLane("lead", 0, duration=2.0, offset=0.8)])
+    lateral = across(motorway, 40)
+    wave = [0.4 - 0.4 * math.cos(math.pi * (i + 1) / 20) for i in range(20)]
+    assert lateral == pytest.approx([*wave, *[0.8] * 20], abs=0.01)
+
+
+def test_a_change_of_lane_may_end_off_the_lanes_middle(motorway: SumoTraffic) -> None:
+    drive(motorway, 1)
+    motorway.begin([ChangeLane("lead", 1, duration=2.0, offset=-0.5)])
+    lateral = across(motorway, 40)
+    assert np.abs(np.diff([0.0, *lateral])).max() < 0.3
+    assert lateral[-1] == pytest.approx(3.75 - 0.5, abs=0.02)

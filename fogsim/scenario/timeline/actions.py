@@ -9,11 +9,13 @@ from fogsim.scenario.sensors.faults import fault_of
 from fogsim.scenario.timeline.lamps import lamp_switches
 from fogsim.scenario.timeline.schema import (
     LONGEST_CHANGE,
+    ArriveAction,
     DepartAction,
     Doing,
     FogActions,
     LaneAction,
     LightActions,
+    PathAction,
     SignalActions,
     SpeedAction,
     StopAction,
@@ -25,6 +27,7 @@ from fogsim.values import Fault, FogChange, FogField, Lamp
 from fogsim.values.light import ALL_LAMPS
 from fogsim.values.script import (
     Actions,
+    Arrive,
     ChangeFog,
     ChangeLane,
     ChangeLight,
@@ -32,10 +35,13 @@ from fogsim.values.script import (
     Depart,
     Enter,
     Follow,
+    FollowPath,
+    Leave,
     SetLamps,
     SetSignal,
     Shape,
     Stop,
+    TakeRoute,
     TrafficAction,
     Walk,
 )
@@ -159,6 +165,7 @@ def vehicles_of(entry: TimelineEntry) -> tuple[str, ...]:
         if isinstance(doing, VehicleActions):
             others = [
                 doing.follow.vehicle if doing.follow else None,
+                doing.arrive.vehicle if doing.arrive else None,
                 doing.speed.like if doing.speed else None,
                 doing.change_lane.to_lane_of if doing.change_lane else None,
                 doing.depart.like if doing.depart else None,
@@ -176,28 +183,42 @@ def _of_vehicle(subject: str, doing: VehicleActions, now: Situation) -> list[Tra
     if doing.depart:
         return _departure(vehicle, doing.depart, now) if speed is None else None
     if speed is None:
-        return None
+        # A path may bring a vehicle onto the road.
+        return [_path(vehicle, doing.path)] if doing.path and doing.model_fields_set == {"path"} else None
     if doing.walk:
         return [Walk(vehicle, doing.walk.speed_kmh / KMH_PER_MPS)]
-    moves: list[TrafficAction | None] = []
-    if doing.speed:
-        moves.append(_speed_change(vehicle, doing.speed, speed, now))
-    if doing.brake:
-        brake = doing.brake
-        moves.append(_braking(vehicle, speed, brake.to_kmh / KMH_PER_MPS, brake.deceleration_mps2, brake.hold_s))
-    if doing.break_down:
-        moves.append(_braking(vehicle, speed, 0.0, doing.break_down.deceleration_mps2, None))
-    if doing.follow:
-        follow, leader = doing.follow, now.vehicle_id(doing.follow.vehicle)
-        is_there = now.speed(follow.vehicle) is not None
-        moves.append(Follow(vehicle, leader, follow.headway_s, _endless(follow.for_s)) if is_there else None)
-    if doing.stop:
-        moves.append(_stopping(vehicle, doing.stop, now.position(subject)))
+    if doing.leave:
+        return [Leave(vehicle)]
+    moves: list[TrafficAction | None] = [_path(vehicle, doing.path)] if doing.path else []
+    moves += _motions(vehicle, doing, subject, speed, now)
+    if doing.take_route:
+        moves.append(TakeRoute(vehicle, doing.take_route))
     if doing.change_lane:
         moves.append(_lane_change(vehicle, doing.change_lane, subject, speed, now))
     moves += _switches(vehicle, doing)
     whole = [move for move in moves if move is not None]
     return whole if len(whole) == len(moves) else None
+
+
+def _motions(
+    vehicle: str, doing: VehicleActions, subject: str, speed: float, now: Situation
+) -> Iterator[TrafficAction | None]:
+    """What changes the speed of a vehicle; None for what cannot begin yet."""
+    if doing.speed:
+        yield _speed_change(vehicle, doing.speed, speed, now)
+    if doing.brake:
+        brake = doing.brake
+        yield _braking(vehicle, speed, brake.to_kmh / KMH_PER_MPS, brake.deceleration_mps2, brake.hold_s)
+    if doing.break_down:
+        yield _braking(vehicle, speed, 0.0, doing.break_down.deceleration_mps2, None)
+    if doing.follow:
+        follow, leader = doing.follow, now.vehicle_id(doing.follow.vehicle)
+        action = Follow(vehicle, leader, follow.headway_s, _endless(follow.for_s), follow.gap_m)
+        yield action if now.speed(follow.vehicle) is not None else None
+    if doing.arrive:
+        yield _arrival(vehicle, doing.arrive, now)
+    if doing.stop:
+        yield _stopping(vehicle, doing.stop, now.position(subject))
 
 
 def _departure(vehicle: str, action: DepartAction, now: Situation) -> list[TrafficAction] | None:
@@ -222,6 +243,9 @@ def departing_vehicles(entries: Sequence[TimelineEntry]) -> frozenset[str]:
 
 
 def _speed_change(vehicle: str, action: SpeedAction, begin: float, now: Situation) -> ChangeSpeed | None:
+    if action.profile:
+        profile = tuple((time, speed / KMH_PER_MPS) for time, speed in action.profile)
+        return ChangeSpeed(vehicle, profile[-1][1], hold=_endless(action.for_s), profile=profile)
     other = None if action.like is None else now.speed(action.like)
     if action.to_kmh is not None:
         speed = action.to_kmh / KMH_PER_MPS
@@ -254,6 +278,18 @@ def _switches(vehicle: str, doing: VehicleActions) -> Iterator[SetLamps]:
         yield SetLamps(vehicle, lit=lit, automatic=own)
 
 
+def _arrival(vehicle: str, action: ArriveAction, now: Situation) -> Arrive:
+    other = now.vehicle_id(action.vehicle)
+    speed = None if action.to_kmh is None else action.to_kmh / KMH_PER_MPS
+    return Arrive(vehicle, other, action.distance_m, action.its_distance_m, speed, action.factor)
+
+
+def _path(vehicle: str, action: PathAction) -> FollowPath:
+    headed = [(*point[:2], math.radians(point[2]) if len(point) > 2 else math.nan) for point in action.points]
+    speed = None if action.speed_kmh is None else action.speed_kmh / KMH_PER_MPS
+    return FollowPath(vehicle, tuple(headed), action.at_s, action.ahead_m, speed, action.stays, action.origin)
+
+
 def _stopping(vehicle: str, action: StopAction, now: float | None) -> Stop | None:
     stand = _endless(action.for_s)
     if action.after_m is not None:
@@ -277,7 +313,7 @@ def _lane_change(vehicle: str, action: LaneAction, subject: str, speed: float, n
     duration = action.duration_s
     if action.distance_m is not None:
         duration = min(action.distance_m / max(speed, _SLOWEST), LONGEST_CHANGE)
-    return ChangeLane(vehicle, lanes, action.stay_s, duration, action.indicator_s, oncoming)
+    return ChangeLane(vehicle, lanes, action.stay_s, duration, action.indicator_s, oncoming, action.offset_m)
 
 
 def _density(action: FogActions, reference: float) -> float:

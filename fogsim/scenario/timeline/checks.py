@@ -103,6 +103,8 @@ def _person_mistake(subject: str, doing: Doing, scenario: "Scenario") -> str | N
     actor = scenario.actors.get(subject)
     if actor is not None and actor.is_person and not doing.walk:
         return f"{subject} is a person, who can walk and nothing else"
+    if doing.take_route and subject == EGO:
+        return "take_route: positions count along the ego's route, which is known from the beginning"
     if doing.walk and (subject == EGO or (actor is not None and not actor.is_person)):
         persons = [name for name, one in scenario.actors.items() if one.is_person]
         return f"{subject} is a vehicle, and persons walk; {suggest(subject, persons) if persons else 'there are none'}"

@@ -48,6 +48,9 @@ class SpeedAction(Section):
     like: Id | None = None
     """Or another vehicle (its id, or `ego`) whose speed at the beginning of the action it comes to."""
 
+    profile: tuple[tuple[Time, SpeedKmh], ...] = ()
+    """Or times from the beginning, and the speeds that it has then [km/h]; evenly in between, and the last one on."""
+
     factor: Annotated[Number, Field(ge=0, le=100)] = 1.0
     """Factor on that speed."""
 
@@ -71,13 +74,15 @@ class SpeedAction(Section):
 
     @model_validator(mode="after")
     def _one_pace(self) -> Self:
-        if (self.to_kmh is None) == (self.like is None):
-            raise ValueError("say which speed: to_kmh or like (another vehicle), and not both")
+        if [self.to_kmh is None, self.like is None, not self.profile].count(False) != 1:
+            raise ValueError("say which speed: to_kmh, like (another vehicle) or profile, and only one of them")
+        if [time for time, _ in self.profile] != sorted({time for time, _ in self.profile}):
+            raise ValueError("profile: each time must be later than the one before")
         if self.continuous and self.like is None:
             raise ValueError("continuous goes with like, the vehicle whose speed it follows")
         given = [key for key in ("over_s", "rate_mps2") if getattr(self, key) is not None]
-        if len(given) > 1 or (given and self.shape is Shape.STEP):
-            raise ValueError("give over_s, rate_mps2 or shape: step, not two of them")
+        if len(given) > 1 or (given and (self.profile or self.shape is Shape.STEP)):
+            raise ValueError("give over_s, rate_mps2, profile or shape: step, not two of them")
         return self
 
 
@@ -113,11 +118,39 @@ class FollowAction(Section):
     vehicle: Id
     """The other one: its id, or `ego`."""
 
-    headway_s: Annotated[Period, Field(le=60)]
-    """Gap, bumper to bumper, over its own speed; 2 m at standstill."""
+    headway_s: Annotated[Time, Field(le=60)] = 0.0
+    """Gap, bumper to bumper, over its own speed."""
+
+    gap_m: Annotated[Number, Field(ge=-100, le=1000)] = 2.0
+    """Gap at standstill, to which the headway adds; negative between other points than the bumpers."""
 
     for_s: Period | None = None
     """How long; without it, to the end of the run."""
+
+    @model_validator(mode="after")
+    def _some_gap(self) -> Self:
+        if not {"headway_s", "gap_m"} & self.model_fields_set:
+            raise ValueError("say how far behind: headway_s, gap_m or both")
+        return self
+
+
+class ArriveAction(Section):
+    """A vehicle drives so that it is at a place when another one is at a place of its own."""
+
+    vehicle: Id
+    """The other one: its id, or `ego`."""
+
+    distance_m: Distance
+    """How far it has driven by then since it came onto the road."""
+
+    its_distance_m: Distance
+    """How far the other one has."""
+
+    to_kmh: Annotated[Number, Field(ge=-500, le=500)] | None = None
+    """Speed that it has there, and keeps; any if it is not given."""
+
+    factor: Annotated[Number, Field(ge=0, le=100)] = 0.0
+    """Factor on the other one's speed, to which `to_kmh` is added."""
 
 
 class StopAction(Section):
@@ -170,6 +203,10 @@ class LaneAction(Section):
 
     stay_s: Period = 60.0
     """How long it stays there."""
+
+    offset_m: Annotated[Number, Field(ge=-10, le=10)] | None = None
+    """Distance of its middle from the lane's middle afterwards, to the left; `lanes: 0` moves it in its own lane, or,
+    on a `path`, to the left of that."""
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
@@ -231,6 +268,38 @@ class DepartAction(Section):
         return self
 
 
+class PathAction(Section):
+    """A vehicle, or a body, moves along a path, on the lanes or off them, whoever is there."""
+
+    points: Annotated[tuple[tuple[Place, Place] | tuple[Place, Place, Number], ...], Field(min_length=1)]
+    """x and y of its points in the network's coordinates [m], each with a heading [deg, to the left of x] or none:
+    then it faces the way that it goes."""
+
+    at_s: tuple[Time, ...] = ()
+    """When it is at each point, from the beginning; without these it moves at its speed, which other entries order."""
+
+    ahead_m: Distance = 0.0
+    """How far its front bumper is ahead of the point that follows the path."""
+
+    speed_kmh: SpeedKmh | None = None
+    """Speed with which it begins; without it, the one that it has."""
+
+    stays: Flag = False
+    """Whether it stays at the end also on a lane, where a vehicle otherwise drives on; off the lanes all stay."""
+
+    origin: Literal["map", "place", "vehicle"] = "map"
+    """Where points and headings count from: the network's origin; the vehicle's point at the beginning, along the
+    network's axes (`place`), or ahead of it and to its left (`vehicle`)."""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if self.at_s and (len(self.at_s) != len(self.points) or list(self.at_s) != sorted({*self.at_s})):
+            raise ValueError("at_s has a time for each of points, each later than the one before")
+        if len({len(point) for point in self.points}) > 1 or len(self.points[0]) + len(self.points) < 4:
+            raise ValueError("give a heading with each of points or with none, and with a single one")
+        return self
+
+
 class WalkAction(Section):
     """A person who waits, or walks, walks on at a speed."""
 
@@ -250,6 +319,9 @@ class VehicleActions(Section):
     follow: FollowAction | None = None
     """Keep a headway to another vehicle."""
 
+    arrive: ArriveAction | None = None
+    """Be at a place when another vehicle is at one."""
+
     stop: StopAction | None = None
     """Stop at a place."""
 
@@ -265,20 +337,31 @@ class VehicleActions(Section):
     hazard_lights: Flag | None = None
     """Whether both indicators are lit."""
 
+    leave: Literal[True] | None = None
+    """Leave the road at once."""
+
     depart: DepartAction | None = None
     """Come onto the road, for an id that is in no file."""
+
+    take_route: tuple[Id, ...] | None = None
+    """Drive to the first of these edges, on the way that SUMO finds, and then along them; not for the ego."""
+
+    path: PathAction | None = None
+    """Move along a path, also onto the road, for a vehicle of a route file that waits (`depart="triggered"`)."""
 
     walk: WalkAction | None = None
     """Walk, for a person."""
 
     @model_validator(mode="after")
     def _one_motion(self) -> Self:
-        motions = ("speed", "brake", "follow", "stop", "break_down")
+        motions = ("speed", "brake", "follow", "arrive", "stop", "break_down")
         given = [key for key in motions if getattr(self, key) is not None]
         if len(given) > 1:
             raise ValueError(f"{' and '.join(given)} cannot begin together: each sets the speed; take two entries")
         if self.walk and len(self.model_fields_set) > 1:
             raise ValueError("walk stands by itself: a person does nothing else")
+        if self.leave and len(self.model_fields_set) > 1:
+            raise ValueError("leave stands by itself: the vehicle is gone")
         if self.depart and len(self.model_fields_set) > 1:
             raise ValueError("depart stands by itself: what the vehicle does then is another entry")
         return self

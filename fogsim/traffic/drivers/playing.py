@@ -9,10 +9,7 @@ import numpy as np
 
 from fogsim.values import Lamp, TrafficState
 from fogsim.values.light import Side, dark_on, settled
-from fogsim.values.script import ChangeLane, ChangeSpeed, Follow, SetLamps, Shape, Stop, TrafficAction
-
-BESIDE_STANDSTILL = 2.0
-"""Gap that a following vehicle leaves when it stands [m]."""
+from fogsim.values.script import Arrive, ChangeLane, ChangeSpeed, Follow, SetLamps, Shape, Stop, TrafficAction
 
 GAP_GAIN, SPEED_GAIN = 0.25, 0.8
 """Of the law by which a scripted vehicle follows: acceleration for a gap [1/s²] and for a difference of speeds [1/s].
@@ -86,6 +83,9 @@ def speed_on_the_way(action: ChangeSpeed, first: float, passed: float) -> float:
     passed : float
         Time since then [s].
     """
+    if action.profile:
+        times, speeds = zip(*action.profile, strict=True)
+        return float(np.interp(passed, (0.0, *times), (first, *speeds)))
     at_once = action.shape is Shape.STEP or action.duration <= 0.0
     share = 1.0 if at_once else min(max(passed / action.duration, 0.0), 1.0)
     if action.shape is Shape.SINUSOIDAL:
@@ -105,9 +105,34 @@ class _FollowCourse:
         gap, own = motion.gap(follow.vehicle, follow.leader), motion.speed(follow.vehicle)
         if gap is None:
             return math.inf
-        excess = gap - BESIDE_STANDSTILL - follow.headway * own
+        excess = gap - follow.gap - follow.headway * own
         wanted = GAP_GAIN * excess + SPEED_GAIN * (motion.speed(follow.leader) - own)
         return max(own + min(max(wanted, LEAST_ACCELERATION), MOST_ACCELERATION) * motion.step, 0.0)
+
+
+@dataclass(slots=True)
+class _ArriveCourse:
+    """Steers to a place and time by a cubic from the present place and speed, planned again at each step."""
+
+    action: Arrive
+    last: float | None = None
+
+    def speed(self, motion: Motion) -> float | None:
+        action = self.action
+        if self.last is not None or action.other not in motion.present:
+            return self.last if self.last is not None else motion.speed(action.vehicle)
+        own, other = motion.speed(action.vehicle), motion.speed(action.other)
+        left = action.distance - motion.driven(action.vehicle)
+        time = (action.other_distance - motion.driven(action.other)) / max(other, 0.01)
+        final = None if action.speed is None else max(action.speed + action.factor * other, 0.0)
+        if time <= motion.step or left <= 0.0:
+            self.last = own if final is None else final
+            return self.last
+        if final is None:
+            wanted = 3.0 * (left - own * time) / time**2
+        else:
+            wanted = 6.0 * left / time**2 - (4.0 * own + 2.0 * final) / time
+        return max(own + wanted * motion.step, 0.0)
 
 
 @dataclass(slots=True)
@@ -274,6 +299,8 @@ class Playing:
                 self._courses[action.vehicle] = _SpeedCourse(action, motion.time, motion.speed(action.vehicle))
             case Follow():
                 self._courses[action.vehicle] = _FollowCourse(action, motion.time)
+            case Arrive():
+                self._courses[action.vehicle] = _ArriveCourse(action)
             case Stop():
                 place = motion.driven(action.vehicle) + action.distance
                 self._courses[action.vehicle] = _StopCourse(action, place)

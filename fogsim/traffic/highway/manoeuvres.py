@@ -160,7 +160,7 @@ class Manoeuvres:
 
 def _is_playable(action: TrafficAction) -> TypeGuard[ChangeLane | SetLamps]:
     if isinstance(action, ChangeLane):
-        return action.duration is None and action.indicator == 0.0 and not action.oncoming
+        return (action.duration, action.offset) == (None, None) and action.indicator == 0.0 and not action.oncoming
     return isinstance(action, SetLamps) and action.failed == ALL_LAMPS and action.side is None
 
 

@@ -3,8 +3,8 @@
 import heapq
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.etree.ElementTree import Element, fromstring
 
@@ -19,6 +19,7 @@ from fogsim.traffic.road.plan_view import PlanView, plan_view
 FARTHEST_ROUTE, LONGEST_LAPS = 50_000.0, 10_000.0
 """Lengths at which an endless route, and one that goes round and round, is cut off [m]."""
 
+_ROUNDING = 0.01  # of places across a lane [m]
 NEAR_JUNCTION = 2.0
 """Distance by which a place inside a junction is moved to its end [m]."""
 
@@ -46,10 +47,11 @@ class RoadLane:
 
 @dataclass(frozen=True, slots=True)
 class Spot:
-    """A place on a lane, by its distance from the start as SUMO counts it [m]."""
+    """A place on a lane, by its distance from the start as SUMO counts it, and to the left of its middle [m]."""
 
     lane: RoadLane
     position: float
+    offset: float = 0.0
 
     @property
     def world(self) -> tuple[float, float, float]:
@@ -61,7 +63,51 @@ class Spot:
         piece = min(int(np.searchsorted(ends, along)), len(lengths) - 1)
         left = along - (ends[piece] - lengths[piece])
         (x, y), (dx, dy) = self.lane.shape[piece], steps[piece] / lengths[piece]
-        return float(x + left * dx), float(y + left * dy), math.atan2(dy, dx)
+        return float(x + left * dx - self.offset * dy), float(y + left * dy + self.offset * dx), math.atan2(dy, dx)
+
+    def shifted(self, offset: float) -> "Spot":
+        """The place so far to the left of the lane's middle [m]; ValueError if it is not in the lane."""
+        if abs(offset) > 0.5 * self.lane.width + _ROUNDING:
+            raise ValueError(f"{abs(offset):g} m from the middle is not in its lane, {self.lane.width:g} m wide")
+        return replace(self, offset=offset)
+
+
+class RoadWidths:
+    """Widths of all lanes of a road, for driving or not, along it."""
+
+    def __init__(self, road: Element) -> None:
+        self._road = road
+
+    def middle(self, lane: str, s: float) -> float:
+        """The t of the middle of a lane at s [m]; ValueError if there is no such lane."""
+        section = _last_before(self._road.iterfind("lanes/laneSection"), "s", s)
+        side = "right" if lane.startswith("-") else "left"
+        inner = [] if section is None else list(section.iterfind(f"{side}/lane"))
+        numbers = {int(one.get("id", "0")): one for one in inner}
+        if section is None or (lane != "0" and (not lane.lstrip("-").isdecimal() or int(lane) not in numbers)):
+            known = ", ".join(map(str, sorted(numbers))) or "none"
+            raise ValueError(f"the {side} side of its road has no lane {lane!r}; it has {known}")
+        sign, along = (-1 if side == "right" else 1), s - float(section.get("s", "0"))
+        widths = [
+            _polynomial(numbers[sign * i].iterfind("width"), "sOffset", along) for i in range(1, abs(int(lane)) + 1)
+        ]
+        t = _polynomial(self._road.iterfind("lanes/laneOffset"), "s", s)
+        return t + sign * (math.fsum(widths) - 0.5 * widths[-1]) if widths else t
+
+
+def _last_before(elements: Iterable[Element], key: str, s: float) -> Element | None:
+    """The last of elements that begin at or before s, otherwise the first."""
+    found = list(elements)
+    return next((one for one in reversed(found) if float(one.get(key, "0")) <= s), found[0] if found else None)
+
+
+def _polynomial(elements: Iterable[Element], key: str, s: float) -> float:
+    """Value at s of the cubic that holds there [m]; 0 without one."""
+    piece = _last_before(elements, key, s)
+    if piece is None:
+        return 0.0
+    ds = s - float(piece.get(key, "0"))
+    return math.fsum(float(piece.get(name, "0")) * ds**power for power, name in enumerate("abcd"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +124,7 @@ class OpenDriveLanes:
     latitude: float | None
     longitude: float | None
     crossings: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    widths: Mapping[str, "RoadWidths"] = field(default_factory=dict)
 
     def on_lane(self, road: str, lane: str, s: float) -> Spot:
         """Place on a lane by OpenDRIVE's road, lane and s [m]; ValueError if it is not on the road."""
@@ -96,15 +143,30 @@ class OpenDriveLanes:
         x, y, heading = self._reference(road, s)
         return x - t * math.sin(heading), y + t * math.cos(heading), heading + (math.pi if t > 0.0 else 0.0)
 
+    def middle(self, road: str, lane: str, s: float) -> float:
+        """The t of the middle of any lane, for driving or not, at s of its road [m]; ValueError if there is none."""
+        self._reference(road, s)
+        return self.widths[road].middle(lane, s)
+
     def at(self, x: float, y: float, heading: float | None) -> Spot:
         """Place on the nearest lane that leads in the direction `heading` [rad] (None for any); ValueError if none."""
         feet = [_foot(one, x, y) for one in self.lanes]
         fit = [(d, spot) for d, spot in feet if heading is None or math.cos(spot.world[2] - heading) > 0.0]
         distance, spot = min(fit, key=lambda one: one[0], default=(math.inf, None))
-        if spot is None or distance > 0.5 * spot.lane.width + 0.01:
+        if spot is None or distance > 0.5 * spot.lane.width + _ROUNDING:
             away = "" if spot is None else f"; the nearest is {distance:.1f} m away"
             raise ValueError(f"({x:g}, {y:g}) is on no lane that leads there{away}")
-        return spot
+        middle_x, middle_y, along = spot.world
+        return replace(spot, offset=(y - middle_y) * math.cos(along) - (x - middle_x) * math.sin(along))
+
+    def nearest(self, x: float, y: float) -> Spot | None:
+        """Place on the nearest lane, whatever its direction; None off the lanes."""
+        distance, spot = min((_foot(one, x, y) for one in self.lanes), key=lambda one: one[0])
+        return spot if distance <= 0.5 * spot.lane.width + _ROUNDING else None
+
+    def foot(self, lane: RoadLane, x: float, y: float) -> Spot:
+        """Place in the middle of a lane that is nearest to a point [m]."""
+        return _foot(lane, x, y)[1]
 
     def beside(self, spot: Spot, lanes: int) -> Spot:
         """Place on the lane that is `lanes` to the left on the same edge; ValueError if there is none."""
@@ -133,7 +195,7 @@ class OpenDriveLanes:
         lane, position = spot.lane, spot.position + distance
         for _ in range(len(self.lanes)):
             if 0.0 <= position <= lane.length:
-                return Spot(lane, position)
+                return Spot(lane, position, spot.offset)
             other, crossing = self._neighbour(lane, position > lane.length, route)
             beyond = position - lane.length if position > lane.length else -position
             if beyond < crossing:
@@ -154,6 +216,24 @@ class OpenDriveLanes:
             raise ValueError(f"the road {'ends' if ahead else 'begins'} before that")
         other = min(lanes, key=lambda one: abs(one.index - lane.index))
         return other, self.crossings.get((lane.edge, edge) if ahead else (edge, lane.edge), 0.0)
+
+    def backwards(self, spot: Spot) -> list[tuple[float, float]]:
+        """Points from a place against its lane's direction, straight on until the road ends [m]."""
+        found, lane, position, length = [spot.world[:2]], spot.lane, spot.position, 0.0
+        while length < LONGEST_LAPS:
+            steps = np.diff(lane.shape, axis=0)
+            lengths = np.hypot(steps[:, 0], steps[:, 1])
+            along = np.concatenate([[0.0], np.cumsum(lengths)]) * lane.length / lengths.sum()
+            to_left = np.column_stack([-steps[:, 1], steps[:, 0]]) / lengths[:, None]
+            points = lane.shape + spot.offset * np.vstack([to_left, to_left[-1:]])
+            found += [(float(x), float(y)) for x, y in points[along < position][::-1]]
+            length += lane.length
+            try:
+                lane, _ = self._neighbour(lane, ahead=False, route=())
+            except ValueError:
+                break
+            position = math.inf
+        return found
 
     def route(self, edge: str, wanted: Sequence[str] = ()) -> tuple[str, ...]:
         """Edges from one on through the `wanted`, and straight ahead until the road ends; ValueError without a way.
@@ -233,14 +313,15 @@ def read_opendrive_lanes(net: str, opendrive: Path) -> OpenDriveLanes:
     if not is_opendrive(opendrive):
         return OpenDriveLanes(lanes, followers, {}, None, None, _crossings(root))
     source = read_opendrive(opendrive)
-    roads = {}
+    roads, widths = {}, {}
     for road in source.iter("road"):
         try:
             roads[road.get("id", "")] = plan_view(road.iterfind("planView/geometry"))
+            widths[road.get("id", "")] = RoadWidths(road)
         except ValueError as error:
             raise InputError(f"{opendrive}: road {road.get('id')!r}: {error}") from None
     latitude, longitude = _origin(source.findtext("header/geoReference", ""))
-    return OpenDriveLanes(lanes, followers, roads, latitude, longitude, _crossings(root))
+    return OpenDriveLanes(lanes, followers, roads, latitude, longitude, _crossings(root), widths)
 
 
 def _lanes(root: Element) -> Iterator[RoadLane]:

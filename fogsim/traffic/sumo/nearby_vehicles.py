@@ -164,4 +164,8 @@ class NearbyVehicles:
 
 def _positions(position: Callable[[str], Sequence[float]], vehicles: Sequence[str]) -> NDArray[np.float64]:
     flat = itertools.chain.from_iterable(map(position, vehicles))
-    return np.fromiter(flat, np.float64, 3 * len(vehicles)).reshape(-1, 3)
+    try:
+        return np.fromiter(flat, np.float64, 3 * len(vehicles)).reshape(-1, 3)
+    except ValueError:
+        # Far from all lanes a vehicle has no height.
+        return np.array([(*position(vehicle), 0.0)[:3] for vehicle in vehicles])

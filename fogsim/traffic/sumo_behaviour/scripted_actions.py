@@ -7,11 +7,13 @@ from fogsim.traffic.sumo.claims import LANE_CHANGE_MODE, Claims
 from fogsim.traffic.sumo.lane_changes import LaneChangeSmoothing
 from fogsim.traffic.sumo.link import Api, is_off_lanes
 from fogsim.traffic.sumo_behaviour.departures import depart, enter
+from fogsim.traffic.sumo_behaviour.lane_offsets import LaneOffsets
+from fogsim.traffic.sumo_behaviour.paths import Paths
 from fogsim.traffic.sumo_behaviour.signal_control import SignalControl
 from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
 from fogsim.traffic.sumo_lanes.route_position import GapToEgo
-from fogsim.values.script import ChangeLane, Depart, Enter, SetSignal, TrafficAction, Walk
+from fogsim.values.script import ChangeLane, Depart, Enter, FollowPath, Leave, SetSignal, TakeRoute, TrafficAction, Walk
 
 _REGARD_OF_OTHERS, _NO_COLLISION = 3 << 8, 1 << 8
 """Bits of SUMO's lane-change mode on what of others a change that is asked for regards, and those for as much as does
@@ -51,6 +53,8 @@ class ScriptedActions:
         self._lane_changes = lane_changes
         self._signals = SignalControl(api)
         self._modes = Claims(api, LANE_CHANGE_MODE, f"{session}.script")
+        self._offsets = LaneOffsets(api)
+        self._paths = Paths(api)
         self._changing: dict[str, float] = {}
         self._oncoming: set[str] = set()
 
@@ -86,10 +90,17 @@ class ScriptedActions:
                 refused += [] if depart(self._api, action, present) else [action]
             elif isinstance(action, Enter):
                 refused += [] if enter(self._api, action, present) else [action]
+            elif isinstance(action, FollowPath):
+                self._paths.begin(action, time, present)
             elif isinstance(action, Walk):
                 refused += [] if self._walk(action) else [action]
             elif action.vehicle not in present or not self._has_lane(action):
                 refused.append(action)
+            elif isinstance(action, TakeRoute):
+                refused += [] if self._take_route(action) else [action]
+            elif isinstance(action, Leave):
+                self._paths.leave(action.vehicle)
+                self._api.vehicle.remove(action.vehicle)
             else:
                 self._playing.begin(action, motion)
         return tuple(refused)
@@ -101,8 +112,24 @@ class ScriptedActions:
         person.setSpeed(action.person, action.speed)
         return True
 
+    def _take_route(self, action: TakeRoute) -> bool:
+        vehicle = self._api.vehicle
+        route, index = vehicle.getRoute(action.vehicle), vehicle.getRouteIndex(action.vehicle)
+        if index < 0 or action.vehicle in self._paths.vehicles:
+            return False
+        here, edges = route[index], list(action.edges)
+        if here in edges:
+            vehicle.setRoute(action.vehicle, edges[edges.index(here) :])
+            return True
+        found = self._api.simulation.findRoute(here, edges[0], vehicle.getTypeID(action.vehicle)).edges
+        if found:
+            vehicle.setRoute(action.vehicle, [*found, *edges[1:]])
+        return bool(found)
+
     def _has_lane(self, action: TrafficAction) -> bool:
         if not isinstance(action, ChangeLane) or action.oncoming or action.vehicle in self._oncoming:
+            return True
+        if action.vehicle in self._paths.vehicles and not action.lanes:
             return True
         return has_lane(self._api, action.vehicle, action.lanes)
 
@@ -127,14 +154,29 @@ class ScriptedActions:
         """
         self._signals.update(time)
         self._end_changes(time, present)
-        if self._playing.is_idle:
-            return
+        if not self._playing.is_idle or self._paths.vehicles:
+            self._play(time, present)
+        self._offsets.play(time + self._step, present)
+
+    def _play(self, time: float, present: Collection[str]) -> None:
         motion = self._motion(time, present)
-        self._speeds.impose(self._playing.speeds(motion), self._playing.following)
+        speeds = self._playing.speeds(motion)
+        self._paths.play(time, self._step, speeds, present)
+        free = {vehicle: speed for vehicle, speed in speeds.items() if vehicle not in self._paths.vehicles}
+        self._speeds.impose(free, self._playing.following)
         for change in self._playing.changes(motion):
             self._change_lane(change, time)
 
     def _change_lane(self, change: ChangeLane, time: float) -> None:
+        if change.vehicle in self._paths.vehicles:
+            self._paths.shift(change.vehicle, change.offset or 0.0, change.duration or 0.0, time)
+            return
+        is_in_lane = change.offset is not None and not change.lanes
+        if change.offset is not None:
+            # What is shown glides to another lane by itself.
+            self._offsets.begin(change.vehicle, change.offset, (change.duration or 0.0) * is_in_lane, time)
+        if is_in_lane:
+            return
         vehicle, mode = change.vehicle, int(self._modes.own_value(change.vehicle))
         self._modes.claim(vehicle, mode & ~_REGARD_OF_OTHERS | _NO_COLLISION)
         self._changing[vehicle] = time + min(change.stay, LONGEST_CHANGE)
@@ -165,6 +207,7 @@ class ScriptedActions:
             Vehicles on the road.
         """
         self._signals.release()
+        self._paths.release(present)
         for vehicle in self._changing.keys() & set(present):
             self._modes.withdraw(vehicle)
         self._changing.clear()

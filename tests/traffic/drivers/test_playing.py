@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.traffic.drivers.playing import BESIDE_STANDSTILL, Lamps, Motion, Playing, speed_on_the_way
+from fogsim.traffic.drivers.playing import Lamps, Motion, Playing, speed_on_the_way
 from fogsim.values import Lamp, TrafficState
 from fogsim.values.light import ALL_LAMPS, Side, burning, dark_on
 from fogsim.values.script import ChangeLane, ChangeSpeed, Follow, SetLamps, Shape, Stop
@@ -88,7 +88,7 @@ def test_a_follower_comes_to_its_headway_and_keeps_it() -> None:
     road.playing.begin(Follow("a", "b", 1.2, hold=80.0), road.motion)
     for _ in range(700):
         road.step()
-    assert road.gap == pytest.approx(1.2 * 25.0 + BESIDE_STANDSTILL, abs=0.05)
+    assert road.gap == pytest.approx(1.2 * 25.0 + 2.0, abs=0.05)
     assert road.speeds["a"] == pytest.approx(25.0, abs=0.02)
     del road.speeds["b"]
     assert road.step() == {"a": math.inf}  # nobody is left to be followed

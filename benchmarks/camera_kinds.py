@@ -1,7 +1,8 @@
 """How daytime methods read fog through cameras and light that their models do not assume.
 
 Photographs of roads (`photograph_pictures.py`, other numbers than `photograph_roads.py` uses) get exact even fog of
-V_met 60, 120 and 250 m in their light, or none; then a camera of one kind takes them: tone curves that are not sRGB,
+V_met 60, 120 and 250 m in their light, or none, under an overcast sky but for the kind with shadows. Then a camera of
+one kind takes them: tone curves that are not sRGB,
 local tone mapping, sharpening and JPEG, overexposure, dirt and reflections on the windscreen, vignetting, a bonnet; or
 the scene is of one kind: bright or wet roads, skies that darken toward the horizon as real ones do
 (docs/explanation/airlight.md). Views that are no lane are clear. Methods are given a response of sRGB and a pitch that
@@ -19,6 +20,7 @@ The second form reads photographs of the user: the CSV has the columns `file` an
 
 import argparse
 import csv
+import itertools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -76,6 +78,7 @@ class Kind:
     file: Callable[[Pixels, Random], Pixels] = lambda pixels, _rng: pixels
     exposure: tuple[float, float] = (0.5, 0.85)
     lane: bool = True
+    sunny: bool = False
 
 
 def srgb(light: Floats) -> Floats:
@@ -217,6 +220,7 @@ KINDS = {
     "wet road": Kind(scene=wet_road),
     "convex sky": Kind(enters=convex_sky),
     "arch": _no_lane(arch),
+    "sun and shadows": Kind(sunny=True),
     "turned away": _no_lane(turned_away),
 }
 
@@ -232,8 +236,9 @@ class Frame:
 
 def frames(kind: Kind, name: str, images: int) -> Iterator[Frame]:
     """Every photograph of a kind in every fog."""
-    for number in range(images):
-        taken = photograph(POOL, FIRST + number)
+    numbers = (n for n in itertools.count(FIRST) if photograph(POOL, n).is_sunny is kind.sunny)
+    for number in itertools.islice(numbers, images):
+        taken = photograph(POOL, number)
         distance = RoadPlane(Calibration(taken.taken_by)).distance()
         rows = np.arange(taken.taken_by.height, dtype=float)[:, None] * np.ones(distance.shape)
         elevation = np.arctan((taken.taken_by.horizon_row - rows) / taken.taken_by.focal_length)

@@ -39,8 +39,6 @@ class Measured(NamedTuple):
     ----------
     seen : (cells,) float64
         Luminance of the cells, full scale being 1.
-    depth : (cells,) float64
-        Distance to the road, inf in the sky [m].
     up : (cells,) float64
         Elevation of sky cells over the highest [-], 0 on the road.
     others : (shapes, cells) float64
@@ -55,7 +53,6 @@ class Measured(NamedTuple):
     """
 
     seen: Floats
-    depth: Floats
     up: Floats
     others: Floats
     sky_scale: float
@@ -85,6 +82,7 @@ def log_likelihoods(
     extinction: Floats,
     veil: Templates,
     road: Templates,
+    depth: Templates,
     variance: Floats,
     weight: Floats,
     best: Fit,
@@ -99,6 +97,8 @@ def log_likelihoods(
         Extinction coefficients [1/m].
     veil, road : (draws, n, cells) float32
         What lamps light.
+    depth : (draws, cells) float32
+        Distance to the road [m].
     variance : (cells,) float64
         Of what the model says of each cell.
     weight : (cells,) float64
@@ -117,10 +117,11 @@ def log_likelihoods(
     known, scratch = np.zeros((2, len(terms))), np.empty((len(terms), len(terms) + 1))
     highest = -np.inf
     for place in range(count):
-        _even_light(measured, extinction[place], even)
-        _sums_of_light(even, seen, precision, gram, side)
-        gram[2, 2] += 1.0 / measured.even**2
         for draw in range(draws):
+            if is_day or draw == 0:
+                _even_light(measured.up, depth[draw], extinction[place], even)
+                _sums_of_light(even, seen, precision, gram, side)
+                gram[2, 2] += 1.0 / measured.even**2
             _sums_of_lamps(veil[draw, place], road[draw, place], even, seen, precision, is_day, gram, side)
             if len(others) > 0:
                 glow = others[draw % len(others)]
@@ -158,11 +159,11 @@ def _terms(is_day: bool, has_others: bool) -> NDArray[np.int64]:
 
 
 @kernel
-def _even_light(measured: Measured, extinction: float, even: Floats) -> None:
+def _even_light(up: Floats, depth: NDArray[np.float32], extinction: float, even: Floats) -> None:
     """What daylight adds to cells: airlight, the road behind it, and how the sky brightens upward."""
-    for cell in range(len(measured.seen)):
-        kept = math.exp(-extinction * measured.depth[cell])
-        even[0, cell], even[1, cell], even[2, cell] = 1.0 - kept, kept, 4.0 * measured.up[cell]
+    for cell in range(len(up)):
+        kept = math.exp(-extinction * depth[cell])
+        even[0, cell], even[1, cell], even[2, cell] = 1.0 - kept, kept, 4.0 * up[cell]
 
 
 @kernel

@@ -51,7 +51,7 @@ MOST_CLIPPED = 0.02
 ROAD_TEXTURE, SKY_TEXTURE, LEVEL, FLOOR = 0.1, 0.2, 0.02, 2e-4
 """Deviations of the model: over what is seen of road and sky, over the mean of all cells, and of full scale [-]."""
 
-INDEPENDENT = {True: 16.0, False: 6.0}
+INDEPENDENT = {True: 24.0, False: 6.0}
 """Number of cells that err independently, where all of the road is seen, by whether the beam is known [-]."""
 
 MOST_MISFIT, LEAST_WEIGHT = {True: 2.0, False: 2.5}, 0.6
@@ -69,7 +69,7 @@ OUTSHONE = "lamps of others outshine what the own ones light"
 ROUNDS, SETTLED = 4, 0.05
 """How often weights of the cells are found again, and changes of them that change nothing [-]."""
 
-CLEAR, MAY_BE_CLEAR = 2000.0, 0.05
+CLEAR, MAY_BE_CLEAR = 2000.0, 0.1
 """Visibility above which own lamps show no fog [m], and its probability from which on there is no upper bound [-]."""
 
 GLOWS = [(1.2 + 0.2 * (i % 5), 20.0 * 6.0 ** (i % 4 / 3)) for i in range(20)]
@@ -250,19 +250,20 @@ class NightRoad:
         seen_road = np.count_nonzero(~is_sky) / np.count_nonzero(~self._cells.is_sky)
         independent = INDEPENDENT[self._lamps != "unknown"] * seen_road
         scales = sky_scale, lamp_scale, PEDESTAL, independent
-        return Measured(luminance, self._depth[used], self._up[used], others, *scales)
+        return Measured(luminance, self._up[used], others, *scales)
 
     def _estimate(self, measured: Measured, own: OwnLight, used: NDArray[np.bool_]) -> Estimate:
         extinction = np.array([extinction_from_visibility(one) for one in VISIBILITIES.tolist()])
         is_sky, seen = self._cells.is_sky[used], measured.seen
         variance = (np.where(is_sky, SKY_TEXTURE, ROAD_TEXTURE) * seen) ** 2 + FLOOR**2 + (LEVEL * seen.mean()) ** 2
+        templates = own.veil, own.road, own.depth
         weight, best = np.ones(len(seen)), Fit(np.empty(len(seen)), np.empty(2))
-        found = log_likelihoods(measured, extinction, own.veil, own.road, variance, weight, best)
+        found = log_likelihoods(measured, extinction, *templates, variance, weight, best)
         for _ in range(ROUNDS):
             earlier, weight = weight, robust_weights(seen, best.luminance, variance)
             if np.abs(weight - earlier).max() < SETTLED:
                 break
-            found = log_likelihoods(measured, extinction, own.veil, own.road, variance, weight, best)
+            found = log_likelihoods(measured, extinction, *templates, variance, weight, best)
         misfit, lamplight = best.summary.tolist()
         power, doubt = BY_DAYLIGHT if lamplight < MOSTLY_DAYLIGHT else (1.0, 1.0)
         likelihood = np.exp(power * (found - found.max())).mean(axis=0) ** (doubt / power)
@@ -315,7 +316,7 @@ def _quantiles(share: Floats) -> tuple[float, float, float]:
 def _of_cells(own: OwnLight, used: NDArray[np.bool_]) -> OwnLight:
     if used.all():
         return own
-    return OwnLight(np.ascontiguousarray(own.veil[:, :, used]), np.ascontiguousarray(own.road[:, :, used]))
+    return OwnLight(*(np.ascontiguousarray(one[..., used]) for one in (own.veil, own.road, own.depth)))
 
 
 def _too_little(seen: Seen, used: NDArray[np.bool_], is_sky: NDArray[np.bool_]) -> str:

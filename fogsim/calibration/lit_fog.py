@@ -41,7 +41,7 @@ RETROREFLECTION, AT = 0.015, 20.0
 EXPONENTS, STARTS = (0.0, 1.1), (0.3, 2.0)
 """Powers of the distance by which that falls, and distances within which the bonnet hides the veil [m]."""
 
-LOSSES, KEPT_FORWARD = (0.25, 0.4), (0.7, 1.0)
+LOSSES, KEPT_FORWARD = (0.2, 0.4), (0.7, 1.0)
 """Parts of the extinction that spread light suffers (0.3 fits photons), and that light on its way to the road does."""
 
 CURVED, CURVATURE_DEVIATION = 0.5, 2.5e-4

@@ -29,6 +29,7 @@ LAMPS, PEDESTAL, AIRLIGHT, DAY_ROAD, SLOPE, OTHERS = range(6)
 AIRLIGHT_MEAN, AIRLIGHT_DEVIATION = 0.7, 0.5
 DAY_ROAD_MEAN, DAY_ROAD_DEVIATION = 0.15, 0.12
 SLOPE_DEVIATION = 0.3
+GLOW_CLEAR, GLOW_REACH = 0.05, 100.0
 """What is known of airlight, of the road by day, and of how the sky brightens upward, over their scale [-]."""
 
 
@@ -128,6 +129,7 @@ def log_likelihoods(
                 _sums_of_others(glow, veil[draw, place], road[draw, place], even, seen, precision, gram, side)
             if len(terms) > 2:
                 _combine(gram, side, 1.0, terms, matrix, right)
+                known[1, -1] = 1.0 / min(1.0, GLOW_CLEAR + GLOW_REACH * extinction[place]) ** 2
                 _set_known(terms, _daylight_scale(matrix, right, terms, measured, used, known, scratch), known)
             likelihood = 0.0
             for ratio in RATIOS:
@@ -325,8 +327,7 @@ def _set_known(terms: NDArray[np.int64], scale: float, known: Floats) -> None:
         elif terms[i] == DAY_ROAD:
             mean, deviation = DAY_ROAD_MEAN * scale, DAY_ROAD_DEVIATION * scale
         elif terms[i] == OTHERS:
-            # A halo is no brighter than full scale where it begins: at the edge of what is clipped.
-            deviation = 1.0
+            continue
         known[0, i], known[1, i] = mean, 1.0 / deviation**2
 
 

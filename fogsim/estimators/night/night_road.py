@@ -69,7 +69,7 @@ OUTSHONE = "lamps of others outshine what the own ones light"
 ROUNDS, SETTLED = 4, 0.05
 """How often weights of the cells are found again, and changes of them that change nothing [-]."""
 
-CLEAR, MAY_BE_CLEAR = 2000.0, 0.1
+CLEAR, MAY_BE_CLEAR = 2000.0, 0.15
 """Visibility above which own lamps show no fog [m], and its probability from which on there is no upper bound [-]."""
 
 GLOWS = [(1.2 + 0.2 * (i % 5), 20.0 * 6.0 ** (i % 4 / 3)) for i in range(20)]
@@ -86,8 +86,9 @@ LEAD_HALF_WIDTH, LEAD_HEIGHT, LEAD_MARGIN, CLOSEST_LEAD = 1.5, 4.0, 0.4, 8.0
 """What a vehicle ahead covers at most, below its wheels too, for they and the pitch are not known, and how near it
 leaves too little [m]."""
 
-COMMON = 0.95
-"""Part of the deviation of ln V that is of lamps, droplets and pavement, the same in all frames of a drive [-]."""
+COMMON, MOST_COMMON = 0.95, 0.5
+"""Part of the deviation of ln V that is of lamps, droplets and pavement, the same in all frames of a drive, and the most
+that these err where lamps of others shine, whose glow is another in each frame [-]."""
 
 MOSTLY_DAYLIGHT, BY_DAYLIGHT = 0.5, (4.0, 0.7)
 """Share of lamplight below which daylight outshines the own lamps; there, the power whose mean of the likelihood over
@@ -290,6 +291,8 @@ class NightRoad:
         value = extinction_from_visibility(middle)
         deviation = (extinction_from_visibility(low) - value) / NORMAL_90_PERCENT
         common = COMMON * 0.5 * math.log(high / low) / NORMAL_90_PERCENT
+        if len(measured.others) > 0:
+            common = min(common, MOST_COMMON)
         return Estimate(self.method, value, deviation, diagnostics=diagnostics, common_deviation=common)
 
 

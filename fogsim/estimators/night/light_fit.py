@@ -29,8 +29,11 @@ LAMPS, PEDESTAL, AIRLIGHT, DAY_ROAD, SLOPE, OTHERS = range(6)
 AIRLIGHT_MEAN, AIRLIGHT_DEVIATION = 0.7, 0.5
 DAY_ROAD_MEAN, DAY_ROAD_DEVIATION = 0.15, 0.12
 SLOPE_DEVIATION = 0.3
-GLOW_CLEAR, GLOW_REACH = 0.05, 100.0
 """What is known of airlight, of the road by day, and of how the sky brightens upward, over their scale [-]."""
+
+GLOW_CLEAR, GLOW_REACH = 0.05, 100.0
+"""Standard deviation of the glow of others' lamps where it begins, over full scale: in clear air, where lenses make it
+[-], and the distance that times the extinction is what fog adds, up to 1 in all [m]."""
 
 
 class Measured(NamedTuple):
@@ -319,15 +322,15 @@ def _of_lamps_alone(matrix: Floats, right: Floats, used: Floats) -> float:
 
 @kernel
 def _set_known(terms: NDArray[np.int64], scale: float, known: Floats) -> None:
-    """Set means and precisions of amplitudes, before anything is seen, by the size of the daylight."""
+    """Set means and precisions of amplitudes of daylight, before anything is seen, by its size."""
     for i in range(2, len(terms)):
         mean, deviation = 0.0, SLOPE_DEVIATION * scale
+        if terms[i] == OTHERS:
+            continue
         if terms[i] == AIRLIGHT:
             mean, deviation = AIRLIGHT_MEAN * scale, AIRLIGHT_DEVIATION * scale
         elif terms[i] == DAY_ROAD:
             mean, deviation = DAY_ROAD_MEAN * scale, DAY_ROAD_DEVIATION * scale
-        elif terms[i] == OTHERS:
-            continue
         known[0, i], known[1, i] = mean, 1.0 / deviation**2
 
 

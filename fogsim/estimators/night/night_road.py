@@ -87,8 +87,8 @@ LEAD_HALF_WIDTH, LEAD_HEIGHT, LEAD_MARGIN, CLOSEST_LEAD = 1.5, 4.0, 0.4, 8.0
 leaves too little [m]."""
 
 COMMON, MOST_COMMON = 0.95, 0.5
-"""Part of the deviation of ln V that is of lamps, droplets and pavement, the same in all frames of a drive, and the most
-that these err where lamps of others shine, whose glow is another in each frame [-]."""
+"""Part of the deviation of ln V that is of own lamps, droplets and pavement, the same in all frames of a drive, and the
+most that it is where lamps of others shine, whose glow is another in each frame [-]."""
 
 MOSTLY_DAYLIGHT, BY_DAYLIGHT = 0.5, (4.0, 0.7)
 """Share of lamplight below which daylight outshines the own lamps; there, the power whose mean of the likelihood over

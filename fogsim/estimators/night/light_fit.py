@@ -10,6 +10,7 @@ from fogsim.jit import kernel
 
 Floats = NDArray[np.float64]
 Templates = NDArray[np.float32]
+Terms = NDArray[np.int64]
 
 RATIOS = np.linspace(-1.8, 1.8, 7)
 """ln of the veil over the road, relative to what is drawn: pavement and droplets [-]."""
@@ -154,7 +155,7 @@ def log_likelihoods(
 
 
 @kernel
-def _terms(is_day: bool, has_others: bool) -> NDArray[np.int64]:
+def _terms(is_day: bool, has_others: bool) -> Terms:
     """Terms of which the light consists."""
     terms = np.arange(OTHERS + 1)
     if is_day:
@@ -164,7 +165,7 @@ def _terms(is_day: bool, has_others: bool) -> NDArray[np.int64]:
 
 
 @kernel
-def _even_light(up: Floats, depth: NDArray[np.float32], extinction: float, even: Floats) -> None:
+def _even_light(up: Floats, depth: Templates, extinction: float, even: Floats) -> None:
     """What daylight adds to cells: airlight, the road behind it, and how the sky brightens upward."""
     for cell in range(len(up)):
         kept = math.exp(-extinction * depth[cell])
@@ -174,10 +175,10 @@ def _even_light(up: Floats, depth: NDArray[np.float32], extinction: float, even:
 @kernel
 def _model(
     used: Floats,
-    terms: NDArray[np.int64],
+    terms: Terms,
     factor: float,
-    veil: NDArray[np.float32],
-    road: NDArray[np.float32],
+    veil: Templates,
+    road: Templates,
     even: Floats,
     measured: Measured,
     draw: int,
@@ -218,8 +219,8 @@ def _sums_of_light(even: Floats, seen: Floats, precision: Floats, gram: Floats, 
 
 @kernel
 def _sums_of_lamps(
-    veil: NDArray[np.float32],
-    road: NDArray[np.float32],
+    veil: Templates,
+    road: Templates,
     even: Floats,
     seen: Floats,
     precision: Floats,
@@ -253,8 +254,8 @@ def _sums_of_lamps(
 @kernel
 def _sums_of_others(
     glow: Floats,
-    veil: NDArray[np.float32],
-    road: NDArray[np.float32],
+    veil: Templates,
+    road: Templates,
     even: Floats,
     seen: Floats,
     precision: Floats,
@@ -276,9 +277,7 @@ def _sums_of_others(
 
 
 @kernel
-def _combine(
-    gram: Floats, side: Floats, factor: float, terms: NDArray[np.int64], matrix: Floats, right: Floats
-) -> None:
+def _combine(gram: Floats, side: Floats, factor: float, terms: Terms, matrix: Floats, right: Floats) -> None:
     """Normal equations of lamplight as one, with a ratio of veil and road."""
     matrix[0, 0] = factor * factor * gram[0, 0] + 2.0 * factor * gram[0, 1] + gram[1, 1]
     right[0] = factor * side[0] + side[1]
@@ -292,13 +291,7 @@ def _combine(
 
 @kernel
 def _daylight_scale(
-    matrix: Floats,
-    right: Floats,
-    terms: NDArray[np.int64],
-    measured: Measured,
-    used: Floats,
-    known: Floats,
-    scratch: Floats,
+    matrix: Floats, right: Floats, terms: Terms, measured: Measured, used: Floats, known: Floats, scratch: Floats
 ) -> float:
     """Standard size of the airlight: of the sky that is seen, or by the light sensor and the lamplight's amplitude."""
     if measured.lamp_scale == 0.0:
@@ -321,7 +314,7 @@ def _of_lamps_alone(matrix: Floats, right: Floats, used: Floats) -> float:
 
 
 @kernel
-def _set_known(terms: NDArray[np.int64], scale: float, known: Floats) -> None:
+def _set_known(terms: Terms, scale: float, known: Floats) -> None:
     """Set means and precisions of amplitudes of daylight, before anything is seen, by its size."""
     for i in range(2, len(terms)):
         mean, deviation = 0.0, SLOPE_DEVIATION * scale
@@ -335,9 +328,7 @@ def _set_known(terms: NDArray[np.int64], scale: float, known: Floats) -> None:
 
 
 @kernel
-def _of_all_light(
-    matrix: Floats, right: Floats, terms: NDArray[np.int64], known: Floats, used: Floats, scratch: Floats
-) -> float:
+def _of_all_light(matrix: Floats, right: Floats, terms: Terms, known: Floats, used: Floats, scratch: Floats) -> float:
     """As `_of_lamps_alone`, with light of others and of the day, whose size is about known."""
     count = len(terms)
     free = np.ones(count, np.bool_)

@@ -69,8 +69,9 @@ OUTSHONE = "lamps of others outshine what the own ones light"
 ROUNDS, SETTLED = 4, 0.05
 """How often weights of the cells are found again, and changes of them that change nothing [-]."""
 
-CLEAR, MAY_BE_CLEAR = 2000.0, 0.15
-"""Visibility above which own lamps show no fog [m], and its probability from which on there is no upper bound [-]."""
+CLEAR, MAY_BE_CLEAR = 2000.0, {True: 0.15, False: 0.05}
+"""Visibility above which own lamps show no fog [m], and its probability from which on there is no upper bound [-], by
+whether the beam is known."""
 
 GLOWS = [(1.2 + 0.2 * (i % 5), 20.0 * 6.0 ** (i % 4 / 3)) for i in range(20)]
 """Shapes of the glow of others' lamps: power of the angle by which it falls, and distance of the lamps [m]."""
@@ -109,11 +110,10 @@ class NightRoad:
     Linear luminance of some rectangles of sky and road is explained as veil, lit road, daylight that is left, and an
     even dark offset. What a vehicle does not know is drawn, once for each camera and set of lamps: aim and intensity of
     the beam, pitch, height of the lamps, where the veil begins, droplets, how light that is scattered more than once
-    spreads, and how the pavement returns it. The posterior of ln V is the mean over the draws, with amplitudes of
+    spreads, how the pavement returns it, and crest or sag. The posterior is the mean over the draws, with amplitudes of
     the light fitted in each. Where it leaves clear air possible the estimate is not valid and has a bound.
 
-    Own method. gallen2014 compares shapes alone, by correlation, which in thin fog hardly depend on the visibility, and
-    amplitude alone is that of two visibilities; together they tell both.
+    Own method: both the shape and the amplitude of the light count.
 
     Parameters
     ----------
@@ -280,7 +280,7 @@ class NightRoad:
         if weight.mean() < LEAST_WEIGHT:
             return Estimate.invalid(self.method, OUTSHONE, **diagnostics)
         widened = math.exp(NORMAL_90_PERCENT * BOUND_SOFTNESS)
-        if share[VISIBILITIES > CLEAR].sum() > MAY_BE_CLEAR:
+        if share[VISIBILITIES > CLEAR].sum() > MAY_BE_CLEAR[self._lamps != "unknown"]:
             bounds = ExtinctionBounds(most=extinction_from_visibility(low) / widened, softness=BOUND_SOFTNESS)
             reason = f"own lamps show no fog for certain, and visibility is at least {low:.0f} m"
             return replace(Estimate.invalid(self.method, reason, **diagnostics), bounds=bounds)

@@ -1,8 +1,9 @@
 """Light of the own head lamps in fog and on the road, for draws of what a vehicle does not know about them."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +27,7 @@ from fogsim.values.luminous_intensity import luminous_intensity
 Floats = NDArray[np.float64]
 Watch = Callable[[int, int], None]
 
-DRAWS, PATTERNS = 100, {True: 20, False: 100}
+DRAWS, PATTERNS = 150, {True: 30, False: 150}
 """How many draws are made, and how many different beams are among them, by whether the beam is known."""
 
 PITCH_DEVIATION, AIM_DEVIATION, APART_DEVIATION = np.radians((0.1, 0.2, 0.1))
@@ -84,10 +85,12 @@ def lit_fog(
     road, depth = np.zeros_like(veil), np.zeros((DRAWS, len(cells.box)), np.float32)
     returned, low_beam = _road_glow(camera, cells, lit), where.beams.get(Lamp.LOW_BEAM)
     shown: list[HeadLamp] = []
+    # A Latin hypercube: of as many independent draws the posterior would depend by a seventh on chance.
+    places = (rng.permuted(np.tile(np.arange(DRAWS), (len(_Draw._fields) + 1, 1)), axis=1) + 0.5) / DRAWS
     for number in range(DRAWS):
         if number % (DRAWS // PATTERNS[known]) == 0:
             shown = _redrawn(lit, rng, None if known else low_beam)
-        draw = _draw(rng, len(lit))
+        draw = _draw(rng, iter(places[:, number].tolist()), len(lit))
         veil[number], road[number], depth[number] = _light(camera, cells, shown, draw)
         veil[number] += draw.glow * returned
         if watch is not None:
@@ -95,23 +98,31 @@ def lit_fog(
     return OwnLight(veil, road, depth)
 
 
-def _draw(rng: np.random.Generator, lamps: int) -> _Draw:
+def _draw(rng: np.random.Generator, place: Iterator[float], lamps: int) -> _Draw:
+    """One draw, by its places (0 … 1) in the distributions of all but the lamps' own aims and the droplets."""
+
+    def normal() -> float:
+        return NormalDist().inv_cdf(next(place))
+
+    def between(least: float, most: float) -> float:
+        return least + (most - least) * next(place)
+
     kinds = [phase_function(kind) for kind in Droplets]
     share = rng.dirichlet(np.full(len(kinds), 0.5))
     value = sum(part * kind(kinds[0].angle) for part, kind in zip(share, kinds, strict=True))
     mixed = PhaseFunction(kinds[0].angle, np.asarray(value))
     phase = ScatteringPhase(phase_table(mixed), phase_table(blurred(mixed, PHASE_SPREAD)), SPREAD)
     return _Draw(
-        pitch=PITCH_DEVIATION * rng.standard_normal(),
-        aims=AIM_DEVIATION * rng.standard_normal(2) + APART_DEVIATION * rng.standard_normal((lamps, 2)),
-        raised=HEIGHT_DEVIATION * rng.standard_normal(),
-        exponent=rng.uniform(*EXPONENTS),
-        start=math.exp(rng.uniform(*np.log(STARTS))),
-        loss=rng.uniform(*LOSSES),
-        to_road=rng.uniform(*KEPT_FORWARD),
-        spread=math.exp(SPREAD_DEVIATION * rng.standard_normal()),
-        glow=math.exp(GLOW_DEVIATION * rng.standard_normal()),
-        curvature=CURVATURE_DEVIATION * rng.standard_normal() * (rng.random() < CURVED),
+        pitch=PITCH_DEVIATION * normal(),
+        aims=AIM_DEVIATION * np.array((normal(), normal())) + APART_DEVIATION * rng.standard_normal((lamps, 2)),
+        raised=HEIGHT_DEVIATION * normal(),
+        exponent=between(*EXPONENTS),
+        start=math.exp(between(*np.log(STARTS).tolist())),
+        loss=between(*LOSSES),
+        to_road=between(*KEPT_FORWARD),
+        spread=math.exp(SPREAD_DEVIATION * normal()),
+        glow=math.exp(GLOW_DEVIATION * normal()),
+        curvature=CURVATURE_DEVIATION * normal() * (next(place) < CURVED),
         phase=phase,
     )
 

@@ -4,7 +4,8 @@
 are not the oracle's, `high beams` that of the oracle's time with high beams in which the belief lights them too, and
 `uninformed` how many decisions light high beams or fog lamps on a belief that says too little (never, if all is well).
 The first two seconds of a run, in which nothing has been seen yet, count. The ego drives at a fixed speed, so that both
-runs of a pair meet the same traffic.
+runs of a pair meet the same traffic. At 100 and 120 m the oracle stands at a limit of the policy, and the smallest
+error of an estimate decides; the last line leaves these out.
 
 `--choose` prints what constants of the night model and of the fusion do in another pool of drives, from which they
 were chosen: other visibilities of four scenarios and seed 100. `valid` is the share of images with an estimate,
@@ -36,11 +37,14 @@ CASES = {
     "clear_night": ("20 km",),
     "rural_night_fog": ("70 m", "200 m", "2000 m"),
     "rural_night_alone": ("80 m",),
-    "rural_night_oncoming": ("120 m",),
-    "tail_lamp_failure": ("100 m",),
+    "rural_night_oncoming": ("120 m", "200 m"),
+    "tail_lamp_failure": ("100 m", "70 m"),
     "night_motorway_fog": ("150 m, bank of 100 m",),
-    "street_lit_town": ("100 m",),
+    "street_lit_town": ("100 m", "60 m"),
 }
+AT_LIMITS = ("100 m", "120 m")
+"""Visibilities at which the oracle itself is at a limit of `gallen2014`: 100 m, or 120 m with its hysteresis."""
+
 OPTIONAL_LAMPS = Lamp.HIGH_BEAM | Lamp.FRONT_FOG | Lamp.REAR_FOG
 
 
@@ -64,8 +68,10 @@ def settings(scenario: str, visibility: str) -> Iterator[str]:
     """Overrides of a scenario: its fog, a fixed speed, and nothing that the lamps do not need."""
     yield from ("expect={}", "vary={}", "end_on_collision=false")
     yield f"advice={{method: fixed_speed, parameters: {{speed: {SPEED}}}}}"
+    if scenario != "night_motorway_fog":
+        yield f"fog.visibility={visibility}"
     if scenario == "rural_night_fog":
-        yield from (f"fog.visibility_m={visibility.removesuffix(' m')}", "timeline=[]", "duration_s=30")
+        yield from ("timeline=[]", "duration_s=30")
     if scenario in ("clear_night", "night_motorway_fog"):
         yield "duration_s=60"
 
@@ -108,8 +114,7 @@ def drives_to_choose_from() -> Iterator[list[Step]]:
     for scenario, visibilities in CHOICE_POOL.items():
         for visibility in visibilities:
             lighting = "lighting={method: gallen2014, informed_by: truth}"
-            fog = f"fog.visibility_m={visibility.removesuffix(' m')}"
-            overrides = [*settings(scenario, visibility), "timeline=[]", fog, f"duration_s={CHOICE_SECONDS}", lighting]
+            overrides = [*settings(scenario, visibility), "timeline=[]", f"duration_s={CHOICE_SECONDS}", lighting]
             yield list(fogsim.run(fogsim.load_scenario(scenario, overrides), seed=CHOICE_SEED))[::3]
 
 
@@ -160,9 +165,13 @@ def docs_table(found: list[dict[str, Any]]) -> list[str]:
             f"| {one['scenario']} | {one['visibility']} | {one['frames']} | {one['informed_pct']:.0f} "
             f"| {one['differs_pct']:.1f} | {high} | {one['uninformed_lit']} |"
         )
-    frames = sum(one["frames"] for one in found)
-    differ = sum(one["differs_pct"] * one["frames"] for one in found) / frames
-    return [*lines, f"| all | | {frames} | | {differ:.1f} | | {sum(one['uninformed_lit'] for one in found)} |"]
+    clear_of_limits = [one for one in found if one["visibility"] not in AT_LIMITS]
+    for label, chosen in (("all", found), ("all but 100 and 120 m", clear_of_limits)):
+        frames = sum(one["frames"] for one in chosen)
+        differ = sum(one["differs_pct"] * one["frames"] for one in chosen) / frames
+        uninformed = sum(one["uninformed_lit"] for one in chosen)
+        lines.append(f"| {label} | | {frames} | | {differ:.1f} | | {uninformed} |")
+    return lines
 
 
 def main() -> None:

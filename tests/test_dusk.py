@@ -95,3 +95,19 @@ def test_the_belief_stays_honest_while_night_falls_on_front_fog_lamps(visibility
     beliefs = [step.belief for step in fogsim.run(scenario, seed=seed)]
     held = [one.visibility_quantile(0.05) <= visibility <= one.visibility_quantile(0.95) for one in beliefs]
     assert np.mean(held) >= 0.95
+
+
+def test_at_dusk_a_crest_is_no_fog() -> None:
+    """Beyond a crest what is seen below the horizon is air, as in fog much denser than this."""
+    settings = [
+        "expect={}",
+        "duration=6 s",
+        "light.illuminance=30 lx",
+        "fog.visibility=300 m",
+        "clocks.camera_period=0.4 s",
+    ]
+    settings += ["actors.ego.position=280 m", "sut.estimators=[night_road]", "sut.lighting=low_beam"]
+    steps = list(fogsim.run(fogsim.load_scenario("rural_night_alone", settings), seed=1))
+    intervals = [step.estimates[0].visibility_interval for step in steps]
+    assert np.mean([low <= 300.0 <= high for low, high in intervals]) >= 0.9
+    assert np.mean([step.estimates[0].valid for step in steps]) >= 0.5

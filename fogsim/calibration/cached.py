@@ -111,13 +111,13 @@ def _as_json(kind: Callable[..., _T]) -> _Form[_T]:
 
 def _encoded_light(light: OwnLight) -> bytes:
     file = io.BytesIO()
-    np.savez_compressed(file, veil=light.veil, road=light.road)
+    np.savez_compressed(file, veil=light.veil, road=light.road, depth=light.depth)
     return file.getvalue()
 
 
 def _decoded_light(kept: bytes) -> OwnLight:
     with np.load(io.BytesIO(kept), allow_pickle=False) as arrays:
-        return OwnLight(arrays["veil"], arrays["road"])
+        return OwnLight(arrays["veil"], arrays["road"], arrays["depth"])
 
 
 _OWN_LIGHT = _Form(_encoded_light, _decoded_light)

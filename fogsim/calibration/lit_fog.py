@@ -1,8 +1,9 @@
 """Light of the own head lamps in fog and on the road, for draws of what a vehicle does not know about them."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +27,7 @@ from fogsim.values.luminous_intensity import luminous_intensity
 Floats = NDArray[np.float64]
 Watch = Callable[[int, int], None]
 
-DRAWS, PATTERNS = 100, {True: 20, False: 100}
+DRAWS, PATTERNS = 150, {True: 30, False: 150}
 """How many draws are made, and how many different beams are among them, by whether the beam is known."""
 
 PITCH_DEVIATION, AIM_DEVIATION, APART_DEVIATION = np.radians((0.1, 0.2, 0.1))
@@ -41,8 +42,11 @@ RETROREFLECTION, AT = 0.015, 20.0
 EXPONENTS, STARTS = (0.0, 1.1), (0.3, 2.0)
 """Powers of the distance by which that falls, and distances within which the bonnet hides the veil [m]."""
 
-LOSSES, KEPT_FORWARD = (0.25, 0.4), (0.7, 1.0)
+LOSSES, KEPT_FORWARD = (0.2, 0.4), (0.7, 1.0)
 """Parts of the extinction that spread light suffers (0.3 fits photons), and that light on its way to the road does."""
+
+CURVED, CURVATURE_DEVIATION = 0.5, 2.5e-4
+"""Share of the draws whose road curves upward or downward [-], and the standard deviation of that curvature [1/m]."""
 
 SPREAD_DEVIATION, GLOW_DEVIATION = 0.3, 0.5
 """Standard deviations of ln of how much light is spread, and of how much the lit road returns into the fog [-]."""
@@ -60,6 +64,7 @@ class _Draw(NamedTuple):
     to_road: float
     spread: float
     glow: float
+    curvature: float
     phase: ScatteringPhase
 
 
@@ -77,36 +82,47 @@ def lit_fog(
     where = mount or LampMount()
     lit = own_head_lamps(lamps, camera.mount_height, setback, where)
     veil = np.zeros((DRAWS, len(VISIBILITIES), len(cells.box)), np.float32)
-    road = np.zeros_like(veil)
+    road, depth = np.zeros_like(veil), np.zeros((DRAWS, len(cells.box)), np.float32)
     returned, low_beam = _road_glow(camera, cells, lit), where.beams.get(Lamp.LOW_BEAM)
     shown: list[HeadLamp] = []
+    # A Latin hypercube: of as many independent draws the posterior would depend by a seventh on chance.
+    places = (rng.permuted(np.tile(np.arange(DRAWS), (len(_Draw._fields) + 1, 1)), axis=1) + 0.5) / DRAWS
     for number in range(DRAWS):
         if number % (DRAWS // PATTERNS[known]) == 0:
             shown = _redrawn(lit, rng, None if known else low_beam)
-        draw = _draw(rng, len(lit))
-        veil[number], road[number] = _light(camera, cells, shown, draw)
+        draw = _draw(rng, iter(places[:, number].tolist()), len(lit))
+        veil[number], road[number], depth[number] = _light(camera, cells, shown, draw)
         veil[number] += draw.glow * returned
         if watch is not None:
             watch(number + 1, DRAWS)
-    return OwnLight(veil, road)
+    return OwnLight(veil, road, depth)
 
 
-def _draw(rng: np.random.Generator, lamps: int) -> _Draw:
+def _draw(rng: np.random.Generator, place: Iterator[float], lamps: int) -> _Draw:
+    """One draw, by its places (0 … 1) in the distributions of all but the lamps' own aims and the droplets."""
+
+    def normal() -> float:
+        return NormalDist().inv_cdf(next(place))
+
+    def between(least: float, most: float) -> float:
+        return least + (most - least) * next(place)
+
     kinds = [phase_function(kind) for kind in Droplets]
     share = rng.dirichlet(np.full(len(kinds), 0.5))
     value = sum(part * kind(kinds[0].angle) for part, kind in zip(share, kinds, strict=True))
     mixed = PhaseFunction(kinds[0].angle, np.asarray(value))
     phase = ScatteringPhase(phase_table(mixed), phase_table(blurred(mixed, PHASE_SPREAD)), SPREAD)
     return _Draw(
-        pitch=PITCH_DEVIATION * rng.standard_normal(),
-        aims=AIM_DEVIATION * rng.standard_normal(2) + APART_DEVIATION * rng.standard_normal((lamps, 2)),
-        raised=HEIGHT_DEVIATION * rng.standard_normal(),
-        exponent=rng.uniform(*EXPONENTS),
-        start=math.exp(rng.uniform(*np.log(STARTS))),
-        loss=rng.uniform(*LOSSES),
-        to_road=rng.uniform(*KEPT_FORWARD),
-        spread=math.exp(SPREAD_DEVIATION * rng.standard_normal()),
-        glow=math.exp(GLOW_DEVIATION * rng.standard_normal()),
+        pitch=PITCH_DEVIATION * normal(),
+        aims=AIM_DEVIATION * np.array((normal(), normal())) + APART_DEVIATION * rng.standard_normal((lamps, 2)),
+        raised=HEIGHT_DEVIATION * normal(),
+        exponent=between(*EXPONENTS),
+        start=math.exp(between(*np.log(STARTS).tolist())),
+        loss=between(*LOSSES),
+        to_road=between(*KEPT_FORWARD),
+        spread=math.exp(SPREAD_DEVIATION * normal()),
+        glow=math.exp(GLOW_DEVIATION * normal()),
+        curvature=CURVATURE_DEVIATION * normal() * (next(place) < CURVED),
         phase=phase,
     )
 
@@ -155,12 +171,12 @@ def _turned(pitch: float, yaw: float = 0.0) -> Floats:
 
 def _light(
     camera: Camera, cells: Cells, lit: Sequence[HeadLamp], draw: _Draw
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Veil and lit road of one draw (visibilities, cells)."""
+) -> tuple[NDArray[np.float32], NDArray[np.float32], Floats]:
+    """Veil and lit road of one draw (visibilities, cells), and the distance to the road (cells) [m]."""
     rays = matrix_product(cells.rays.reshape(-1, 3), _turned(draw.pitch).T)
     rays /= np.sqrt((rays**2).sum(axis=1, keepdims=True))
     is_sky = np.repeat(cells.is_sky, SUB_ROWS)
-    reach = np.where(is_sky, np.inf, camera.mount_height / np.maximum(-rays[:, 2], 1e-3))
+    reach = np.where(is_sky, np.inf, _reach(rays, camera.mount_height, draw.curvature))
     at, length = ray_pieces()
     length = np.where(at < draw.start, 0.0, length)
     shape = (len(rays), len(at))
@@ -184,7 +200,15 @@ def _light(
     ways = draw.to_road * way + np.where(is_sky, 0.0, reach)
     roads = road * np.exp(-np.array(extinctions)[:, None] * ways)
     veil, lit_road = (one.reshape(len(extinctions), -1, SUB_ROWS).mean(axis=2) for one in (veils, roads))
-    return veil.astype(np.float32), lit_road.astype(np.float32)
+    depth = 1.0 / np.maximum((1.0 / reach).reshape(-1, SUB_ROWS).mean(axis=1), 1e-9)
+    return veil.astype(np.float32), lit_road.astype(np.float32), depth
+
+
+def _reach(rays: Floats, height: float, curvature: float) -> Floats:
+    """Distance along rays to a road that curves upward [m]; inf beyond the crest of one that curves downward."""
+    down = np.maximum(-rays[:, 2], 1e-3)
+    square = down**2 + 2.0 * height * curvature * (1.0 - rays[:, 2] ** 2)
+    return np.where(square < 0.0, np.inf, 2.0 * height / (down + np.sqrt(np.maximum(square, 0.0))))
 
 
 def _lit_road(
@@ -224,7 +248,8 @@ def _road_glow(camera: Camera, cells: Cells, lit: tuple[HeadLamp, ...]) -> NDArr
         sources = patches.sources(lit, camera, pose, FogField(extinction, (0.0, 0.0, 0.0)))
         away = np.sqrt((sources.position**2).sum(axis=1))
         cosine = (rays[:, None] * sources.position).sum(axis=2) / away
-        angle = np.maximum(np.arccos(np.clip(cosine, -1.0, 1.0)), 0.02)
+        # Pieces of road are wide: before its middle each glows no more than at its edge.
+        angle = np.maximum(np.arccos(np.clip(cosine, -1.0, 1.0)), np.sqrt(sources.area / math.pi) / away)
         depth = extinction * away
         # What droplets send to the eye has left the road in all directions, not toward the eye alone.
         upward = sources.intensity / np.maximum(-sources.position[:, 2] / away, 0.01)

@@ -126,7 +126,7 @@ def test_own_light_is_kept_for_its_camera_and_lamps(
 ) -> None:
     monkeypatch.setenv("FOGSIM_CACHE_DIR", str(tmp_path / "cache"))
     made: list[tuple[object, ...]] = []
-    light = OwnLight(np.ones((2, 3, 4), np.float32), np.zeros((2, 3, 4), np.float32))
+    light = OwnLight(np.ones((2, 3, 4), np.float32), np.zeros((2, 3, 4), np.float32), np.ones((2, 4), np.float32))
 
     def compute(camera: Camera, lamps: Lamp, setback: float, **options: object) -> OwnLight:
         made.append((camera, lamps, setback, options["known"]))

@@ -43,8 +43,8 @@ FOLD_DISTANCE = 10.0
 """Nodes lie evenly over r / (r + FOLD_DISTANCE) [m]."""
 
 INTERVALS = 32
-CELL_PIXELS = 10
-"""Pixels between two rays; there are 40 … 64 cells across the image."""
+CELLS = 64
+"""Cells across the image between whose corners the veil is interpolated: below a cut-off it changes within a degree."""
 
 _FARTHEST = 1e4
 
@@ -63,16 +63,15 @@ def veil_rays(camera: Camera) -> VeilRays:
     camera : Camera
         The camera, which looks along the vehicle's axis but for its pitch and roll.
     """
-    cells = min(max(round(camera.width / CELL_PIXELS), 40), 64)
-    rows = max(2, math.ceil(cells * camera.height / camera.width)) + 1
+    rows = max(2, math.ceil(CELLS * camera.height / camera.width)) + 1
     u0, v0 = camera.principal_point
-    right = (np.linspace(0, camera.width - 1, cells + 1) - u0) / camera.focal_length
+    right = (np.linspace(0, camera.width - 1, CELLS + 1) - u0) / camera.focal_length
     down = (np.linspace(0, camera.height - 1, rows) - v0) / camera.focal_length
     plane = np.stack(np.broadcast_arrays(right, down[:, None], np.ones((1, 1))), axis=-1).reshape(-1, 3)
     rays = matrix_product(plane, camera_axes(camera, CameraPose((0.0, 0.0, 0.0), 0.0)))
     at, length = ray_pieces()
     directions = rays / np.linalg.norm(rays, axis=1)[:, None]
-    return VeilRays((rows, cells + 1), np.ascontiguousarray(directions, dtype=np.float32), at, length)
+    return VeilRays((rows, CELLS + 1), np.ascontiguousarray(directions, dtype=np.float32), at, length)
 
 
 def ray_pieces() -> tuple[NDArray[np.float64], NDArray[np.float64]]:

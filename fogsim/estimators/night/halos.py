@@ -203,24 +203,12 @@ class HaloWatch:
 
 
 def mean_steepness(halos: tuple[Halo, ...]) -> float | None:
-    """Mean Br50 of a picture [levels of 255 a pixel]; None without a halo.
-
-    Parameters
-    ----------
-    halos : tuple of Halo
-        Of the sources that were selected.
-    """
+    """Mean Br50 of a picture [levels of 255 a pixel]; None without a halo."""
     return sum(one.steepness for one in halos) / len(halos) if halos else None
 
 
 def largest_sharpness(halos: tuple[Halo, ...]) -> float | None:
-    """Sharpness of the sharpest halo of a picture [levels of 255 a pixel]; None without a halo.
-
-    Parameters
-    ----------
-    halos : tuple of Halo
-        Of the sources that were selected.
-    """
+    """Sharpness of the sharpest halo of a picture [levels of 255 a pixel]; None without a halo."""
     return max((one.sharpness for one in halos), default=None)
 
 

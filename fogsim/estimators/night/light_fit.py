@@ -10,6 +10,7 @@ from fogsim.jit import kernel
 
 Floats = NDArray[np.float64]
 Templates = NDArray[np.float32]
+Terms = NDArray[np.int64]
 
 RATIOS = np.linspace(-1.8, 1.8, 7)
 """ln of the veil over the road, relative to what is drawn: pavement and droplets [-]."""
@@ -31,6 +32,10 @@ DAY_ROAD_MEAN, DAY_ROAD_DEVIATION = 0.15, 0.12
 SLOPE_DEVIATION = 0.3
 """What is known of airlight, of the road by day, and of how the sky brightens upward, over their scale [-]."""
 
+GLOW_CLEAR, GLOW_REACH = 0.05, 100.0
+"""Standard deviation of the glow of others' lamps where it begins, over full scale: in clear air, where lenses make it
+[-], and the distance that times the extinction is what fog adds, up to 1 in all [m]."""
+
 
 class Measured(NamedTuple):
     """What an image shows.
@@ -39,8 +44,6 @@ class Measured(NamedTuple):
     ----------
     seen : (cells,) float64
         Luminance of the cells, full scale being 1.
-    depth : (cells,) float64
-        Distance to the road, inf in the sky [m].
     up : (cells,) float64
         Elevation of sky cells over the highest [-], 0 on the road.
     others : (shapes, cells) float64
@@ -55,7 +58,6 @@ class Measured(NamedTuple):
     """
 
     seen: Floats
-    depth: Floats
     up: Floats
     others: Floats
     sky_scale: float
@@ -85,6 +87,7 @@ def log_likelihoods(
     extinction: Floats,
     veil: Templates,
     road: Templates,
+    depth: Templates,
     variance: Floats,
     weight: Floats,
     best: Fit,
@@ -99,6 +102,8 @@ def log_likelihoods(
         Extinction coefficients [1/m].
     veil, road : (draws, n, cells) float32
         What lamps light.
+    depth : (draws, cells) float32
+        Distance to the road [m].
     variance : (cells,) float64
         Of what the model says of each cell.
     weight : (cells,) float64
@@ -117,16 +122,18 @@ def log_likelihoods(
     known, scratch = np.zeros((2, len(terms))), np.empty((len(terms), len(terms) + 1))
     highest = -np.inf
     for place in range(count):
-        _even_light(measured, extinction[place], even)
-        _sums_of_light(even, seen, precision, gram, side)
-        gram[2, 2] += 1.0 / measured.even**2
         for draw in range(draws):
+            if is_day or draw == 0:
+                _even_light(measured.up, depth[draw], extinction[place], even)
+                _sums_of_light(even, seen, precision, gram, side)
+                gram[2, 2] += 1.0 / measured.even**2
             _sums_of_lamps(veil[draw, place], road[draw, place], even, seen, precision, is_day, gram, side)
             if len(others) > 0:
                 glow = others[draw % len(others)]
                 _sums_of_others(glow, veil[draw, place], road[draw, place], even, seen, precision, gram, side)
             if len(terms) > 2:
                 _combine(gram, side, 1.0, terms, matrix, right)
+                known[1, -1] = 1.0 / min(1.0, GLOW_CLEAR + GLOW_REACH * extinction[place]) ** 2
                 _set_known(terms, _daylight_scale(matrix, right, terms, measured, used, known, scratch), known)
             likelihood = 0.0
             for ratio in RATIOS:
@@ -148,7 +155,7 @@ def log_likelihoods(
 
 
 @kernel
-def _terms(is_day: bool, has_others: bool) -> NDArray[np.int64]:
+def _terms(is_day: bool, has_others: bool) -> Terms:
     """Terms of which the light consists."""
     terms = np.arange(OTHERS + 1)
     if is_day:
@@ -158,20 +165,20 @@ def _terms(is_day: bool, has_others: bool) -> NDArray[np.int64]:
 
 
 @kernel
-def _even_light(measured: Measured, extinction: float, even: Floats) -> None:
+def _even_light(up: Floats, depth: Templates, extinction: float, even: Floats) -> None:
     """What daylight adds to cells: airlight, the road behind it, and how the sky brightens upward."""
-    for cell in range(len(measured.seen)):
-        kept = math.exp(-extinction * measured.depth[cell])
-        even[0, cell], even[1, cell], even[2, cell] = 1.0 - kept, kept, 4.0 * measured.up[cell]
+    for cell in range(len(up)):
+        kept = math.exp(-extinction * depth[cell])
+        even[0, cell], even[1, cell], even[2, cell] = 1.0 - kept, kept, 4.0 * up[cell]
 
 
 @kernel
 def _model(
     used: Floats,
-    terms: NDArray[np.int64],
+    terms: Terms,
     factor: float,
-    veil: NDArray[np.float32],
-    road: NDArray[np.float32],
+    veil: Templates,
+    road: Templates,
     even: Floats,
     measured: Measured,
     draw: int,
@@ -212,8 +219,8 @@ def _sums_of_light(even: Floats, seen: Floats, precision: Floats, gram: Floats, 
 
 @kernel
 def _sums_of_lamps(
-    veil: NDArray[np.float32],
-    road: NDArray[np.float32],
+    veil: Templates,
+    road: Templates,
     even: Floats,
     seen: Floats,
     precision: Floats,
@@ -247,8 +254,8 @@ def _sums_of_lamps(
 @kernel
 def _sums_of_others(
     glow: Floats,
-    veil: NDArray[np.float32],
-    road: NDArray[np.float32],
+    veil: Templates,
+    road: Templates,
     even: Floats,
     seen: Floats,
     precision: Floats,
@@ -270,9 +277,7 @@ def _sums_of_others(
 
 
 @kernel
-def _combine(
-    gram: Floats, side: Floats, factor: float, terms: NDArray[np.int64], matrix: Floats, right: Floats
-) -> None:
+def _combine(gram: Floats, side: Floats, factor: float, terms: Terms, matrix: Floats, right: Floats) -> None:
     """Normal equations of lamplight as one, with a ratio of veil and road."""
     matrix[0, 0] = factor * factor * gram[0, 0] + 2.0 * factor * gram[0, 1] + gram[1, 1]
     right[0] = factor * side[0] + side[1]
@@ -286,13 +291,7 @@ def _combine(
 
 @kernel
 def _daylight_scale(
-    matrix: Floats,
-    right: Floats,
-    terms: NDArray[np.int64],
-    measured: Measured,
-    used: Floats,
-    known: Floats,
-    scratch: Floats,
+    matrix: Floats, right: Floats, terms: Terms, measured: Measured, used: Floats, known: Floats, scratch: Floats
 ) -> float:
     """Standard size of the airlight: of the sky that is seen, or by the light sensor and the lamplight's amplitude."""
     if measured.lamp_scale == 0.0:
@@ -315,24 +314,21 @@ def _of_lamps_alone(matrix: Floats, right: Floats, used: Floats) -> float:
 
 
 @kernel
-def _set_known(terms: NDArray[np.int64], scale: float, known: Floats) -> None:
-    """Set means and precisions of amplitudes, before anything is seen, by the size of the daylight."""
+def _set_known(terms: Terms, scale: float, known: Floats) -> None:
+    """Set means and precisions of amplitudes of daylight, before anything is seen, by its size."""
     for i in range(2, len(terms)):
         mean, deviation = 0.0, SLOPE_DEVIATION * scale
+        if terms[i] == OTHERS:
+            continue
         if terms[i] == AIRLIGHT:
             mean, deviation = AIRLIGHT_MEAN * scale, AIRLIGHT_DEVIATION * scale
         elif terms[i] == DAY_ROAD:
             mean, deviation = DAY_ROAD_MEAN * scale, DAY_ROAD_DEVIATION * scale
-        elif terms[i] == OTHERS:
-            # A halo is no brighter than full scale where it begins: at the edge of what is clipped.
-            deviation = 1.0
         known[0, i], known[1, i] = mean, 1.0 / deviation**2
 
 
 @kernel
-def _of_all_light(
-    matrix: Floats, right: Floats, terms: NDArray[np.int64], known: Floats, used: Floats, scratch: Floats
-) -> float:
+def _of_all_light(matrix: Floats, right: Floats, terms: Terms, known: Floats, used: Floats, scratch: Floats) -> float:
     """As `_of_lamps_alone`, with light of others and of the day, whose size is about known."""
     count = len(terms)
     free = np.ones(count, np.bool_)

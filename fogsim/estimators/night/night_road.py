@@ -51,7 +51,7 @@ MOST_CLIPPED = 0.02
 ROAD_TEXTURE, SKY_TEXTURE, LEVEL, FLOOR = 0.1, 0.2, 0.02, 2e-4
 """Deviations of the model: over what is seen of road and sky, over the mean of all cells, and of full scale [-]."""
 
-INDEPENDENT = {True: 16.0, False: 6.0}
+INDEPENDENT = {True: 24.0, False: 6.0}
 """Number of cells that err independently, where all of the road is seen, by whether the beam is known [-]."""
 
 MOST_MISFIT, LEAST_WEIGHT = {True: 2.0, False: 2.5}, 0.6
@@ -69,8 +69,9 @@ OUTSHONE = "lamps of others outshine what the own ones light"
 ROUNDS, SETTLED = 4, 0.05
 """How often weights of the cells are found again, and changes of them that change nothing [-]."""
 
-CLEAR, MAY_BE_CLEAR = 2000.0, 0.05
-"""Visibility above which own lamps show no fog [m], and its probability from which on there is no upper bound [-]."""
+CLEAR, MAY_BE_CLEAR = 2000.0, {True: 0.15, False: 0.05}
+"""Visibility above which own lamps show no fog [m], and its probability from which on there is no upper bound [-], by
+whether the beam is known."""
 
 GLOWS = [(1.2 + 0.2 * (i % 5), 20.0 * 6.0 ** (i % 4 / 3)) for i in range(20)]
 """Shapes of the glow of others' lamps: power of the angle by which it falls, and distance of the lamps [m]."""
@@ -86,8 +87,9 @@ LEAD_HALF_WIDTH, LEAD_HEIGHT, LEAD_MARGIN, CLOSEST_LEAD = 1.5, 4.0, 0.4, 8.0
 """What a vehicle ahead covers at most, below its wheels too, for they and the pitch are not known, and how near it
 leaves too little [m]."""
 
-COMMON = 0.95
-"""Part of the deviation of ln V that is of lamps, droplets and pavement, the same in all frames of a drive [-]."""
+COMMON, MOST_COMMON = 0.95, 0.5
+"""Part of the deviation of ln V that is of own lamps, droplets and pavement, the same in all frames of a drive, and the
+most that it is where lamps of others shine, whose glow is another in each frame [-]."""
 
 MOSTLY_DAYLIGHT, BY_DAYLIGHT = 0.5, (4.0, 0.7)
 """Share of lamplight below which daylight outshines the own lamps; there, the power whose mean of the likelihood over
@@ -108,11 +110,10 @@ class NightRoad:
     Linear luminance of some rectangles of sky and road is explained as veil, lit road, daylight that is left, and an
     even dark offset. What a vehicle does not know is drawn, once for each camera and set of lamps: aim and intensity of
     the beam, pitch, height of the lamps, where the veil begins, droplets, how light that is scattered more than once
-    spreads, and how the pavement returns it. The posterior of ln V is the mean over the draws, with amplitudes of
+    spreads, how the pavement returns it, and crest or sag. The posterior is the mean over the draws, with amplitudes of
     the light fitted in each. Where it leaves clear air possible the estimate is not valid and has a bound.
 
-    Own method. gallen2014 compares shapes alone, by correlation, which in thin fog hardly depend on the visibility, and
-    amplitude alone is that of two visibilities; together they tell both.
+    Own method: both the shape and the amplitude of the light count.
 
     Parameters
     ----------
@@ -250,19 +251,20 @@ class NightRoad:
         seen_road = np.count_nonzero(~is_sky) / np.count_nonzero(~self._cells.is_sky)
         independent = INDEPENDENT[self._lamps != "unknown"] * seen_road
         scales = sky_scale, lamp_scale, PEDESTAL, independent
-        return Measured(luminance, self._depth[used], self._up[used], others, *scales)
+        return Measured(luminance, self._up[used], others, *scales)
 
     def _estimate(self, measured: Measured, own: OwnLight, used: NDArray[np.bool_]) -> Estimate:
         extinction = np.array([extinction_from_visibility(one) for one in VISIBILITIES.tolist()])
         is_sky, seen = self._cells.is_sky[used], measured.seen
         variance = (np.where(is_sky, SKY_TEXTURE, ROAD_TEXTURE) * seen) ** 2 + FLOOR**2 + (LEVEL * seen.mean()) ** 2
+        templates = own.veil, own.road, own.depth
         weight, best = np.ones(len(seen)), Fit(np.empty(len(seen)), np.empty(2))
-        found = log_likelihoods(measured, extinction, own.veil, own.road, variance, weight, best)
+        found = log_likelihoods(measured, extinction, *templates, variance, weight, best)
         for _ in range(ROUNDS):
             earlier, weight = weight, robust_weights(seen, best.luminance, variance)
             if np.abs(weight - earlier).max() < SETTLED:
                 break
-            found = log_likelihoods(measured, extinction, own.veil, own.road, variance, weight, best)
+            found = log_likelihoods(measured, extinction, *templates, variance, weight, best)
         misfit, lamplight = best.summary.tolist()
         power, doubt = BY_DAYLIGHT if lamplight < MOSTLY_DAYLIGHT else (1.0, 1.0)
         likelihood = np.exp(power * (found - found.max())).mean(axis=0) ** (doubt / power)
@@ -278,7 +280,7 @@ class NightRoad:
         if weight.mean() < LEAST_WEIGHT:
             return Estimate.invalid(self.method, OUTSHONE, **diagnostics)
         widened = math.exp(NORMAL_90_PERCENT * BOUND_SOFTNESS)
-        if share[VISIBILITIES > CLEAR].sum() > MAY_BE_CLEAR:
+        if share[VISIBILITIES > CLEAR].sum() > MAY_BE_CLEAR[self._lamps != "unknown"]:
             bounds = ExtinctionBounds(most=extinction_from_visibility(low) / widened, softness=BOUND_SOFTNESS)
             reason = f"own lamps show no fog for certain, and visibility is at least {low:.0f} m"
             return replace(Estimate.invalid(self.method, reason, **diagnostics), bounds=bounds)
@@ -289,6 +291,8 @@ class NightRoad:
         value = extinction_from_visibility(middle)
         deviation = (extinction_from_visibility(low) - value) / NORMAL_90_PERCENT
         common = COMMON * 0.5 * math.log(high / low) / NORMAL_90_PERCENT
+        if len(measured.others) > 0:
+            common = min(common, MOST_COMMON)
         return Estimate(self.method, value, deviation, diagnostics=diagnostics, common_deviation=common)
 
 
@@ -315,7 +319,7 @@ def _quantiles(share: Floats) -> tuple[float, float, float]:
 def _of_cells(own: OwnLight, used: NDArray[np.bool_]) -> OwnLight:
     if used.all():
         return own
-    return OwnLight(np.ascontiguousarray(own.veil[:, :, used]), np.ascontiguousarray(own.road[:, :, used]))
+    return OwnLight(*(np.ascontiguousarray(one[..., used]) for one in (own.veil, own.road, own.depth)))
 
 
 def _too_little(seen: Seen, used: NDArray[np.bool_], is_sky: NDArray[np.bool_]) -> str:

@@ -77,10 +77,13 @@ class OwnLight:
     veil, road : (draws, visibilities, cells) float32
         Luminance of the lit fog before road and sky, and of the lit road through the fog [cd/m²]; visibilities are
         `VISIBILITIES`, cells those of `cells_of`.
+    depth : (draws, cells) float32
+        Distance to the road, 1e9 in the sky [m].
     """
 
     veil: NDArray[np.float32]
     road: NDArray[np.float32]
+    depth: NDArray[np.float32]
 
 
 def lit_head_lamps(observation: Observation) -> Lamp:

@@ -184,14 +184,15 @@ def test_cells_are_measured_where_they_look() -> None:
 def test_the_likelihood_is_largest_where_the_light_was_made() -> None:
     rng = np.random.default_rng(1)
     veil, road = (np.exp(rng.standard_normal((3, 37, 30))).astype(np.float32) for _ in range(2))
-    depth = np.where(np.arange(30) < 12, np.inf, np.geomspace(5.0, 100.0, 30))
+    depth = np.tile(np.where(np.arange(30) < 12, 1e9, np.geomspace(5.0, 100.0, 30)), (3, 1)).astype(np.float32)
     seen = 0.2 * (veil[1, 20] + road[1, 20]).astype(np.float64) + 1e-4
     glow = np.geomspace(1.0, 0.01, 30)[None]
     for others, amount in ((glow[:0], 0.0), (glow, 0.0), (glow, 0.3)):
         shown = seen + amount * glow[0]
-        known = Measured(shown, depth, np.zeros(30), others, 0.0, 0.0, 6e-4, 16.0)
+        known = Measured(shown, np.zeros(30), others, 0.0, 0.0, 6e-4, 16.0)
         best = Fit(np.empty(30), np.empty(2))
-        found = log_likelihoods(known, 3.0 / VISIBILITIES, veil, road, (0.05 * shown) ** 2, np.ones(30), best)
+        templates = veil, road, depth
+        found = log_likelihoods(known, 3.0 / VISIBILITIES, *templates, (0.05 * shown) ** 2, np.ones(30), best)
         assert np.unravel_index(np.argmax(found), found.shape) == (1, 20)
         assert np.allclose(best.luminance, shown, rtol=2e-3)
         assert best.summary[0] < 1e-2

@@ -1,0 +1,117 @@
+"""Rows of sky and road that the day model reads, and their medians."""
+
+import math
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+from fogsim.values.camera import Camera
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+SKY_HEIGHT, SKY_BINS, SKY_WIDTH = 0.25, 11, 0.56
+"""How far above the horizon sky is read [rad], in how many bins, over what share of the columns."""
+
+HALF_LANE = 1.15
+"""Half the width of the road's strip [m]."""
+
+NEAR_HORIZON, SINGLE, STEP = 3.2, 10, 0.1
+"""Deviations of the horizon within which rows are read one by one, how many more of them, and the relative height of
+the bins below [-]."""
+
+MOST_COLUMNS, MOST_ROWS = 80, 4
+"""Most pixels of a row, and rows of a bin, that are read."""
+
+
+class RowBins(NamedTuple):
+    """Bins of rows, the highest first.
+
+    Attributes
+    ----------
+    first, last : (n,) int64
+        Rows.
+    left, right : (n,) int64
+        First and last columns.
+    """
+
+    first: Ints
+    last: Ints
+    left: Ints
+    right: Ints
+
+
+@lru_cache(maxsize=64)
+def row_bins(camera: Camera, deviation: float) -> RowBins:
+    """Lay bins over the image of a camera.
+
+    Parameters
+    ----------
+    camera : Camera
+        The assumed calibration; its roll is taken as undone.
+    deviation : float
+        Standard deviation of the horizon's row [px].
+    """
+    horizon, bottom = camera.horizon_row, camera.height - 1
+    around = NEAR_HORIZON * deviation + 1.0
+    step = max(round(deviation / 2.5), 1)
+    edges = [math.floor(horizon - around)]
+    top = max(math.floor(horizon - SKY_HEIGHT * camera.focal_length), 0)
+    for edge in horizon - np.geomspace(around, max(horizon - top, around + 2.0), SKY_BINS + 1)[1:]:
+        if edges[-1] - math.floor(edge) >= 1 and edge >= 0.0:
+            edges.append(math.floor(edge))
+    edges = edges[::-1]
+    while edges[-1] < horizon + around + SINGLE * step:
+        edges.append(edges[-1] + step)
+    while edges[-1] < bottom:
+        edges.append(edges[-1] + max(math.ceil(STEP * (edges[-1] - horizon)), step))
+    first, last = np.array(edges[:-1]), np.minimum(np.array(edges[1:]) - 1, bottom)
+    kept = (first <= last) & (first >= 0)
+    first, last = first[kept], last[kept]
+    middle, u0 = 0.5 * (first + last), camera.principal_point[0]
+    half = np.where(
+        last < horizon - around,
+        0.5 * SKY_WIDTH * camera.width,
+        np.maximum(HALF_LANE * (middle - horizon) / camera.mount_height, max(2.0, 0.006 * camera.focal_length)),
+    )
+    left = np.clip(np.rint(u0 - half), 0, camera.width - 1).astype(np.int64)
+    right = np.clip(np.rint(u0 + half), 0, camera.width - 1).astype(np.int64)
+    return RowBins(first.astype(np.int64), last.astype(np.int64), left, right)
+
+
+@kernel
+def bin_medians(image: NDArray[Any], bins: RowBins, channel: int, out: Floats) -> None:
+    """Median of each bin, and the median distance from it [pixel values].
+
+    Parameters
+    ----------
+    image : (rows, cols, channels) uint8 or uint16
+        The image.
+    bins : RowBins
+        Where to look.
+    channel : int
+        Which channel.
+    out : (2, n) float64
+        Is written.
+    """
+    values = np.empty(MOST_COLUMNS * MOST_ROWS)
+    for i in range(bins.first.size):
+        rows = min(bins.last[i] - bins.first[i] + 1, MOST_ROWS)
+        columns = min(bins.right[i] - bins.left[i] + 1, MOST_COLUMNS)
+        count = 0
+        for a in range(rows):
+            row = bins.first[i] + (2 * a + 1) * (bins.last[i] - bins.first[i] + 1) // (2 * rows)
+            for b in range(columns):
+                column = bins.left[i] + (2 * b + 1) * (bins.right[i] - bins.left[i] + 1) // (2 * columns)
+                values[count] = image[row, column, channel]
+                count += 1
+        seen = np.sort(values[:count])
+        middle = 0.5 * (seen[(count - 1) // 2] + seen[count // 2])
+        apart = np.sort(np.abs(seen - middle))
+        # Of values in whole levels the median jumps: the mean of the middle half stands for it.
+        quarter = count // 4
+        out[0, i] = seen[quarter : count - quarter].mean()
+        out[1, i] = apart[count // 2]

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.vision.day.row_kernels import (
-    AIRLIGHT, COLUMNS, DARKENING, NEAR_TONE, ROAD, SHEEN, SKY, STRAY, TONE, VIGNETTING, WET,
+    AIRLIGHT, COLUMNS, DARKENING, NEAR_TONE, OTHER_SKY, ROAD, SHEEN, SKY, STRAY, TONE, VIGNETTING, WET,
 )  # fmt: skip
 
 Floats = NDArray[np.float64]
@@ -61,7 +61,7 @@ class Lights(NamedTuple):
     chance: Floats
 
 
-def lights() -> Lights:
+def _lights() -> Lights:
     """Even or darkening airlight, dry or wet, with or without a sky, and local tone mapping."""
     rows = []
     for darkening, likely in ((False, 0.45), (True, 0.55)):
@@ -76,11 +76,30 @@ def lights() -> Lights:
     mean[:, ROAD], deviation[:, ROAD] = USUAL_ROAD, ROAD_DEVIATION
     deviation[:, SHEEN], deviation[:, WET] = 0.06 * USUAL_ROAD, 0.05
     deviation[:, VIGNETTING], deviation[:, STRAY], deviation[:, SKY] = 0.3, 0.02, 0.1
-    for i, (darkening, wet, _, tone, _) in enumerate(rows):
+    for i, (darkening, wet, sky, tone, _) in enumerate(rows):
         if darkening:
             mean[i, DARKENING], deviation[i, DARKENING] = 0.32, 0.16
+        if not sky:
+            deviation[i, OTHER_SKY] = AIRLIGHT_DEVIATION
         if wet:
             deviation[i, WET] = 0.5
         if tone:
             deviation[i, TONE], deviation[i, NEAR_TONE] = 0.12, 0.06
     return Lights(mean, deviation, np.array([r[2] for r in rows]), np.array([r[4] for r in rows]))
+
+
+LIGHTS = _lights()
+
+CUT_CHANCE = 0.05
+"""Chance of each row at which a bonnet or a dashboard may end the road [-]."""
+
+
+def lights_chances(cuts: int) -> Floats:
+    """Chances of the lights, where so many rows may end the road.
+
+    Parameters
+    ----------
+    cuts : int
+        How many.
+    """
+    return np.asarray((1.0 - CUT_CHANCE * cuts) * LIGHTS.chance)

@@ -20,7 +20,16 @@ MOST_SLOPE = 12.0
 STATED = 0.45
 """Chance that a camera has the response that its description states [-]."""
 
-OTHERS = {"srgb": 0.12, "s .5": 0.15, "s 1": 0.07, "knee .8": 0.1, "knee 2.2": 0.06, "film": 0.07, "2.5": 0.08, "1.8": 0.05}
+OTHERS = {
+    "srgb": 0.12,
+    "s .5": 0.15,
+    "s 1": 0.07,
+    "knee .8": 0.1,
+    "knee 2.2": 0.06,
+    "film": 0.07,
+    "2.5": 0.08,
+    "1.8": 0.05,
+}
 """How likely the other curves are, before they are scaled to the rest of 1 [-]: sRGB, S-curves over it, soft
 shoulders, a film curve and powers."""
 

@@ -13,13 +13,16 @@ from fogsim.values.camera import Camera
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-SKY_HEIGHT, SKY_BINS, SKY_WIDTH = 0.25, 11, 0.56
+SKY_HEIGHT, SKY_BINS, SKY_WIDTH = 0.25, 8, 0.56
 """How far above the horizon sky is read [rad], in how many bins, over what share of the columns."""
 
 HALF_LANE = 1.15
 """Half the width of the road's strip [m]."""
 
-NEAR_HORIZON, SINGLE, STEP = 3.2, 10, 0.1
+OUTER, TAIL = 2.4, 0.04
+"""Half the width of the strip in which contrast is looked for [m], and share of its pixels beyond either level [-]."""
+
+NEAR_HORIZON, SINGLE, STEP = 3.2, 6, 0.12
 """Deviations of the horizon within which rows are read one by one, how many more of them, and the relative height of
 the bins below [-]."""
 
@@ -36,16 +39,20 @@ class RowBins(NamedTuple):
         Rows.
     left, right : (n,) int64
         First and last columns.
+    outer_left, outer_right : (n,) int64
+        The same of a wider strip of road, over which contrast is looked for.
     """
 
     first: Ints
     last: Ints
     left: Ints
     right: Ints
+    outer_left: Ints
+    outer_right: Ints
 
 
 @lru_cache(maxsize=64)
-def row_bins(camera: Camera, deviation: float) -> RowBins:
+def row_bins(camera: Camera, deviation: float, horizon: float) -> RowBins:
     """Lay bins over the image of a camera.
 
     Parameters
@@ -54,8 +61,10 @@ def row_bins(camera: Camera, deviation: float) -> RowBins:
         The assumed calibration; its roll is taken as undone.
     deviation : float
         Standard deviation of the horizon's row [px].
+    horizon : float
+        That row.
     """
-    horizon, bottom = camera.horizon_row, camera.height - 1
+    bottom = camera.height - 1
     around = NEAR_HORIZON * deviation + 1.0
     step = max(round(deviation / 2.5), 1)
     edges = [math.floor(horizon - around)]
@@ -79,7 +88,9 @@ def row_bins(camera: Camera, deviation: float) -> RowBins:
     )
     left = np.clip(np.rint(u0 - half), 0, camera.width - 1).astype(np.int64)
     right = np.clip(np.rint(u0 + half), 0, camera.width - 1).astype(np.int64)
-    return RowBins(first.astype(np.int64), last.astype(np.int64), left, right)
+    wider = np.maximum(half, OUTER * np.maximum(middle - horizon, 0.0) / camera.mount_height)
+    outer = [np.clip(np.rint(u0 + side * wider), 0, camera.width - 1).astype(np.int64) for side in (-1.0, 1.0)]
+    return RowBins(first.astype(np.int64), last.astype(np.int64), left, right, *outer)
 
 
 @kernel
@@ -94,8 +105,8 @@ def bin_medians(image: NDArray[Any], bins: RowBins, channel: int, out: Floats) -
         Where to look.
     channel : int
         Which channel.
-    out : (2, n) float64
-        Is written.
+    out : (3, n) float64
+        Is written: medians, their scatter, and the contrast across the wider strip.
     """
     values = np.empty(MOST_COLUMNS * MOST_ROWS)
     for i in range(bins.first.size):
@@ -115,3 +126,11 @@ def bin_medians(image: NDArray[Any], bins: RowBins, channel: int, out: Floats) -
         quarter = count // 4
         out[0, i] = seen[quarter : count - quarter].mean()
         out[1, i] = apart[count // 2]
+        row = (bins.first[i] + bins.last[i]) // 2
+        count = min(bins.outer_right[i] - bins.outer_left[i] + 1, MOST_COLUMNS)
+        for b in range(count):
+            column = bins.outer_left[i] + (2 * b + 1) * (bins.outer_right[i] - bins.outer_left[i] + 1) // (2 * count)
+            values[b] = image[row, column, channel]
+        seen = np.sort(values[:count])
+        tail = int(TAIL * count)
+        out[2, i] = seen[count - 1 - tail] - seen[tail]

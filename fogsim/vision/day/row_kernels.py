@@ -6,6 +6,7 @@ the light and every column by one pass, so the evidence of each prior of β cost
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +15,10 @@ from fogsim.jit import kernel
 
 Floats = NDArray[np.float64]
 
-AIRLIGHT, ROAD, DARKENING, SHEEN, WET, VIGNETTING, TONE, NEAR_TONE, STRAY, SKY, SHIFT, COLUMNS = range(12)
+AIRLIGHT, ROAD, DARKENING, SHEEN, WET, VIGNETTING, TONE, NEAR_TONE, STRAY, SKY, SHIFT, OTHER_SKY, COLUMNS = range(13)
 """Columns: airlight, road, how the airlight darkens downward, sheen at grazing angles, mirror image of the sky on a wet
 road, shade of the lens, two shapes of local tone mapping, stray light, a sky's brightness higher up,
-a small shift of the horizon; and their number."""
+a small shift of the horizon, a sky that is not the airlight's; and their number."""
 
 DARKENING_ANGLE, SHEEN_ANGLE, SKY_ANGLE = 0.064, 0.06, 0.3
 """Angles over which airlight darkens downward, sheen fades and a sky's brightness changes [rad]."""
@@ -31,14 +32,54 @@ PATCHES, GRAIN, SHARED_ROWS = 30.0, 4.0, 8.0
 SKY_VARIANCE = 0.10
 """Growth of a sky's variance upward from the horizon [1/rad, of full scale squared]."""
 
+SHARED_NOISE, HIGHEST_OBSTACLE = 0.5 / 255.0, 0.12
+"""Deviation of noise that neighbouring rows share, of full scale [-], and up to where things stand before the sky [rad].
+"""
+
 NODES, WEIGHTS = np.array([-0.7745966692414834, 0.0, 0.7745966692414834]), np.array([5.0, 8.0, 5.0]) / 18.0
 """Gauss and Legendre's three places within a row, and their weights."""
+
+MOST_CONTRAST, MOST_DOUBT = 1.2, 3.0
+"""Greatest contrast across a road in clear air, relative to the airlight, and most that one row speaks against fog that
+leaves less [-]."""
 
 REFRACTION = 1.33**2
 """Squared refractive index of water [-]."""
 
 FARTHEST = 5000.0
 """Depth that counts as the road's farthest [m]."""
+
+
+class RowData(NamedTuple):
+    """What was read of an image, under each response (r, n).
+
+    Attributes
+    ----------
+    first, last : (n,) float64
+        Rows of each bin.
+    light, slope, noise, by_row : (r, n) float64
+        Light of each bin, its derivative by the signal, its noise (0 where clipped), and its change by row.
+    level, least_airlight : (r,) float64
+        Brightest light, and light that the airlight surely exceeds.
+    contrast : (2, n) float64
+        Contrast across a strip of road, relative to the airlight, and the noise of that.
+    cuts : (c,) int64
+        Bins before which the road ends, the first being the first bin below the horizon, the last n.
+    free : (c,) float64
+        Evidence of the signals of the bins from each cut on by a law of no road.
+    """
+
+    first: Floats
+    last: Floats
+    light: Floats
+    slope: Floats
+    noise: Floats
+    by_row: Floats
+    level: Floats
+    least_airlight: Floats
+    contrast: Floats
+    cuts: NDArray[np.int64]
+    free: Floats
 
 
 @kernel
@@ -85,14 +126,17 @@ def fill_columns(
         middle, size = 0.5 * (first[i] + last[i]), last[i] - first[i] + 1.0
         columns[i] = 0.0
         left = 0.0
-        for j in range(3):
-            row = middle + 0.5 * size * NODES[j]
-            angle = (row - horizon) / focal
-            weight = WEIGHTS[j]
-            if angle <= 1e-6:
-                columns[i, AIRLIGHT] += weight
-                columns[i, SKY] += weight * -angle / 0.1 * math.exp(angle / SKY_ANGLE)
-                continue
+        top, bottom = middle - 0.5 * size, middle + 0.5 * size
+        sky = min(max((horizon - top) / size, 0.0), 1.0)
+        if sky > 0.0:
+            angle = max(0.5 * (horizon - top) if sky < 1.0 else horizon - middle, 0.0) / focal
+            columns[i, AIRLIGHT] = columns[i, OTHER_SKY] = sky
+            columns[i, SKY] = sky * angle / 0.1 * math.exp(-angle / SKY_ANGLE)
+        upper = max(top, horizon)
+        for j in range(3 if sky < 1.0 else 0):
+            row = 0.5 * (upper + bottom) + 0.5 * (bottom - upper) * NODES[j]
+            angle = max(row - horizon, 1e-4) / focal
+            weight = WEIGHTS[j] * (1.0 - sky)
             slant = math.sqrt(1.0 + angle * angle)
             depth = min(height / angle, hidden)
             through = math.exp(-extinction * depth * slant)
@@ -196,7 +240,7 @@ def sky_pass(
 @kernel
 def road_pass(
     light: Floats, noise: Floats, shared: Floats, columns: Floats, place: Floats, albedo: Floats, hidden: float,
-    cuts: Floats, grams: Floats, halves: Floats,
+    cuts: NDArray[np.int64], grams: Floats, halves: Floats,
 ) -> None:  # fmt: skip
     """Whiten the road's rows, from far to near; Gram matrices of all rows up to each of several cuts.
 
@@ -210,7 +254,7 @@ def road_pass(
         Deviations of the road's light by patches and grain, and of what hides the road.
     hidden : float
         Depth from which on something hides the road [m].
-    cuts : (m,) float64
+    cuts : (m,) int64
         Bins before which rows end, ascending; bins of sky have an angle below 0.
     grams : (m, COLUMNS + 1, COLUMNS + 1) float64
         Is written, upper half.
@@ -305,7 +349,7 @@ def log_normal_share(value: float) -> float:
 
 
 @kernel
-def evidence(gram: Floats, half: float, mean: Floats, deviation: Floats, least_airlight: float, found: Floats) -> float:
+def evidence(gram: Floats, half: float, mean: Floats, deviation: Floats, least_airlight: float) -> float:
     """Logarithm of the density of the light under normal priors of the columns' factors.
 
     Parameters
@@ -318,8 +362,6 @@ def evidence(gram: Floats, half: float, mean: Floats, deviation: Floats, least_a
         Of the priors; a column of deviation 0 is left out.
     least_airlight : float
         Light that the airlight surely exceeds, as clipped pixels show.
-    found : (2,) float64
-        Posterior means of airlight and road; is written.
     """
     used, size = np.empty(COLUMNS, np.int64), 0
     for j in range(COLUMNS):
@@ -380,7 +422,6 @@ def evidence(gram: Floats, half: float, mean: Floats, deviation: Floats, least_a
         a_square += z_a[a] * z_a[a]
         r_square += z_r[a] * z_r[a]
         d_square += both * both
-    found[0], found[1] = airlight, road
     result += log_normal_share(road / math.sqrt(r_square)) + log_normal_share(apart / math.sqrt(d_square))
     if least_airlight > 0.0:
         result += log_normal_share((airlight - least_airlight) / math.sqrt(a_square + 1e-6))
@@ -388,93 +429,96 @@ def evidence(gram: Floats, half: float, mean: Floats, deviation: Floats, least_a
 
 
 @kernel
-def evidence_grid(
-    rows: Floats, horizons: Floats, lens: Floats, extinctions: Floats,
-    light: Floats, slope: Floats, noise: Floats, by_row: Floats, level: Floats, least_airlight: Floats,
-    surfaces: Floats, lights: Floats, with_sky: NDArray[np.int64],
-    free: Floats, cuts: Floats, shift: float, out: Floats, factors: Floats,
-) -> None:  # fmt: skip
-    """Logarithm of the evidence of every response, horizon, extinction, surface, and light or cut.
+def contrast_across(contrast: Floats, place: Floats, size: int) -> float:
+    """Logarithm of the chance of contrasts across the road, of which fog leaves the less, the farther away.
 
     Parameters
     ----------
-    rows : (2, n) float64
-        First and last row of each bin.
-    horizons : (h,) float64
-        Rows of the horizon.
+    contrast : (2, n) float64
+        Contrast of each bin, relative to the airlight, and the noise of that.
+    place
+        See `fill_columns`.
+    size : int
+        How many bins, from the first on, are sky.
+    """
+    total = 0.0
+    for i in range(size, place.shape[0]):
+        noise = contrast[1, i]
+        apart = (contrast[0, i] - MOST_CONTRAST * place[i, 0]) / noise - 3.0
+        if apart > 0.0:
+            total -= min(0.5 * apart * apart, MOST_DOUBT)
+    return total
+
+
+@kernel
+def evidence_grid(
+    rows: RowData, lens: Floats, cells: Floats, tried: NDArray[np.int64],
+    surfaces: Floats, lights: Floats, many: int, shift: float, out: Floats,
+) -> None:  # fmt: skip
+    """Logarithm of the evidence of cells, pairs of a response and a surface, and lights or cuts.
+
+    Parameters
+    ----------
+    rows : RowData
+        What was read.
     lens : (3,) float64
         See `fill_columns`.
-    extinctions : (v,) float64
-        k [1/m].
-    light, slope, noise : (r, n) float64
-        Of each response: light of each bin, its derivative by the signal, noise; 0 where clipped.
-    level, least_airlight : (r,) float64
-        Brightest light, and light that the airlight surely exceeds.
+    cells : (c, 2) float64
+        Row of the horizon, and k [1/m].
+    tried : (t, 2) int64
+        Response and surface of each pair.
     surfaces : (s, 4) float64
         Patches, grain and obstacles, and the depth from which on those hide the road [m].
     lights : (2, l, COLUMNS) float64
         Means and deviations of the columns' factors.
-    with_sky : (l,) int64
-        Whether each counts the sky.
-    free : (n + 1,) float64
-        Evidence of the signals of the bins before each by a law of no road: of the sky, and of the road to its end.
-    cuts : (c,) float64
-        Bins before which the road ends, the last being n.
-    out : (r, h, v, s, l + c - 1) float64
+    many : int
+        How many of the lights count, from the first on; where all do, also roads that end at each cut but the last,
+        under the first light.
+    shift : float
+        Standard deviation of the horizon about each of its rows [px].
+    out : (c, t, m) float64
         Is written.
-    factors : (r, h, v, s, l + c - 1, 2) float64
-        Airlight and road; is written.
     """
-    n = rows.shape[1]
+    n, last = rows.first.size, rows.cuts.size - 1
     columns, place = np.empty((n, COLUMNS)), np.empty((n, 5))
-    grams, halves = np.empty((cuts.size, COLUMNS + 1, COLUMNS + 1)), np.empty(cuts.size)
-    sky_gram = np.zeros((COLUMNS + 1, COLUMNS + 1))
-    mean, deviation = np.empty(COLUMNS), np.empty(COLUMNS)
-    shared, albedo, hide = np.empty(n), np.empty(3), np.empty(2)
-    jacobian, of_road = np.zeros(n + 1), np.empty(n)
-    last = cuts.size - 1
-    for h in range(horizons.size):
+    grams, halves = np.empty((rows.cuts.size, COLUMNS + 1, COLUMNS + 1)), np.empty(rows.cuts.size)
+    sky_gram, gram = np.zeros((COLUMNS + 1, COLUMNS + 1)), np.zeros((COLUMNS + 1, COLUMNS + 1))
+    mean, deviation, albedo, hide = np.empty(COLUMNS), np.empty(COLUMNS), np.empty(3), np.empty(2)
+    shared, jacobian, of_road = np.empty(n), np.zeros(n + 1), np.empty(n)
+    for c in range(cells.shape[0]):
+        horizon, extinction = cells[c, 0], cells[c, 1]
         size = 0
-        while size < n and rows[1, size] + 0.5 <= horizons[h]:
+        while size < n and rows.last[size] + 0.5 <= horizon:
             size += 1
-        for v in range(extinctions.size):
-            for s in range(surfaces.shape[0]):
-                hidden = surfaces[s, 3]
-                if s == 0 or hidden < FARTHEST or surfaces[s - 1, 3] < FARTHEST:
-                    fill_columns(rows[0], rows[1], horizons[h], lens, extinctions[v], hidden, columns, place)
-                for r in range(light.shape[0]):
-                    for i in range(n):
-                        jacobian[i + 1] = jacobian[i] + (math.log(slope[r, i]) if noise[r, i] > 0.0 else 0.0)
-                        shared[i] = 0.5 / 255.0 * slope[r, i]
-                        of_road[i] = noise[r, i] if i >= size else 0.0
-                        columns[i, SHIFT] = by_row[r, i]
-                    sky_gram[:] = 0.0
-                    hide[0] = surfaces[s, 2] * level[r] * math.exp(-extinctions[v] * min(hidden, FARTHEST))
-                    hide[1] = 0.12
-                    if hidden >= FARTHEST:
-                        hide[0] = 0.0
-                    sky_half = sky_pass(light[r], slope[r], noise[r], columns, place, size, hide, sky_gram)
-                    for j in range(3):
-                        albedo[j] = surfaces[s, j] * level[r]
-                    road_pass(
-                        light[r], of_road, shared, columns, place, albedo, hidden, cuts, grams, halves
-                    )  # fmt: skip
-                    for j in range(lights.shape[1] + last):
-                        cut = last if j < lights.shape[1] else j - lights.shape[1]
-                        which = j if j < lights.shape[1] else 0
-                        end = int(cuts[cut])
-                        for i in range(COLUMNS):
-                            mean[i], deviation[i] = lights[0, which, i] * level[r], lights[1, which, i] * level[r]
-                        mean[SHIFT], deviation[SHIFT] = 0.0, shift
-                        gram, half = grams[cut].copy(), halves[cut]
-                        total = jacobian[end] + free[n] - free[end]
-                        if with_sky[which] == 1:
-                            for a in range(COLUMNS + 1):
-                                for b in range(a, COLUMNS + 1):
-                                    gram[a, b] += sky_gram[a, b]
-                            half += sky_half
-                            least = least_airlight[r]
-                        else:
-                            total += free[size] - jacobian[size]
-                            least = 0.0
-                        out[r, h, v, s, j] = total + evidence(gram, half, mean, deviation, least, factors[r, h, v, s, j])
+        before, across = -1.0, 0.0
+        for t in range(tried.shape[0]):
+            r, s = tried[t, 0], tried[t, 1]
+            hidden, level = surfaces[s, 3], rows.level[r]
+            if hidden != before:
+                fill_columns(rows.first, rows.last, horizon, lens, extinction, hidden, columns, place)
+                across = contrast_across(rows.contrast, place, size)
+                before = hidden
+            noise, slope = rows.noise[r], rows.slope[r]
+            for i in range(n):
+                jacobian[i + 1] = jacobian[i] + (math.log(slope[i]) if noise[i] > 0.0 else 0.0)
+                shared[i] = SHARED_NOISE * slope[i]
+                of_road[i] = noise[i] if i >= size else 0.0
+                columns[i, SHIFT] = rows.by_row[r, i]
+            sky_gram[:] = 0.0
+            hide[0] = surfaces[s, 2] * level * math.exp(-extinction * hidden) if hidden < FARTHEST else 0.0
+            hide[1] = HIGHEST_OBSTACLE
+            sky_half = sky_pass(rows.light[r], slope, noise, columns, place, size, hide, sky_gram)
+            for j in range(3):
+                albedo[j] = surfaces[s, j] * level
+            road_pass(rows.light[r], of_road, shared, columns, place, albedo, hidden, rows.cuts, grams, halves)
+            for j in range(out.shape[2]):
+                cut, which = (last, j) if j < many else (j - many, 0)
+                for i in range(COLUMNS):
+                    mean[i], deviation[i] = lights[0, which, i] * level, lights[1, which, i] * level
+                mean[SHIFT], deviation[SHIFT] = 0.0, shift
+                for a in range(COLUMNS + 1):
+                    for b in range(a, COLUMNS + 1):
+                        gram[a, b] = grams[cut, a, b] + sky_gram[a, b]
+                least = rows.least_airlight[r] if deviation[OTHER_SKY] == 0.0 else 0.0
+                total = jacobian[max(rows.cuts[cut], size)] + rows.free[cut] + across
+                out[c, t, j] = total + evidence(gram, halves[cut] + sky_half, mean, deviation, least)

@@ -1,0 +1,275 @@
+"""How dense the fog is by the day model: its posterior over visibility, horizon and hypotheses, for one image."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
+from fogsim.values.camera import Camera
+from fogsim.vision.day.hypotheses import CUT_CHANCE, LIGHTS, SURFACES, lights_chances
+from fogsim.vision.day.response_curves import curves_of
+from fogsim.vision.day.row_bins import row_bins
+from fogsim.vision.day.row_data import read_rows
+from fogsim.vision.day.row_kernels import AIRLIGHT, RowData, evidence_grid
+from fogsim.vision.lines.horizon import Horizon
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+NEAREST, FARTHEST, STEP = math.log(12.0), math.log(60_000.0), 0.2
+"""Visibilities between which fog is looked for, in logarithms of metres, and about how far apart [-]."""
+
+CLEAR_CHANCE = 0.05
+"""Chance of air without any fog, which the farthest visibility stands for [-]."""
+
+HORIZONS, HORIZON_CHANCES = (-1.2, 0.0, 1.2), (0.22, 0.56, 0.22)
+"""Horizons, in deviations of what is known of it, and their chances: normal laws about each, half as wide, make up the
+whole."""
+
+HORIZON_SHARE = 0.6
+"""Deviation of each of these laws, over that of the whole [-]."""
+
+SHARP = 0.03
+"""Change of the signal within four rows from which on the horizon is where it is steepest, as one more choice [-]."""
+
+WORTHWHILE = 10.0
+"""Logarithm of the evidence below the best at which a visibility is not tried under other hypotheses [-]."""
+
+FINE = 0.01
+"""Step of the posterior [ln m]."""
+
+UNLIKELY = -1e4
+"""Logarithm of the chance of what was not tried."""
+
+
+@dataclass(frozen=True, slots=True)
+class DayFit:
+    """Posterior of the visibility.
+
+    Attributes
+    ----------
+    log_visibility, chance : (n,) float64
+        Logarithms of visibilities [ln m], evenly, and their probabilities.
+    fog_over_none : float
+        Logarithm of the evidence of a road in air or fog over that of no road.
+    responses, surfaces, lights : (r,), (s,), (l,) float64
+        Probabilities of the hypotheses.
+    clipped : float
+        Share of the sky's bins that are clipped [-].
+    end : float
+        Last row of road, above a bonnet or a dashboard.
+    contrast : float
+        How much brighter the far road is than the near one, over the sky [-].
+    """
+
+    log_visibility: Floats
+    chance: Floats
+    fog_over_none: float
+    responses: Floats
+    surfaces: Floats
+    lights: Floats
+    clipped: float
+    contrast: float
+    end: float
+
+    def quantile(self, share: float) -> float:
+        """Visibility below which the truth lies with a probability [m].
+
+        Parameters
+        ----------
+        share : float
+            That probability.
+        """
+        return float(np.exp(np.interp(share, np.cumsum(self.chance), self.log_visibility)))
+
+    def below(self, visibility: float) -> float:
+        """Probability that the visibility is less than some [-].
+
+        Parameters
+        ----------
+        visibility : float
+            That one [m].
+        """
+        return float(self.chance[self.log_visibility < math.log(visibility)].sum())
+
+
+def fit_day(image: NDArray[Any], camera: Camera, horizon: Horizon) -> DayFit:
+    """Weigh all hypotheses by their evidence.
+
+    Parameters
+    ----------
+    image : (rows, cols) or (rows, cols, 3) uint8 or uint16
+        A level image, contiguous.
+    camera : Camera
+        The assumed calibration.
+    horizon : Horizon
+        What is known of the horizon.
+    """
+    pixels = image if image.ndim == 3 else image[:, :, None]
+    bins = row_bins(camera, horizon.standard_deviation, round(horizon.row))
+    rows = read_rows(pixels, bins, camera, horizon.row)
+    return _weighed(rows, camera, horizon)
+
+
+def _weighed(rows: RowData, camera: Camera, horizon: Horizon) -> DayFit:
+    responses, surfaces = np.log(curves_of(camera).chance), np.log(SURFACES.chance)
+    lights = np.log(np.append(lights_chances(rows.cuts.size - 2), [CUT_CHANCE] * (rows.cuts.size - 2)))
+    logs, extinctions, likely = _visibilities()
+    at, of_horizon = _horizons(rows, horizon)
+    grid = _Grid(rows, camera, HORIZON_SHARE * horizon.standard_deviation)
+    cells = np.stack(np.meshgrid(at, extinctions, indexing="ij"), axis=-1)
+    prior = of_horizon[:, None] + likely
+    # A first look, at all cells by the likeliest hypotheses, and by others at some.
+    whole = grid.evidence(cells.reshape(-1, 2), np.zeros((1, 2), np.int64), ALL).reshape(*cells.shape[:2], -1)
+    none = float(np.logaddexp.reduce(whole[:, 0, LIGHTS.sky.size] + of_horizon))
+    whole = np.delete(whole, LIGHTS.sky.size, axis=2) + lights + prior[:, :, None]
+    of_light = np.logaddexp.reduce(whole, axis=(0, 1))
+    end = int(np.argmax(of_light[LIGHTS.sky.size :])) if rows.cuts.size > 2 else 0
+    if rows.cuts.size > 2 and of_light[LIGHTS.sky.size + end] > of_light[: LIGHTS.sky.size].max():
+        return _weighed(_ended(rows, end + 1), camera, horizon)
+    first = np.logaddexp.reduce(whole, axis=2)
+    kept = np.flatnonzero(of_light[: LIGHTS.sky.size] > of_light.max() - SUITS)
+    some = np.logaddexp.reduce(grid.evidence(cells[1, ::2], OTHERS, kept) + lights[kept], axis=2)
+    some += prior[1, ::2, None]
+    chosen = _worthwhile(first, some.max(axis=1))
+    # Where fog may be, all surfaces, and all responses over the surfaces that suit.
+    places, before = cells[chosen], prior[chosen][:, None]
+    tried = [(0, s) for s in range(surfaces.size)]
+    found = [grid.evidence(places, np.array(tried), kept) + lights[kept]]
+    of_surface = np.logaddexp.reduce(found[0] + (before + surfaces)[:, :, None], axis=(0, 2))
+    suit = [s for s in range(surfaces.size) if of_surface[s] > of_surface.max() - SUITS]
+    others = [(r, s) for s in suit for r in range(1, responses.size)]
+    found.append(grid.evidence(places, np.array(others), kept) + lights[kept])
+    pairs = np.array(tried + others)
+    each = np.concatenate(found, axis=1) + (responses[pairs[:, 0]] + surfaces[pairs[:, 1]] + before)[:, :, None]
+    chance = np.logaddexp.reduce(each, axis=2)
+    total = np.full(prior.shape, UNLIKELY)
+    total[chosen] = np.logaddexp.reduce(chance, axis=1)
+    by_visibility = np.logaddexp.reduce(total, axis=0)
+    evidence = float(np.logaddexp.reduce(by_visibility))
+    weight = np.exp(chance - evidence).sum(axis=0)
+    fine, posterior = _interpolated(logs, by_visibility)
+    sky = rows.noise[0, : rows.cuts[0]]
+    return DayFit(
+        log_visibility=fine,
+        chance=posterior,
+        fog_over_none=evidence - none - float(responses[0]),
+        responses=np.bincount(pairs[:, 0], weight, responses.size),
+        surfaces=np.bincount(pairs[:, 1], weight, surfaces.size),
+        lights=np.bincount(kept, np.exp(each - evidence).sum(axis=(0, 1)), LIGHTS.sky.size),
+        end=float(rows.last[-1]),
+        clipped=float(np.mean(sky <= 0.0)) if sky.size else 0.0,
+        contrast=float(rows.light[0, rows.cuts[0] :].max() - rows.light[0, -1]) / float(rows.level[0]),
+    )
+
+
+def _visibilities() -> tuple[Floats, Floats, Floats]:
+    """Logarithms of visibilities, extinctions, and logarithms of their chances."""
+    logs = np.linspace(NEAREST, FARTHEST, math.ceil((FARTHEST - NEAREST) / STEP) + 1)
+    extinctions = OPTICAL_DEPTH_AT_VISIBILITY / np.exp(logs)
+    extinctions[-1] = 1e-7
+    likely = np.full(logs.size, math.log((1.0 - CLEAR_CHANCE) / (logs.size - 1)))
+    likely[-1] = math.log(CLEAR_CHANCE)
+    return logs, extinctions, likely
+
+
+OTHERS = np.array([(0, 1), (0, 2), (0, 3), (0, 4), (0, 5), (2, 0), (4, 0)])
+"""Responses and surfaces of a first look."""
+
+SUITS = 5.0
+"""Logarithm of the evidence below the best at which a surface is not tried under other responses [-]."""
+
+
+ALL = np.arange(LIGHTS.sky.size)
+"""All lights."""
+
+CLIPPED_AIRLIGHT = 0.6
+"""Deviation of the airlight before an image is seen, over the usual one, where the sky is clipped [-]: exposure meters
+do not let it be much brighter."""
+
+
+class _Grid:
+    """What all evaluations of one image have in common."""
+
+    def __init__(self, rows: RowData, camera: Camera, shift: float) -> None:
+        self._rows, self._shift = rows, shift
+        self._lens = np.array([camera.focal_length, camera.mount_height, camera.principal_point[1]])
+
+    def evidence(self, cells: Floats, tried: Ints, lights: Ints) -> Floats:
+        """(c, t, m) float64: see `evidence_grid`; under all lights there also are roads that end sooner."""
+        laws = np.stack([LIGHTS.mean, LIGHTS.deviation])[:, lights]
+        laws[1, :, AIRLIGHT] *= CLIPPED_AIRLIGHT if self._rows.least_airlight.any() else 1.0
+        cuts = self._rows.cuts.size - 1 if lights is ALL else 0
+        out = np.empty((len(cells), len(tried), lights.size + cuts))
+        surfaces = np.column_stack([SURFACES.albedo, SURFACES.hidden])
+        places = np.ascontiguousarray(cells)
+        evidence_grid(self._rows, self._lens, places, tried, surfaces, laws, lights.size, self._shift, out)
+        return np.where(np.isfinite(out), out, UNLIKELY)
+
+
+def _ended(rows: RowData, cut: int) -> RowData:
+    """Return the rows up to a cut alone."""
+    end = int(rows.cuts[cut])
+    parts = {name: getattr(rows, name)[..., :end] for name in ("first", "last", "light", "slope", "noise", "by_row")}
+    parts = {name: np.ascontiguousarray(values) for name, values in parts.items()}
+    return rows._replace(
+        **parts,
+        contrast=np.ascontiguousarray(rows.contrast[:, :end]),
+        cuts=np.array([rows.cuts[0], end]),
+        free=np.array([rows.free[0] - rows.free[cut], 0.0]),
+    )
+
+
+def _horizons(rows: RowData, horizon: Horizon) -> tuple[Floats, Floats]:
+    """Rows of the horizon that are tried, and the logarithms of their chances."""
+    deviation = horizon.standard_deviation
+    at, chance = horizon.row + deviation * np.array(HORIZONS), np.array(HORIZON_CHANCES)
+    edge = _edge(rows, horizon)
+    if edge is not None:
+        share = 0.3 * math.exp(-0.5 * ((edge - horizon.row) / deviation) ** 2)
+        at, chance = np.append(at, edge), np.append((1.0 - share) * chance, share)
+    return at, np.log(chance)
+
+
+def _edge(rows: RowData, horizon: Horizon) -> float | None:
+    """Where brightness changes most from row to row about the horizon, if it does much."""
+    middle, light = 0.5 * (rows.first + rows.last), rows.light[0] / rows.level[0]
+    near = np.flatnonzero((np.abs(middle - horizon.row) < 3.0 * horizon.standard_deviation + 1.0))
+    near = near[(near > 1) & (near < middle.size - 2)]
+    if near.size == 0:
+        return None
+    place = int(near[np.argmax(np.abs(light[near + 1] - light[near - 1]))])
+    low, high = light[place - 2], light[place + 2]
+    if abs(high - low) < SHARP:
+        return None
+    inside = float((high - light[place - 1 : place + 2]).sum() / (high - low))
+    step = float(middle[place] - middle[place - 1])
+    edge = float(middle[place - 2]) + (0.5 + inside) * step
+    return edge if abs(edge - horizon.row) < 3.0 * horizon.standard_deviation else None
+
+
+def _worthwhile(first: Floats, some: Floats) -> NDArray[np.bool_]:
+    """(h, v) bool: where fog may be, after a first look at all cells, and at every second visibility by others."""
+    best = max(first.max(), some.max())
+    good = first > best - WORTHWHILE
+    good[:, ::2] |= some > best - WORTHWHILE
+    wider = good.copy()
+    wider[:, 1:] |= good[:, :-1]
+    wider[:, :-1] |= good[:, 1:]
+    return np.asarray(wider)
+
+
+def _interpolated(logs: Floats, chance: Floats) -> tuple[Floats, Floats]:
+    """Posterior in finer steps: its logarithm by cubic pieces (Catmull and Rom)."""
+    value = np.maximum(chance - chance.max(), -60.0)
+    fine = np.arange(logs[0], logs[-1], FINE)
+    place = np.clip((fine - logs[0]) / (logs[1] - logs[0]), 0.0, logs.size - 1.001)
+    low = place.astype(np.int64)
+    s = place - low
+    a, b, c, d = (value[np.clip(low + i, 0, logs.size - 1)] for i in (-1, 0, 1, 2))
+    cubic = b + 0.5 * s * (c - a + s * (2.0 * a - 5.0 * b + 4.0 * c - d + s * (3.0 * (b - c) + d - a)))
+    weight = np.exp(np.minimum(cubic, 5.0))
+    return fine, weight / weight.sum()

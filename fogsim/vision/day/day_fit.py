@@ -119,7 +119,7 @@ def _weighed(rows: RowData, camera: Camera, horizon: Horizon) -> DayFit:
     lights = np.log(np.append(lights_chances(rows.cuts.size - 2), [CUT_CHANCE] * (rows.cuts.size - 2)))
     logs, extinctions, likely = _visibilities()
     at, of_horizon = _horizons(rows, horizon)
-    grid = _Grid(rows, camera, HORIZON_SHARE * horizon.standard_deviation)
+    grid = _Grid(rows, camera, horizon.row, HORIZON_SHARE * horizon.standard_deviation)
     cells = np.stack(np.meshgrid(at, extinctions, indexing="ij"), axis=-1)
     prior = of_horizon[:, None] + likely
     # A first look, at all cells by the likeliest hypotheses, and by others at some.
@@ -194,9 +194,12 @@ do not let it be much brighter."""
 class _Grid:
     """What all evaluations of one image have in common."""
 
-    def __init__(self, rows: RowData, camera: Camera, shift: float) -> None:
+    def __init__(self, rows: RowData, camera: Camera, horizon: float, shift: float) -> None:
         self._rows, self._shift = rows, shift
         self._lens = np.array([camera.focal_length, camera.mount_height, camera.principal_point[1]])
+        self._surfaces = np.column_stack([SURFACES.albedo, SURFACES.hidden])
+        step = camera.focal_length * camera.mount_height / max(_step(rows) - horizon, 1.0)
+        self._surfaces[np.isnan(self._surfaces)] = step
 
     def evidence(self, cells: Floats, tried: Ints, lights: Ints) -> Floats:
         """(c, t, m) float64: see `evidence_grid`; under all lights there also are roads that end sooner."""
@@ -204,10 +207,19 @@ class _Grid:
         laws[1, :, AIRLIGHT] *= CLIPPED_AIRLIGHT if self._rows.least_airlight.any() else 1.0
         cuts = self._rows.cuts.size - 1 if lights is ALL else 0
         out = np.empty((len(cells), len(tried), lights.size + cuts))
-        surfaces = np.column_stack([SURFACES.albedo, SURFACES.hidden])
         places = np.ascontiguousarray(cells)
-        evidence_grid(self._rows, self._lens, places, tried, surfaces, laws, lights.size, self._shift, out)
+        evidence_grid(self._rows, self._lens, places, tried, self._surfaces, laws, lights.size, self._shift, out)
         return np.where(np.isfinite(out), out, UNLIKELY)
+
+
+def _step(rows: RowData) -> float:
+    """Row above which something may hide the road: where its light changes most from bin to bin."""
+    road = slice(int(rows.cuts[0]) + 2, int(rows.cuts[-1]))
+    light = rows.light[0, road]
+    if light.size < 3:
+        return float(rows.last[-1])
+    change = np.abs(np.diff(light)) / (rows.noise[0, road][1:] + 0.01 * rows.level[0])
+    return float(rows.first[road][1 + int(np.argmax(change))])
 
 
 def _ended(rows: RowData, cut: int) -> RowData:

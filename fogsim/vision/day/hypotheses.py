@@ -19,7 +19,7 @@ class Surfaces(NamedTuple):
     ----------
     albedo : (n, 3) float64
     hidden : (n,) float64
-        [m].
+        [m]; NaN where the road has its greatest step.
     chance : (n,) float64
     """
 
@@ -40,7 +40,7 @@ SURFACES = Surfaces(
         [PATCHES, GRAIN, 0.0], [0.3 * PATCHES, 0.3 * GRAIN, 0.0], [2.5 * PATCHES, 2.5 * GRAIN, 0.0],
         [PATCHES, SHADOW, 0.0], [PATCHES, GRAIN, OBSTACLE], [PATCHES, GRAIN, OBSTACLE],
     ]),
-    hidden=np.array([np.inf, np.inf, np.inf, np.inf, 60.0, 200.0]),
+    hidden=np.array([np.inf, np.inf, np.inf, np.inf, np.nan, 200.0]),
     chance=np.array([0.35, 0.25, 0.15, 0.12, 0.065, 0.065]),
 )  # fmt: skip
 

@@ -26,6 +26,9 @@ NEAR_HORIZON, SINGLE, STEP = 3.2, 6, 0.12
 """Deviations of the horizon within which rows are read one by one, how many more of them, and the relative height of
 the bins below [-]."""
 
+SKY_SHARE, SKY_REACH = 7, 0.012
+"""Part of a row of sky (one in so many) that is at least seen, and half the width of its pixel values, relative [-]."""
+
 MOST_COLUMNS, MOST_ROWS = 80, 4
 """Most pixels of a row, and rows of a bin, that are read."""
 
@@ -94,7 +97,32 @@ def row_bins(camera: Camera, deviation: float, horizon: float) -> RowBins:
 
 
 @kernel
-def bin_medians(image: NDArray[Any], bins: RowBins, channel: int, out: Floats) -> None:
+def bright_part(seen: Floats) -> tuple[float, float]:
+    """Mean of those pixels of sky that are alike near the brightest, and their mean distance from it.
+
+    Parameters
+    ----------
+    seen : (n,) float64
+        Pixel values, ascending.
+    """
+    count = seen.size
+    centre = seen[count - 1 - count // SKY_SHARE]
+    spread = seen[count - 1 - count // 20] - seen[count - 1 - count // 3]
+    reach = max(SKY_REACH * centre, min(1.5 * spread, 3.0 * SKY_REACH * centre))
+    apart = 0.0
+    for _ in range(4):
+        total, kept, apart = 0.0, 0, 0.0
+        for value in seen:
+            if abs(value - centre) <= reach:
+                total += value
+                apart += abs(value - centre)
+                kept += 1
+        centre, apart = total / max(kept, 1), apart / max(kept, 1)
+    return centre, apart
+
+
+@kernel
+def bin_medians(image: NDArray[Any], bins: RowBins, channel: int, sky_end: int, out: Floats) -> None:
     """Median of each bin, and the median distance from it [pixel values].
 
     Parameters
@@ -105,6 +133,8 @@ def bin_medians(image: NDArray[Any], bins: RowBins, channel: int, out: Floats) -
         Where to look.
     channel : int
         Which channel.
+    sky_end : int
+        Row before which bins are sky as wide as the image.
     out : (3, n) float64
         Is written: medians, their scatter, and the contrast across the wider strip.
     """
@@ -126,6 +156,9 @@ def bin_medians(image: NDArray[Any], bins: RowBins, channel: int, out: Floats) -
         quarter = count // 4
         out[0, i] = seen[quarter : count - quarter].mean()
         out[1, i] = apart[count // 2]
+        if bins.last[i] < sky_end:
+            # Trees and houses hide sky on both sides: what is alike near the brightest counts.
+            out[0, i], out[1, i] = bright_part(seen)
         row = (bins.first[i] + bins.last[i]) // 2
         count = min(bins.outer_right[i] - bins.outer_left[i] + 1, MOST_COLUMNS)
         for b in range(count):

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
 from fogsim.vision.day.response_curves import POINTS, curves_of
-from fogsim.vision.day.row_bins import RowBins, bin_medians
+from fogsim.vision.day.row_bins import SKY_WIDTH, RowBins, bin_medians
 from fogsim.vision.day.row_kernels import RowData
 
 Floats = NDArray[np.float64]
@@ -47,7 +47,9 @@ def read_rows(image: NDArray[Any], bins: RowBins, camera: Camera, horizon: float
         Row of the horizon.
     """
     found = np.empty((3, bins.first.size))
-    bin_medians(image, bins, image.shape[2] // 2, found)
+    wide = np.flatnonzero(bins.right - bins.left < 0.5 * SKY_WIDTH * camera.width)
+    sky_end = int(bins.first[wide[0]]) if wide.size else 0
+    bin_medians(image, bins, image.shape[2] // 2, sky_end, found)
     signal, scatter, across = found / (2**camera.bits - 1)
     middle = 0.5 * (bins.first + bins.last)
     by_row = np.zeros(signal.size)

@@ -45,6 +45,10 @@ UNLIKELY = -1e4
 """Logarithm of the chance of what was not tried."""
 
 
+VEHICLE = 1.8
+"""Height up to which a vehicle ahead may hide the sky [m]."""
+
+
 @dataclass(frozen=True, slots=True)
 class DayFit:
     """Posterior of the visibility.
@@ -61,6 +65,8 @@ class DayFit:
         Share of the sky's bins that are clipped [-].
     end : float
         Last row of road, above a bonnet or a dashboard.
+    brightest : float
+        Light that hardly any bin exceeds, over full scale [-].
     contrast : float
         How much brighter the far road is than the near one, over the sky [-].
     """
@@ -72,6 +78,7 @@ class DayFit:
     surfaces: Floats
     lights: Floats
     clipped: float
+    brightest: float
     contrast: float
     end: float
 
@@ -96,7 +103,7 @@ class DayFit:
         return float(self.chance[self.log_visibility < math.log(visibility)].sum())
 
 
-def fit_day(image: NDArray[Any], camera: Camera, horizon: Horizon) -> DayFit:
+def fit_day(image: NDArray[Any], camera: Camera, horizon: Horizon, free: float = math.inf) -> DayFit:
     """Weigh all hypotheses by their evidence.
 
     Parameters
@@ -107,10 +114,14 @@ def fit_day(image: NDArray[Any], camera: Camera, horizon: Horizon) -> DayFit:
         The assumed calibration.
     horizon : Horizon
         What is known of the horizon.
+    free : float
+        Depth up to which the own lane is free of the vehicle ahead [m].
     """
     pixels = image if image.ndim == 3 else image[:, :, None]
     bins = row_bins(camera, horizon.standard_deviation, round(horizon.row))
     rows = read_rows(pixels, bins, camera, horizon.row)
+    if math.isfinite(free):
+        rows = _without_vehicle(rows, camera, horizon.row, free)
     return _weighed(rows, camera, horizon)
 
 
@@ -162,6 +173,7 @@ def _weighed(rows: RowData, camera: Camera, horizon: Horizon) -> DayFit:
         lights=np.bincount(kept, np.exp(each - evidence).sum(axis=(0, 1)), LIGHTS.sky.size),
         end=float(rows.last[-1]),
         clipped=float(np.mean(sky <= 0.0)) if sky.size else 0.0,
+        brightest=float(rows.level[0]),
         contrast=float(rows.light[0, rows.cuts[0] :].max() - rows.light[0, -1]) / float(rows.level[0]),
     )
 
@@ -212,6 +224,15 @@ class _Grid:
         return np.where(np.isfinite(out), out, UNLIKELY)
 
 
+def _without_vehicle(rows: RowData, camera: Camera, horizon: float, free: float) -> RowData:
+    """Leave out rows that the vehicle ahead may hide."""
+    above = max(VEHICLE - camera.mount_height, 0.0) * camera.focal_length / free
+    hidden = (rows.last > horizon - above) & (rows.first < horizon + camera.row_distance / free)
+    contrast = rows.contrast.copy()
+    contrast[0, hidden] = 0.0
+    return rows._replace(noise=np.where(hidden, 0.0, rows.noise), contrast=contrast)
+
+
 def _step(rows: RowData) -> float:
     """Row above which something may hide the road: where its light changes most from bin to bin."""
     road = slice(int(rows.cuts[0]) + 2, int(rows.cuts[-1]))
@@ -249,7 +270,7 @@ def _horizons(rows: RowData, horizon: Horizon) -> tuple[Floats, Floats]:
 def _edge(rows: RowData, horizon: Horizon) -> float | None:
     """Where brightness changes most from row to row about the horizon, if it does much."""
     middle, light = 0.5 * (rows.first + rows.last), rows.light[0] / rows.level[0]
-    near = np.flatnonzero((np.abs(middle - horizon.row) < 3.0 * horizon.standard_deviation + 1.0))
+    near = np.flatnonzero(np.abs(middle - horizon.row) < 3.0 * horizon.standard_deviation + 1.0)
     near = near[(near > 1) & (near < middle.size - 2)]
     if near.size == 0:
         return None

@@ -6,7 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.vision.day.row_kernels import (
-    AIRLIGHT, COLUMNS, DARKENING, NEAR_TONE, OTHER_SKY, ROAD, SHEEN, SKY, STRAY, TONE, VIGNETTING, WET,
+    AIRLIGHT,
+    COLUMNS,
+    DARKENING,
+    NEAR_TONE,
+    OTHER_SKY,
+    ROAD,
+    SHEEN,
+    SKY,
+    STRAY,
+    TONE,
+    VIGNETTING,
+    WET,
 )  # fmt: skip
 
 Floats = NDArray[np.float64]
@@ -52,12 +63,17 @@ class Lights(NamedTuple):
     ----------
     mean, deviation : (n, COLUMNS) float64
     sky : (n,) int64
+        Whether the sky is as bright as the airlight.
+    is_wet, is_unusual : (n,) bool
+        Whether the road is wet, and whether that or local tone mapping is there.
     chance : (n,) float64
     """
 
     mean: Floats
     deviation: Floats
     sky: NDArray[np.int64]
+    is_wet: NDArray[np.bool_]
+    is_unusual: NDArray[np.bool_]
     chance: Floats
 
 
@@ -85,7 +101,14 @@ def _lights() -> Lights:
             deviation[i, WET] = 0.5
         if tone:
             deviation[i, TONE], deviation[i, NEAR_TONE] = 0.12, 0.06
-    return Lights(mean, deviation, np.array([r[2] for r in rows]), np.array([r[4] for r in rows]))
+    return Lights(
+        mean,
+        deviation,
+        sky=np.array([row[2] for row in rows]),
+        is_wet=np.array([row[1] for row in rows]),
+        is_unusual=np.array([row[1] or row[3] for row in rows]),
+        chance=np.array([row[4] for row in rows]),
+    )
 
 
 LIGHTS = _lights()

@@ -33,8 +33,8 @@ SKY_VARIANCE = 0.10
 """Growth of a sky's variance upward from the horizon [1/rad, of full scale squared]."""
 
 SHARED_NOISE, HIGHEST_OBSTACLE = 0.5 / 255.0, 0.12
-"""Deviation of noise that neighbouring rows share, of full scale [-], and up to where things stand before the sky [rad].
-"""
+"""Deviation of noise that neighbouring rows share, of full scale [-], and up to where things stand before the sky
+[rad]."""
 
 NODES, WEIGHTS = np.array([-0.7745966692414834, 0.0, 0.7745966692414834]), np.array([5.0, 8.0, 5.0]) / 18.0
 """Gauss and Legendre's three places within a row, and their weights."""
@@ -266,7 +266,7 @@ def road_pass(
     p = np.zeros((4, 4))
     rate = math.sqrt(3.0) / PATCHES
     p[0, 0], p[1, 1], p[2, 2], p[3, 3] = 1.0, rate * rate, 1.0, 1.0
-    f, h, ph = np.zeros((4, 4)), np.empty(4), np.empty(4)
+    f, ph = np.zeros((4, 4)), np.empty(4)
     half, cut = 0.0, 0
     depth, angle = 0.0, 0.0
     total = light.size

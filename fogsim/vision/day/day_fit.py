@@ -41,6 +41,9 @@ WORTHWHILE = 10.0
 FINE = 0.01
 """Step of the posterior [ln m]."""
 
+FLOOR, MOST_OVER = -25.0, 1.5
+"""Least logarithm of the chance, over the best cell's, that is interpolated, and greatest [-]."""
+
 UNLIKELY = -1e4
 """Logarithm of the chance of what was not tried."""
 
@@ -157,12 +160,8 @@ def _weighed(rows: RowData, camera: Camera, horizon: Horizon) -> DayFit:
     pairs = np.array(tried + others)
     each = np.concatenate(found, axis=1) + (responses[pairs[:, 0]] + surfaces[pairs[:, 1]] + before)[:, :, None]
     chance = np.logaddexp.reduce(each, axis=2)
-    total = np.full(prior.shape, UNLIKELY)
-    total[chosen] = np.logaddexp.reduce(chance, axis=1)
-    by_visibility = np.logaddexp.reduce(total, axis=0)
-    evidence = float(np.logaddexp.reduce(by_visibility))
-    weight = np.exp(chance - evidence).sum(axis=0)
-    fine, posterior = _interpolated(logs, by_visibility)
+    fine, posterior, evidence = _interpolated(logs, chosen, chance)
+    weight = np.exp(chance - np.logaddexp.reduce(chance, axis=None)).sum(axis=0)
     sky = rows.noise[0, : rows.cuts[0]]
     return DayFit(
         log_visibility=fine,
@@ -170,7 +169,7 @@ def _weighed(rows: RowData, camera: Camera, horizon: Horizon) -> DayFit:
         fog_over_none=evidence - none - float(responses[0]),
         responses=np.bincount(pairs[:, 0], weight, responses.size),
         surfaces=np.bincount(pairs[:, 1], weight, surfaces.size),
-        lights=np.bincount(kept, np.exp(each - evidence).sum(axis=(0, 1)), LIGHTS.sky.size),
+        lights=np.bincount(kept, _shares(each), LIGHTS.sky.size),
         end=float(rows.last[-1]),
         clipped=float(np.mean(sky <= 0.0)) if sky.size else 0.0,
         brightest=float(rows.level[0]),
@@ -295,14 +294,28 @@ def _worthwhile(first: Floats, some: Floats) -> NDArray[np.bool_]:
     return np.asarray(wider)
 
 
-def _interpolated(logs: Floats, chance: Floats) -> tuple[Floats, Floats]:
-    """Posterior in finer steps: its logarithm by cubic pieces (Catmull and Rom)."""
-    value = np.maximum(chance - chance.max(), -60.0)
-    fine = np.arange(logs[0], logs[-1], FINE)
-    place = np.clip((fine - logs[0]) / (logs[1] - logs[0]), 0.0, logs.size - 1.001)
-    low = place.astype(np.int64)
-    s = place - low
-    a, b, c, d = (value[np.clip(low + i, 0, logs.size - 1)] for i in (-1, 0, 1, 2))
+def _shares(each: Floats) -> Floats:
+    """Probabilities of the last axis."""
+    logs = np.logaddexp.reduce(each, axis=(0, 1))
+    return np.asarray(np.exp(logs - np.logaddexp.reduce(logs)))
+
+
+def _interpolated(logs: Floats, chosen: NDArray[np.bool_], chance: Floats) -> tuple[Floats, Floats, float]:
+    """Posterior in finer steps, of cells under pairs of hypotheses, and the logarithm of its sum.
+
+    For each horizon and pair its logarithm is cubic between visibilities (Catmull and Rom), so that parabolas stay.
+    """
+    best = float(chance.max())
+    value = np.full((*chosen.shape, chance.shape[1]), FLOOR)
+    value[chosen] = np.maximum(chance - best, FLOOR)
+    inside = np.flatnonzero(chosen.any(axis=0))
+    first, last = max(int(inside[0]) - 1, 0), min(int(inside[-1]) + 1, logs.size - 1)
+    step = logs[1] - logs[0]
+    place = np.arange(0.0, last - first, FINE / step)
+    low = first + np.minimum(place.astype(np.int64), last - first - 1)
+    s = (place - (low - first))[None, :, None]
+    a, b, c, d = (value[:, np.clip(low + i, 0, logs.size - 1)] for i in (-1, 0, 1, 2))
     cubic = b + 0.5 * s * (c - a + s * (2.0 * a - 5.0 * b + 4.0 * c - d + s * (3.0 * (b - c) + d - a)))
-    weight = np.exp(np.minimum(cubic, 5.0))
-    return fine, weight / weight.sum()
+    weight = np.exp(np.minimum(cubic, MOST_OVER)).sum(axis=(0, 2))
+    total = float(weight.sum())
+    return logs[first] + place * step, weight / total, best + math.log(total * FINE / step)

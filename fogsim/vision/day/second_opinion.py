@@ -13,6 +13,10 @@ from fogsim.vision.day.day_fit import fit_day
 from fogsim.vision.day.verdict import CALIBRATION_DEVIATION, WIDEST, DayVerdict, agree, verdict_of
 from fogsim.vision.lines.horizon import Horizon
 
+POSSIBLY, MOSTLY = 0.35, 0.6
+"""Probabilities of a wet road or local tone mapping from which on an estimate that knows neither is widened, and given
+up where the day model has no answer [-]."""
+
 PERIOD = 5.0
 """Time after which an estimate that has been agreed with is looked at again [s]."""
 
@@ -63,18 +67,32 @@ class SecondOpinion:
 
 
 def _chosen(own: Estimate, verdict: DayVerdict) -> Estimate:
-    if verdict.is_outside or not own.valid:
+    if not own.valid or (verdict.outside > MOSTLY and verdict.reason):
         return _of_day(own, verdict)
-    if not verdict.is_sure or verdict.reason or agree(own.visibility_interval, verdict.interval):
+    if not verdict.is_sure or verdict.reason:
         return own
-    dense = max(own.extinction + NORMAL_90_PERCENT * own.standard_deviation, verdict.most)
-    thin = max(min(own.extinction - NORMAL_90_PERCENT * own.standard_deviation, verdict.least), 0.0)
+    if verdict.outside > POSSIBLY:
+        low, high = verdict.interval
+        return _spanning(own, own.extinction, verdict) if low < own.visibility < high else _of_day(own, verdict)
+    if agree(own.visibility_interval, verdict.interval):
+        return own
+    return _spanning(own, 0.5 * (own.extinction + verdict.extinction), verdict)
+
+
+def _spanning(own: Estimate, middle: float, verdict: DayVerdict) -> Estimate:
+    """Return an estimate whose interval holds those of both, or none if that says nothing."""
+    thin, dense = _ends(own)
+    thin, dense = max(min(thin, verdict.least), 0.0), max(dense, verdict.most)
     if dense > WIDEST * thin:
-        return Estimate.invalid(
-            own.method, "what is seen of the road and how it brightens do not agree on the fog", **_found(own)
-        )
-    middle, half = 0.5 * (dense + thin), 0.5 * (dense - thin) / NORMAL_90_PERCENT
+        return Estimate.invalid(own.method, "how the road fades and how its image brightens disagree", **_found(own))
+    middle = min(max(middle, thin), dense)
+    half = max(dense - middle, middle - thin) / NORMAL_90_PERCENT
     return replace(own, extinction=middle, standard_deviation=half, optical_depths=None, denser=None)
+
+
+def _ends(own: Estimate) -> tuple[float, float]:
+    half = NORMAL_90_PERCENT * own.standard_deviation
+    return own.extinction - half, own.extinction + half
 
 
 def _of_day(own: Estimate, verdict: DayVerdict) -> Estimate:

@@ -26,9 +26,8 @@ USUAL_SURFACES, LEAST_USUAL, LEAST_SKY = 3, 0.8, 0.5
 """How many of the surfaces, from the first on, are roads that nothing hides or shades, and least probabilities of those
 and of a sky that is the airlight's, for a posterior that counts against another method [-]."""
 
-OUTSIDE, SURELY_OUTSIDE = 0.35, 35.0
-"""Probability of a wet road or local tone mapping from which on methods that know neither are not believed [-], and
-least logarithm of the evidence of a road for that [-]."""
+OUTSIDE_A_ROAD = 35.0
+"""Logarithm of the evidence of a road over that of none from which on a wet one or local tone mapping counts [-]."""
 
 HARDLY_STATED = 0.05
 """Probability of the stated response below which the camera has another one [-]."""
@@ -57,8 +56,9 @@ class DayVerdict:
         Why it is no answer; empty if it is.
     is_sure : bool
         Whether it counts against another method: a road under a sky, neither hidden nor in shade.
-    is_outside : bool
-        Whether the image shows what the joint fit does not know: a wet road or local tone mapping.
+    outside : float
+        Probability that the image shows what the joint fit does not know, a wet road or local tone mapping; 0 where
+        the road is not sure [-].
     """
 
     extinction: float
@@ -66,7 +66,7 @@ class DayVerdict:
     interval: tuple[float, float]
     reason: str
     is_sure: bool
-    is_outside: bool
+    outside: float
 
     @property
     def most(self) -> float:
@@ -111,7 +111,7 @@ def verdict_of(fit: DayFit) -> DayVerdict:
         interval=(low, math.inf if is_clear else high),
         reason="" if answers and is_road else _reason(fit, is_road, sky),
         is_sure=is_sure,
-        is_outside=is_sure and outside > OUTSIDE and fit.fog_over_none > SURELY_OUTSIDE,
+        outside=outside if is_sure and fit.fog_over_none > OUTSIDE_A_ROAD else 0.0,
     )
 
 

@@ -69,7 +69,7 @@ class SecondOpinion:
 def _chosen(own: Estimate, verdict: DayVerdict) -> Estimate:
     if not own.valid or (verdict.outside > MOSTLY and verdict.reason):
         return _of_day(own, verdict)
-    if not verdict.is_sure or verdict.reason:
+    if not (verdict.is_sure and verdict.is_even) or verdict.reason:
         return own
     if verdict.outside > POSSIBLY:
         low, high = verdict.interval

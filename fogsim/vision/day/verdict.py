@@ -22,14 +22,14 @@ WIDEST = 4.0
 A_ROAD, SURELY_A_ROAD = math.log(10.0), 20.0
 """Logarithms of the evidence of a road over that of none from which on there is one, and surely is [-]."""
 
-USUAL_SURFACES, LEAST_USUAL, LEAST_SKY = 3, 0.8, 0.5
-"""How many of the surfaces, from the first on, are roads that nothing hides or shades, and least probabilities of those
-and of a sky that is the airlight's, for a posterior that counts against another method [-]."""
+EVEN_SURFACES, USUAL_SURFACES, LEAST_USUAL, LEAST_SKY = 2, 3, 0.8, 0.5
+"""How many of the surfaces, from the first on, are even roads, and roads that nothing hides or shades; least probability
+of those, and of a sky that is the airlight's, for a posterior to be believed [-]."""
 
 OUTSIDE_A_ROAD = 35.0
 """Logarithm of the evidence of a road over that of none from which on a wet one or local tone mapping counts [-]."""
 
-HARDLY_STATED = 0.05
+HARDLY_STATED = 0.03
 """Probability of the stated response below which the camera has another one [-]."""
 
 LEAST_CONTRAST = 0.08
@@ -56,6 +56,8 @@ class DayVerdict:
         Why it is no answer; empty if it is.
     is_sure : bool
         Whether it counts against another method: a road under a sky, neither hidden nor in shade.
+    is_even : bool
+        Whether the road is as even as roads mostly are.
     outside : float
         Probability that the image shows what the joint fit does not know, a wet road or local tone mapping; 0 where
         the road is not sure [-].
@@ -66,6 +68,7 @@ class DayVerdict:
     interval: tuple[float, float]
     reason: str
     is_sure: bool
+    is_even: bool
     outside: float
 
     @property
@@ -105,13 +108,16 @@ def verdict_of(fit: DayFit) -> DayVerdict:
     is_road = fit.fog_over_none > A_ROAD
     sky = float(by_light[LIGHTS.sky == 1].sum())
     is_sure = fit.fog_over_none > SURELY_A_ROAD and usual > LEAST_USUAL and sky > LEAST_SKY
+    is_sure = is_sure and fit.responses[0] > HARDLY_STATED
+    is_even = float(fit.surfaces[:EVEN_SURFACES].sum()) > LEAST_USUAL
     return DayVerdict(
         extinction=0.5 * (dense + thin),
         deviation=0.5 * (dense - thin) / NORMAL_90_PERCENT,
         interval=(low, math.inf if is_clear else high),
         reason="" if answers and is_road else _reason(fit, is_road, sky),
         is_sure=is_sure,
-        outside=outside if is_sure and fit.fog_over_none > OUTSIDE_A_ROAD else 0.0,
+        is_even=is_even,
+        outside=outside if is_sure and is_even and fit.fog_over_none > OUTSIDE_A_ROAD else 0.0,
     )
 
 

@@ -138,7 +138,7 @@ def _weighed(rows: RowData, camera: Camera, horizon: Horizon) -> DayFit:
     prior = of_horizon[:, None] + likely
     # A first look, at all cells by the likeliest hypotheses, and by others at some.
     whole = grid.evidence(cells.reshape(-1, 2), np.zeros((1, 2), np.int64), ALL).reshape(*cells.shape[:2], -1)
-    none = float(np.logaddexp.reduce(whole[:, 0, LIGHTS.sky.size] + of_horizon))
+    none = float(np.logaddexp(np.logaddexp.reduce(whole[:, 0, LIGHTS.sky.size] + of_horizon), rows.none))
     whole = np.delete(whole, LIGHTS.sky.size, axis=2) + lights + prior[:, :, None]
     of_light = np.logaddexp.reduce(whole, axis=(0, 1))
     end = int(np.argmax(of_light[LIGHTS.sky.size :])) if rows.cuts.size > 2 else 0
@@ -166,7 +166,7 @@ def _weighed(rows: RowData, camera: Camera, horizon: Horizon) -> DayFit:
     return DayFit(
         log_visibility=fine,
         chance=posterior,
-        fog_over_none=evidence - none - float(responses[0]),
+        fog_over_none=evidence - none,
         responses=np.bincount(pairs[:, 0], weight, responses.size),
         surfaces=np.bincount(pairs[:, 1], weight, surfaces.size),
         lights=np.bincount(kept, _shares(each), LIGHTS.sky.size),

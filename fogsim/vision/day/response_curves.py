@@ -26,7 +26,8 @@ OTHERS = {
     "s 1": 0.07,
     "knee .8": 0.1,
     "knee 2.2": 0.06,
-    "film": 0.07,
+    "film 1": 0.06,
+    "film 2": 0.05,
     "2.5": 0.08,
     "1.8": 0.05,
 }
@@ -86,7 +87,8 @@ def _inverse(name: str, signal: Floats) -> Floats:
         bent = (1.0 - np.exp(-float(number) * light)) / (1.0 - np.exp(-float(number)))
         out = respond(bent, Response.SRGB)
     elif kind == "film":
-        bent = light * (2.51 * light + 0.03) / (light * (2.43 * light + 0.59) + 0.14)
+        gained = float(number) * light
+        bent = gained * (2.51 * gained + 0.03) / (gained * (2.43 * gained + 0.59) + 0.14)
         out = respond(bent / bent[-1], Response.SRGB)
     elif kind == "linear":
         out = light

@@ -64,6 +64,7 @@ def read_rows(image: NDArray[Any], bins: RowBins, camera: Camera, horizon: float
     level = np.quantile(light, BRIGHTEST, axis=1)
     contrast = np.stack([across, CONTRAST_NOISE * np.hypot(1.5 * noise, 1.5 / 255.0)]) * slope[0] / level[0]
     cuts = _cuts(bins, camera, horizon)
+    free = _free(signal, noise, clipped)
     return RowData(
         first=bins.first.astype(np.float64),
         last=bins.last.astype(np.float64),
@@ -75,7 +76,8 @@ def read_rows(image: NDArray[Any], bins: RowBins, camera: Camera, horizon: float
         least_airlight=light[:, clipped].min(axis=1) if clipped.any() else np.zeros(len(light)),
         contrast=contrast,
         cuts=cuts,
-        free=_free(signal, noise, clipped)[cuts],
+        free=free[cuts],
+        none=float(free[0]),
     )
 
 

@@ -67,6 +67,8 @@ class RowData(NamedTuple):
         Bins before which the road ends, the first being the first bin below the horizon, the last n.
     free : (c,) float64
         Evidence of the signals of the bins from each cut on by a law of no road.
+    none : float
+        The same of all bins, the sky's too.
     """
 
     first: Floats
@@ -80,6 +82,7 @@ class RowData(NamedTuple):
     contrast: Floats
     cuts: NDArray[np.int64]
     free: Floats
+    none: float
 
 
 @kernel

@@ -26,8 +26,11 @@ EVEN_SURFACES, USUAL_SURFACES, LEAST_USUAL, LEAST_SKY = 2, 3, 0.8, 0.5
 """How many of the surfaces, from the first on, are even roads, and roads that nothing hides or shades; least probability
 of those, and of a sky that is the airlight's, for a posterior to be believed [-]."""
 
-OUTSIDE_A_ROAD = 35.0
-"""Logarithm of the evidence of a road over that of none from which on a wet one or local tone mapping counts [-]."""
+CLIPPING = 0.4
+"""Probability that the airlight is not even, where a clipped sky does not show it [-]."""
+
+DENSEST = 13.5
+"""Least lower end of an interval that is believed [m]: what is no road at all looks like denser fog."""
 
 HARDLY_STATED = 0.03
 """Probability of the stated response below which the camera has another one [-]."""
@@ -59,8 +62,8 @@ class DayVerdict:
     is_even : bool
         Whether the road is as even as roads mostly are.
     outside : float
-        Probability that the image shows what the joint fit does not know, a wet road or local tone mapping; 0 where
-        the road is not sure [-].
+        Probability that the image shows what the joint fit does not know, a wet road, local tone mapping or clipped
+        airlight that is not even; 0 where the road is not sure [-].
     """
 
     extinction: float
@@ -103,12 +106,12 @@ def verdict_of(fit: DayFit) -> DayVerdict:
     dense, thin = extinction_from_visibility(low), 0.0 if is_clear else extinction_from_visibility(high)
     by_light = fit.lights
     usual = float(fit.surfaces[:USUAL_SURFACES].sum())
-    outside = float(by_light[LIGHTS.is_unusual].sum())
+    outside = max(float(by_light[LIGHTS.is_unusual].sum()), CLIPPING if fit.clipped > 0.0 else 0.0)
     answers = is_clear or (fit.below(FOG) > LEAST_FOG and high < WIDEST * low)
     is_road = fit.fog_over_none > A_ROAD
     sky = float(by_light[LIGHTS.sky == 1].sum())
     is_sure = fit.fog_over_none > SURELY_A_ROAD and usual > LEAST_USUAL and sky > LEAST_SKY
-    is_sure = is_sure and fit.responses[0] > HARDLY_STATED
+    is_sure = is_sure and low > DENSEST
     is_even = float(fit.surfaces[:EVEN_SURFACES].sum()) > LEAST_USUAL
     return DayVerdict(
         extinction=0.5 * (dense + thin),
@@ -117,7 +120,7 @@ def verdict_of(fit: DayFit) -> DayVerdict:
         reason="" if answers and is_road else _reason(fit, is_road, sky),
         is_sure=is_sure,
         is_even=is_even,
-        outside=outside if is_sure and is_even and fit.fog_over_none > OUTSIDE_A_ROAD else 0.0,
+        outside=outside if is_sure and is_even else 0.0,
     )
 
 

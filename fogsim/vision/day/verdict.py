@@ -19,8 +19,9 @@ end of an answer with one [m]."""
 WIDEST = 4.0
 """Most ratio of the ends of an answer [-]."""
 
-A_ROAD, SURELY_A_ROAD = math.log(10.0), 20.0
-"""Logarithms of the evidence of a road over that of none from which on there is one, and surely is [-]."""
+A_ROAD, LIKELY_A_ROAD, SURELY_A_ROAD = math.log(10.0), 10.0, 20.0
+"""Logarithms of the evidence of a road over that of none from which on there is one, it is believed where another
+method has no answer, and against another one's [-]."""
 
 EVEN_SURFACES, USUAL_SURFACES, LEAST_USUAL, LEAST_SKY = 2, 3, 0.8, 0.5
 """How many of the surfaces, from the first on, are even roads, and roads that nothing hides or shades; least probability
@@ -60,7 +61,7 @@ class DayVerdict:
     is_sure : bool
         Whether it counts against another method: a road under a sky, neither hidden nor in shade.
     is_even : bool
-        Whether the road is as even as roads mostly are.
+        Whether the road is surely one, and as even as roads mostly are.
     outside : float
         Probability that the image shows what the joint fit does not know, a wet road, local tone mapping or clipped
         airlight that is not even; 0 where the road is not sure [-].
@@ -110,9 +111,10 @@ def verdict_of(fit: DayFit) -> DayVerdict:
     answers = is_clear or (fit.below(FOG) > LEAST_FOG and high < WIDEST * low)
     is_road = fit.fog_over_none > A_ROAD
     sky = float(by_light[LIGHTS.sky == 1].sum())
-    is_sure = fit.fog_over_none > SURELY_A_ROAD and usual > LEAST_USUAL and sky > LEAST_SKY
+    is_sky = sky > LEAST_SKY or fit.clipped > 0.0
+    is_sure = fit.fog_over_none > LIKELY_A_ROAD and usual > LEAST_USUAL and is_sky
     is_sure = is_sure and low > DENSEST
-    is_even = float(fit.surfaces[:EVEN_SURFACES].sum()) > LEAST_USUAL
+    is_even = fit.fog_over_none > SURELY_A_ROAD and float(fit.surfaces[:EVEN_SURFACES].sum()) > LEAST_USUAL
     return DayVerdict(
         extinction=0.5 * (dense + thin),
         deviation=0.5 * (dense - thin) / NORMAL_90_PERCENT,

@@ -1,7 +1,7 @@
 """How dense the fog is by the day model: its posterior over visibility, horizon and hypotheses, for one image."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from fogsim.vision.day.hypotheses import CUT_CHANCE, LIGHTS, SURFACES, lights_ch
 from fogsim.vision.day.response_curves import curves_of
 from fogsim.vision.day.row_bins import row_bins
 from fogsim.vision.day.row_data import read_rows
-from fogsim.vision.day.row_kernels import AIRLIGHT, RowData, evidence_grid
+from fogsim.vision.day.row_kernels import AIRLIGHT, COLUMNS, RowData, contrast_across, evidence_grid, fill_columns
 from fogsim.vision.lines.horizon import Horizon
 
 Floats = NDArray[np.float64]
@@ -66,12 +66,13 @@ class DayFit:
         Probabilities of the hypotheses.
     clipped : float
         Share of the sky's bins that are clipped [-].
-    end : float
-        Last row of road, above a bonnet or a dashboard.
     brightest : float
         Light that hardly any bin exceeds, over full scale [-].
     contrast : float
         How much brighter the far road is than the near one, over the sky [-].
+    doubt : float
+        How much contrast across the road speaks against the extinction that another method claims, in logarithms of
+        chances [-].
     """
 
     log_visibility: Floats
@@ -83,7 +84,7 @@ class DayFit:
     clipped: float
     brightest: float
     contrast: float
-    end: float
+    doubt: float = 0.0
 
     def quantile(self, share: float) -> float:
         """Visibility below which the truth lies with a probability [m].
@@ -106,7 +107,9 @@ class DayFit:
         return float(self.chance[self.log_visibility < math.log(visibility)].sum())
 
 
-def fit_day(image: NDArray[Any], camera: Camera, horizon: Horizon, free: float = math.inf) -> DayFit:
+def fit_day(
+    image: NDArray[Any], camera: Camera, horizon: Horizon, free: float = math.inf, claimed: float = 0.0
+) -> DayFit:
     """Weigh all hypotheses by their evidence.
 
     Parameters
@@ -119,13 +122,15 @@ def fit_day(image: NDArray[Any], camera: Camera, horizon: Horizon, free: float =
         What is known of the horizon.
     free : float
         Depth up to which the own lane is free of the vehicle ahead [m].
+    claimed : float
+        Extinction that another method claims, of which contrast across the road is asked [1/m].
     """
     pixels = image if image.ndim == 3 else image[:, :, None]
     bins = row_bins(camera, horizon.standard_deviation, round(horizon.row))
     rows = read_rows(pixels, bins, camera, horizon.row)
     if math.isfinite(free):
         rows = _without_vehicle(rows, camera, horizon.row, free)
-    return _weighed(rows, camera, horizon)
+    return replace(_weighed(rows, camera, horizon), doubt=_doubt(rows, camera, horizon, claimed))
 
 
 def _weighed(rows: RowData, camera: Camera, horizon: Horizon) -> DayFit:
@@ -170,7 +175,6 @@ def _weighed(rows: RowData, camera: Camera, horizon: Horizon) -> DayFit:
         responses=np.bincount(pairs[:, 0], weight, responses.size),
         surfaces=np.bincount(pairs[:, 1], weight, surfaces.size),
         lights=np.bincount(kept, _shares(each), LIGHTS.sky.size),
-        end=float(rows.last[-1]),
         clipped=float(np.mean(sky <= 0.0)) if sky.size else 0.0,
         brightest=float(rows.level[0]),
         contrast=float(rows.light[0, rows.cuts[0] :].max() - rows.light[0, -1]) / float(rows.level[0]),
@@ -207,7 +211,7 @@ class _Grid:
 
     def __init__(self, rows: RowData, camera: Camera, horizon: float, shift: float) -> None:
         self._rows, self._shift = rows, shift
-        self._lens = np.array([camera.focal_length, camera.mount_height, camera.principal_point[1]])
+        self._lens = _lens_of(camera)
         self._surfaces = np.column_stack([SURFACES.albedo, SURFACES.hidden])
         step = camera.focal_length * camera.mount_height / max(_step(rows) - horizon, 1.0)
         self._surfaces[np.isnan(self._surfaces)] = step
@@ -253,6 +257,21 @@ def _ended(rows: RowData, cut: int) -> RowData:
         cuts=np.array([rows.cuts[0], end]),
         free=np.array([rows.free[0] - rows.free[cut], 0.0]),
     )
+
+
+def _doubt(rows: RowData, camera: Camera, horizon: Horizon, extinction: float) -> float:
+    """How much contrast across the road speaks against an extinction, at the horizon that suits it best."""
+    columns, place = np.empty((rows.first.size, COLUMNS)), np.empty((rows.first.size, 5))
+    logs = []
+    for row in horizon.row + horizon.standard_deviation * np.array([-1.0, 0.0, 1.0]):
+        fill_columns(rows.first, rows.last, float(row), _lens_of(camera), extinction, math.inf, columns, place)
+        logs.append(contrast_across(rows.contrast, place, int((rows.last + 0.5 <= row).sum())))
+    return -max(logs)
+
+
+def _lens_of(camera: Camera) -> Floats:
+    """(3,) float64: what `fill_columns` takes of a camera."""
+    return np.array([camera.focal_length, camera.mount_height, camera.principal_point[1]])
 
 
 def _horizons(rows: RowData, horizon: Horizon) -> tuple[Floats, Floats]:

@@ -17,6 +17,9 @@ POSSIBLY, MOSTLY = 0.35, 0.6
 """Probabilities of a wet road or local tone mapping from which on an estimate that knows neither is widened, and given
 up where the day model has no answer [-]."""
 
+MOST_DOUBT = 15.0
+"""Doubt by contrast across the road from which on an estimate is given up [-]."""
+
 PERIOD = 5.0
 """Time after which an estimate that has been agreed with is looked at again [s]."""
 
@@ -60,13 +63,16 @@ class SecondOpinion:
         """
         if own.valid and (not is_straight or self._agreed < time < self._agreed + PERIOD):
             return _with_calibration(own)
-        verdict = verdict_of(fit_day(np.ascontiguousarray(level), self._camera, horizon, free))
+        verdict = verdict_of(fit_day(np.ascontiguousarray(level), self._camera, horizon, free, max(_ends(own)[0], 0.0)))
         chosen = _chosen(own, verdict)
         self._agreed = time if chosen is own else -math.inf
         return _with_calibration(chosen) if chosen is own and own.valid else chosen
 
 
 def _chosen(own: Estimate, verdict: DayVerdict) -> Estimate:
+    if own.valid and verdict.doubt > MOST_DOUBT:
+        reason = "contrast survives where the fog that the road's brightness shows would leave none"
+        return Estimate.invalid(own.method, reason, **_found(own))
     if not own.valid or (verdict.outside > MOSTLY and verdict.reason):
         return _of_day(own, verdict)
     if not (verdict.is_sure and verdict.is_even) or verdict.reason:
@@ -91,7 +97,7 @@ def _spanning(own: Estimate, middle: float, verdict: DayVerdict) -> Estimate:
 
 
 def _ends(own: Estimate) -> tuple[float, float]:
-    half = NORMAL_90_PERCENT * own.standard_deviation
+    half = NORMAL_90_PERCENT * own.standard_deviation if own.valid else 0.0
     return own.extinction - half, own.extinction + half
 
 

@@ -65,6 +65,8 @@ class DayVerdict:
     outside : float
         Probability that the image shows what the joint fit does not know, a wet road, local tone mapping or clipped
         airlight that is not even; 0 where the road is not sure [-].
+    doubt : float
+        See `DayFit`.
     """
 
     extinction: float
@@ -74,6 +76,7 @@ class DayVerdict:
     is_sure: bool
     is_even: bool
     outside: float
+    doubt: float
 
     @property
     def most(self) -> float:
@@ -123,6 +126,7 @@ def verdict_of(fit: DayFit) -> DayVerdict:
         is_sure=is_sure,
         is_even=is_even,
         outside=outside if is_sure and is_even else 0.0,
+        doubt=fit.doubt,
     )
 
 

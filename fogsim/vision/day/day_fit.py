@@ -35,8 +35,9 @@ HORIZON_SHARE = 0.6
 SHARP = 0.03
 """Change of the signal within four rows from which on the horizon is where it is steepest, as one more choice [-]."""
 
-WORTHWHILE = 10.0
-"""Logarithm of the evidence below the best at which a visibility is not tried under other hypotheses [-]."""
+FIRST_WORTHWHILE, WORTHWHILE = 14.0, 10.0
+"""Logarithms of the evidence below the best at which a visibility is not tried under other horizons and surfaces, and
+under other responses [-]."""
 
 FINE = 0.01
 """Step of the posterior [ln m]."""
@@ -135,35 +136,39 @@ def fit_day(
 
 def _weighed(rows: RowData, camera: Camera, horizon: Horizon) -> DayFit:
     responses, surfaces = np.log(curves_of(camera).chance), np.log(SURFACES.chance)
-    lights = np.log(np.append(lights_chances(rows.cuts.size - 2), [CUT_CHANCE] * (rows.cuts.size - 2)))
+    ends = rows.cuts.size - 2
+    lights = np.log(np.append(lights_chances(ends), [CUT_CHANCE] * ends))
     logs, extinctions, likely = _visibilities()
     at, of_horizon = _horizons(rows, horizon)
     grid = _Grid(rows, camera, horizon.row, HORIZON_SHARE * horizon.standard_deviation)
     cells = np.stack(np.meshgrid(at, extinctions, indexing="ij"), axis=-1)
     prior = of_horizon[:, None] + likely
-    # A first look, at all cells by the likeliest hypotheses, and by others at some.
-    whole = grid.evidence(cells.reshape(-1, 2), np.zeros((1, 2), np.int64), ALL).reshape(*cells.shape[:2], -1)
-    none = float(np.logaddexp(np.logaddexp.reduce(whole[:, 0, LIGHTS.sky.size] + of_horizon), rows.none))
-    whole = np.delete(whole, LIGHTS.sky.size, axis=2) + lights + prior[:, :, None]
-    of_light = np.logaddexp.reduce(whole, axis=(0, 1))
-    end = int(np.argmax(of_light[LIGHTS.sky.size :])) if rows.cuts.size > 2 else 0
-    if rows.cuts.size > 2 and of_light[LIGHTS.sky.size + end] > of_light[: LIGHTS.sky.size].max():
-        return _weighed(_ended(rows, end + 1), camera, horizon)
-    first = np.logaddexp.reduce(whole, axis=2)
-    kept = np.flatnonzero(of_light[: LIGHTS.sky.size] > of_light.max() - SUITS)
-    some = np.logaddexp.reduce(grid.evidence(cells[1, ::2], OTHERS, kept) + lights[kept], axis=2)
-    some += prior[1, ::2, None]
-    chosen = _worthwhile(first, some.max(axis=1))
-    # Where fog may be, all surfaces, and all responses over the surfaces that suit.
-    places, before = cells[chosen], prior[chosen][:, None]
+    # A first look, at every second visibility under the middle horizon.
+    whole = grid.evidence(np.concatenate([cells[1, ::2], cells[:, 0]]), USUAL, ALL)[:, 0]
+    none = float(np.logaddexp(np.logaddexp.reduce(whole[-at.size :, ALL.size] + of_horizon), rows.none))
+    whole = np.delete(whole[: -at.size], ALL.size, axis=1) + lights
+    of_light = np.logaddexp.reduce(whole + likely[::2, None], axis=0)
+    if ends and of_light[ALL.size :].max() > of_light[: ALL.size].max():
+        return _weighed(_ended(rows, 1 + int(np.argmax(of_light[ALL.size :]))), camera, horizon)
+    kept = np.flatnonzero(of_light[: ALL.size] > of_light.max() - SUITS)
+    some = np.logaddexp.reduce(grid.evidence(cells[1, ::2], OTHERS, kept) + lights[kept], axis=2).max(axis=1)
+    some = np.maximum(some, np.logaddexp.reduce(whole, axis=1)) + likely[::2]
+    chosen = np.zeros(prior.shape, np.bool_)
+    chosen[:, ::2] = some > some.max() - FIRST_WORTHWHILE
+    chosen = _wider(chosen, 2)
+    # Where fog may be, all surfaces; where it still may be, all responses over the surfaces that suit.
     tried = [(0, s) for s in range(surfaces.size)]
-    found = [grid.evidence(places, np.array(tried), kept) + lights[kept]]
-    of_surface = np.logaddexp.reduce(found[0] + (before + surfaces)[:, :, None], axis=(0, 2))
+    found = _scattered(grid.evidence(cells[chosen], np.array(tried), kept) + lights[kept], chosen)
+    found += (prior[:, :, None] + surfaces)[:, :, :, None]
+    good = np.logaddexp.reduce(found, axis=(2, 3))
+    chosen &= _wider(good > good.max() - WORTHWHILE, 1)
+    of_surface = np.logaddexp.reduce(found[chosen], axis=(0, 2))
     suit = [s for s in range(surfaces.size) if of_surface[s] > of_surface.max() - SUITS]
     others = [(r, s) for s in suit for r in range(1, responses.size)]
-    found.append(grid.evidence(places, np.array(others), kept) + lights[kept])
     pairs = np.array(tried + others)
-    each = np.concatenate(found, axis=1) + (responses[pairs[:, 0]] + surfaces[pairs[:, 1]] + before)[:, :, None]
+    each = grid.evidence(cells[chosen], np.array(others), kept) + lights[kept] + prior[chosen][:, None, None]
+    each += surfaces[pairs[len(tried) :, 1]][:, None]
+    each = np.concatenate([found[chosen], each], axis=1) + responses[pairs[:, 0]][:, None]
     chance = np.logaddexp.reduce(each, axis=2)
     fine, posterior, evidence = _interpolated(logs, chosen, chance)
     weight = np.exp(chance - np.logaddexp.reduce(chance, axis=None)).sum(axis=0)
@@ -174,11 +179,27 @@ def _weighed(rows: RowData, camera: Camera, horizon: Horizon) -> DayFit:
         fog_over_none=evidence - none,
         responses=np.bincount(pairs[:, 0], weight, responses.size),
         surfaces=np.bincount(pairs[:, 1], weight, surfaces.size),
-        lights=np.bincount(kept, _shares(each), LIGHTS.sky.size),
+        lights=np.bincount(kept, _shares(each), ALL.size),
         clipped=float(np.mean(sky <= 0.0)) if sky.size else 0.0,
         brightest=float(rows.level[0]),
         contrast=float(rows.light[0, rows.cuts[0] :].max() - rows.light[0, -1]) / float(rows.level[0]),
     )
+
+
+def _wider(cells: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
+    """(h, v) bool: cells, and those at so many visibilities to either side."""
+    wide = cells.copy()
+    for step in range(1, steps + 1):
+        wide[:, step:] |= cells[:, :-step]
+        wide[:, :-step] |= cells[:, step:]
+    return wide
+
+
+def _scattered(values: Floats, chosen: NDArray[np.bool_]) -> Floats:
+    """(h, v, …) float64: values of the chosen cells in the place of each; the others are unlikely."""
+    out = np.full((*chosen.shape, *values.shape[1:]), UNLIKELY)
+    out[chosen] = values
+    return out
 
 
 def _visibilities() -> tuple[Floats, Floats, Floats]:
@@ -190,6 +211,9 @@ def _visibilities() -> tuple[Floats, Floats, Floats]:
     likely[-1] = math.log(CLEAR_CHANCE)
     return logs, extinctions, likely
 
+
+USUAL = np.zeros((1, 2), np.int64)
+"""The stated response and the usual surface."""
 
 OTHERS = np.array([(0, 1), (0, 2), (0, 3), (0, 4), (0, 5), (2, 0), (4, 0)])
 """Responses and surfaces of a first look."""
@@ -300,17 +324,6 @@ def _edge(rows: RowData, horizon: Horizon) -> float | None:
     step = float(middle[place] - middle[place - 1])
     edge = float(middle[place - 2]) + (0.5 + inside) * step
     return edge if abs(edge - horizon.row) < 3.0 * horizon.standard_deviation else None
-
-
-def _worthwhile(first: Floats, some: Floats) -> NDArray[np.bool_]:
-    """(h, v) bool: where fog may be, after a first look at all cells, and at every second visibility by others."""
-    best = max(first.max(), some.max())
-    good = first > best - WORTHWHILE
-    good[:, ::2] |= some > best - WORTHWHILE
-    wider = good.copy()
-    wider[:, 1:] |= good[:, :-1]
-    wider[:, :-1] |= good[:, 1:]
-    return np.asarray(wider)
 
 
 def _shares(each: Floats) -> Floats:

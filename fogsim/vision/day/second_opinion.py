@@ -17,7 +17,7 @@ POSSIBLY, MOSTLY = 0.35, 0.6
 """Probabilities of a wet road or local tone mapping from which on an estimate that knows neither is widened, and given
 up where the day model has no answer [-]."""
 
-MOST_DOUBT = 15.0
+MOST_DOUBT = 18.0
 """Doubt by contrast across the road from which on an estimate is given up [-]."""
 
 PERIOD = 5.0
@@ -70,28 +70,36 @@ class SecondOpinion:
 
 
 def _chosen(own: Estimate, verdict: DayVerdict) -> Estimate:
-    if own.valid and verdict.doubt > MOST_DOUBT:
-        reason = "contrast survives where the fog that the road's brightness shows would leave none"
-        return Estimate.invalid(own.method, reason, **_found(own))
-    if not own.valid or (verdict.outside > MOSTLY and verdict.reason):
+    if not own.valid:
         return _of_day(own, verdict)
-    if not (verdict.is_sure and verdict.is_even) or verdict.reason:
-        return own
+    if verdict.doubt > MOST_DOUBT:
+        return _none(own, "contrast survives where the fog that the road's brightness shows would leave none")
+    if verdict.reason:
+        return _of_day(own, verdict) if verdict.outside > MOSTLY else own
+    return _weighed(own, verdict) if verdict.is_sure and verdict.is_even else own
+
+
+def _weighed(own: Estimate, verdict: DayVerdict) -> Estimate:
+    """Weigh two answers."""
+    agreed = agree(own.visibility_interval, verdict.interval)
     if verdict.outside > POSSIBLY:
-        low, high = verdict.interval
-        return _spanning(own, own.extinction, verdict) if low < own.visibility < high else _of_day(own, verdict)
-    if agree(own.visibility_interval, verdict.interval):
+        if not verdict.interval[0] < own.visibility < verdict.interval[1]:
+            return _of_day(own, verdict)
+    elif agreed:
         return own
-    return _spanning(own, 0.5 * (own.extinction + verdict.extinction), verdict)
+    spanning = _spanning(own, own.extinction if agreed else 0.5 * (own.extinction + verdict.extinction), verdict)
+    if spanning is None and agreed:
+        thin, dense = _ends(own)
+        return own if verdict.most - verdict.least > dense - thin else _of_day(own, verdict)
+    return spanning or _none(own, "how the road fades and how its image brightens disagree")
 
 
-def _spanning(own: Estimate, middle: float, verdict: DayVerdict) -> Estimate:
-    """Return an estimate whose interval holds those of both, or none if that says nothing."""
+def _spanning(own: Estimate, middle: float, verdict: DayVerdict) -> Estimate | None:
+    """Return an estimate whose interval holds those of both, or None if that says too little."""
     thin, dense = _ends(own)
     thin, dense = max(min(thin, verdict.least), 0.0), max(dense, verdict.most)
     if dense > WIDEST * thin:
-        return Estimate.invalid(own.method, "how the road fades and how its image brightens disagree", **_found(own))
-    middle = min(max(middle, thin), dense)
+        return None
     half = max(dense - middle, middle - thin) / NORMAL_90_PERCENT
     return replace(own, extinction=middle, standard_deviation=half, optical_depths=None, denser=None)
 
@@ -105,7 +113,7 @@ def _of_day(own: Estimate, verdict: DayVerdict) -> Estimate:
     """Return the day model's answer, or why there is none."""
     if verdict.reason or not verdict.is_sure:
         reason = verdict.reason or str(own.diagnostics.get("reason", ""))
-        return Estimate.invalid(own.method, reason, **_found(own))
+        return _none(own, reason)
     return Estimate(
         own.method,
         verdict.extinction,
@@ -114,6 +122,10 @@ def _of_day(own: Estimate, verdict: DayVerdict) -> Estimate:
         reach=verdict.reach,
         common_deviation=CALIBRATION_DEVIATION,
     )
+
+
+def _none(own: Estimate, reason: str) -> Estimate:
+    return Estimate.invalid(own.method, reason, **_found(own))
 
 
 def _found(own: Estimate) -> dict[str, object]:

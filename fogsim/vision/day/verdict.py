@@ -24,8 +24,8 @@ A_ROAD, LIKELY_A_ROAD, SURELY_A_ROAD = math.log(10.0), 10.0, 20.0
 method has no answer, and against another one's [-]."""
 
 EVEN_SURFACES, USUAL_SURFACES, LEAST_USUAL, LEAST_SKY = 2, 3, 0.8, 0.5
-"""How many of the surfaces, from the first on, are even roads, and roads that nothing hides or shades; least probability
-of those, and of a sky that is the airlight's, for a posterior to be believed [-]."""
+"""How many of the surfaces, from the first on, are even roads, and roads that nothing hides or shades; least
+probability of those, and of a sky that is the airlight's, for a posterior to be believed [-]."""
 
 CLIPPING = 0.4
 """Probability that the airlight is not even, where a clipped sky does not show it [-]."""
@@ -61,7 +61,7 @@ class DayVerdict:
     is_sure : bool
         Whether it counts against another method: a road under a sky, neither hidden nor in shade.
     is_even : bool
-        Whether the road is surely one, and as even as roads mostly are.
+        Whether the road is surely one, as even as roads mostly are, and the response may be the stated one.
     outside : float
         Probability that the image shows what the joint fit does not know, a wet road, local tone mapping or clipped
         airlight that is not even; 0 where the road is not sure [-].
@@ -117,7 +117,8 @@ def verdict_of(fit: DayFit) -> DayVerdict:
     is_sky = sky > LEAST_SKY or fit.clipped > 0.0
     is_sure = fit.fog_over_none > LIKELY_A_ROAD and usual > LEAST_USUAL and is_sky
     is_sure = is_sure and low > DENSEST
-    is_even = fit.fog_over_none > SURELY_A_ROAD and float(fit.surfaces[:EVEN_SURFACES].sum()) > LEAST_USUAL
+    even = float(fit.surfaces[:EVEN_SURFACES].sum())
+    is_even = fit.fog_over_none > SURELY_A_ROAD and even > LEAST_USUAL and fit.responses[0] > HARDLY_STATED
     return DayVerdict(
         extinction=0.5 * (dense + thin),
         deviation=0.5 * (dense - thin) / NORMAL_90_PERCENT,

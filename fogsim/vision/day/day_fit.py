@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
+from fogsim.vision.day.evidence_kernels import evidence_grid
 from fogsim.vision.day.hypotheses import CUT_CHANCE, LIGHTS, SURFACES, lights_chances
 from fogsim.vision.day.response_curves import curves_of
 from fogsim.vision.day.row_bins import row_bins
 from fogsim.vision.day.row_data import read_rows
-from fogsim.vision.day.row_kernels import AIRLIGHT, COLUMNS, RowData, contrast_across, evidence_grid, fill_columns
+from fogsim.vision.day.row_kernels import AIRLIGHT, COLUMNS, RowData, contrast_across, fill_columns
 from fogsim.vision.lines.horizon import Horizon
 
 Floats = NDArray[np.float64]

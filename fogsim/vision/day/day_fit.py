@@ -178,9 +178,9 @@ def _weighed(rows: RowData, camera: Camera, horizon: Horizon) -> DayFit:
         log_visibility=fine,
         chance=posterior,
         fog_over_none=evidence - none,
-        responses=np.bincount(pairs[:, 0], weight, responses.size),
-        surfaces=np.bincount(pairs[:, 1], weight, surfaces.size),
-        lights=np.bincount(kept, _shares(each), ALL.size),
+        responses=_sums(pairs[:, 0], weight, responses.size),
+        surfaces=_sums(pairs[:, 1], weight, surfaces.size),
+        lights=_sums(kept, _shares(each), ALL.size),
         clipped=float(np.mean(sky <= 0.0)) if sky.size else 0.0,
         brightest=float(rows.level[0]),
         contrast=float(rows.light[0, rows.cuts[0] :].max() - rows.light[0, -1]) / float(rows.level[0]),
@@ -325,6 +325,11 @@ def _edge(rows: RowData, horizon: Horizon) -> float | None:
     step = float(middle[place] - middle[place - 1])
     edge = float(middle[place - 2]) + (0.5 + inside) * step
     return edge if abs(edge - horizon.row) < 3.0 * horizon.standard_deviation else None
+
+
+def _sums(which: Ints, weight: Floats, count: int) -> Floats:
+    """Sum of weights by number."""
+    return np.asarray(np.bincount(which, weight, count), np.float64)
 
 
 def _shares(each: Floats) -> Floats:

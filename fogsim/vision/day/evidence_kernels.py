@@ -82,7 +82,7 @@ def factored(
             total -= low[a, c] * right[c]
         right[a] = total / low[a, a]
         square += 2.0 * math.log(low[a, a]) - right[a] * right[a]
-    return square
+    return float(square)
 
 
 @kernel

@@ -96,4 +96,4 @@ def _inverse(name: str, signal: Floats) -> Floats:
         out = srgb
     else:
         out = light ** (1.0 / float(kind))
-    return np.interp(signal, out, light)
+    return np.asarray(np.interp(signal, out, light))

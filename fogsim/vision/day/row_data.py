@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
+from fogsim.vision.day.bin_kernels import RowBins, bin_medians
 from fogsim.vision.day.response_curves import POINTS, curves_of
-from fogsim.vision.day.row_bins import SKY_WIDTH, RowBins, bin_medians
+from fogsim.vision.day.row_bins import SKY_WIDTH
 from fogsim.vision.day.row_kernels import RowData
 
 Floats = NDArray[np.float64]

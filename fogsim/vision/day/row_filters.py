@@ -122,7 +122,7 @@ def take_in(
     for a in range(4):
         for b in range(a, 4):
             p[a, b] -= gain[a] * gain[b]
-    return variance
+    return float(variance)
 
 
 @kernel

@@ -9,9 +9,10 @@ import numpy as np
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
-from fogsim.values.estimate import DenserFog, Estimate, OpticalDepths
+from fogsim.values.estimate import NORMAL_90_PERCENT, DenserFog, Estimate, OpticalDepths
 from fogsim.values.observation import LeadMeasurement, Observation
 from fogsim.vision.day.second_opinion import SecondOpinion
+from fogsim.vision.day.verdict import WIDEST
 from fogsim.vision.light.daylight import lit_by_lamps
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.pixel_kernels import LinearPixels
@@ -54,9 +55,6 @@ MIN_AIRLIGHT = 6.0
 MIN_USED = 0.4
 """Least share of the own lane's bins, as far as it is free, that must fit [-]."""
 
-SURE_OF_FOG = 4.0
-"""Least k in its standard deviations for an estimate of dense fog [-]."""
-
 OVERCONFIDENCE = 1.6
 """By how much the fit's deviation is too small where roads and cameras are not what its model knows: verges, tracks and
 repairs in the strips, compression, soiled windscreens; measured on pictures that FogSim did not draw [-]."""
@@ -80,11 +78,6 @@ LEAST_DEVIATION = 1e-4
 DARKENS = 0.5
 """Chance of an airlight that darkens toward the road from which on the fog counts as even [-]: its law is that of a
 layer."""
-
-SUNLIT, BRIGHTENS = 0.3, 1.5
-"""Luminance of the road over the airlight's beyond which the sun lights it [-]: asphalt reflects no more of the sky's
-light. The sun's light too is reflected more at grazing angles, by a share that nobody knows, which looks like fog: so
-many times what is beyond counts as the deviation of the road's luminance along the way, relative to it [-]."""
 
 MOST_OBSTACLES = 2
 """How often what stands in the own lane is looked for anew, each time nearer."""
@@ -389,17 +382,16 @@ def _too_little_seen(uneven: UnevenFit, told: float) -> str:
     if math.isinf(told) and fit.extinction > CLEAR and uneven.reach * fit.extinction < LEAST_DEPTH:
         return "something hides all lanes, or shade lies on them"
     deviation = math.hypot(_deviation(fit), _unevenness(uneven) * fit.extinction)
-    if fit.extinction < SURE_OF_FOG * deviation and fit.extinction + 2.0 * deviation > CLEAR:
+    half = NORMAL_90_PERCENT * deviation
+    dense, thin = fit.extinction + half, fit.extinction - half
+    if dense > WIDEST * thin and dense > CLEAR:
         return "the extinction is not observable: too little road is seen"
     return ""
 
 
 def _deviation(fit: JointFit) -> float:
     """Standard deviation of the extinction, what the model leaves out included [1/m]."""
-    share = fit.road / fit.airlight
-    # A change of the road's luminance changes its contrast to the airlight, and so k, by R / (A − R) as much.
-    sunlit = BRIGHTENS * max(share - SUNLIT, 0.0) * share / max(1.0 - share, LEAST_CONTRAST)
-    model = math.hypot(MODEL_DEVIATION, sunlit) * fit.extinction
+    model = MODEL_DEVIATION * fit.extinction
     return math.hypot(OVERCONFIDENCE * fit.extinction_deviation, model, LEAST_DEVIATION)
 
 

@@ -72,6 +72,8 @@ class DayFit:
         Light that hardly any bin exceeds, over full scale [-].
     contrast : float
         How much brighter the far road is than the near one, over the sky [-].
+    response_deviation : float
+        Standard deviation of ln k among responses [-].
     doubt : float
         How much contrast across the road speaks against the extinction that another method claims, in logarithms of
         chances [-].
@@ -86,6 +88,7 @@ class DayFit:
     clipped: float
     brightest: float
     contrast: float
+    response_deviation: float
     doubt: float = 0.0
 
     def quantile(self, share: float) -> float:
@@ -183,6 +186,7 @@ def _weighed(rows: RowData, camera: Camera, horizon: Horizon) -> DayFit:
         lights=_sums(kept, _shares(each), ALL.size),
         clipped=float(np.mean(sky <= 0.0)) if sky.size else 0.0,
         brightest=float(rows.level[0]),
+        response_deviation=_apart(np.log(cells[chosen][:, 1]), chance, pairs[:, 0]),
         contrast=float(rows.light[0, rows.cuts[0] :].max() - rows.light[0, -1]) / float(rows.level[0]),
     )
 
@@ -325,6 +329,15 @@ def _edge(rows: RowData, horizon: Horizon) -> float | None:
     step = float(middle[place] - middle[place - 1])
     edge = float(middle[place - 2]) + (0.5 + inside) * step
     return edge if abs(edge - horizon.row) < 3.0 * horizon.standard_deviation else None
+
+
+def _apart(logs: Floats, chance: Floats, response: Ints) -> float:
+    """Standard deviation of the mean logarithm among responses."""
+    weight = np.exp(chance - np.logaddexp.reduce(chance, axis=None))
+    of_each = _sums(response, weight.sum(axis=0), int(response.max()) + 1)
+    means = _sums(response, (weight * logs[:, None]).sum(axis=0), of_each.size) / np.maximum(of_each, 1e-12)
+    mean = float((of_each * means).sum())
+    return math.sqrt(float((of_each * (means - mean) ** 2).sum()))
 
 
 def _sums(which: Ints, weight: Floats, count: int) -> Floats:

@@ -35,11 +35,11 @@ class SecondOpinion:
 
     def __init__(self, camera: Camera) -> None:
         self._camera = camera
-        self._agreed = -math.inf
+        self._agreed, self._response = -math.inf, 0.0
 
     def reset(self) -> None:
         """Forget all earlier frames."""
-        self._agreed = -math.inf
+        self._agreed, self._response = -math.inf, 0.0
 
     def on(
         self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float, time: float, is_straight: bool
@@ -62,11 +62,12 @@ class SecondOpinion:
             Whether the road neither bends nor sags, as the day model has it.
         """
         if own.valid and (not is_straight or self._agreed < time < self._agreed + PERIOD):
-            return _with_calibration(own)
+            return _with_calibration(own, self._response)
         verdict = verdict_of(fit_day(np.ascontiguousarray(level), self._camera, horizon, free, max(_ends(own)[0], 0.0)))
         chosen = _chosen(own, verdict)
         self._agreed = time if chosen is own else -math.inf
-        return _with_calibration(chosen) if chosen is own and own.valid else chosen
+        self._response = verdict.response_deviation if verdict.is_sure and verdict.is_even else 0.0
+        return _with_calibration(own, self._response) if chosen is own and own.valid else chosen
 
 
 def _chosen(own: Estimate, verdict: DayVerdict) -> Estimate:
@@ -132,12 +133,13 @@ def _found(own: Estimate) -> dict[str, object]:
     return {name: value for name, value in own.diagnostics.items() if name != "reason"}
 
 
-def _with_calibration(own: Estimate) -> Estimate:
-    """Add to an interval what height and focal length leave open, the same in all images of a drive."""
+def _with_calibration(own: Estimate, response: float) -> Estimate:
+    """Add to an interval what height, focal length and response leave open, the same in all images of a drive."""
     if own.extinction <= 0.0:
         return own
+    unknown = math.hypot(CALIBRATION_DEVIATION, response)
     return replace(
         own,
-        standard_deviation=math.hypot(own.standard_deviation, CALIBRATION_DEVIATION * own.extinction),
-        common_deviation=math.hypot(own.common_deviation, CALIBRATION_DEVIATION),
+        standard_deviation=math.hypot(own.standard_deviation, unknown * own.extinction),
+        common_deviation=math.hypot(own.common_deviation, unknown),
     )

@@ -65,7 +65,7 @@ class DayVerdict:
     outside : float
         Probability that the image shows what the joint fit does not know, a wet road, local tone mapping or clipped
         airlight that is not even; 0 where the road is not sure [-].
-    doubt : float
+    doubt, response_deviation : float
         See `DayFit`.
     """
 
@@ -77,6 +77,7 @@ class DayVerdict:
     is_even: bool
     outside: float
     doubt: float
+    response_deviation: float
 
     @property
     def most(self) -> float:
@@ -128,6 +129,7 @@ def verdict_of(fit: DayFit) -> DayVerdict:
         is_even=is_even,
         outside=outside if is_sure and is_even else 0.0,
         doubt=fit.doubt,
+        response_deviation=fit.response_deviation if fit.below(FOG) > LEAST_FOG else 0.0,
     )
 
 

@@ -138,6 +138,8 @@ KINDS = {
     "dirt": Kind(dirty),
     "convex sky 1": Kind(sky=convex(0.01), airlight=0.35),
     "convex sky 2": Kind(sky=convex(0.02), airlight=0.25),
+    "convex sky 3": Kind(sky=convex(0.03), airlight=0.2),
+    "overcast over dark land, clipped": Kind(sky=lambda above: 1.0 + 1.2 * above, airlight=0.85),
 }
 
 
@@ -155,3 +157,30 @@ def draw(name: str, visibility: float, seed: int) -> np.ndarray:
         linear = np.where(below < 0.0, linear * kind.sky(-below), linear)
     length = camera.mount_height / np.maximum(np.sin(np.maximum(below, 1e-4)), 1e-4)
     return kind.taken(Light(linear, below, kind.airlight * np.exp(-3.0 * length / visibility), rng))
+
+
+def views(name: str, seed: int) -> np.ndarray:
+    """Grey image of something ahead that is no lane in fog, in clear air."""
+    rng, camera = np.random.default_rng(seed + 9), CAMERA
+    v, u = np.mgrid[: camera.height, : camera.width].astype(float)
+    apart, below = np.abs(u - camera.principal_point[0]), v - camera.horizon_row
+    scene = Road(1e9, 140.0, 35.0, 105.0, 28.0, camera=replace(camera, response=Response.LINEAR), patch_contrast=0.05)
+    light = fogged(scene, *scan(scene, seed, 2)).reshape(camera.height, 2, camera.width, 2).mean(axis=(1, 3)) / 255.0
+    hills = (below < 0.0) & (below > -20.0 - 15.0 * np.sin(u / 60.0 + seed))
+    if name == "arch":
+        light = np.full(light.shape, 0.6)
+        light[(apart < 180.0) & ~((apart < rng.uniform(60, 110)) & (below > -40.0)) & (v > 60.0)] = 0.38
+        light[360:] = 0.06
+    elif name == "bonnet":
+        light = np.where(hills, 0.12, light)
+        edge = camera.height * (0.62 + 0.02 * seed) + 18.0 * (apart / 320.0) ** 2
+        shine = 0.33 - 0.25 * (v - edge) / camera.height + 0.1 * np.exp(-np.maximum(v - edge, 0.0) / 30.0)
+        light = np.where(v > edge, shine, light)
+    elif name == "tower":
+        light = np.where((apart < 70.0) & (v > 40.0), 0.25, np.where(below > 30.0, 0.12, 0.7))
+    elif name == "trees":
+        covered = (below < 2.0) & (below > -110.0 - 20.0 * np.sin(u / 40.0)) & (apart > 14.0)
+        light = np.where(covered, 0.03 + 0.02 * rng.random(light.shape), light)
+    elif name == "wall":
+        light = np.where(below < 40.0, 0.75 - 0.001 * v, 0.3 * (1.0 + 0.1 * rng.standard_normal(light.shape)))
+    return noisy(srgb(light), rng)

@@ -90,8 +90,7 @@ def _weighed(own: Estimate, verdict: DayVerdict) -> Estimate:
         return own
     spanning = _spanning(own, own.extinction if agreed else 0.5 * (own.extinction + verdict.extinction), verdict)
     if spanning is None and agreed:
-        thin, dense = _ends(own)
-        return own if verdict.most - verdict.least > dense - thin else _of_day(own, verdict)
+        return own
     return spanning or _none(own, "how the road fades and how its image brightens disagree")
 
 

@@ -16,6 +16,9 @@ FOG, LEAST_FOG, CLEAR = 2000.0, 0.95, 1000.0
 """Visibility below which there is fog [m], least probability of that for an answer with two ends [-], and least lower
 end of an answer with one [m]."""
 
+SLACK = 1.15
+"""Ratio of ends up to which intervals that have nothing in common do not contradict one another [-]."""
+
 WIDEST = 4.0
 """Most ratio of the ends of an answer [-]."""
 
@@ -112,7 +115,8 @@ def verdict_of(fit: DayFit) -> DayVerdict:
     by_light = fit.lights
     usual = float(fit.surfaces[:USUAL_SURFACES].sum())
     outside = max(float(by_light[LIGHTS.is_unusual].sum()), CLIPPING if fit.clipped > 0.0 else 0.0)
-    answers = is_clear or (fit.below(FOG) > LEAST_FOG and high < WIDEST * low)
+    shows = fit.below(FOG) > LEAST_FOG and fit.contrast > LEAST_CONTRAST
+    answers = is_clear or (shows and high < WIDEST * low)
     is_road = fit.fog_over_none > A_ROAD
     sky = float(by_light[LIGHTS.sky == 1].sum())
     is_sky = sky > LEAST_SKY or fit.clipped > 0.0
@@ -151,11 +155,11 @@ def _reason(fit: DayFit, is_road: bool, sky: float) -> str:
 
 
 def agree(one: tuple[float, float], other: tuple[float, float]) -> bool:
-    """Whether two intervals of visibility have something in common.
+    """Whether two intervals of visibility have something in common, or almost.
 
     Parameters
     ----------
     one, other : (float, float)
         Their ends [m].
     """
-    return one[0] <= other[1] and other[0] <= one[1]
+    return one[0] <= SLACK * other[1] and other[0] <= SLACK * one[1]

@@ -9,10 +9,9 @@ import numpy as np
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
-from fogsim.values.estimate import NORMAL_90_PERCENT, DenserFog, Estimate, OpticalDepths
+from fogsim.values.estimate import DenserFog, Estimate, OpticalDepths
 from fogsim.values.observation import LeadMeasurement, Observation
 from fogsim.vision.day.second_opinion import SecondOpinion
-from fogsim.vision.day.verdict import WIDEST
 from fogsim.vision.light.daylight import lit_by_lamps
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.pixel_kernels import LinearPixels
@@ -54,6 +53,9 @@ MIN_AIRLIGHT = 6.0
 
 MIN_USED = 0.4
 """Least share of the own lane's bins, as far as it is free, that must fit [-]."""
+
+SURE_OF_FOG = 4.0
+"""Least k in its standard deviations for an estimate of dense fog [-]."""
 
 OVERCONFIDENCE = 1.6
 """By how much the fit's deviation is too small where roads and cameras are not what its model knows: verges, tracks and
@@ -382,9 +384,7 @@ def _too_little_seen(uneven: UnevenFit, told: float) -> str:
     if math.isinf(told) and fit.extinction > CLEAR and uneven.reach * fit.extinction < LEAST_DEPTH:
         return "something hides all lanes, or shade lies on them"
     deviation = math.hypot(_deviation(fit), _unevenness(uneven) * fit.extinction)
-    half = NORMAL_90_PERCENT * deviation
-    dense, thin = fit.extinction + half, fit.extinction - half
-    if dense > WIDEST * thin and dense > CLEAR:
+    if fit.extinction < SURE_OF_FOG * deviation and fit.extinction + 2.0 * deviation > CLEAR:
         return "the extinction is not observable: too little road is seen"
     return ""
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
+from fogsim.vision.light.pixel_kernels import even_column
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -91,7 +92,7 @@ def bin_medians(image: NDArray[Any], bins: RowBins, channel: int, sky_end: int, 
         for a in range(rows):
             row = bins.first[i] + (2 * a + 1) * (bins.last[i] - bins.first[i] + 1) // (2 * rows)
             for b in range(columns):
-                column = bins.left[i] + (2 * b + 1) * (bins.right[i] - bins.left[i] + 1) // (2 * columns)
+                column = even_column(b, columns, bins.left[i] - 0.5, bins.right[i] + 0.5)
                 values[count] = image[row, column, channel]
                 count += 1
         seen = np.sort(values[:count])
@@ -107,7 +108,7 @@ def bin_medians(image: NDArray[Any], bins: RowBins, channel: int, sky_end: int, 
         row = (bins.first[i] + bins.last[i]) // 2
         count = min(bins.outer_right[i] - bins.outer_left[i] + 1, MOST_COLUMNS)
         for b in range(count):
-            column = bins.outer_left[i] + (2 * b + 1) * (bins.outer_right[i] - bins.outer_left[i] + 1) // (2 * count)
+            column = even_column(b, count, bins.outer_left[i] - 0.5, bins.outer_right[i] + 0.5)
             values[b] = image[row, column, channel]
         seen = np.sort(values[:count])
         tail = int(TAIL * count)

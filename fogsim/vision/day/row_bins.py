@@ -61,8 +61,10 @@ def row_bins(camera: Camera, deviation: float, horizon: float) -> RowBins:
         0.5 * SKY_WIDTH * camera.width,
         np.maximum(HALF_LANE * (middle - horizon) / camera.mount_height, max(2.0, 0.006 * camera.focal_length)),
     )
-    left = np.clip(np.rint(u0 - half), 0, camera.width - 1).astype(np.int64)
-    right = np.clip(np.rint(u0 + half), 0, camera.width - 1).astype(np.int64)
     wider = np.maximum(half, OUTER * np.maximum(middle - horizon, 0.0) / camera.mount_height)
-    outer = [np.clip(np.rint(u0 + side * wider), 0, camera.width - 1).astype(np.int64) for side in (-1.0, 1.0)]
-    return RowBins(first.astype(np.int64), last.astype(np.int64), left, right, *outer)
+    sides = []
+    for reach in (half, wider):
+        # Of a mirrored camera these are the mirrored columns.
+        sides.append(np.clip(np.ceil(u0 - reach - 1e-6), 0, camera.width - 1).astype(np.int64))
+        sides.append(np.clip(np.floor(u0 + reach + 1e-6), 0, camera.width - 1).astype(np.int64))
+    return RowBins(first.astype(np.int64), last.astype(np.int64), *sides)

@@ -115,6 +115,9 @@ class JointRoad:
     evidence; fog that it is found in counts as even (`fogsim.vision.strips.airlight_slopes`,
     docs/explanation/airlight.md).
 
+    Where response, sky or light may be others than this fit knows, a second model of the image decides, or widens the
+    interval (`fogsim.vision.day`).
+
     Own method: no paper describes it. It stands on Hautière et al. 2006 and negru2013 for the geometry of fog on a
     flat road. Daytime only; the road must be darker than the airlight.
 

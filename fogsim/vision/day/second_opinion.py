@@ -20,7 +20,7 @@ up where the day model has no answer [-]."""
 MOST_DOUBT = 18.0
 """Doubt by contrast across the road from which on an estimate is given up [-]."""
 
-PERIOD = 5.0
+PERIOD = 10.0
 """Time after which an estimate that has been agreed with is looked at again [s]."""
 
 

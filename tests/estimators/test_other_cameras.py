@@ -8,7 +8,7 @@ from fogsim.estimators import make
 from fogsim.values import Observation
 
 SOLVED = sorted(set(KINDS) - {"clahe", "wet", "dirt"})
-"""Kinds whose every interval holds, and each of which is read."""
+"""Kinds that are always read, with intervals that hold."""
 
 
 def estimate(image):

@@ -128,7 +128,7 @@ def fit_day(
     free : float
         Depth up to which the own lane is free of the vehicle ahead [m].
     claimed : float
-        Extinction that another method claims, of which contrast across the road is asked [1/m].
+        Extinction that another method claims; contrast across the road may speak against it [1/m].
     """
     pixels = image if image.ndim == 3 else image[:, :, None]
     bins = row_bins(camera, horizon.standard_deviation, round(horizon.row))

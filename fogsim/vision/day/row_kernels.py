@@ -156,7 +156,7 @@ def fill_columns(
 
 @kernel
 def contrast_across(contrast: Floats, place: Floats, size: int) -> float:
-    """Logarithm of the chance of contrasts across the road, of which fog leaves the less, the farther away.
+    """Logarithm of the chance of contrasts across the road; fog leaves less of them, the farther away they are.
 
     Parameters
     ----------

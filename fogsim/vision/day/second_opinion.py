@@ -1,4 +1,4 @@
-"""The day model beside another method's estimate: which of both counts, or that neither does."""
+"""The day model as a second opinion on an estimate: which of the two counts, or that neither does."""
 
 import math
 from dataclasses import replace

@@ -11,6 +11,7 @@ from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import DenserFog, Estimate, OpticalDepths
 from fogsim.values.observation import LeadMeasurement, Observation
+from fogsim.vision.day.second_opinion import SecondOpinion
 from fogsim.vision.light.daylight import lit_by_lamps
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.pixel_kernels import LinearPixels
@@ -80,11 +81,6 @@ DARKENS = 0.5
 """Chance of an airlight that darkens toward the road from which on the fog counts as even [-]: its law is that of a
 layer."""
 
-SUNLIT, BRIGHTENS = 0.3, 1.5
-"""Luminance of the road over the airlight's beyond which the sun lights it [-]: asphalt reflects no more of the sky's
-light. The sun's light too is reflected more at grazing angles, by a share that nobody knows, which looks like fog: so
-many times what is beyond counts as the deviation of the road's luminance along the way, relative to it [-]."""
-
 MOST_OBSTACLES = 2
 """How often what stands in the own lane is looked for anew, each time nearer."""
 
@@ -118,6 +114,9 @@ class JointRoad:
     land and is fitted too (prior: the sky's own brightening in the picture). That is weighed against even airlight by
     evidence; fog that it is found in counts as even (`fogsim.vision.strips.airlight_slopes`,
     docs/explanation/airlight.md).
+
+    Where response, sky or light may be others than this fit knows, a second model of the image decides, or widens the
+    interval (`fogsim.vision.day`).
 
     Own method: no paper describes it. It stands on Hautière et al. 2006 and negru2013 for the geometry of fog on a
     flat road. Daytime only; the road must be darker than the airlight.
@@ -158,6 +157,7 @@ class JointRoad:
         self._earlier: deque[tuple[StripCurves, Sky]] = deque(maxlen=int(frames) - 1)
         self._before: deque[tuple[float, float]] = deque()
         self._droplets = DropletMemory()
+        self._second = SecondOpinion(camera)
 
     def reset(self) -> None:
         """Forget all earlier frames."""
@@ -165,6 +165,7 @@ class JointRoad:
         self._earlier.clear()
         self._before.clear()
         self._droplets = DropletMemory()
+        self._second.reset()
 
     def update(self, observation: Observation) -> Estimate:
         """Estimate the fog from one image, and the range of the lead vehicle if it is tracked.
@@ -197,26 +198,43 @@ class JointRoad:
         level = levelled(image, self._camera)
         pixels = linear_pixels(level, self._camera)
         sky = sky_above(pixels, self._camera, 3.0 * self._horizon.standard_deviation + 2.0)
-        if sky is None or sky.luminance < MIN_AIRLIGHT:
-            return Estimate.invalid(
-                self.method, "too dark above the horizon, or no sky: this is a daytime method", **found
-            )
+        if sky is not None and sky.luminance < MIN_AIRLIGHT:
+            return Estimate.invalid(self.method, "too dark above the horizon: this is a daytime method", **found)
         if why := lit_by_lamps(level, self._camera, observation.lead):
             return Estimate.invalid(self.method, why, **found)
         horizon, course = self._seen_course(pixels)
+        free = _free_road(observation.lead)
+        if sky is None:
+            own = Estimate.invalid(self.method, "no sky is seen above the road", **found)
+        else:
+            own, free = self._joint(observation, pixels, sky, horizon, course, free, found)
+        return self._second.on(own, level, horizon, free, observation.time, course.is_straight)
+
+    def _joint(
+        self,
+        observation: Observation,
+        pixels: LinearPixels,
+        sky: Sky,
+        horizon: Horizon,
+        course: RoadCourse,
+        free: float,
+        found: dict[str, object],
+    ) -> tuple[Estimate, float]:
+        """Estimate of the joint fit alone, and the depth up to which it finds the own lane free [m]."""
         self._geometry, self._shaded = self._straight, 0.0
         if not course.is_straight:
             self._geometry = course_geometry(self._straight, self._camera, course)
         prior = joint_prior(sky, self._camera, horizon)
         priors = (prior,) if self._even_airlight else (prior, *darkening_priors(prior, sky, self._droplets.chances))
-        fit = self._fitted(pixels, sky, priors, _free_road(observation.lead), course)
+        fit = self._fitted(pixels, sky, priors, free, course)
         if isinstance(fit, str):
-            return Estimate.invalid(self.method, fit, **found)
+            return Estimate.invalid(self.method, fit, **found), free
         self._droplets.learn(fit.fit.droplets, observation.time, observation.speed)
         unsure = course_deviation(fit.fit, self._geometry, self._camera, course, prior, sky.noise)
         front = fit.denser or airlight_edge(pixels, self._geometry, self._camera, sky, fit, prior.shift_deviation)
         changing = self._change(observation.time, fit.fit.extinction)
-        return self._estimate(fit, front, found, unsure, changing)
+        own = self._estimate(fit, front, found, unsure, changing)
+        return own, min(free, _obstacle(fit.fit, self._geometry))
 
     def _fitted(
         self, pixels: LinearPixels, sky: Sky, priors: Priors, free: float, course: RoadCourse
@@ -378,10 +396,7 @@ def _too_little_seen(uneven: UnevenFit, told: float) -> str:
 
 def _deviation(fit: JointFit) -> float:
     """Standard deviation of the extinction, what the model leaves out included [1/m]."""
-    share = fit.road / fit.airlight
-    # A change of the road's luminance changes its contrast to the airlight, and so k, by R / (A − R) as much.
-    sunlit = BRIGHTENS * max(share - SUNLIT, 0.0) * share / max(1.0 - share, LEAST_CONTRAST)
-    model = math.hypot(MODEL_DEVIATION, sunlit) * fit.extinction
+    model = MODEL_DEVIATION * fit.extinction
     return math.hypot(OVERCONFIDENCE * fit.extinction_deviation, model, LEAST_DEVIATION)
 
 

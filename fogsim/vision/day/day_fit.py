@@ -1,0 +1,372 @@
+"""How dense the fog is by the day model: its posterior over visibility, horizon and hypotheses, for one image."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
+from fogsim.values.camera import Camera
+from fogsim.vision.day.evidence_kernels import evidence_grid
+from fogsim.vision.day.hypotheses import CUT_CHANCE, LIGHTS, SURFACES, lights_chances
+from fogsim.vision.day.response_curves import curves_of
+from fogsim.vision.day.row_bins import row_bins
+from fogsim.vision.day.row_data import read_rows
+from fogsim.vision.day.row_kernels import AIRLIGHT, COLUMNS, RowData, contrast_across, fill_columns
+from fogsim.vision.lines.horizon import Horizon
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+NEAREST, FARTHEST, STEP = math.log(12.0), math.log(60_000.0), 0.2
+"""Visibilities between which fog is looked for, in logarithms of metres, and about how far apart [-]."""
+
+CLEAR_CHANCE = 0.05
+"""Chance of air without any fog, which the farthest visibility stands for [-]."""
+
+HORIZONS, HORIZON_CHANCES = (-1.2, 0.0, 1.2), (0.22, 0.56, 0.22)
+"""Horizons, in deviations of what is known of it, and their chances: normal laws about each, half as wide, make up the
+whole."""
+
+HORIZON_SHARE = 0.6
+"""Deviation of each of these laws, over that of the whole [-]."""
+
+SHARP = 0.03
+"""Change of the signal within four rows from which on the horizon is where it is steepest, as one more choice [-]."""
+
+FIRST_WORTHWHILE, WORTHWHILE = 14.0, 10.0
+"""Logarithms of the evidence below the best at which a visibility is not tried under other horizons and surfaces, and
+under other responses [-]."""
+
+FINE = 0.01
+"""Step of the posterior [ln m]."""
+
+FLOOR, MOST_OVER = -25.0, 1.5
+"""Least logarithm of the chance, over the best cell's, that is interpolated, and greatest [-]."""
+
+UNLIKELY = -1e4
+"""Logarithm of the chance of what was not tried."""
+
+
+VEHICLE = 1.8
+"""Height up to which a vehicle ahead may hide the sky [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class DayFit:
+    """Posterior of the visibility.
+
+    Attributes
+    ----------
+    log_visibility, chance : (n,) float64
+        Logarithms of visibilities [ln m], evenly, and their probabilities.
+    fog_over_none : float
+        Logarithm of the evidence of a road in air or fog over that of no road.
+    responses, surfaces, lights : (r,), (s,), (l,) float64
+        Probabilities of the hypotheses.
+    clipped : float
+        Share of the sky's bins that are clipped [-].
+    brightest : float
+        Light that hardly any bin exceeds, over full scale [-].
+    contrast : float
+        How much brighter the far road is than the near one, over the sky [-].
+    response_deviation : float
+        Standard deviation of ln k among responses [-].
+    doubt : float
+        How much contrast across the road speaks against the extinction that another method claims, in logarithms of
+        chances [-].
+    """
+
+    log_visibility: Floats
+    chance: Floats
+    fog_over_none: float
+    responses: Floats
+    surfaces: Floats
+    lights: Floats
+    clipped: float
+    brightest: float
+    contrast: float
+    response_deviation: float
+    doubt: float = 0.0
+
+    def quantile(self, share: float) -> float:
+        """Visibility below which the truth lies with a probability [m].
+
+        Parameters
+        ----------
+        share : float
+            That probability.
+        """
+        return float(np.exp(np.interp(share, np.cumsum(self.chance), self.log_visibility)))
+
+    def below(self, visibility: float) -> float:
+        """Probability that the visibility is less than some [-].
+
+        Parameters
+        ----------
+        visibility : float
+            That one [m].
+        """
+        return float(self.chance[self.log_visibility < math.log(visibility)].sum())
+
+
+def fit_day(
+    image: NDArray[Any], camera: Camera, horizon: Horizon, free: float = math.inf, claimed: float = 0.0
+) -> DayFit:
+    """Weigh all hypotheses by their evidence.
+
+    Parameters
+    ----------
+    image : (rows, cols) or (rows, cols, 3) uint8 or uint16
+        A level image, contiguous.
+    camera : Camera
+        The assumed calibration.
+    horizon : Horizon
+        What is known of the horizon.
+    free : float
+        Depth up to which the own lane is free of the vehicle ahead [m].
+    claimed : float
+        Extinction that another method claims; contrast across the road may speak against it [1/m].
+    """
+    pixels = image if image.ndim == 3 else image[:, :, None]
+    bins = row_bins(camera, horizon.standard_deviation, round(horizon.row))
+    rows = read_rows(pixels, bins, camera, horizon.row)
+    if math.isfinite(free):
+        rows = _without_vehicle(rows, camera, horizon.row, free)
+    return replace(_weighed(rows, camera, horizon), doubt=_doubt(rows, camera, horizon, claimed))
+
+
+def _weighed(rows: RowData, camera: Camera, horizon: Horizon) -> DayFit:
+    responses, surfaces = np.log(curves_of(camera).chance), np.log(SURFACES.chance)
+    ends = rows.cuts.size - 2
+    lights = np.log(np.append(lights_chances(ends), [CUT_CHANCE] * ends))
+    logs, extinctions, likely = _visibilities()
+    at, of_horizon = _horizons(rows, horizon)
+    grid = _Grid(rows, camera, horizon.row, HORIZON_SHARE * horizon.standard_deviation)
+    cells = np.stack(np.meshgrid(at, extinctions, indexing="ij"), axis=-1)
+    prior = of_horizon[:, None] + likely
+    # A first look, at every second visibility under the middle horizon.
+    whole = grid.evidence(np.concatenate([cells[1, ::2], cells[:, 0]]), USUAL, ALL)[:, 0]
+    none = float(np.logaddexp(np.logaddexp.reduce(whole[-at.size :, ALL.size] + of_horizon), rows.none))
+    whole = np.delete(whole[: -at.size], ALL.size, axis=1) + lights
+    of_light = np.logaddexp.reduce(whole + likely[::2, None], axis=0)
+    if ends and of_light[ALL.size :].max() > of_light[: ALL.size].max():
+        return _weighed(_ended(rows, 1 + int(np.argmax(of_light[ALL.size :]))), camera, horizon)
+    kept = np.flatnonzero(of_light[: ALL.size] > of_light.max() - SUITS)
+    some = np.logaddexp.reduce(grid.evidence(cells[1, ::2], OTHERS, kept) + lights[kept], axis=2).max(axis=1)
+    some = np.maximum(some, np.logaddexp.reduce(whole, axis=1)) + likely[::2]
+    chosen = np.zeros(prior.shape, np.bool_)
+    chosen[:, ::2] = some > some.max() - FIRST_WORTHWHILE
+    chosen = _wider(chosen, 2)
+    # Where fog may be, all surfaces; where it still may be, all responses over the surfaces that suit.
+    tried = [(0, s) for s in range(surfaces.size)]
+    found = _scattered(grid.evidence(cells[chosen], np.array(tried), kept) + lights[kept], chosen)
+    found += (prior[:, :, None] + surfaces)[:, :, :, None]
+    good = np.logaddexp.reduce(found, axis=(2, 3))
+    chosen &= _wider(good > good.max() - WORTHWHILE, 1)
+    of_surface = np.logaddexp.reduce(found[chosen], axis=(0, 2))
+    suit = [s for s in range(surfaces.size) if of_surface[s] > of_surface.max() - SUITS]
+    others = [(r, s) for s in suit for r in range(1, responses.size)]
+    pairs = np.array(tried + others)
+    each = grid.evidence(cells[chosen], np.array(others), kept) + lights[kept] + prior[chosen][:, None, None]
+    each += surfaces[pairs[len(tried) :, 1]][:, None]
+    each = np.concatenate([found[chosen], each], axis=1) + responses[pairs[:, 0]][:, None]
+    chance = np.logaddexp.reduce(each, axis=2)
+    fine, posterior, evidence = _interpolated(logs, chosen, chance)
+    weight = np.exp(chance - np.logaddexp.reduce(chance, axis=None)).sum(axis=0)
+    sky = rows.noise[0, : rows.cuts[0]]
+    return DayFit(
+        log_visibility=fine,
+        chance=posterior,
+        fog_over_none=evidence - none,
+        responses=_sums(pairs[:, 0], weight, responses.size),
+        surfaces=_sums(pairs[:, 1], weight, surfaces.size),
+        lights=_sums(kept, _shares(each), ALL.size),
+        clipped=float(np.mean(sky <= 0.0)) if sky.size else 0.0,
+        brightest=float(rows.level[0]),
+        response_deviation=_apart(np.log(cells[chosen][:, 1]), chance, pairs[:, 0]),
+        contrast=float(rows.light[0, rows.cuts[0] :].max() - rows.light[0, -1]) / float(rows.level[0]),
+    )
+
+
+def _wider(cells: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
+    """(h, v) bool: cells, and those at so many visibilities to either side."""
+    wide = cells.copy()
+    for step in range(1, steps + 1):
+        wide[:, step:] |= cells[:, :-step]
+        wide[:, :-step] |= cells[:, step:]
+    return wide
+
+
+def _scattered(values: Floats, chosen: NDArray[np.bool_]) -> Floats:
+    """(h, v, …) float64: values of the chosen cells in the place of each; the others are unlikely."""
+    out = np.full((*chosen.shape, *values.shape[1:]), UNLIKELY)
+    out[chosen] = values
+    return out
+
+
+def _visibilities() -> tuple[Floats, Floats, Floats]:
+    """Logarithms of visibilities, extinctions, and logarithms of their chances."""
+    logs = np.linspace(NEAREST, FARTHEST, math.ceil((FARTHEST - NEAREST) / STEP) + 1)
+    extinctions = OPTICAL_DEPTH_AT_VISIBILITY / np.exp(logs)
+    extinctions[-1] = 1e-7
+    likely = np.full(logs.size, math.log((1.0 - CLEAR_CHANCE) / (logs.size - 1)))
+    likely[-1] = math.log(CLEAR_CHANCE)
+    return logs, extinctions, likely
+
+
+USUAL = np.zeros((1, 2), np.int64)
+"""The stated response and the usual surface."""
+
+OTHERS = np.array([(0, 1), (0, 2), (0, 3), (0, 4), (0, 5), (2, 0), (4, 0)])
+"""Responses and surfaces of a first look."""
+
+SUITS = 5.0
+"""Logarithm of the evidence below the best at which a surface is not tried under other responses [-]."""
+
+
+ALL = np.arange(LIGHTS.sky.size)
+"""All lights."""
+
+CLIPPED_AIRLIGHT = 0.6
+"""Deviation of the airlight before an image is seen, over the usual one, where the sky is clipped [-]: exposure meters
+do not let it be much brighter."""
+
+
+class _Grid:
+    """What all evaluations of one image have in common."""
+
+    def __init__(self, rows: RowData, camera: Camera, horizon: float, shift: float) -> None:
+        self._rows, self._shift = rows, shift
+        self._lens = _lens_of(camera)
+        self._surfaces = np.column_stack([SURFACES.albedo, SURFACES.hidden])
+        step = camera.focal_length * camera.mount_height / max(_step(rows) - horizon, 1.0)
+        self._surfaces[np.isnan(self._surfaces)] = step
+
+    def evidence(self, cells: Floats, tried: Ints, lights: Ints) -> Floats:
+        """(c, t, m) float64: see `evidence_grid`; under all lights there also are roads that end sooner."""
+        laws = np.stack([LIGHTS.mean, LIGHTS.deviation])[:, lights]
+        laws[1, :, AIRLIGHT] *= CLIPPED_AIRLIGHT if self._rows.least_airlight.any() else 1.0
+        cuts = self._rows.cuts.size - 1 if lights is ALL else 0
+        out = np.empty((len(cells), len(tried), lights.size + cuts))
+        places = np.ascontiguousarray(cells)
+        evidence_grid(self._rows, self._lens, places, tried, self._surfaces, laws, lights.size, self._shift, out)
+        return np.where(np.isfinite(out), out, UNLIKELY)
+
+
+def _without_vehicle(rows: RowData, camera: Camera, horizon: float, free: float) -> RowData:
+    """Leave out rows that the vehicle ahead may hide."""
+    above = max(VEHICLE - camera.mount_height, 0.0) * camera.focal_length / free
+    hidden = (rows.last > horizon - above) & (rows.first < horizon + camera.row_distance / free)
+    contrast = rows.contrast.copy()
+    contrast[0, hidden] = 0.0
+    return rows._replace(noise=np.where(hidden, 0.0, rows.noise), contrast=contrast)
+
+
+def _step(rows: RowData) -> float:
+    """Row above which something may hide the road: where its light changes most from bin to bin."""
+    road = slice(int(rows.cuts[0]) + 2, int(rows.cuts[-1]))
+    light = rows.light[0, road]
+    if light.size < 3:
+        return float(rows.last[-1])
+    change = np.abs(np.diff(light)) / (rows.noise[0, road][1:] + 0.01 * rows.level[0])
+    return float(rows.first[road][1 + int(np.argmax(change))])
+
+
+def _ended(rows: RowData, cut: int) -> RowData:
+    """Return the rows up to a cut alone."""
+    end = int(rows.cuts[cut])
+    parts = {name: getattr(rows, name)[..., :end] for name in ("first", "last", "light", "slope", "noise", "by_row")}
+    parts = {name: np.ascontiguousarray(values) for name, values in parts.items()}
+    return rows._replace(
+        **parts,
+        contrast=np.ascontiguousarray(rows.contrast[:, :end]),
+        cuts=np.array([rows.cuts[0], end]),
+        free=np.array([rows.free[0] - rows.free[cut], 0.0]),
+    )
+
+
+def _doubt(rows: RowData, camera: Camera, horizon: Horizon, extinction: float) -> float:
+    """How much contrast across the road speaks against an extinction, at the horizon that suits it best."""
+    columns, place = np.empty((rows.first.size, COLUMNS)), np.empty((rows.first.size, 5))
+    logs = []
+    for row in horizon.row + horizon.standard_deviation * np.array([-1.0, 0.0, 1.0]):
+        fill_columns(rows.first, rows.last, float(row), _lens_of(camera), extinction, math.inf, columns, place)
+        logs.append(contrast_across(rows.contrast, place, int((rows.last + 0.5 <= row).sum())))
+    return -max(logs)
+
+
+def _lens_of(camera: Camera) -> Floats:
+    """(3,) float64: what `fill_columns` takes of a camera."""
+    return np.array([camera.focal_length, camera.mount_height, camera.principal_point[1]])
+
+
+def _horizons(rows: RowData, horizon: Horizon) -> tuple[Floats, Floats]:
+    """Rows of the horizon that are tried, and the logarithms of their chances."""
+    deviation = horizon.standard_deviation
+    at, chance = horizon.row + deviation * np.array(HORIZONS), np.array(HORIZON_CHANCES)
+    edge = _edge(rows, horizon)
+    if edge is not None:
+        share = 0.3 * math.exp(-0.5 * ((edge - horizon.row) / deviation) ** 2)
+        at, chance = np.append(at, edge), np.append((1.0 - share) * chance, share)
+    return at, np.log(chance)
+
+
+def _edge(rows: RowData, horizon: Horizon) -> float | None:
+    """Where brightness changes most from row to row about the horizon, if it does much."""
+    middle, light = 0.5 * (rows.first + rows.last), rows.light[0] / rows.level[0]
+    near = np.flatnonzero(np.abs(middle - horizon.row) < 3.0 * horizon.standard_deviation + 1.0)
+    near = near[(near > 1) & (near < middle.size - 2)]
+    if near.size == 0:
+        return None
+    place = int(near[np.argmax(np.abs(light[near + 1] - light[near - 1]))])
+    low, high = light[place - 2], light[place + 2]
+    if abs(high - low) < SHARP:
+        return None
+    inside = float((high - light[place - 1 : place + 2]).sum() / (high - low))
+    step = float(middle[place] - middle[place - 1])
+    edge = float(middle[place - 2]) + (0.5 + inside) * step
+    return edge if abs(edge - horizon.row) < 3.0 * horizon.standard_deviation else None
+
+
+def _apart(logs: Floats, chance: Floats, response: Ints) -> float:
+    """Standard deviation of the mean logarithm among responses."""
+    weight = np.exp(chance - np.logaddexp.reduce(chance, axis=None))
+    of_each = _sums(response, weight.sum(axis=0), int(response.max()) + 1)
+    means = _sums(response, (weight * logs[:, None]).sum(axis=0), of_each.size) / np.maximum(of_each, 1e-12)
+    mean = float((of_each * means).sum())
+    return math.sqrt(float((of_each * (means - mean) ** 2).sum()))
+
+
+def _sums(which: Ints, weight: Floats, count: int) -> Floats:
+    """Sum of weights by number."""
+    return np.asarray(np.bincount(which, weight, count), np.float64)
+
+
+def _shares(each: Floats) -> Floats:
+    """Probabilities of the last axis."""
+    logs = np.logaddexp.reduce(each, axis=(0, 1))
+    return np.asarray(np.exp(logs - np.logaddexp.reduce(logs)))
+
+
+def _interpolated(logs: Floats, chosen: NDArray[np.bool_], chance: Floats) -> tuple[Floats, Floats, float]:
+    """Posterior in finer steps, of cells under pairs of hypotheses, and the logarithm of its sum.
+
+    For each horizon and pair its logarithm is cubic between visibilities (Catmull and Rom), so that parabolas stay.
+    """
+    best = float(chance.max())
+    value = np.full((*chosen.shape, chance.shape[1]), FLOOR)
+    value[chosen] = np.maximum(chance - best, FLOOR)
+    inside = np.flatnonzero(chosen.any(axis=0))
+    first, last = max(int(inside[0]) - 1, 0), min(int(inside[-1]) + 1, logs.size - 1)
+    step = logs[1] - logs[0]
+    place = np.arange(0.0, last - first, FINE / step)
+    low = first + np.minimum(place.astype(np.int64), last - first - 1)
+    s = (place - (low - first))[None, :, None]
+    a, b, c, d = (value[:, np.clip(low + i, 0, logs.size - 1)] for i in (-1, 0, 1, 2))
+    cubic = b + 0.5 * s * (c - a + s * (2.0 * a - 5.0 * b + 4.0 * c - d + s * (3.0 * (b - c) + d - a)))
+    weight = np.exp(np.minimum(cubic, MOST_OVER)).sum(axis=(0, 2))
+    total = float(weight.sum())
+    return logs[first] + place * step, weight / total, best + math.log(total * FINE / step)

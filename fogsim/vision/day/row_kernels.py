@@ -1,0 +1,176 @@
+"""Evidence of fog in rows of sky and road: a Kalman filter over each, and columns whose factors are integrated out.
+
+Light of row i is C_i β + h_i · x_i + noise: β has the airlight, the road's reflectance and other factors with normal
+priors, x_i the state of the albedo along the road, of the sky above it and of noise that rows share. The filter whitens
+the light and every column by one pass, so the evidence of each prior of β costs a small Cholesky factor.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.jit import kernel
+
+Floats = NDArray[np.float64]
+
+AIRLIGHT, ROAD, DARKENING, SHEEN, WET, VIGNETTING, TONE, NEAR_TONE, STRAY, SKY, SHIFT, OTHER_SKY, COLUMNS = range(13)
+"""Columns: airlight, road, how the airlight darkens downward, sheen at grazing angles, mirror image of the sky on a wet
+road, shade of the lens, two shapes of local tone mapping, stray light, a sky's brightness higher up,
+a small shift of the horizon, a sky that is not the airlight's; and their number."""
+
+DARKENING_ANGLE, SHEEN_ANGLE, SKY_ANGLE = 0.064, 0.06, 0.3
+"""Angles over which airlight darkens downward, sheen fades and a sky's brightness changes [rad]."""
+
+TONE_ANGLE, NEAR_TONE_ANGLE = 0.12, 0.04
+"""Angles over which local tone mapping changes [rad]."""
+
+NODES, WEIGHTS = np.array([-0.7745966692414834, 0.0, 0.7745966692414834]), np.array([5.0, 8.0, 5.0]) / 18.0
+"""Gauss and Legendre's three places within a row, and their weights."""
+
+MOST_CONTRAST, MOST_DOUBT = 1.2, 3.0
+"""Greatest contrast across a road in clear air, relative to the airlight, and most that one row speaks against fog that
+leaves less [-]."""
+
+REFRACTION = 1.33**2
+"""Squared refractive index of water [-]."""
+
+FARTHEST = 5000.0
+"""Depth that counts as the road's farthest [m]."""
+
+
+class RowData(NamedTuple):
+    """What was read of an image, under each response (r, n).
+
+    Attributes
+    ----------
+    first, last : (n,) float64
+        Rows of each bin.
+    light, slope, noise, by_row : (r, n) float64
+        Light of each bin, its derivative by the signal, its noise (0 where clipped), and its change by row.
+    level, least_airlight : (r,) float64
+        Brightest light, and light that the airlight surely exceeds.
+    contrast : (2, n) float64
+        Contrast across a strip of road, relative to the airlight, and the noise of that.
+    cuts : (c,) int64
+        Bins before which the road ends, the first being the first bin below the horizon, the last n.
+    free : (c,) float64
+        Evidence of the signals of the bins from each cut on by a law of no road.
+    none : float
+        The same of all bins, the sky's too.
+    """
+
+    first: Floats
+    last: Floats
+    light: Floats
+    slope: Floats
+    noise: Floats
+    by_row: Floats
+    level: Floats
+    least_airlight: Floats
+    contrast: Floats
+    cuts: NDArray[np.int64]
+    free: Floats
+    none: float
+
+
+@kernel
+def fresnel(sine: float) -> float:
+    """Share of light that water mirrors under an angle above it.
+
+    Parameters
+    ----------
+    sine : float
+        Of the angle.
+    """
+    root = math.sqrt(REFRACTION - 1.0 + sine * sine)
+    across, along = (sine - root) / (sine + root), (REFRACTION * sine - root) / (REFRACTION * sine + root)
+    return 0.5 * (across * across + along * along)
+
+
+@kernel
+def fill_columns(
+    first: Floats, last: Floats, horizon: float, lens: Floats, extinction: float, hidden: float,
+    columns: Floats, place: Floats,
+) -> None:  # fmt: skip
+    """Columns of all bins, and where each lies.
+
+    Parameters
+    ----------
+    first, last : (n,) float64
+        Rows of each bin.
+    horizon : float
+        Row of the horizon.
+    lens : (3,) float64
+        Focal length [px], height [m], principal row.
+    extinction : float
+        k [1/m].
+    hidden : float
+        Depth from which on something hides the road [m].
+    columns : (n, COLUMNS) float64
+        Is written.
+    place : (n, 5) float64
+        Is written: what fog leaves of the road, its depth and extent [m], rows below the horizon [px],
+        angle above it [rad].
+    """
+    focal, height = lens[0], lens[1]
+    for i in range(first.size):
+        middle, size = 0.5 * (first[i] + last[i]), last[i] - first[i] + 1.0
+        columns[i] = 0.0
+        left = 0.0
+        top, bottom = middle - 0.5 * size, middle + 0.5 * size
+        sky = min(max((horizon - top) / size, 0.0), 1.0)
+        if sky > 0.0:
+            angle = max(0.5 * (horizon - top) if sky < 1.0 else horizon - middle, 0.0) / focal
+            columns[i, AIRLIGHT] = columns[i, OTHER_SKY] = sky
+            columns[i, SKY] = sky * angle / 0.1 * math.exp(-angle / SKY_ANGLE)
+        upper = max(top, horizon)
+        for j in range(3 if sky < 1.0 else 0):
+            row = 0.5 * (upper + bottom) + 0.5 * (bottom - upper) * NODES[j]
+            angle = max(row - horizon, 1e-4) / focal
+            weight = WEIGHTS[j] * (1.0 - sky)
+            slant = math.sqrt(1.0 + angle * angle)
+            depth = min(height / angle, hidden)
+            through = math.exp(-extinction * depth * slant)
+            left += weight * through
+            columns[i, AIRLIGHT] += weight * (1.0 - through)
+            columns[i, ROAD] += weight * through
+            columns[i, DARKENING] -= weight * (1.0 - through) * (1.0 - math.exp(-angle / DARKENING_ANGLE))
+            columns[i, SHEEN] += weight * through * math.exp(-angle / SHEEN_ANGLE)
+            columns[i, WET] += weight * through * fresnel(angle / slant)
+            columns[i, STRAY] += weight
+        angle = (middle - horizon) / focal
+        off = (middle - lens[2]) / focal
+        columns[i, VIGNETTING] = off * off
+        columns[i, TONE] = math.exp(-((angle / TONE_ANGLE) ** 2))
+        columns[i, NEAR_TONE] = math.exp(-((angle / NEAR_TONE_ANGLE) ** 2))
+        below = max(angle, 0.25 / focal)
+        place[i, 0] = left
+        place[i, 1] = min(height / below, FARTHEST)
+        upper, lower = max(below - 0.5 * size / focal, 0.1 / focal), below + 0.5 * size / focal
+        place[i, 2] = min(height / upper, FARTHEST) - min(height / lower, FARTHEST)
+        place[i, 3] = middle - horizon
+        place[i, 4] = max(-angle, 0.0)
+
+
+@kernel
+def contrast_across(contrast: Floats, place: Floats, size: int) -> float:
+    """Logarithm of the chance of contrasts across the road; fog leaves less of them, the farther away they are.
+
+    Parameters
+    ----------
+    contrast : (2, n) float64
+        Contrast of each bin, relative to the airlight, and the noise of that.
+    place
+        See `fill_columns`.
+    size : int
+        How many bins, from the first on, are sky.
+    """
+    total = 0.0
+    for i in range(size, place.shape[0]):
+        noise = contrast[1, i]
+        apart = (contrast[0, i] - MOST_CONTRAST * place[i, 0]) / noise - 3.0
+        if apart > 0.0:
+            total -= min(0.5 * apart * apart, MOST_DOUBT)
+    return total

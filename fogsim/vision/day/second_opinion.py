@@ -1,0 +1,144 @@
+"""The day model as a second opinion on an estimate: which of the two counts, or that neither does."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.values.camera import Camera
+from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate
+from fogsim.vision.day.day_fit import fit_day
+from fogsim.vision.day.verdict import CALIBRATION_DEVIATION, WIDEST, DayVerdict, agree, verdict_of
+from fogsim.vision.lines.horizon import Horizon
+
+POSSIBLY, MOSTLY = 0.35, 0.6
+"""Probabilities of a wet road or local tone mapping from which on an estimate that knows neither is widened, and given
+up where the day model has no answer [-]."""
+
+MOST_DOUBT = 18.0
+"""Doubt by contrast across the road from which on an estimate is given up [-]."""
+
+PERIOD = 10.0
+"""Time after which an estimate that has been agreed with is looked at again [s]."""
+
+
+class SecondOpinion:
+    """Weighs estimates of a method by the day model, in a drive from time to time.
+
+    Parameters
+    ----------
+    camera : Camera
+        The assumed calibration.
+    """
+
+    def __init__(self, camera: Camera) -> None:
+        self._camera = camera
+        self._agreed, self._response = -math.inf, 0.0
+
+    def reset(self) -> None:
+        """Forget all earlier frames."""
+        self._agreed, self._response = -math.inf, 0.0
+
+    def on(
+        self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float, time: float, is_straight: bool
+    ) -> Estimate:
+        """Return an estimate, what the day model has instead, or neither.
+
+        Parameters
+        ----------
+        own : Estimate
+            Of the other method, valid or not.
+        level : (rows, cols) or (rows, cols, 3) uint8 or uint16
+            A level image.
+        horizon : Horizon
+            What is known of the horizon.
+        free : float
+            Depth up to which the own lane is free [m].
+        time : float
+            Of the image [s].
+        is_straight : bool
+            Whether the road neither bends nor sags, as the day model has it.
+        """
+        if own.valid and (not is_straight or self._agreed < time < self._agreed + PERIOD):
+            return _with_calibration(own, self._response)
+        verdict = verdict_of(fit_day(np.ascontiguousarray(level), self._camera, horizon, free, max(_ends(own)[0], 0.0)))
+        chosen = _chosen(own, verdict)
+        self._agreed = time if chosen is own else -math.inf
+        self._response = verdict.response_deviation if verdict.is_sure and verdict.is_even else 0.0
+        return _with_calibration(own, self._response) if chosen is own and own.valid else chosen
+
+
+def _chosen(own: Estimate, verdict: DayVerdict) -> Estimate:
+    if not own.valid:
+        return _of_day(own, verdict)
+    if verdict.doubt > MOST_DOUBT:
+        return _none(own, "contrast survives where the fog that the road's brightness shows would leave none")
+    if verdict.reason:
+        return _of_day(own, verdict) if verdict.outside > MOSTLY else own
+    return _weighed(own, verdict) if verdict.is_sure and verdict.is_even else own
+
+
+def _weighed(own: Estimate, verdict: DayVerdict) -> Estimate:
+    """Weigh two answers."""
+    agreed = agree(own.visibility_interval, verdict.interval)
+    if verdict.outside > POSSIBLY:
+        if not verdict.interval[0] < own.visibility < verdict.interval[1]:
+            return _of_day(own, verdict)
+    elif agreed:
+        return own
+    spanning = _spanning(own, own.extinction if agreed else 0.5 * (own.extinction + verdict.extinction), verdict)
+    if spanning is None and agreed:
+        return own
+    return spanning or _none(own, "how the road fades and how its image brightens disagree")
+
+
+def _spanning(own: Estimate, middle: float, verdict: DayVerdict) -> Estimate | None:
+    """Return an estimate whose interval holds those of both, or None if that says too little."""
+    thin, dense = _ends(own)
+    thin, dense = max(min(thin, verdict.least), 0.0), max(dense, verdict.most)
+    if dense > WIDEST * thin:
+        return None
+    half = max(dense - middle, middle - thin) / NORMAL_90_PERCENT
+    return replace(own, extinction=middle, standard_deviation=half, optical_depths=None, denser=None)
+
+
+def _ends(own: Estimate) -> tuple[float, float]:
+    half = NORMAL_90_PERCENT * own.standard_deviation if own.valid else 0.0
+    return own.extinction - half, own.extinction + half
+
+
+def _of_day(own: Estimate, verdict: DayVerdict) -> Estimate:
+    """Return the day model's answer, or why there is none."""
+    if verdict.reason or not verdict.is_sure:
+        reason = verdict.reason or str(own.diagnostics.get("reason", ""))
+        return _none(own, reason)
+    return Estimate(
+        own.method,
+        verdict.extinction,
+        verdict.deviation,
+        diagnostics=_found(own),
+        reach=verdict.reach,
+        common_deviation=CALIBRATION_DEVIATION,
+    )
+
+
+def _none(own: Estimate, reason: str) -> Estimate:
+    return Estimate.invalid(own.method, reason, **_found(own))
+
+
+def _found(own: Estimate) -> dict[str, object]:
+    return {name: value for name, value in own.diagnostics.items() if name != "reason"}
+
+
+def _with_calibration(own: Estimate, response: float) -> Estimate:
+    """Add to an interval what height, focal length and response leave open, the same in all images of a drive."""
+    if own.extinction <= 0.0:
+        return own
+    unknown = math.hypot(CALIBRATION_DEVIATION, response)
+    return replace(
+        own,
+        standard_deviation=math.hypot(own.standard_deviation, unknown * own.extinction),
+        common_deviation=math.hypot(own.common_deviation, unknown),
+    )

@@ -1,0 +1,165 @@
+"""What the day model says of an image, and when it is to be believed."""
+
+import math
+from dataclasses import dataclass
+
+from fogsim.units import extinction_from_visibility
+from fogsim.values.estimate import NORMAL_90_PERCENT
+from fogsim.vision.day.day_fit import DayFit
+from fogsim.vision.day.hypotheses import LIGHTS
+
+CALIBRATION_DEVIATION = math.hypot(0.05, 0.02)
+"""Standard deviation of ln k by the height and the focal length of the camera, of 5 % and 2 % [-]: k λ over the rows
+below the horizon is the optical depth, and λ the product of both, so either goes into k as it is."""
+
+FOG, LEAST_FOG, CLEAR = 2000.0, 0.95, 1000.0
+"""Visibility below which there is fog [m], least probability of that for an answer with two ends [-], and least lower
+end of an answer with one [m]."""
+
+SLACK = 1.15
+"""Ratio of ends up to which intervals that have nothing in common do not contradict one another [-]."""
+
+WIDEST = 4.0
+"""Most ratio of the ends of an answer [-]."""
+
+A_ROAD, LIKELY_A_ROAD, SURELY_A_ROAD = math.log(10.0), 10.0, 20.0
+"""Logarithms of the evidence of a road over that of none from which on there is one, it is believed where another
+method has no answer, and against another one's [-]."""
+
+EVEN_SURFACES, USUAL_SURFACES, LEAST_USUAL, LEAST_SKY = 2, 3, 0.8, 0.5
+"""How many of the surfaces, from the first on, are even roads, and roads that nothing hides or shades; least
+probability of those, and of a sky that is the airlight's, for a posterior to be believed [-]."""
+
+CLIPPING = 0.4
+"""Probability that the airlight is not even, where a clipped sky does not show it [-]."""
+
+DENSEST = 13.5
+"""Least lower end of an interval that is believed [m]: what is no road at all looks like denser fog."""
+
+HARDLY_STATED = 0.03
+"""Probability of the stated response below which the camera has another one [-]."""
+
+LEAST_CONTRAST = 0.08
+"""Least contrast of far road to near road over the sky for fog to show [-]."""
+
+DARK = 6.0 / 255.0
+"""Light of the brightest rows below which it is no day, over full scale [-]."""
+
+MOSTLY_CLIPPED = 0.5
+"""Share of the sky's bins beyond which clipping is a reason [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class DayVerdict:
+    """An answer of the day model.
+
+    Attributes
+    ----------
+    extinction, deviation : float
+        k and half the width of its 90 % interval over 1.645 [1/m].
+    interval : (float, float)
+        Ends of the visibility [m].
+    reason : str
+        Why it is no answer; empty if it is.
+    is_sure : bool
+        Whether it counts against another method: a road under a sky, neither hidden nor in shade.
+    is_even : bool
+        Whether the road is surely one, as even as roads mostly are, and the response may be the stated one.
+    outside : float
+        Probability that the image shows what the joint fit does not know, a wet road, local tone mapping or clipped
+        airlight that is not even; 0 where the road is not sure [-].
+    doubt, response_deviation : float
+        See `DayFit`.
+    """
+
+    extinction: float
+    deviation: float
+    interval: tuple[float, float]
+    reason: str
+    is_sure: bool
+    is_even: bool
+    outside: float
+    doubt: float
+    response_deviation: float
+
+    @property
+    def most(self) -> float:
+        """Greatest k of the interval [1/m]."""
+        return self.extinction + NORMAL_90_PERCENT * self.deviation
+
+    @property
+    def least(self) -> float:
+        """Least k of the interval [1/m]."""
+        return self.extinction - NORMAL_90_PERCENT * self.deviation
+
+    @property
+    def reach(self) -> float:
+        """Distance up to which it speaks of the fog [m]."""
+        return math.exp(0.5 * (math.log(self.interval[0]) + math.log(min(self.interval[1], FOG))))
+
+
+def verdict_of(fit: DayFit) -> DayVerdict:
+    """Judge a posterior.
+
+    Parameters
+    ----------
+    fit : DayFit
+        The posterior.
+    """
+    low, middle, high = (fit.quantile(share) for share in (0.05, 0.5, 0.95))
+    calibration = NORMAL_90_PERCENT * CALIBRATION_DEVIATION
+    low = middle / math.exp(math.hypot(math.log(middle / low), calibration))
+    high = middle * math.exp(math.hypot(math.log(high / middle), calibration))
+    is_clear = low > CLEAR
+    dense, thin = extinction_from_visibility(low), 0.0 if is_clear else extinction_from_visibility(high)
+    by_light = fit.lights
+    usual = float(fit.surfaces[:USUAL_SURFACES].sum())
+    outside = max(float(by_light[LIGHTS.is_unusual].sum()), CLIPPING if fit.clipped > 0.0 else 0.0)
+    shows = fit.below(FOG) > LEAST_FOG and fit.contrast > LEAST_CONTRAST
+    answers = is_clear or (shows and high < WIDEST * low)
+    is_road = fit.fog_over_none > A_ROAD
+    sky = float(by_light[LIGHTS.sky == 1].sum())
+    is_sky = sky > LEAST_SKY or fit.clipped > 0.0
+    is_sure = fit.fog_over_none > LIKELY_A_ROAD and usual > LEAST_USUAL and is_sky
+    is_sure = is_sure and low > DENSEST
+    even = float(fit.surfaces[:EVEN_SURFACES].sum())
+    is_even = fit.fog_over_none > SURELY_A_ROAD and even > LEAST_USUAL and fit.responses[0] > HARDLY_STATED
+    return DayVerdict(
+        extinction=0.5 * (dense + thin),
+        deviation=0.5 * (dense - thin) / NORMAL_90_PERCENT,
+        interval=(low, math.inf if is_clear else high),
+        reason="" if answers and is_road else _reason(fit, is_road, sky),
+        is_sure=is_sure,
+        is_even=is_even,
+        outside=outside if is_sure and is_even else 0.0,
+        doubt=fit.doubt,
+        response_deviation=fit.response_deviation if fit.below(FOG) > LEAST_FOG else 0.0,
+    )
+
+
+def _reason(fit: DayFit, is_road: bool, sky: float) -> str:
+    """Why a posterior is no answer."""
+    hidden = sky < LEAST_SKY or float(fit.surfaces[USUAL_SURFACES + 1 :].sum()) > LEAST_SKY
+    wet = float(fit.lights[LIGHTS.is_wet].sum()) > LEAST_SKY
+    reasons = (
+        (fit.brightest < DARK, "too dark: this is a daytime method"),
+        (fit.clipped > MOSTLY_CLIPPED, "the sky is clipped, and the airlight not known: expose for the sky"),
+        (fit.contrast < LEAST_CONTRAST, "the road is nearly as bright as the airlight, or brighter"),
+        (not is_road, "what is ahead does not look like a road: no lane, or something covers it"),
+        (hidden, "the sky above the road is hidden"),
+        (wet, "the road may be wet: it mirrors the sky as fog would veil it"),
+        (fit.responses[0] < HARDLY_STATED, "the camera does not have the response that its description states"),
+    )
+    said = (reason for holds, reason in reasons if holds)
+    return next(said, "the extinction is not observable: too little road is seen")
+
+
+def agree(one: tuple[float, float], other: tuple[float, float]) -> bool:
+    """Whether two intervals of visibility have something in common, or almost.
+
+    Parameters
+    ----------
+    one, other : (float, float)
+        Their ends [m].
+    """
+    return one[0] <= SLACK * other[1] and other[0] <= SLACK * one[1]

@@ -1,0 +1,85 @@
+"""Which of two answers counts."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fogsim.values import Camera, Estimate
+from fogsim.vision.day import second_opinion
+from fogsim.vision.day.second_opinion import MOST_DOUBT, PERIOD, SecondOpinion
+from fogsim.vision.day.verdict import CALIBRATION_DEVIATION, DayVerdict
+from fogsim.vision.lines.horizon import Horizon
+
+CAMERA = Camera(64, 48, 60.0, (31.5, 23.5), 1.3)
+OWN = Estimate("joint_road", 0.03, 0.0015, diagnostics={"road": 50.0})
+AGREES = DayVerdict(0.031, 0.002, (88.0, 108.0), "", True, True, 0.0, 0.0, 0.0)
+DENSER = replace(AGREES, extinction=0.06, deviation=0.003, interval=(46.0, 54.0))
+FAR = replace(AGREES, extinction=0.003, deviation=0.0002, interval=(900.0, 1100.0))
+SILENT = replace(AGREES, reason="dark")
+
+
+@pytest.fixture
+def said(monkeypatch):
+    """Function from an estimate and what the day model finds to what comes of both, and how often it looked."""
+    looks = []
+
+    def answer(own, verdict, times=(0.0,), is_straight=True):
+        looks.clear()
+        monkeypatch.setattr(second_opinion, "fit_day", lambda *arguments: looks.append(arguments))
+        monkeypatch.setattr(second_opinion, "verdict_of", lambda _: verdict)
+        second, image = SecondOpinion(CAMERA), np.zeros((48, 64), np.uint8)
+        found = [second.on(own, image, Horizon(23.5, 1.0), math.inf, time, is_straight) for time in times]
+        return found[-1], len(looks)
+
+    return answer
+
+
+def test_an_estimate_that_is_agreed_with_stays_with_the_calibration_in_its_interval(said):
+    found, _ = said(OWN, replace(AGREES, response_deviation=0.1))
+    assert found.extinction == OWN.extinction
+    common = math.hypot(CALIBRATION_DEVIATION, 0.1)
+    assert found.common_deviation == pytest.approx(common)
+    assert found.standard_deviation == pytest.approx(math.hypot(0.0015, 0.03 * common))
+
+
+def test_in_a_drive_it_is_looked_at_again_from_time_to_time(said):
+    assert said(OWN, AGREES, (0.0, 0.1, 0.2, PERIOD + 0.1))[1] == 2
+    assert said(OWN, replace(SILENT, outside=0.9), (0.0, 0.1, 0.2))[1] == 3
+
+
+def test_the_day_model_answers_where_the_other_has_none_and_else_says_why_not(said):
+    none = Estimate.invalid("joint_road", "no sky is seen above the road")
+    found, _ = said(none, DENSER)
+    assert found.valid
+    assert found.visibility_interval == pytest.approx((46.0, 54.0), rel=0.02)
+    assert said(none, SILENT)[0].diagnostics["reason"] == "dark"
+    unsure = said(none, replace(DENSER, is_sure=False))[0]
+    assert not unsure.valid
+    assert unsure.diagnostics["reason"] == "no sky is seen above the road"
+
+
+def test_two_answers_that_exclude_one_another_are_spanned_or_given_up(said):
+    found, _ = said(OWN, DENSER)
+    low, high = found.visibility_interval
+    assert low <= 46.5
+    assert high >= 105.0
+    far, _ = said(OWN, FAR)
+    assert "disagree" in str(far.diagnostics["reason"])
+    assert said(OWN, replace(FAR, is_even=False))[0].valid
+
+
+def test_what_the_joint_fit_does_not_know_makes_the_day_model_decide(said):
+    assert said(OWN, replace(FAR, outside=0.9))[0].visibility == pytest.approx(math.log(20) / 0.003)
+    assert not said(OWN, replace(SILENT, outside=0.9))[0].valid
+    assert said(OWN, replace(SILENT, outside=0.4))[0].valid
+
+
+def test_contrast_beyond_its_fog_ends_an_estimate(said):
+    assert said(OWN, replace(AGREES, doubt=MOST_DOUBT - 1.0))[0].valid
+    assert "contrast" in str(said(OWN, replace(AGREES, doubt=MOST_DOUBT + 1.0))[0].diagnostics["reason"])
+
+
+def test_a_bent_road_is_the_joint_fits(said):
+    assert said(OWN, DENSER, is_straight=False)[1] == 0

@@ -51,6 +51,9 @@ from fogsim.vision.uneven.uneven_fit import UnevenFit, even_fog, fit_uneven
 MIN_AIRLIGHT = 6.0
 """Sky darker than this is no day [linear grey levels]."""
 
+SCALE_DEVIATION = 0.054
+"""Usual relative deviation of distances on the road: 5 % by the height and 2 % by the focal length of a camera [-]."""
+
 MIN_USED = 0.4
 """Least share of the own lane's bins, as far as it is free, that must fit [-]."""
 
@@ -127,6 +130,8 @@ class JointRoad:
         The assumed calibration.
     pitch_deviation : float
         Standard deviation of the true pitch about the assumed one [rad].
+    scale_deviation : float
+        Relative standard deviation of focal length × mount height, with which distances on the road go [-].
     frames : int
         How many of the last frames' curves are averaged; 1 lets every frame stand alone. More average patches out,
         and lag behind a change of fog by half as many frames.
@@ -146,6 +151,7 @@ class JointRoad:
         camera: Camera,
         *,
         pitch_deviation: PitchDeviation = PITCH_DEVIATION,
+        scale_deviation: Annotated[float, Range(0.0, 1.0)] = SCALE_DEVIATION,
         frames: Annotated[int, Range(1, 10_000)] = 1,
         even_airlight: bool = False,
     ) -> None:
@@ -157,7 +163,7 @@ class JointRoad:
         self._earlier: deque[tuple[StripCurves, Sky]] = deque(maxlen=int(frames) - 1)
         self._before: deque[tuple[float, float]] = deque()
         self._droplets = DropletMemory()
-        self._second = SecondOpinion(camera)
+        self._second = SecondOpinion(camera, scale_deviation)
 
     def reset(self) -> None:
         """Forget all earlier frames."""

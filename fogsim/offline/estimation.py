@@ -191,9 +191,9 @@ class _Bench:
 
     def _parameters_of(self, name: str) -> dict[str, object]:
         drive = NightDrive() if self._night is None else self._night
-        pitch = {"pitch_deviation": self._deviations.pitch}
+        deviations = {"pitch_deviation": self._deviations.pitch, "scale_deviation": self._deviations.scale}
         known = accepted_parameters(ESTIMATORS[name])
-        return {**drive.parameters_of(name), **{key: value for key, value in pitch.items() if key in known}}
+        return {**drive.parameters_of(name), **{key: value for key, value in deviations.items() if key in known}}
 
     def reset(self) -> None:
         """Forget all earlier images."""

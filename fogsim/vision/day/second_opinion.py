@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate
 from fogsim.vision.day.day_fit import fit_day
-from fogsim.vision.day.verdict import CALIBRATION_DEVIATION, WIDEST, DayVerdict, agree, verdict_of
+from fogsim.vision.day.verdict import WIDEST, DayVerdict, agree, verdict_of
 from fogsim.vision.lines.horizon import Horizon
 
 POSSIBLY, MOSTLY = 0.35, 0.6
@@ -31,10 +31,12 @@ class SecondOpinion:
     ----------
     camera : Camera
         The assumed calibration.
+    scale_deviation : float
+        Standard deviation of ln k by its height and focal length [-].
     """
 
-    def __init__(self, camera: Camera) -> None:
-        self._camera = camera
+    def __init__(self, camera: Camera, scale_deviation: float) -> None:
+        self._camera, self._scale = camera, scale_deviation
         self._agreed, self._response = -math.inf, 0.0
 
     def reset(self) -> None:
@@ -62,12 +64,15 @@ class SecondOpinion:
             Whether the road neither bends nor sags, as the day model has it.
         """
         if own.valid and (not is_straight or self._agreed < time < self._agreed + PERIOD):
-            return _with_calibration(own, self._response)
-        verdict = verdict_of(fit_day(np.ascontiguousarray(level), self._camera, horizon, free, max(_ends(own)[0], 0.0)))
+            return _with_calibration(own, self._scale, self._response)
+        fit = fit_day(np.ascontiguousarray(level), self._camera, horizon, free, max(_ends(own)[0], 0.0))
+        verdict = verdict_of(fit, self._scale)
         chosen = _chosen(own, verdict)
+        if chosen is not own and chosen.valid:
+            chosen = replace(chosen, common_deviation=max(chosen.common_deviation, self._scale))
         self._agreed = time if chosen is own else -math.inf
         self._response = verdict.response_deviation if verdict.is_sure and verdict.is_even else 0.0
-        return _with_calibration(own, self._response) if chosen is own and own.valid else chosen
+        return _with_calibration(own, self._scale, self._response) if chosen is own and own.valid else chosen
 
 
 def _chosen(own: Estimate, verdict: DayVerdict) -> Estimate:
@@ -120,7 +125,6 @@ def _of_day(own: Estimate, verdict: DayVerdict) -> Estimate:
         verdict.deviation,
         diagnostics=_found(own),
         reach=verdict.reach,
-        common_deviation=CALIBRATION_DEVIATION,
     )
 
 
@@ -132,11 +136,11 @@ def _found(own: Estimate) -> dict[str, object]:
     return {name: value for name, value in own.diagnostics.items() if name != "reason"}
 
 
-def _with_calibration(own: Estimate, response: float) -> Estimate:
+def _with_calibration(own: Estimate, scale: float, response: float) -> Estimate:
     """Add to an interval what height, focal length and response leave open, the same in all images of a drive."""
     if own.extinction <= 0.0:
         return own
-    unknown = math.hypot(CALIBRATION_DEVIATION, response)
+    unknown = math.hypot(scale, response)
     return replace(
         own,
         standard_deviation=math.hypot(own.standard_deviation, unknown * own.extinction),

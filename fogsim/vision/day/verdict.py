@@ -8,10 +8,6 @@ from fogsim.values.estimate import NORMAL_90_PERCENT
 from fogsim.vision.day.day_fit import DayFit
 from fogsim.vision.day.hypotheses import LIGHTS
 
-CALIBRATION_DEVIATION = math.hypot(0.05, 0.02)
-"""Standard deviation of ln k by the height and the focal length of the camera, of 5 % and 2 % [-]: k λ over the rows
-below the horizon is the optical depth, and λ the product of both, so either goes into k as it is."""
-
 FOG, LEAST_FOG, CLEAR = 2000.0, 0.95, 1000.0
 """Visibility below which there is fog [m], least probability of that for an answer with two ends [-], and least lower
 end of an answer with one [m]."""
@@ -98,16 +94,18 @@ class DayVerdict:
         return math.exp(0.5 * (math.log(self.interval[0]) + math.log(min(self.interval[1], FOG))))
 
 
-def verdict_of(fit: DayFit) -> DayVerdict:
+def verdict_of(fit: DayFit, scale_deviation: float) -> DayVerdict:
     """Judge a posterior.
 
     Parameters
     ----------
     fit : DayFit
         The posterior.
+    scale_deviation : float
+        Standard deviation of ln k by the height and the focal length of the camera [-].
     """
     low, middle, high = (fit.quantile(share) for share in (0.05, 0.5, 0.95))
-    calibration = NORMAL_90_PERCENT * CALIBRATION_DEVIATION
+    calibration = NORMAL_90_PERCENT * scale_deviation
     low = middle / math.exp(math.hypot(math.log(middle / low), calibration))
     high = middle * math.exp(math.hypot(math.log(high / middle), calibration))
     is_clear = low > CLEAR

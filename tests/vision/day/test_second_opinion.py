@@ -9,10 +9,11 @@ import pytest
 from fogsim.values import Camera, Estimate
 from fogsim.vision.day import second_opinion
 from fogsim.vision.day.second_opinion import MOST_DOUBT, PERIOD, SecondOpinion
-from fogsim.vision.day.verdict import CALIBRATION_DEVIATION, DayVerdict
+from fogsim.vision.day.verdict import DayVerdict
 from fogsim.vision.lines.horizon import Horizon
 
 CAMERA = Camera(64, 48, 60.0, (31.5, 23.5), 1.3)
+SCALE = 0.05
 OWN = Estimate("joint_road", 0.03, 0.0015, diagnostics={"road": 50.0})
 AGREES = DayVerdict(0.031, 0.002, (88.0, 108.0), "", True, True, 0.0, 0.0, 0.0)
 DENSER = replace(AGREES, extinction=0.06, deviation=0.003, interval=(46.0, 54.0))
@@ -28,8 +29,8 @@ def said(monkeypatch):
     def answer(own, verdict, times=(0.0,), is_straight=True):
         looks.clear()
         monkeypatch.setattr(second_opinion, "fit_day", lambda *arguments: looks.append(arguments))
-        monkeypatch.setattr(second_opinion, "verdict_of", lambda _: verdict)
-        second, image = SecondOpinion(CAMERA), np.zeros((48, 64), np.uint8)
+        monkeypatch.setattr(second_opinion, "verdict_of", lambda *_: verdict)
+        second, image = SecondOpinion(CAMERA, SCALE), np.zeros((48, 64), np.uint8)
         found = [second.on(own, image, Horizon(23.5, 1.0), math.inf, time, is_straight) for time in times]
         return found[-1], len(looks)
 
@@ -39,7 +40,7 @@ def said(monkeypatch):
 def test_an_estimate_that_is_agreed_with_stays_with_the_calibration_in_its_interval(said):
     found, _ = said(OWN, replace(AGREES, response_deviation=0.1))
     assert found.extinction == OWN.extinction
-    common = math.hypot(CALIBRATION_DEVIATION, 0.1)
+    common = math.hypot(SCALE, 0.1)
     assert found.common_deviation == pytest.approx(common)
     assert found.standard_deviation == pytest.approx(math.hypot(0.0015, 0.03 * common))
 

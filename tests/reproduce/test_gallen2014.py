@@ -25,7 +25,8 @@ def test_the_evaluation_runs_small() -> None:
     records = [record for record in found.records if "score_12.6" in record]
     scores = [record["score_12.6"] for record in records]
     assert all(thick > thin for thick, thin in itertools.pairwise(scores))
-    assert records[1]["corrected_m"] == pytest.approx(records[1]["visibility_m"], rel=0.2)
+    assert records[1]["corrected_m"] is not None
+    assert all(one["corrected_low_m"] < one["visibility_m"] < one["corrected_high_m"] for one in records)
     assert found.picture.shape[2] == 3
     assert len(found.cells) == 17
 

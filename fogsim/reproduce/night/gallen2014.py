@@ -186,7 +186,9 @@ def _dissipating(camera: Camera, fogs: int, steps: Steps) -> Iterator[dict[str, 
             record: dict[str, Any] = {"visibility_m": round(visibility, 1)}
             for one, score in zip(REFERENCES, scores.score.tolist(), strict=True):
                 record[f"score_{one:g}"] = round(score, 3)
-            yield record | {f"{name}_m": one and round(one, 1) for name, one in zip(_METHODS, found, strict=True)}
+            record |= {f"{name}_m": one and round(one, 1) for name, one in zip(_METHODS, found, strict=True)}
+            low, high = veil.visibility_interval
+            yield record | {"corrected_low_m": round(low, 1), "corrected_high_m": round(min(high, 1e6), 1)}
 
 
 def _driven(road: NightRoad, visibility: float, seed: tuple[int, ...]) -> list[Pixels]:

@@ -136,6 +136,7 @@ MEASUREMENTS = (
     ),
     benchmark("frames", 2, times="all"),
     benchmark("photograph_roads", 1, ("photographs",)),
+    benchmark("camera_kinds", 3, ("camera kinds",), " --images 5"),
     benchmark("sign_estimators", 6, ("sign estimators",), " --drives 12"),
     benchmark("sensor_faults", 6, ("sensor faults",)),
     benchmark("roadside_cameras", 3, ("roadside cameras",)),

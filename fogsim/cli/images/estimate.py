@@ -94,7 +94,7 @@ def estimate_command(
     ] = None,
 ) -> None:
     """Estimate the visibility in your own images or video (docs/how_to/estimate.md)."""
-    from fogsim.offline import find_source
+    from fogsim.offline import chosen_methods, find_source
 
     guessing = _Guessing(mount_height, field_of_view, horizon_row, track, track_offset)
     if guess_camera:
@@ -109,17 +109,12 @@ def estimate_command(
     if as_json and as_csv:
         raise InputError("--json and --csv both go to stdout: give one of them")
     drive = _night_drive(night, lamps, setback, head_lamps, halos)
+    methods = chosen_methods(_methods(method, drive, mapped=signs is not None))
     source = find_source(images, sequence=sequence, rate=rate)
-    calibration = _calibration(source, camera, guessing)
     outputs = _Outputs(as_json, as_csv, overlay, plot, overwrite)
-    _estimate(
-        source,
-        calibration,
-        _methods(method, drive, mapped=signs is not None),
-        outputs,
-        (signs, track, track_offset),
-        drive,
-    )
+    _check_plot(outputs, source)
+    calibration = _calibration(source, camera, guessing)
+    _estimate(source, calibration, methods, outputs, (signs, track, track_offset), drive)
 
 
 def _methods(named: list[str] | None, night: "NightDrive | None", *, mapped: bool) -> list[str]:
@@ -213,17 +208,16 @@ def _night_drive(
 def _estimate(
     images: "Source",
     calibration: "Calibration",
-    names: list[str],
+    methods: tuple[str, ...],
     outputs: _Outputs,
     mapped: tuple[Path | None, Path | None, float],
     night: "NightDrive | None",
 ) -> None:
-    from fogsim.offline import OverlayFile, chosen_methods, estimates_of, straightened
+    from fogsim.offline import OverlayFile, estimates_of, straightened
     from fogsim.offline.clip_summary import Clip
 
-    methods, unusable = chosen_methods(names), list[str]()
+    unusable = list[str]()
     source, camera = straightened(images, calibration)
-    _check_plot(outputs, source)
     watch = _watch(mapped, source, camera)
     clip, rows = Clip(methods), _Rows(source, methods, outputs)
     with contextlib.ExitStack() as stack:

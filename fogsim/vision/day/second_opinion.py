@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate
 from fogsim.vision.day.day_fit import fit_day
+from fogsim.vision.day.far_objects import share_of_far_objects
 from fogsim.vision.day.verdict import WIDEST, DayVerdict, agree, verdict_of
 from fogsim.vision.lines.horizon import Horizon
 
@@ -19,6 +20,9 @@ up where the day model has no answer [-]."""
 
 MOST_DOUBT = 18.0
 """Doubt by contrast across the road from which on an estimate is given up [-]."""
+
+MOST_FAR = 0.2
+"""Share of the image's width in which things show that fog would hide, from which on an estimate is given up [-]."""
 
 PERIOD = 10.0
 """Time after which an estimate that has been agreed with is looked at again [s]."""
@@ -63,16 +67,25 @@ class SecondOpinion:
         is_straight : bool
             Whether the road neither bends nor sags, as the day model has it.
         """
-        if own.valid and (not is_straight or self._agreed < time < self._agreed + PERIOD):
+        if own.valid and self._agreed < time < self._agreed + PERIOD:
             return _with_calibration(own, self._scale, self._response)
+        if own.valid and not is_straight:
+            chosen, self._response = own, 0.0
+        else:
+            chosen = self._with_day_model(own, level, horizon, free)
+        if chosen.valid and share_of_far_objects(level, self._camera, horizon, _ends(chosen)[0]) > MOST_FAR:
+            chosen = _none(own, "what stands at the horizon is darker than fog would leave it")
+        self._agreed = time if chosen is own else -math.inf
+        return _with_calibration(own, self._scale, self._response) if chosen is own and own.valid else chosen
+
+    def _with_day_model(self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float) -> Estimate:
         fit = fit_day(np.ascontiguousarray(level), self._camera, horizon, free, max(_ends(own)[0], 0.0))
         verdict = verdict_of(fit, self._scale)
-        chosen = _chosen(own, verdict)
-        if chosen is not own and chosen.valid:
-            chosen = replace(chosen, common_deviation=max(chosen.common_deviation, self._scale))
-        self._agreed = time if chosen is own else -math.inf
         self._response = verdict.response_deviation if verdict.is_sure and verdict.is_even else 0.0
-        return _with_calibration(own, self._scale, self._response) if chosen is own and own.valid else chosen
+        chosen = _chosen(own, verdict)
+        if chosen is own or not chosen.valid:
+            return chosen
+        return replace(chosen, common_deviation=max(chosen.common_deviation, self._scale))
 
 
 def _chosen(own: Estimate, verdict: DayVerdict) -> Estimate:

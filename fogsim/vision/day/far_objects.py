@@ -1,0 +1,75 @@
+"""What stands at the horizon against fog that is claimed: it can be darker than the airlight only if it is near."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.values.camera import Camera
+from fogsim.vision.light.luminance import linear_luminance
+from fogsim.vision.lines.horizon import Horizon
+
+BLOCKS = 80
+"""Groups of columns that are judged, across the image."""
+
+ABOVE = 5
+"""Rows above the horizon that are looked at [px]: at the height of the camera's eye, where no crown overhangs."""
+
+SKY_HEIGHT, BRIGHTEST = 0.1, 0.9
+"""Rows above the horizon from which the airlight is taken, over the image's, and the quantile of their light [-]."""
+
+OWN_LANE = 0.2
+"""Columns to either side of the way ahead that do not count, over the image's: vehicles have dark windows above bright
+bodies [-]."""
+
+DARKER, BRIGHTER = 0.8, 0.15
+"""Light over the airlight below which something stands there, and by how much the ground before it must be brighter to
+show that it stands farther away [-]."""
+
+LEAST_ROWS = 3
+"""Rows of ground that show that."""
+
+
+def share_of_far_objects(level: NDArray[Any], camera: Camera, horizon: Horizon, extinction: float) -> float:
+    """Share of the image's width in which something is seen that fog of an extinction would hide [-].
+
+    At the depth d fog leaves no light below A (1 − e^(−k d)), so that something of the light L is nearer than
+    −ln(1 − L / A) / k, and its foot lies as far below the horizon. Where the ground between there and the horizon is
+    seen, it is farther.
+
+    Parameters
+    ----------
+    level : (rows, cols) or (rows, cols, 3) uint8 or uint16
+        A level image.
+    camera : Camera
+        The assumed calibration.
+    horizon : Horizon
+        What is known of the horizon.
+    extinction : float
+        The least that is claimed [1/m].
+    """
+    margin = 2.0 * horizon.standard_deviation + 1.0
+    first, last = math.floor(horizon.row - margin) - ABOVE, math.floor(horizon.row - margin)
+    ground = math.ceil(horizon.row + margin)
+    top = max(math.floor(last - SKY_HEIGHT * camera.height), 0)
+    if first < 0 or last <= top or ground + LEAST_ROWS >= camera.height or not extinction > 0.0:
+        return 0.0
+    light = linear_luminance(level[top:], camera.response, camera.bits, camera.black_level)
+    per_block = max(light.shape[1] // BLOCKS, 1)
+    count = light.shape[1] // per_block
+    blocks = light[:, : count * per_block].reshape(light.shape[0], count, per_block).mean(axis=2)
+    aside = np.abs((np.arange(count) + 0.5) * per_block - camera.principal_point[0]) > OWN_LANE * camera.width
+    blocks = blocks[:, aside]
+    airlight = float(np.quantile(blocks[: last - top], BRIGHTEST)) if aside.any() else 0.0
+    if not airlight > 0.0:
+        return 0.0
+    blocks = blocks / airlight
+    above, below = blocks[first - top : last - top].mean(axis=0), blocks[ground - top :]
+    depth = -np.log1p(-np.clip(above, 0.0, DARKER)) / extinction
+    foot = camera.row_distance / np.maximum(depth, 1e-3)
+    rows = np.arange(below.shape[0])[:, None] + ground - horizon.row
+    before = (rows < foot - margin) & (below > above + BRIGHTER)
+    counted = (rows < foot - margin).sum(axis=0)
+    seen = (above < DARKER) & (counted >= LEAST_ROWS) & (before.sum(axis=0) > 0.5 * counted)
+    return float(seen.mean())

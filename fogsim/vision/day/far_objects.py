@@ -16,7 +16,7 @@ BLOCKS = 80
 ABOVE = 5
 """Rows above the horizon that are looked at [px]: at the height of the camera's eye, where no crown overhangs."""
 
-SKY_HEIGHT, BRIGHTEST = 0.1, 0.9
+SKY_HEIGHT, BRIGHTEST = 0.5, 0.9
 """Rows above the horizon from which the airlight is taken, over the image's, and the quantile of their light [-]."""
 
 OWN_LANE = 0.2

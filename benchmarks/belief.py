@@ -217,7 +217,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/explanation/estimators.md")
+    parser.add_argument("--docs", action="store_true", help="write the table of docs/explanation/belief.md")
     parser.add_argument("--pool", type=int, choices=(0, 1), default=1, help="0: constants chosen on it")
     arguments = parser.parse_args()
     found: dict[tuple[str, str], Found] = {}
@@ -227,7 +227,7 @@ def main() -> None:
             follow(name, seen, found.setdefault((drive.kind, name), Found()), drive.seed)
     rows = list(records(found, arguments.pool))
     if arguments.docs:
-        write_table("explanation/estimators.md", "belief", table(rows))
+        write_table("explanation/belief.md", "belief", table(rows))
     print(json.dumps(rows, indent=2) if arguments.json else "\n".join(table(rows)))
 
 

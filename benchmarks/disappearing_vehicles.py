@@ -169,7 +169,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/explanation/estimators.md")
+    parser.add_argument("--docs", action="store_true", help="write the table of docs/benchmarks/estimators.md")
     parser.add_argument("--pool", type=int, choices=(0, 1), default=1, help="0: constants chosen on it")
     arguments = parser.parse_args()
     found = {visibility: Found() for visibility in VISIBILITIES}
@@ -179,7 +179,7 @@ def main() -> None:
     rows = [record(f"{visibility:g}", one, arguments.pool) for visibility, one in found.items()]
     rows.append(record("all", together(found), arguments.pool))
     if arguments.docs:
-        write_table("explanation/estimators.md", "disappearing vehicles", table(rows))
+        write_table("benchmarks/estimators.md", "disappearing vehicles", table(rows))
     print(json.dumps(rows, indent=2) if arguments.json else "\n".join(table(rows)))
 
 

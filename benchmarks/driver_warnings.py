@@ -160,7 +160,7 @@ def main() -> None:
     """Print the records, or a table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true")
-    parser.add_argument("--docs", action="store_true", help="write the table into docs/explanation/estimators.md")
+    parser.add_argument("--docs", action="store_true", help="write the table into docs/explanation/belief.md")
     parser.add_argument("--seeds", type=int, default=20, help="drives into the bank")
     parser.add_argument("--drives", type=int, default=6, help="drives of 10 min in each even fog")
     parser.add_argument("--keep", type=Path, help="file in which to keep what is measured, and from which to go on")
@@ -168,7 +168,7 @@ def main() -> None:
     found = list(records(rows(arguments)))
     print(json.dumps(found, indent=1) if arguments.json else "\n".join(table(found)))
     if arguments.docs:
-        write_table("explanation/estimators.md", "warnings", table(found))
+        write_table("explanation/belief.md", "warnings", table(found))
 
 
 if __name__ == "__main__":

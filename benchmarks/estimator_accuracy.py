@@ -167,7 +167,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the tables of docs/explanation/estimators.md")
+    parser.add_argument("--docs", action="store_true", help="write the tables of docs/benchmarks/estimators.md")
     parser.add_argument("--methods", nargs="+", default=list(METHODS), help="estimators of single frames")
     parser.add_argument("--pitch-deviation", type=float, default=0.1, help="deviation of the told pitch [deg]")
     parser.add_argument("--cameras", type=int, default=len(CAMERAS), help="how many of the cameras")
@@ -181,7 +181,7 @@ def main() -> None:
     arguments = parser.parse_args()
     found = list(records(measure(arguments)))
     if arguments.docs:
-        write_table("explanation/estimators.md", "accuracy", [tables(found)])
+        write_table("benchmarks/estimators.md", "accuracy", [tables(found)])
     print(json.dumps(found, indent=2) if arguments.json else tables(found))
 
 

@@ -1,4 +1,4 @@
-"""What `estimator_accuracy.py` makes of its rows: flat records, and the tables of docs/explanation/estimators.md."""
+"""What `estimator_accuracy.py` makes of its rows: flat records, and the tables of docs/benchmarks/estimators.md."""
 
 import math
 from collections.abc import Callable, Iterator

@@ -73,7 +73,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/explanation/estimators.md")
+    parser.add_argument("--docs", action="store_true", help="write the table of docs/benchmarks/estimators.md")
     parser.add_argument("--images", type=some, default=24, help="drawings of each kind")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--keep", type=Path, help="file in which to keep what is measured, and from which to go on")
@@ -81,7 +81,7 @@ def main() -> None:
     rows = measure(arguments.images, arguments.seed, arguments.keep)
     found = list(records(rows, ["--images", str(arguments.images), "--seed", str(arguments.seed)]))
     if arguments.docs:
-        write_table("explanation/estimators.md", "targets", [table(found)])
+        write_table("benchmarks/estimators.md", "targets", [table(found)])
     print(json.dumps(found, indent=2) if arguments.json else table(found))
 
 

@@ -148,7 +148,7 @@ def write_docs(records: list[dict[str, object]]) -> None:
                 for method in methods
             )
             lines.append(f"| {road} | {visibility:.0f} m | {' | '.join(cells)} |")
-    write_table("explanation/estimators.md", "grades", lines)
+    write_table("benchmarks/estimators.md", "grades", lines)
 
 
 def main() -> None:
@@ -159,7 +159,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1, help="seed of the drive")
     parser.add_argument("--duration", type=float, default=180.0, help="longest simulated time [s]")
     parser.add_argument("--drawings", type=int, default=4, help="drawings of each bend and camera")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/explanation/estimators.md")
+    parser.add_argument("--docs", action="store_true", help="write the table of docs/benchmarks/estimators.md")
     arguments = parser.parse_args()
     visibilities = arguments.visibility or [100.0, 200.0, 300.0, 500.0]
     records = [

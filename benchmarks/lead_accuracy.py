@@ -206,14 +206,14 @@ def write_docs(records: list[dict[str, Any]]) -> None:
     parts = ("airlight", "camera", "vehicle")
     whole = [{k: v for k, v in r.items() if k not in parts} for r in records if all(r[p] == "all" for p in parts)]
     apart = [r for r in records if any(r[p] != "all" for p in parts) and "published" not in r["method"]]
-    write_table("explanation/estimators.md", "lead accuracy", [table(whole), "", table(apart)])
+    write_table("benchmarks/estimators.md", "lead accuracy", [table(whole), "", table(apart)])
 
 
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the tables of docs/explanation/estimators.md")
+    parser.add_argument("--docs", action="store_true", help="write the tables of docs/benchmarks/estimators.md")
     parser.add_argument("--methods", nargs="+", default=list(METHODS), choices=list(METHODS), help="what is measured")
     parser.add_argument("--cameras", type=int, default=3, help="how many of the cameras")
     parser.add_argument("--vehicles", type=int, default=len(VEHICLES), help="how many of the vehicles")

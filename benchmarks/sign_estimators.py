@@ -87,7 +87,7 @@ def _percent(values: list[float], percentile: float) -> float | None:
 
 
 def docs_table(found: list[dict[str, Any]]) -> list[str]:
-    """Lines of the table of docs/explanation/estimators.md: `sign_contrast` with right signs, and with wrong ones."""
+    """Lines of the table of docs/benchmarks/estimators.md: `sign_contrast` with right signs, and with wrong ones."""
     told = {(one["visibility"], one["wrong_share"]): one for one in found if one["method"] == "sign_contrast"}
     shares = list(dict.fromkeys(share for _, share in told))
     heads = ["median/p95, %", "90 % intervals hold"]
@@ -105,7 +105,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/explanation/estimators.md")
+    parser.add_argument("--docs", action="store_true", help="write the table of docs/benchmarks/estimators.md")
     parser.add_argument("--pool", type=int, default=1, help="which drives")
     parser.add_argument("--drives", type=int, default=8, help="how many of them")
     parser.add_argument("--wrong", type=float, nargs="+", default=[0.0, 0.2], help="shares of signs that are wrong")
@@ -117,7 +117,7 @@ def main() -> None:
         for record in records(driven(arguments.pool, arguments.drives, wrong, arguments.visibilities), wrong)
     ]
     if arguments.docs:
-        write_table("explanation/estimators.md", "sign estimators", docs_table(found))
+        write_table("benchmarks/estimators.md", "sign estimators", docs_table(found))
     if arguments.json:
         print(json.dumps(found, indent=2))
         return

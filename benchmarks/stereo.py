@@ -145,16 +145,16 @@ def table(rows: Sequence[Row]) -> Iterator[str]:
 
 
 def write_docs(rows: Sequence[Row]) -> None:
-    """Write the table into docs/explanation/estimators.md."""
+    """Write the table into docs/benchmarks/estimators.md."""
     cost = f"One estimate takes {rows[0]['ms']:.0f} ms, the second picture {rows[0]['ms_rig']:.0f} ms a step."
-    write_table("explanation/estimators.md", "stereo", [*table(rows), "", cost])
+    write_table("benchmarks/estimators.md", "stereo", [*table(rows), "", cost])
 
 
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/explanation/estimators.md")
+    parser.add_argument("--docs", action="store_true", help="write the table of docs/benchmarks/estimators.md")
     parser.add_argument("--pool", type=int, choices=(0, 1), default=1, help="0: constants chosen on it")
     arguments = parser.parse_args()
     rows: list[Row] = []

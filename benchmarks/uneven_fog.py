@@ -199,7 +199,7 @@ def records(found: dict[tuple[str, str], Found], pool: int) -> Iterator[Row]:
 
 
 def table(rows: list[Row]) -> Iterator[str]:
-    """Lines of the table of docs/explanation/estimators.md."""
+    """Lines of the table of docs/benchmarks/estimators.md."""
     yield "| fog | method | frames | valid | median / p95, % | bias, % | 90 % intervals hold | τ(d) held |"
     yield "|---|---|---|---|---|---|---|---|"
     for row in rows:
@@ -220,7 +220,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/explanation/estimators.md")
+    parser.add_argument("--docs", action="store_true", help="write the table of docs/benchmarks/estimators.md")
     parser.add_argument("--pool", type=int, choices=(0, 1), default=1, help="0: constants chosen on it")
     parser.add_argument("--methods", nargs="+", default=METHODS, help="names of estimators")
     parser.add_argument("--clear", type=float, default=75.0, help="minutes of driving in clear air")
@@ -233,7 +233,7 @@ def main() -> None:
         run(drive, arguments.methods, found)
     rows = list(records(found, arguments.pool))
     if arguments.docs:
-        write_table("explanation/estimators.md", "uneven fog", table(rows))
+        write_table("benchmarks/estimators.md", "uneven fog", table(rows))
     if arguments.json:
         print(json.dumps(rows, indent=2))
     else:

@@ -30,8 +30,8 @@ EXCERPT = {
 
 
 def excerpt() -> Rows:
-    """Errors of some methods with an untold vehicle ahead, as the page on estimators has them, to two digits."""
-    page = (ROOT / "docs" / "explanation" / "estimators.md").read_text(encoding="utf-8")
+    """Errors of some methods with an untold vehicle ahead, as the page on their accuracy has them, to two digits."""
+    page = (ROOT / "docs" / "benchmarks" / "estimators.md").read_text(encoding="utf-8")
     table = page.split("<!-- table: accuracy -->", 1)[1].split("\n\n")[2].splitlines()
     heading, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table]
     found = {row[0]: row[2:] for row in rows if row[1] == "untold"}
@@ -94,8 +94,8 @@ TABLES: dict[str, tuple[str, Callable[[], Rows]]] = {
     "night-lamps": ("docs/explanation/night.md", night_deviations.lamp_fluxes),
     "night-limits": ("docs/explanation/night.md", night_deviations.fog_limits),
     "night-directions": ("docs/explanation/night.md", night_deviations.directions),
-    **{f"paper-{name}": ("docs/explanation/estimators.md", functools.partial(paper_cells, name)) for name in PAPERS},
-    "zhu2015": ("docs/explanation/estimators.md", zhu2015),
+    **{f"paper-{name}": ("docs/benchmarks/papers.md", functools.partial(paper_cells, name)) for name in PAPERS},
+    "zhu2015": ("docs/benchmarks/papers.md", zhu2015),
     "drivers-published": ("docs/explanation/drivers.md", drivers),
     "drivers-traffic": ("docs/explanation/drivers.md", drivers_traffic),
 }

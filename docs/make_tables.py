@@ -292,7 +292,7 @@ TABLES = {
             compliances,
         ),
     },
-    "explanation/estimators.md": {
+    "benchmarks/papers.md": {
         f"repairs-{name}": (("repair", "the paper", "corrected (the default)"), partial(repairs, kind))
         for name, kind in (
             ("negru2013", Negru2013Repair),

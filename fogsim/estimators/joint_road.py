@@ -30,6 +30,7 @@ from fogsim.vision.lines.road_lines import seen_lines, vanishing_point_of
 from fogsim.vision.strips.airlight_slopes import darkening_priors
 from fogsim.vision.strips.course_geometry import course_deviation, course_geometry
 from fogsim.vision.strips.droplet_memory import DropletMemory
+from fogsim.vision.strips.full_looks import Left, left_by
 from fogsim.vision.strips.joint_checks import CLEAR, LEAST_CONTRAST, MAX_MISFIT, is_ramp, no_road
 from fogsim.vision.strips.joint_fit import ALIKE, MODEL_DEVIATION, JointFit, Priors, fit_own, with_neighbours
 from fogsim.vision.strips.joint_prior import joint_prior
@@ -162,7 +163,7 @@ class JointRoad:
         self._geometry, self._shaded = self._straight, 0.0
         self._earlier: deque[tuple[StripCurves, Sky]] = deque(maxlen=int(frames) - 1)
         self._before: deque[tuple[float, float]] = deque()
-        self._droplets = DropletMemory()
+        self._droplets, self._left = DropletMemory(), Left()
         self._second = SecondOpinion(camera, scale_deviation)
 
     def reset(self) -> None:
@@ -170,7 +171,7 @@ class JointRoad:
         self._check.reset()
         self._earlier.clear()
         self._before.clear()
-        self._droplets = DropletMemory()
+        self._droplets, self._left = DropletMemory(), Left()
         self._second.reset()
 
     def update(self, observation: Observation) -> Estimate:
@@ -232,7 +233,7 @@ class JointRoad:
             self._geometry = course_geometry(self._straight, self._camera, course)
         prior = joint_prior(sky, self._camera, horizon)
         priors = (prior,) if self._even_airlight else (prior, *darkening_priors(prior, sky, self._droplets.chances))
-        fit = self._fitted(pixels, sky, priors, free, course)
+        fit = self._fitted(pixels, sky, priors, free, course, observation.time)
         if isinstance(fit, str):
             return Estimate.invalid(self.method, fit, **found), free
         self._droplets.learn(fit.fit.droplets, observation.time, observation.speed)
@@ -243,7 +244,7 @@ class JointRoad:
         return own, min(free, _obstacle(fit.fit, self._geometry))
 
     def _fitted(
-        self, pixels: LinearPixels, sky: Sky, priors: Priors, free: float, course: RoadCourse
+        self, pixels: LinearPixels, sky: Sky, priors: Priors, free: float, course: RoadCourse, time: float
     ) -> UnevenFit | str:
         """Fit of the road that is free up to a depth, or why there is none that is to be believed.
 
@@ -252,8 +253,11 @@ class JointRoad:
         lowest = lowest_road_row(pixels, self._camera, sky.luminance)
         curves = self._usable(strip_curves(pixels, self._geometry, sky.noise, self._camera, free), sky, lowest)
         whole, told = curves, free
-        own = fit = fit_own(self._averaged(curves, sky), self._geometry, priors)
-        if shaded := self._in_shade(own, pixels, curves, sky, priors, free):
+        if is_full := self._left.is_due(time):
+            self._left = Left()
+        left = self._left
+        own = fit = fit_own(self._averaged(curves, sky), self._geometry, priors, left.albedos)
+        if is_full and (shaded := self._in_shade(own, pixels, curves, sky, priors, free)):
             return shaded
         for _ in range(MOST_OBSTACLES):
             if own is None or fit is None:
@@ -267,7 +271,7 @@ class JointRoad:
                 curves = self._usable(curves, sky, lowest)
             elif fit is not own:
                 break
-            fit = with_neighbours(own, self._averaged(curves, sky), self._geometry, priors)
+            fit = with_neighbours(own, self._averaged(curves, sky), self._geometry, priors, left.albedos)
             if fit is own:
                 break
         self._earlier.append((curves, sky))
@@ -277,11 +281,15 @@ class JointRoad:
         curves = whole if math.isfinite(told) else curves
         # Where a sag or crest is not quite followed, the road fades as in fog that changes along the way.
         uneven = even_fog(fit, self._geometry)
-        if not course.sag.any() and fit.darkening_chance < DARKENS:
+        is_full = is_full or not left.suffices(fit)
+        if is_full and not course.sag.any() and fit.darkening_chance < DARKENS:
             seen = self._averaged(curves, sky)
             hidden = HiddenCourse(self._straight, self._camera, course)
             uneven = fit_uneven(seen, self._geometry, priors[0], own, fit, hidden)
-        return self._doubt(uneven, sky, curves, free, told) or uneven
+        why = self._doubt(uneven, sky, curves, free, told)
+        if is_full:
+            self._left = Left() if why or uneven.even < 1.0 else left_by(time, fit)
+        return why or uneven
 
     def _in_shade(
         self,

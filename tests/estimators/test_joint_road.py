@@ -5,7 +5,7 @@ import pytest
 
 from fogsim.errors import InputError
 from fogsim.estimators import make
-from fogsim.values import Camera, LeadMeasurement, Observation, Response
+from fogsim.values import Camera, Frame, LeadMeasurement, Observation, Response
 
 SMALL = Camera(320, 240, 288.0, (159.5, 119.5), 1.38, np.radians(2.0))
 PAPER = Camera(688, 515, 700.0, (343.5, 257.0), 1.3, np.radians(2.0))
@@ -148,3 +148,23 @@ def test_a_camera_upside_down_is_refused(render, road):
 def test_parameters_out_of_range_are_errors(options):
     with pytest.raises(InputError, match=next(iter(options))):
         make("joint_road", SMALL, **options)
+
+
+def drive(render, road, densities, period=0.1):
+    """Estimates of a drive, an image every period [s], and of each image by itself; the fog by its k over the road's."""
+    moving, drawn = make("joint_road", road.camera), []
+    for i, density in enumerate(densities):
+        image = render(road.but(visibility=road.visibility / density), i)
+        drawn.append((moving.update(Observation(Frame(period * i, image, road.camera))), estimate(image, road.camera)))
+    return drawn
+
+
+def test_hypotheses_that_a_drive_has_ruled_out_change_no_answer(render, road):
+    for along, alone in drive(render, road.but(visibility=120.0, camera=SMALL), [1.0] * 12):
+        assert along.extinction == pytest.approx(alone.extinction, abs=0.5 * alone.standard_deviation)
+        assert along.standard_deviation == pytest.approx(alone.standard_deviation, rel=0.3)
+
+
+def test_fog_that_thickens_between_full_looks_is_followed_at_once(render, road):
+    for along, alone in drive(render, road.but(visibility=200.0, camera=SMALL), [1.0, 1.0, 1.0, 2.0, 2.0]):
+        assert along.extinction == pytest.approx(alone.extinction, rel=0.05)

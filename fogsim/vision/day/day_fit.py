@@ -113,9 +113,14 @@ class DayFit:
 
 
 def fit_day(
-    image: NDArray[Any], camera: Camera, horizon: Horizon, free: float = math.inf, claimed: float = 0.0
+    image: NDArray[Any],
+    camera: Camera,
+    horizon: Horizon,
+    free: float = math.inf,
+    claimed: float = 0.0,
+    earlier: DayFit | None = None,
 ) -> DayFit:
-    """Weigh all hypotheses by their evidence.
+    """Weigh all hypotheses by their evidence, or those that an earlier image of the same drive has left.
 
     Parameters
     ----------
@@ -129,16 +134,21 @@ def fit_day(
         Depth up to which the own lane is free of the vehicle ahead [m].
     claimed : float
         Extinction that another method claims; contrast across the road may speak against it [1/m].
+    earlier : DayFit or None
+        Of that earlier image: other responses and surfaces than it leaves are not tried.
     """
     pixels = image if image.ndim == 3 else image[:, :, None]
     bins = row_bins(camera, horizon.standard_deviation, round(horizon.row))
     rows = read_rows(pixels, bins, camera, horizon.row)
     if math.isfinite(free):
         rows = _without_vehicle(rows, camera, horizon.row, free)
-    return replace(_weighed(rows, camera, horizon), doubt=_doubt(rows, camera, horizon, claimed))
+    fit = replace(_weighed(rows, camera, horizon, earlier), doubt=_doubt(rows, camera, horizon, claimed))
+    if earlier is None:
+        return fit
+    return replace(fit, responses=earlier.responses, response_deviation=earlier.response_deviation)
 
 
-def _weighed(rows: RowData, camera: Camera, horizon: Horizon) -> DayFit:
+def _weighed(rows: RowData, camera: Camera, horizon: Horizon, earlier: DayFit | None) -> DayFit:
     responses, surfaces = np.log(curves_of(camera).chance), np.log(SURFACES.chance)
     ends = rows.cuts.size - 2
     lights = np.log(np.append(lights_chances(ends), [CUT_CHANCE] * ends))
@@ -153,25 +163,31 @@ def _weighed(rows: RowData, camera: Camera, horizon: Horizon) -> DayFit:
     whole = np.delete(whole[: -at.size], ALL.size, axis=1) + lights
     of_light = np.logaddexp.reduce(whole + likely[::2, None], axis=0)
     if ends and of_light[ALL.size :].max() > of_light[: ALL.size].max():
-        return _weighed(_ended(rows, 1 + int(np.argmax(of_light[ALL.size :]))), camera, horizon)
+        return _weighed(_ended(rows, 1 + int(np.argmax(of_light[ALL.size :]))), camera, horizon, earlier)
     kept = np.flatnonzero(of_light[: ALL.size] > of_light.max() - SUITS)
-    some = np.logaddexp.reduce(grid.evidence(cells[1, ::2], OTHERS, kept) + lights[kept], axis=2).max(axis=1)
-    some = np.maximum(some, np.logaddexp.reduce(whole, axis=1)) + likely[::2]
+    likely_responses, likely_surfaces = _left(earlier, responses.size)
+    some = np.logaddexp.reduce(whole, axis=1)
+    others = OTHERS[likely_responses[OTHERS[:, 0]] & likely_surfaces[OTHERS[:, 1]]]
+    if len(others):
+        tried_first = np.logaddexp.reduce(grid.evidence(cells[1, ::2], others, kept) + lights[kept], axis=2)
+        some = np.maximum(some, tried_first.max(axis=1))
+    some += likely[::2]
     chosen = np.zeros(prior.shape, np.bool_)
     chosen[:, ::2] = some > some.max() - FIRST_WORTHWHILE
     chosen = _wider(chosen, 2)
     # Where fog may be, all surfaces; where it still may be, all responses over the surfaces that suit.
-    tried = [(0, s) for s in range(surfaces.size)]
+    left = np.flatnonzero(likely_surfaces)
+    tried = [(0, int(s)) for s in left]
     found = _scattered(grid.evidence(cells[chosen], np.array(tried), kept) + lights[kept], chosen)
-    found += (prior[:, :, None] + surfaces)[:, :, :, None]
+    found += (prior[:, :, None] + surfaces[left])[:, :, :, None]
     good = np.logaddexp.reduce(found, axis=(2, 3))
     chosen &= _wider(good > good.max() - WORTHWHILE, 1)
     of_surface = np.logaddexp.reduce(found[chosen], axis=(0, 2))
-    suit = [s for s in range(surfaces.size) if of_surface[s] > of_surface.max() - SUITS]
-    others = [(r, s) for s in suit for r in range(1, responses.size)]
-    pairs = np.array(tried + others)
-    each = grid.evidence(cells[chosen], np.array(others), kept) + lights[kept] + prior[chosen][:, None, None]
-    each += surfaces[pairs[len(tried) :, 1]][:, None]
+    suit = [int(s) for s, cost in zip(left, of_surface, strict=True) if cost > of_surface.max() - SUITS]
+    pairs = np.array(tried + [(r, s) for s in suit for r in range(1, responses.size) if likely_responses[r]])
+    more = pairs[len(tried) :]
+    each = grid.evidence(cells[chosen], more, kept) + lights[kept] + prior[chosen][:, None, None]
+    each += surfaces[more[:, 1]][:, None]
     each = np.concatenate([found[chosen], each], axis=1) + responses[pairs[:, 0]][:, None]
     chance = np.logaddexp.reduce(each, axis=2)
     fine, posterior, evidence = _interpolated(logs, chosen, chance)
@@ -189,6 +205,15 @@ def _weighed(rows: RowData, camera: Camera, horizon: Horizon) -> DayFit:
         response_deviation=_apart(np.log(cells[chosen][:, 1]), chance, pairs[:, 0]),
         contrast=float(rows.light[0, rows.cuts[0] :].max() - rows.light[0, -1]) / float(rows.level[0]),
     )
+
+
+def _left(earlier: DayFit | None, count: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which of so many responses, and which surfaces, are to be tried; the stated response always is."""
+    if earlier is None:
+        return np.ones(count, np.bool_), np.ones(SURFACES.chance.size, np.bool_)
+    responses = np.zeros(count, np.bool_)
+    responses[0], responses[np.argsort(earlier.responses)[-LIKELY:]] = True, True
+    return responses, earlier.surfaces > HARDLY
 
 
 def _wider(cells: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
@@ -222,6 +247,10 @@ USUAL = np.zeros((1, 2), np.int64)
 
 OTHERS = np.array([(0, 1), (0, 2), (0, 3), (0, 4), (0, 5), (2, 0), (4, 0)])
 """Responses and surfaces of a first look."""
+
+HARDLY, LIKELY = 0.03, 2
+"""Probability below which a surface is not tried in later images of a drive [-], and how many responses are, besides
+the stated one: an image hardly tells them apart, and a camera keeps its own."""
 
 SUITS = 5.0
 """Logarithm of the evidence below the best at which a surface is not tried under other responses [-]."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate
-from fogsim.vision.day.day_fit import fit_day
+from fogsim.vision.day.day_fit import DayFit, fit_day
 from fogsim.vision.day.far_objects import share_of_far_objects
 from fogsim.vision.day.verdict import WIDEST, DayVerdict, agree, verdict_of
 from fogsim.vision.lines.horizon import Horizon
@@ -41,11 +41,12 @@ class SecondOpinion:
 
     def __init__(self, camera: Camera, scale_deviation: float) -> None:
         self._camera, self._scale = camera, scale_deviation
-        self._agreed, self._response = -math.inf, 0.0
+        self.reset()
 
     def reset(self) -> None:
         """Forget all earlier frames."""
         self._agreed, self._response = -math.inf, 0.0
+        self._fit: DayFit | None = None
 
     def on(
         self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float, time: float, is_straight: bool
@@ -75,11 +76,15 @@ class SecondOpinion:
             chosen = self._with_day_model(own, level, horizon, free)
         if chosen.valid and share_of_far_objects(level, self._camera, horizon, _ends(chosen)[0]) > MOST_FAR:
             chosen = _none(own, "what stands at the horizon is darker than fog would leave it")
-        self._agreed = time if chosen is own else -math.inf
+        if chosen is own and own.valid:
+            self._agreed = time
+        else:
+            self._agreed, self._fit = -math.inf, None
         return _with_calibration(own, self._scale, self._response) if chosen is own and own.valid else chosen
 
     def _with_day_model(self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float) -> Estimate:
-        fit = fit_day(np.ascontiguousarray(level), self._camera, horizon, free, max(_ends(own)[0], 0.0))
+        fit = fit_day(np.ascontiguousarray(level), self._camera, horizon, free, max(_ends(own)[0], 0.0), self._fit)
+        self._fit = self._fit or fit
         verdict = verdict_of(fit, self._scale)
         self._response = verdict.response_deviation if verdict.is_sure and verdict.is_even else 0.0
         chosen = _chosen(own, verdict)

@@ -1,6 +1,6 @@
 """Joint fit of extinction, airlight and horizon over strips of road whose albedo may wander.
 
-`fit_jointly` fits given strips, `fit_agreeing` the own lane with those neighbours that agree with it.
+`fit_jointly` fits given strips, `fit_own` the own lane, and `with_neighbours` those strips that agree with it.
 """
 
 import math
@@ -37,6 +37,12 @@ ALBEDOS = (
 
 ALBEDO_CHANCES = (0.5, 0.25, 0.08, 0.05, 0.07, 0.04, 0.01)
 """How likely each of those is before the image is seen [-]."""
+
+EVERY = tuple(range(len(ALBEDOS)))
+"""All of them."""
+
+NEGLIGIBLE = 1e-3
+"""Probability below which an albedo need not be tried in the next images of a drive [-]."""
 
 SMOOTH, EXPLAINED = 4, 1.0
 """How many of those have patches as faint as the first, and misfit of the first up to which stronger ones are not tried
@@ -105,6 +111,8 @@ class JointFit:
     droplets : tuple of float
         Logarithm of how likely this picture is with each kind of droplets, if it darkens, over the likeliest [-]; none
         where it was not tried.
+    albedos : tuple of int
+        Those of `ALBEDOS` that are not negligible.
     """
 
     extinction: float
@@ -117,6 +125,7 @@ class JointFit:
     hidden: NDArray[np.bool_]
     darkening_chance: float = 0.0
     droplets: tuple[float, ...] = ()
+    albedos: tuple[int, ...] = EVERY
 
 
 Priors = tuple[JointPrior, ...]
@@ -124,11 +133,12 @@ Priors = tuple[JointPrior, ...]
 
 @dataclass(frozen=True, slots=True)
 class _Answer:
-    """A solution, its cost with what is likely beforehand, and under which prior."""
+    """A solution, its cost with what is likely beforehand, under which prior, and for which albedo."""
 
     cost: float
     solution: Solution
     prior: JointPrior
+    albedo: int
 
     @property
     def is_even(self) -> bool:
@@ -137,7 +147,11 @@ class _Answer:
 
 
 def fit_jointly(
-    curves: StripCurves, geometry: StripGeometry, priors: Priors, near: JointFit | None = None
+    curves: StripCurves,
+    geometry: StripGeometry,
+    priors: Priors,
+    near: JointFit | None = None,
+    albedos: tuple[int, ...] = EVERY,
 ) -> JointFit | None:
     """Fit Koschmieder's law to strips of road.
 
@@ -155,6 +169,8 @@ def fit_jointly(
         either are averaged by their evidence.
     near : JointFit or None
         Answer for some of the strips, from which to start in place of a search.
+    albedos : tuple of int
+        Those of `ALBEDOS` that are tried after the first.
 
     Returns
     -------
@@ -163,18 +179,20 @@ def fit_jointly(
     """
     if int((curves.variance[0] > 0).sum()) < LEAST_BINS:
         return None
-    return _average([answer for prior in priors for answer in _answers(curves, geometry, prior, near)])
+    return _average([answer for prior in priors for answer in _answers(curves, geometry, prior, near, albedos)])
 
 
-def _answers(curves: StripCurves, geometry: StripGeometry, prior: JointPrior, near: JointFit | None) -> list[_Answer]:
+def _answers(
+    curves: StripCurves, geometry: StripGeometry, prior: JointPrior, near: JointFit | None, albedos: tuple[int, ...]
+) -> list[_Answer]:
     """Answers under one prior, each with its cost, in which how likely the albedo is beforehand is counted."""
     bins = strip_bins(curves, geometry, prior)
     best = _from_search(bins, prior) if near is None else _from_near(bins, near, prior)
-    tried = ALBEDOS if best.misfit > EXPLAINED else ALBEDOS[:SMOOTH]
-    found = [best] + [_refined(bins, albedo, prior, best.theta, MORE_STEPS) for albedo in tried[1:]]
+    most = len(ALBEDOS) if best.misfit > EXPLAINED else SMOOTH
+    found = [(0, best)]
+    found += [(a, _refined(bins, ALBEDOS[a], prior, best.theta, MORE_STEPS)) for a in albedos if 0 < a < most]
     cost = slope_cost(prior) + prior.cost
-    chances = ALBEDO_CHANCES[: len(found)]
-    return [_Answer(f.cost + cost - 2.0 * math.log(chance), f, prior) for f, chance in zip(found, chances, strict=True)]
+    return [_Answer(f.cost + cost - 2.0 * math.log(ALBEDO_CHANCES[a]), f, prior, a) for a, f in found]
 
 
 def strip_bins(curves: StripCurves, geometry: StripGeometry, prior: JointPrior) -> Bins:
@@ -318,7 +336,14 @@ def _average(answers: list[_Answer]) -> JointFit:
         hidden=best.used[0] == albedo_filter.HIDDEN,
         darkening_chance=float(weight[[not answer.is_even for answer in answers]].sum()),
         droplets=_droplets(answers),
+        albedos=_of_weight(answers, weight),
     )
+
+
+def _of_weight(answers: list[_Answer], weight: Floats) -> tuple[int, ...]:
+    """Albedos that are not negligible under all priors together."""
+    share = np.bincount([answer.albedo for answer in answers], weight)
+    return tuple(np.flatnonzero(share > NEGLIGIBLE).tolist())
 
 
 def _droplets(answers: list[_Answer]) -> tuple[float, ...]:
@@ -331,58 +356,31 @@ def _droplets(answers: list[_Answer]) -> tuple[float, ...]:
     return tuple(one - max(found) for one in found)
 
 
-def fit_agreeing(curves: StripCurves, geometry: StripGeometry, priors: Priors) -> JointFit | None:
-    """Fit the own lane, which is the first strip, with the neighbours that agree with it.
+def fit_own(
+    curves: StripCurves, geometry: StripGeometry, priors: Priors, albedos: tuple[int, ...] = EVERY
+) -> JointFit | None:
+    """Fit the own lane, which is the first strip, alone; None if it has too few bins."""
+    return fit_jointly(curves.only([0]), geometry.only([0]), priors, albedos=albedos)
+
+
+def with_neighbours(
+    own: JointFit,
+    curves: StripCurves,
+    geometry: StripGeometry,
+    priors: Priors,
+    albedos: tuple[int, ...] = EVERY,
+) -> JointFit:
+    """Fit the own lane again, with the neighbours that agree with it.
 
     A strip that holds a lane at one distance and a verge at another looks like fog of another density. Where the own
     lane alone says little, all strips count.
-
-    Parameters
-    ----------
-    curves : StripCurves
-        Luminance by bin.
-    geometry : StripGeometry
-        Where the bins are.
-    priors : tuple of JointPrior
-        See `fit_jointly`.
-
-    Returns
-    -------
-    JointFit or None
-        None if the own lane has too few bins.
     """
-    own = fit_own(curves, geometry, priors)
-    return None if own is None else with_neighbours(own, curves, geometry, priors)
 
+    def fitted(strips: list[int]) -> JointFit | None:
+        return fit_jointly(curves.only(strips), geometry.only(strips), priors, own, albedos)
 
-def fit_own(curves: StripCurves, geometry: StripGeometry, priors: Priors) -> JointFit | None:
-    """Fit the own lane alone.
-
-    Parameters
-    ----------
-    curves, geometry, priors
-        See `fit_agreeing`.
-
-    Returns
-    -------
-    JointFit or None
-        None if it has too few bins.
-    """
-    return _fitted(curves, geometry, priors, [0])
-
-
-def with_neighbours(own: JointFit, curves: StripCurves, geometry: StripGeometry, priors: Priors) -> JointFit:
-    """Fit the own lane again, with the neighbours that agree with it.
-
-    Parameters
-    ----------
-    own : JointFit
-        Fit of the own lane alone.
-    curves, geometry, priors
-        See `fit_agreeing`.
-    """
     seen = [strip for strip in range(1, len(curves.variance)) if (curves.variance[strip] > 0).any()]
-    best = _fitted(curves, geometry, priors, [0, *seen], own) if seen else None
+    best = fitted([0, *seen]) if seen else None
     if best is None:
         return own
     agreed = agree(own, best)
@@ -390,7 +388,7 @@ def with_neighbours(own: JointFit, curves: StripCurves, geometry: StripGeometry,
         return best
     if len(seen) == 1:
         return best if agreed else own
-    found = [_fitted(curves, geometry, priors, [0, strip], own) for strip in seen]
+    found = [fitted([0, strip]) for strip in seen]
     pairs = [pair for pair in found if pair is not None]
     # With an obstacle where there is none, or without the one that there is, a lane alone fits well and is far off.
     if own.hidden.any() and len(pairs) == len(seen) and all(_alike(pair, best) for pair in pairs):
@@ -423,9 +421,3 @@ def _alike(first: JointFit, second: JointFit) -> bool:
     """Whether two answers differ by no more than their deviations."""
     apart = math.hypot(first.extinction_deviation, second.extinction_deviation)
     return abs(first.extinction - second.extinction) <= DISAGREEMENT * apart
-
-
-def _fitted(
-    curves: StripCurves, geometry: StripGeometry, priors: Priors, strips: list[int], near: JointFit | None = None
-) -> JointFit | None:
-    return fit_jointly(curves.only(strips), geometry.only(strips), priors, near)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from fogsim.values import Camera
+from fogsim.vision.strips.joint_fit import JointFit, Priors, fit_own, with_neighbours
 from fogsim.vision.strips.joint_kernels import JointPrior
 from fogsim.vision.strips.strip_curves import StripCurves
 from fogsim.vision.strips.strip_geometry import StripGeometry, strip_geometry
@@ -36,3 +37,10 @@ def curves(
     seen = AIRLIGHT + (road * albedo - AIRLIGHT) * transmittance(extinction, shift=shift)
     variance = np.full(seen.shape, NOISE**2)
     return StripCurves(seen + rng.normal(0.0, NOISE, seen.shape), variance, np.full(seen.shape, 2.0))
+
+
+def fit_lanes(seen: StripCurves, geometry: StripGeometry, priors: Priors) -> JointFit:
+    """Fit of the own lane, with the neighbours that agree with it."""
+    own = fit_own(seen, geometry, priors)
+    assert own is not None
+    return with_neighbours(own, seen, geometry, priors)

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fogsim.vision.strips.joint_fit import ALBEDOS, agree, fit_agreeing, fit_jointly, fit_own, strip_bins
+from fogsim.vision.strips.joint_fit import ALBEDOS, agree, fit_jointly, fit_own, strip_bins
 from fogsim.vision.strips.joint_kernels import mean_transmittance
 from fogsim.vision.strips.joint_start_kernels import extinction_costs, fit_constant_albedo
-from tests.vision.strips.koschmieder_strips import AIRLIGHT, GEOMETRY, PRIOR, curves
+from tests.vision.strips.koschmieder_strips import AIRLIGHT, GEOMETRY, PRIOR, curves, fit_lanes
 
 
 def bins(seen):
@@ -62,7 +62,6 @@ def test_too_few_bins_give_no_answer():
         is None
     )
     assert fit_own(replace(seen, variance=np.zeros(seen.variance.shape)), GEOMETRY, (PRIOR,)) is None
-    assert fit_agreeing(replace(seen, variance=np.zeros(seen.variance.shape)), GEOMETRY, (PRIOR,)) is None
 
 
 def test_what_stands_on_the_lane_is_found_and_hides_what_is_behind():
@@ -77,7 +76,7 @@ def test_what_stands_on_the_lane_is_found_and_hides_what_is_behind():
 
 def test_neighbours_that_agree_are_taken_and_others_left_out():
     seen = curves(0.03, 4)
-    own, best = fit_own(seen, GEOMETRY, (PRIOR,)), fit_agreeing(seen, GEOMETRY, (PRIOR,))
+    own, best = fit_own(seen, GEOMETRY, (PRIOR,)), fit_lanes(seen, GEOMETRY, (PRIOR,))
     assert agree(own, best)
     assert best.used.shape[0] == 3
     assert best.extinction_deviation < own.extinction_deviation
@@ -85,7 +84,7 @@ def test_neighbours_that_agree_are_taken_and_others_left_out():
     for seed in range(4, 8):
         seen = curves(0.03, seed)
         seen.luminance[1] = curves(0.04, seed).luminance[1]
-        kept = fit_agreeing(seen, GEOMETRY, (PRIOR,))
+        kept = fit_lanes(seen, GEOMETRY, (PRIOR,))
         assert kept.extinction == pytest.approx(0.03, rel=0.04)
         assert len(kept.used) < 3 or kept.used[1].mean() < 0.7
     # Agreement is a matter of the deviations that are stated: the sharper the answers, the less may they differ.
@@ -101,7 +100,7 @@ def test_a_neighbour_of_patchy_albedo_does_not_make_an_answer_less_sure():
     for seed in range(8):
         seen, verge = curves(0.03, seed), curves(0.03, 100 + seed, road=35.0, patches=0.3)
         seen.luminance[2] = verge.luminance[2]
-        kept = fit_agreeing(seen, GEOMETRY, (PRIOR,))
+        kept = fit_lanes(seen, GEOMETRY, (PRIOR,))
         assert kept.extinction_deviation <= fit_own(seen, GEOMETRY, (PRIOR,)).extinction_deviation
         off.append(abs(kept.extinction / 0.03 - 1.0))
     assert np.median(off) < 0.02

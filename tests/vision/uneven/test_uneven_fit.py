@@ -10,14 +10,14 @@ from fogsim.vision.lines.horizon import Horizon
 from fogsim.vision.lines.road_course import RoadCourse, unseen_course
 from fogsim.vision.lines.road_course_kernels import KNOTS, PIECES
 from fogsim.vision.strips.course_geometry import course_geometry
-from fogsim.vision.strips.joint_fit import fit_agreeing, fit_own
+from fogsim.vision.strips.joint_fit import fit_own
 from fogsim.vision.strips.strip_curves import StripCurves
 from fogsim.vision.uneven.fog_nodes import NODES, UNEVENNESS, fog_nodes
 from fogsim.vision.uneven.hidden_course import HiddenCourse
 from fogsim.vision.uneven.uneven_fit import fit_uneven
 from fogsim.vision.uneven.uneven_kernels import depth_at, distance_at_depth, extinction_at
 from tests.vision.strips import koschmieder_strips
-from tests.vision.strips.koschmieder_strips import AIRLIGHT, CAMERA, GEOMETRY, NOISE, curves
+from tests.vision.strips.koschmieder_strips import AIRLIGHT, CAMERA, GEOMETRY, NOISE, curves, fit_lanes
 
 PRIOR = koschmieder_strips.PRIOR._replace(shift_deviation=0.2)
 """The road's lines tell the horizon; without them a bank may be a horizon that lies lower."""
@@ -52,7 +52,7 @@ def bank(start: float, clear: float = 0.0015, dense: float = 0.05, edge: float =
 
 
 def fitted(seen: StripCurves, course: RoadCourse = LEVEL):
-    own, even = fit_own(seen, GEOMETRY, (PRIOR,)), fit_agreeing(seen, GEOMETRY, (PRIOR,))
+    own, even = fit_own(seen, GEOMETRY, (PRIOR,)), fit_lanes(seen, GEOMETRY, (PRIOR,))
     return fit_uneven(seen, GEOMETRY, PRIOR, own, even, HiddenCourse(GEOMETRY, CAMERA, course))
 
 
@@ -63,7 +63,7 @@ def test_even_fog_stays_what_it_is(extinction):
         found = fitted(seen)
         assert found.even > 0.5
         assert found.denser is None
-        assert found.fit.extinction == pytest.approx(fit_agreeing(seen, GEOMETRY, (PRIOR,)).extinction, rel=0.05)
+        assert found.fit.extinction == pytest.approx(fit_lanes(seen, GEOMETRY, (PRIOR,)).extinction, rel=0.05)
 
 
 @pytest.mark.parametrize("start", [60.0, 90.0, 120.0])

@@ -246,37 +246,20 @@ class JointRoad:
     def _fitted(
         self, pixels: LinearPixels, sky: Sky, priors: Priors, free: float, course: RoadCourse, time: float
     ) -> UnevenFit | str:
-        """Fit of the road that is free up to a depth, or why there is none that is to be believed.
-
-        What stands in the own lane hides, further on, the neighbours' lanes too: they are read again without it.
-        """
-        lowest = lowest_road_row(pixels, self._camera, sky.luminance)
-        curves = self._usable(strip_curves(pixels, self._geometry, sky.noise, self._camera, free), sky, lowest)
+        """Fit of the road that is free up to a depth, or why there is none that is to be believed."""
+        curves = self._curves(pixels, sky, free)
         whole, told = curves, free
         if is_full := self._left.is_due(time):
             self._left = Left()
         left = self._left
-        own = fit = fit_own(self._averaged(curves, sky), self._geometry, priors, left.albedos)
+        own = fit_own(self._averaged(curves, sky), self._geometry, priors, left.albedos)
         if is_full and (shaded := self._in_shade(own, pixels, curves, sky, priors, free)):
             return shaded
-        for _ in range(MOST_OBSTACLES):
-            if own is None or fit is None:
-                break
-            obstacle = _obstacle(fit, self._geometry)
-            if obstacle < free:
-                if self._is_hidden(fit, curves, free):
-                    break
-                free = obstacle
-                curves = strip_curves(pixels, self._geometry, sky.noise, self._camera, free, curves)
-                curves = self._usable(curves, sky, lowest)
-            elif fit is not own:
-                break
-            fit = with_neighbours(own, self._averaged(curves, sky), self._geometry, priors, left.albedos)
-            if fit is own:
-                break
-        self._earlier.append((curves, sky))
-        if own is None or fit is None:
+        if own is None:
+            self._earlier.append((curves, sky))
             return "too little road is seen"
+        fit, curves, free = self._with_other_lanes(own, pixels, curves, sky, priors, free)
+        self._earlier.append((curves, sky))
         # What even fog takes for an obstacle behind a tracked vehicle may be denser fog: it is not left out here.
         curves = whole if math.isfinite(told) else curves
         # Where a sag or crest is not quite followed, the road fades as in fog that changes along the way.
@@ -319,9 +302,32 @@ class JointRoad:
         alike = own is not None and own.extinction > 0.0 and abs(math.log(own.extinction / k)) < ALIKE
         return "" if alike or uneven.reach * k < LEAST_DEPTH else why
 
-    def _usable(self, curves: StripCurves, sky: Sky, lowest: int) -> StripCurves:
-        """Leave out the own bonnet, and what is clipped."""
-        curves = without_rows_below(curves, self._geometry, lowest)
+    def _with_other_lanes(
+        self, own: JointFit, pixels: LinearPixels, curves: StripCurves, sky: Sky, priors: Priors, free: float
+    ) -> tuple[JointFit, StripCurves, float]:
+        """Fit of all lanes that agree, their curves, and the depth up to which they are free [m].
+
+        What stands in the own lane hides, further on, the neighbours' lanes too: they are read again without it.
+        """
+        fit = own
+        for _ in range(MOST_OBSTACLES):
+            obstacle = _obstacle(fit, self._geometry)
+            if obstacle < free:
+                if self._is_hidden(fit, curves, free):
+                    break
+                free = obstacle
+                curves = self._curves(pixels, sky, free, curves)
+            elif fit is not own:
+                break
+            fit = with_neighbours(own, self._averaged(curves, sky), self._geometry, priors, self._left.albedos)
+            if fit is own:
+                break
+        return fit, curves, free
+
+    def _curves(self, pixels: LinearPixels, sky: Sky, free: float, before: StripCurves | None = None) -> StripCurves:
+        """Strips of road up to a depth [m], without the own bonnet and what is clipped."""
+        curves = strip_curves(pixels, self._geometry, sky.noise, self._camera, free, before)
+        curves = without_rows_below(curves, self._geometry, lowest_road_row(pixels, self._camera, sky.luminance))
         return without_clipped(curves) if sky.is_clipped else curves
 
     def _averaged(self, curves: StripCurves, sky: Sky) -> StripCurves:

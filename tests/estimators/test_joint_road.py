@@ -151,7 +151,7 @@ def test_parameters_out_of_range_are_errors(options):
 
 
 def drive(render, road, densities, period=0.1):
-    """Estimates of a drive, an image every period [s], and of each image by itself; the fog by its k over the road's."""
+    """Estimates of a drive, an image every period [s], and of each image alone; fog by its k over the road's."""
     moving, drawn = make("joint_road", road.camera), []
     for i, density in enumerate(densities):
         image = render(road.but(visibility=road.visibility / density), i)

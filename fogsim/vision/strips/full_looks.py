@@ -15,7 +15,7 @@ for even fog still to suffice [-]."""
 
 @dataclass(frozen=True, slots=True)
 class Left:
-    """Hypotheses that a full look has left: albedos, and fog that is even; by its misfit and share of bins in use [-]."""
+    """What a full look has left: albedos, and even fog with its misfit and its share of bins in use [-]."""
 
     time: float = -math.inf
     albedos: tuple[int, ...] = EVERY

@@ -14,9 +14,12 @@ from fogsim.vision.day.far_objects import share_of_far_objects
 from fogsim.vision.day.verdict import WIDEST, DayVerdict, agree, verdict_of
 from fogsim.vision.lines.horizon import Horizon
 
+ALIKE = 0.1
+"""Difference of ln k up to which two answers are the same [-]."""
+
 POSSIBLY, MOSTLY = 0.35, 0.6
-"""Probabilities of a wet road or local tone mapping from which on an estimate that knows neither is widened, and given
-up where the day model has no answer [-]."""
+"""Probabilities of a wet road, local tone mapping or a clipped sky from which on an estimate that knows none of them
+does not count against the day model's answer, and against its silence [-]."""
 
 MOST_DOUBT = 18.0
 """Doubt by contrast across the road from which on an estimate is given up [-]."""
@@ -73,7 +76,7 @@ class SecondOpinion:
         if own.valid and not is_straight:
             chosen, self._response = own, 0.0
         else:
-            chosen = self._with_day_model(own, level, horizon, free)
+            chosen = self._with_day_model(own, level, horizon, free, time)
         if chosen.valid and share_of_far_objects(level, self._camera, horizon, _ends(chosen)[0]) > MOST_FAR:
             chosen = _none(own, "what stands at the horizon is darker than fog would leave it")
         if chosen is own and own.valid:
@@ -82,7 +85,11 @@ class SecondOpinion:
             self._agreed, self._fit = -math.inf, None
         return _with_calibration(own, self._scale, self._response) if chosen is own and own.valid else chosen
 
-    def _with_day_model(self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float) -> Estimate:
+    def _with_day_model(
+        self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float, time: float
+    ) -> Estimate:
+        if not self._agreed < time < self._agreed + 2.0 * PERIOD:
+            self._fit = None
         fit = fit_day(np.ascontiguousarray(level), self._camera, horizon, free, max(_ends(own)[0], 0.0), self._fit)
         self._fit = self._fit or fit
         verdict = verdict_of(fit, self._scale)
@@ -100,21 +107,27 @@ def _chosen(own: Estimate, verdict: DayVerdict) -> Estimate:
         return _none(own, "contrast survives where the fog that the road's brightness shows would leave none")
     if verdict.reason:
         return _of_day(own, verdict) if verdict.outside > MOSTLY else own
-    return _weighed(own, verdict) if verdict.is_sure and verdict.is_even else own
+    return _weighed(own, verdict) if verdict.is_sure else own
 
 
 def _weighed(own: Estimate, verdict: DayVerdict) -> Estimate:
-    """Weigh two answers."""
+    """Weigh two answers: where they are not alike, the interval has both."""
     agreed = agree(own.visibility_interval, verdict.interval)
-    if verdict.outside > POSSIBLY:
-        if not verdict.interval[0] < own.visibility < verdict.interval[1]:
-            return _of_day(own, verdict)
-    elif agreed:
+    if agreed and (math.isinf(verdict.interval[1]) or _are_alike(own, verdict)):
         return own
-    spanning = _spanning(own, own.extinction if agreed else 0.5 * (own.extinction + verdict.extinction), verdict)
-    if spanning is None and agreed:
+    keeps = agreed or not verdict.is_even
+    middle = own.extinction if keeps else 0.5 * (own.extinction + verdict.extinction)
+    if (spanning := _spanning(own, middle, verdict)) is not None:
+        return spanning
+    if verdict.outside > POSSIBLY and not verdict.interval[0] < own.visibility < verdict.interval[1]:
+        return _of_day(own, verdict)
+    if keeps:
         return own
-    return spanning or _none(own, "how the road fades and how its image brightens disagree")
+    return _none(own, "how the road fades and how its image brightens disagree")
+
+
+def _are_alike(own: Estimate, verdict: DayVerdict) -> bool:
+    return own.extinction > 0.0 and abs(math.log(own.extinction / verdict.extinction)) < ALIKE
 
 
 def _spanning(own: Estimate, middle: float, verdict: DayVerdict) -> Estimate | None:

@@ -18,13 +18,7 @@ from fogsim.values.result_checks import checked_advice, checked_lamp_choice, che
 
 
 class AdvisedDriving:
-    """The scenario's own policy: adviser, lighting rules and the driver's warning, asked once a decision period.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """The scenario's own policy: adviser, lighting rules and the driver's warning, asked once a decision period."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
@@ -34,15 +28,7 @@ class AdvisedDriving:
         self._road = RoadAdvice(scenario) if scenario.drivers.advised in DISPLAYS else None
 
     def decide(self, step: Step, previous: Command | None = None) -> Command:
-        """Command for the next camera period; the one before between decisions.
-
-        Parameters
-        ----------
-        step : Step
-            What was finished last.
-        previous : Command or None
-            What this policy has asked for before; None for what was in force.
-        """
+        """Command for the next camera period; the one before between decisions."""
         previous = step.command if previous is None else previous
         if step.index % self._frames:
             return previous
@@ -58,17 +44,7 @@ class AdvisedDriving:
 
 
 def warned(command: Command, step: Step, previous: Command) -> Command:
-    """Add the warning of the ego's driver to a command, by what the vehicle itself knows; none without estimators.
-
-    Parameters
-    ----------
-    command : Command
-        Any command.
-    step : Step
-        What was finished last.
-    previous : Command
-        The command that was in force, with what was remembered of warnings.
-    """
+    """Add the warning of the ego's driver to a command, by what the vehicle itself knows; none without estimators."""
     if not step.estimates:
         return command
     warning, memory = choose_warning(step.belief, step.observation, step.time, previous)
@@ -96,30 +72,12 @@ def _lighting_questions(
 
 
 def known_fog(step: Step, method: InformedMethod) -> Belief:
-    """What a method goes by: what the ego believes, or the truth, as a visibility meter at the road has it.
-
-    Parameters
-    ----------
-    step : Step
-        What was finished last.
-    method : InformedMethod
-        The method of the scenario.
-    """
+    """What a method goes by: what the ego believes, or the truth, as a visibility meter at the road has it."""
     return step.belief if method.informed_by == "belief" else certain_belief(step.truth.extinction_ahead)
 
 
 def spread_advice(command: Command, scenario: Scenario, sections: Sequence[RoadSection] = ()) -> Command:
-    """Let others hear the ego's advice too, if the scenario says so.
-
-    Parameters
-    ----------
-    command : Command
-        With the ego's advice.
-    scenario : Scenario
-        Its ``drivers.advised`` says whom the advice goes to.
-    sections : sequence of RoadSection
-        Sections of the route that are advised each by itself, as `Truth.sections` has them: all are told the same.
-    """
+    """Let others hear the ego's advice too, if the scenario says so."""
     if scenario.drivers.advised == "ego" or not math.isfinite(command.advice.speed):
         return command
     if scenario.drivers.advised == "all":

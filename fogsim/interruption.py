@@ -34,15 +34,7 @@ def leave_on_signals() -> None:
 
 
 def leave(signum: int, _: FrameType | None = None) -> None:
-    """End the process at once, with one line and the exit code of a signal: 130 for SIGINT, 143 SIGTERM, 129 SIGHUP.
-
-    Parameters
-    ----------
-    signum : int
-        The signal.
-    _ : frame or None
-        Where it came, as handlers are given it.
-    """
+    """End the process at once, with one line and the exit code of a signal: 130 for SIGINT, 143 SIGTERM, 129 SIGHUP."""
     # The terminal may be gone after SIGHUP.
     with contextlib.suppress(OSError):
         os.write(2, b"interrupted\n")
@@ -173,13 +165,7 @@ class Interruption:
 
     @contextlib.contextmanager
     def allowed(self) -> Iterator[None]:
-        """Let signals through, one that waits at once.
-
-        Raises
-        ------
-        KeyboardInterrupt
-            From the signal's handler, also where a library has made another error of it (`interruptible`).
-        """
+        """Let signals through, one that waits at once."""
         before = self._raised
         try:
             with interruptible():
@@ -195,13 +181,7 @@ class Interruption:
 
     @contextlib.contextmanager
     def held(self) -> Iterator[None]:
-        """Hold signals back for a while within `allowed`.
-
-        Raises
-        ------
-        KeyboardInterrupt
-            At its end, from the handler of a signal that came.
-        """
+        """Hold signals back for a while within `allowed`."""
         self._allowed = False
         try:
             yield
@@ -212,13 +192,7 @@ class Interruption:
 
 @contextlib.contextmanager
 def interruptible() -> Iterator[None]:
-    """Let Ctrl-C through as KeyboardInterrupt also where compiled code runs: numba may make a SystemError of it.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        In place of a SystemError that one has caused.
-    """
+    """Let Ctrl-C through as KeyboardInterrupt also where compiled code runs: numba may make a SystemError of it."""
     try:
         yield
     except SystemError as error:

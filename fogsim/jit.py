@@ -56,12 +56,7 @@ _NEWS_PERIOD = 10.0
 class Announcement(event.Listener):  # type: ignore[misc] # numba is untyped
     """Tells the user that the time goes into compiling, and that it will not the next time; then how far it has come.
 
-    Parameters
-    ----------
-    tell : callable
-        Gets what is told.
-    clock : callable
-        Gives the time [s].
+    Takes `clock` [s].
     """
 
     def __init__(self, tell: Callable[[str], object], clock: Callable[[], float] = time.monotonic) -> None:
@@ -138,15 +133,7 @@ class Beside:
 
     @contextmanager
     def compiles(self, is_over: Callable[[], bool], packages: Sequence[str]) -> Iterator[None]:
-        """Reckon with another process.
-
-        Parameters
-        ----------
-        is_over : callable
-            Whether that process has ended.
-        packages : sequence of str
-            Beginnings of the names of modules whose kernels it compiles and keeps on the disk.
-        """
+        """Reckon with another process."""
         self._is_over, self._packages = is_over, tuple(packages)
         try:
             yield
@@ -169,13 +156,7 @@ BESIDE = Beside()
 
 
 def is_kept(compiled: object) -> bool | None:
-    """Whether anything of a kernel is on the disk, or came with the installation; None where nothing can be kept.
-
-    Parameters
-    ----------
-    compiled : callable
-        A kernel.
-    """
+    """Whether anything of a kernel is on the disk, or came with the installation; None where nothing can be kept."""
     shipped: ShippedCache | None = getattr(compiled, "shipped", None)
     if shipped is not None and shipped.is_there():
         return True
@@ -189,11 +170,6 @@ def kernel(function: F) -> F:
 
     What came compiled with the installation is taken. Other compiled code is kept beside the module or, for a read-only
     installation, in the user's cache directory; where neither can be written it is compiled again by each process.
-
-    Parameters
-    ----------
-    function : callable
-        Of arrays, numbers and named tuples of them; it does not call itself.
     """
     options = {"nogil": True, "fastmath": False, "error_model": "numpy", "no_cfunc_wrapper": True}
     plain = cast("FunctionType", function)
@@ -292,16 +268,7 @@ class Bands:
         self.middle = 0.5
 
     def work(self, task: Callable[[int, int, int], None], rows: int, columns: int) -> None:
-        """Call a task for each band.
-
-        Parameters
-        ----------
-        task : callable
-            Called with the band's number 0 or 1, its first row and the one after its last, by two threads at once; it
-            gains only where it gives up Python's lock, as kernels do.
-        rows, columns : int
-            Size of the picture [px]: a small one is one band, and so is any in worker processes and on one processor.
-        """
+        """Call a task for each band (`rows`, `columns` [px])."""
         middle = int(self.middle * rows)
         if rows * columns < _WORTHWHILE or not 0 < middle < rows or processors() < 2:
             task(0, 0, rows)

@@ -36,12 +36,7 @@ def stopping_sight_distance(
 def safe_speed(distance: float, reaction_time: float, deceleration: float, grade: float = 0.0) -> float:
     """Largest speed from which one stops within a distance, the inverse of `stopping_sight_distance` [m/s].
 
-    Parameters
-    ----------
-    distance : float
-        Sight distance [m], not negative; ``inf`` gives ``inf``.
-    reaction_time, deceleration, grade : float
-        As in `stopping_sight_distance`.
+    Takes `distance` [m].
     """
     braking = deceleration + GRAVITY * grade
     return braking * (math.sqrt(reaction_time**2 + 2 * distance / braking) - reaction_time)
@@ -52,13 +47,6 @@ def decelerated_speed(speed: float, target: float, deceleration: float, step_len
 
     A target above the speed is given back: speeding up is left to the vehicle's own acceleration.
 
-    Parameters
-    ----------
-    speed, target : float
-        Speed now and to come to [m/s].
-    deceleration : float
-        Largest deceleration to use [m/s²], positive.
-    step_length : float
-        Time to the next step [s].
+    Takes `speed`, `target` [m/s], `deceleration` [m/s²], `step_length` [s].
     """
     return target if math.isinf(target) else max(target, speed - deceleration * step_length)

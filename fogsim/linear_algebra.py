@@ -19,12 +19,7 @@ LEAST_PIVOT = 1e-14
 def matrix_product(left: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
     """Product of two matrices, of a matrix and a vector, or of two vectors, as ``left @ right``.
 
-    Parameters
-    ----------
-    left : (…, n) array
-        A vector, a matrix, or many matrices.
-    right : (n,) or (n, m) array
-        A vector or a matrix.
+    Takes `left` (…, n), `right` (n,).
     """
     if right.ndim == 1:
         return np.asarray((left * right).sum(axis=-1))
@@ -52,10 +47,7 @@ def inverse_of(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     What it says nothing of, or nothing beside the others, has zeros in its row and column (a generalised inverse).
     Beaton's sweep operator (Goodnight 1979, The American Statistician 33, 149–158), the largest pivots first.
 
-    Parameters
-    ----------
-    matrix : (n, n) float64
-        Not changed.
+    Takes `matrix` (n, n).
     """
     count = len(matrix)
     swept, left = matrix.copy(), np.ones(count, np.bool_)
@@ -92,13 +84,7 @@ def _sweep(matrix: NDArray[np.float64], pivot: int) -> None:
 
 @kernel
 def times(matrix: NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Product (n,) of a matrix and a vector, for kernels.
-
-    Parameters
-    ----------
-    matrix : (n, m) float64
-    vector : (m,) float64
-    """
+    """Product (n,) of a matrix and a vector, for kernels (`matrix` (n, m), `vector` (m,))."""
     out = np.zeros(len(matrix))
     for i in range(len(matrix)):
         for j in range(len(vector)):
@@ -108,13 +94,7 @@ def times(matrix: NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[n
 
 @kernel
 def convolution(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Full convolution (n + m - 1,) of two series.
-
-    Parameters
-    ----------
-    one : (n,) float64
-    other : (m,) float64
-    """
+    """Full convolution (n + m - 1,) of two series (`one` (n,), `other` (m,))."""
     size, blocks = len(one) + len(other) - 1, (len(one) + 3) // 4
     # Four terms of a sum at a time, in their order: what has been summed is read and written a quarter as often.
     out, padded = np.zeros(size + 6), np.zeros(len(other) + 6)
@@ -132,13 +112,7 @@ def convolution(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray
 
 
 def straight_line(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
-    """Slope and height at zero of the straight line of least squares.
-
-    Parameters
-    ----------
-    x, y : (n,) float64
-        Points, of which at least two x differ.
-    """
+    """Slope and height at zero of the straight line of least squares (`x`, `y` (n,))."""
     middle, level = float(x.mean()), float(y.mean())
     apart = x - middle
     slope = float(matrix_product(apart, y - level)) / float(matrix_product(apart, apart))

@@ -88,21 +88,7 @@ def run(
 
 
 def warn_of_unplayed(scenario: Scenario, last: TrafficStep) -> None:
-    """Warn of what was not played in a run that is over, if a longer one would not have played it either.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        What was run.
-    last : TrafficStep
-        The last step.
-
-    Warns
-    -----
-    UnplayedWarning
-        If the ego came to the end of its way, or nobody was left, or an event's vehicle had left before, or a lane was
-        not there.
-    """
+    """Warn of what was not played in a run that is over, if a longer one would not have played it either."""
     came_to_end = last.ending in (Ending.ARRIVED, Ending.LEFT_NETWORK, Ending.NOBODY_LEFT)
     if last.unplayed and (came_to_end or last.unplayed.is_final):
         warnings.warn(f"{scenario.name}: not played: {last.unplayed}", UnplayedWarning, stacklevel=3)
@@ -112,13 +98,7 @@ class EntersFog(Protocol):
     """A traffic simulation, as far as fog concerns it."""
 
     def enter_fog(self, fog: FogAccess) -> None:
-        """Let drivers see only what this fog lets them see; see `Traffic.enter_fog`.
-
-        Parameters
-        ----------
-        fog : FogAccess
-            The fog.
-        """
+        """Let drivers see only what this fog lets them see; see `Traffic.enter_fog`."""
 
 
 class DriversFog:
@@ -186,21 +166,7 @@ class DriversFog:
 
 
 def advance_traffic(traffic: AnyTraffic, fog: DriversFog, periods: build.Periods, index: int, command: Command) -> None:
-    """Move a traffic simulation by one camera period, the fog with it.
-
-    Parameters
-    ----------
-    traffic : AnyTraffic
-        The simulation.
-    fog : DriversFog
-        The fog about its drivers.
-    periods : Periods
-        The clocks.
-    index : int
-        Number of the camera period that begins.
-    command : Command
-        What is in force.
-    """
+    """Move a traffic simulation by one camera period, the fog with it."""
     for number in range(periods.traffic_steps):
         fog.set_time((index + number / periods.traffic_steps) * periods.camera_period)
         traffic.advance(command)

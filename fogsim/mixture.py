@@ -18,19 +18,7 @@ _ROUNDS = 50
 def majority(values: Sequence[float], weights: Sequence[float], clusters: int = CLUSTERS) -> NDArray[np.bool_]:
     """Which values are in the weightiest of some clusters, by weighted k-means on a line.
 
-    Parameters
-    ----------
-    values : sequence of float
-        Visibilities of single measurements.
-    weights : sequence of float
-        p(c) of each, more than 0.
-    clusters : int
-        How many; 1 takes in all.
-
-    Returns
-    -------
-    (n,) bool
-        All of them, where there are no more than clusters: there is no majority among three.
+    Returns all of them, where there are no more than clusters: there is no majority among three (n,) bool.
     """
     x, w = np.asarray(values, dtype=np.float64), np.asarray(weights, dtype=np.float64)
     if len(x) <= clusters:
@@ -52,22 +40,7 @@ def majority(values: Sequence[float], weights: Sequence[float], clusters: int = 
 
 
 def reduced(values: Sequence[float], weights: Sequence[float]) -> tuple[float, float]:
-    """Mean and standard deviation of a mixture of normal distributions, one for each value (eq. 2).
-
-    Parameters
-    ----------
-    values : sequence of float
-        At least one.
-    weights : sequence of float
-        p(c) of each, more than 0.
-
-    Returns
-    -------
-    mean : float
-        μ = Σ p z / Σ p.
-    deviation : float
-        √( Σ p (z − μ)² / ((M − 1)/M Σ p) ); of one value 1 / (√(2π) p), as of its own distribution.
-    """
+    """Mean and standard deviation of a mixture of normal distributions, one for each value (eq. 2)."""
     z, p = np.asarray(values, dtype=np.float64), np.asarray(weights, dtype=np.float64)
     mean, count = float((p * z).sum() / p.sum()), len(z)
     if count == 1:

@@ -141,19 +141,7 @@ def _clocks(step: float, decision_period: float = DECISION_PERIOD) -> list[str]:
 
 
 class AttachedSession:
-    """An ego in somebody else's simulation; see `attach`.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    traffic : AttachedTraffic
-        The simulation.
-    drivers : bool
-        Whether the other drivers meet the fog too.
-    seed : int
-        Seed of the sensors' noise and of the drivers' differences.
-    """
+    """An ego in somebody else's simulation; see `attach`."""
 
     def __init__(self, scenario: Scenario, traffic: AttachedTraffic, drivers: bool, seed: int) -> None:
         if scenario.traffic.has_equipped:
@@ -183,18 +171,8 @@ class AttachedSession:
     def observe(self) -> Step | None:
         """Take in what the last simulation step has brought; to be called after each.
 
-        Returns
-        -------
-        Step or None
-            The finished instant, its time counted from the first; None while the ego is not on the road. An ego that
-            is teleported is off the road at least once.
-
-        Raises
-        ------
-        SimulationError
-            If the simulation is lost or was loaded again, or the session is closed.
-        MissingDependencyError
-            If no renderer works here.
+        Returns the finished instant, its time counted from the first; None while the ego is not on the road. An ego
+        that is teleported is off the road at least once.
         """
         if self._closed:
             raise SimulationError("the session is closed")
@@ -238,17 +216,7 @@ class AttachedSession:
 
         The other drivers' sight in the fog, their choice of speed and scripted events are put in force here too.
 
-        Parameters
-        ----------
-        step : Step
-            What was observed last.
-        command : Command or None
-            Advice and lamps; None asks the scenario's own policies, which decide once a decision period.
-
-        Returns
-        -------
-        Command
-            What is in force.
+        Returns what is in force.
         """
         self._command = self._policy.decide(step) if command is None else checked_command(command)
         if step is not self._last:
@@ -272,14 +240,6 @@ class AttachedSession:
 
         Every vehicle gets back what was changed about it: top speed, time headway, lane-change mode, the ego's own
         speed, and sight of its leader.
-
-        Warns
-        -----
-        UserWarning
-            If the ego was never on the road: its id may be wrong.
-        UnplayedWarning
-            If events were not played, or vehicles of the script were never there; not if an error ended the session, or
-            the scenario is one for another ego.
         """
         tells = self._tells_unplayed and self._started and not self._closed
         self._end()

@@ -14,21 +14,13 @@ Seed = Annotated[int, Range(0, math.inf)]
 
 @dataclass(frozen=True, slots=True)
 class Streams:
-    """Independent random generators, one for each part of a run.
+    """Independent random generators, one for each part of a run."""
 
-    Attributes
-    ----------
-    traffic_seed : int
-        Seed of the traffic simulation, in 0 … 2³¹ − 1.
-    patch_seed : int
-        Seed of the patches of fog, unless the scenario has one; the same for every vehicle of a run.
-    camera, sensors, driver, faults, gps, reports, scatterometer : numpy.random.Generator
-        Generators for camera noise, the vehicle's other sensors, drivers, sensor faults, satellite positioning,
-        other vehicles' reports of the fog, and the scatterometer on board.
-    """
-
-    traffic_seed: int
-    patch_seed: int
+    traffic_seed: int  # Seed of the traffic simulation, in 0 … 2³¹ − 1
+    patch_seed: int  # Seed of the patches of fog, unless the scenario has one; the same for every vehicle of a run
+    # camera, sensors, driver, faults, gps, reports, scatterometer: generators for camera noise, the vehicle's other
+    # sensors, drivers, sensor faults, satellite positioning, other vehicles' reports of the fog, and the scatterometer
+    # on board
     camera: np.random.Generator
     sensors: np.random.Generator
     driver: np.random.Generator
@@ -70,13 +62,5 @@ def spawn_streams(seed: int, vehicle: str = "") -> Streams:
 
 
 def named_generator(seed: int, name: str) -> np.random.Generator:
-    """Generator for what is drawn under a name before a run, apart from all streams of the run.
-
-    Parameters
-    ----------
-    seed : int
-        Seed of the run.
-    name : str
-        The name.
-    """
+    """Generator for what is drawn under a name before a run, apart from all streams of the run."""
     return np.random.default_rng([seed, *name.encode()])

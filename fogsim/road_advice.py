@@ -22,11 +22,6 @@ class RoadAdvice:
     and one of which nothing is known has no advice. Informed by the ego's belief, the ego goes by its own advice, and
     tells it to the section on which it is; a section that it has left keeps what it told last, and one that it has not
     reached knows nothing.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario, whose ``drivers.advised`` is one of `DISPLAYS`.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -40,13 +35,7 @@ class RoadAdvice:
         self._read: tuple[Stretch, float] | None = None
 
     def advise(self, step: Step) -> tuple[SpeedAdvice, tuple[StretchAdvice, ...]]:
-        """Advice to the ego, and to all on the sections that have any.
-
-        Parameters
-        ----------
-        step : Step
-            What was finished last.
-        """
+        """Advice to the ego, and to all on the sections that have any."""
         if step.index == 0:
             self._told, self._egos, self._read = {}, SpeedAdvice(), None
         sections = tuple(section.stretch for section in step.truth.sections)
@@ -64,13 +53,7 @@ class RoadAdvice:
         return self._egos, self._advices(sections, shown)
 
     def advise_traffic(self, step: TrafficStep) -> tuple[StretchAdvice, ...]:
-        """Advice to all on the sections that have any, by the meters, where there is no ego.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            What was finished last.
-        """
+        """Advice to all on the sections that have any, by the meters, where there is no ego."""
         if step.index == 0:
             self._told = {}
         self._ask_meters(step)
@@ -121,17 +104,7 @@ class RoadAdvice:
 def stretch_advices(
     sections: Sequence[Stretch], speeds: Sequence[float], display: Display
 ) -> tuple[StretchAdvice, ...]:
-    """Advice to all on sections of road, as far as there is any.
-
-    Parameters
-    ----------
-    sections : (n,) sequence of Stretch
-        The sections.
-    speeds : (n,) sequence of float
-        Advised speeds [m/s]; ``inf`` for none.
-    display : Display
-        How drivers hear it.
-    """
+    """Advice to all on sections of road, as far as there is any (`speeds` [m/s])."""
     told: list[StretchAdvice] = []
     for section, speed in zip(sections, speeds, strict=True):
         last = told[-1] if told else None

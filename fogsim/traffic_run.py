@@ -76,13 +76,7 @@ def run_traffic(
 
 
 class MeteredAdvice:
-    """The scenario's adviser, who goes by the visibility meters; asked once a decision period.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """The scenario's adviser, who goes by the visibility meters; asked once a decision period."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
@@ -91,15 +85,7 @@ class MeteredAdvice:
         self._road = RoadAdvice(scenario) if scenario.drivers.advised in DISPLAYS else None
 
     def decide(self, step: TrafficStep, speed_limit: float) -> Command:
-        """Command for the next camera period; the one in force between decisions.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            What was finished last.
-        speed_limit : float
-            Highest speed limit where somebody drives [m/s]; sections of road have their own.
-        """
+        """Command for the next camera period; the one in force between decisions (`speed_limit` [m/s])."""
         if step.index % self._frames:
             return step.command
         if self._road is not None:
@@ -114,22 +100,7 @@ class MeteredAdvice:
 
 @checked_parameters
 class TrafficRun:
-    """The traffic of one simulation in fog, from command to finished step.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario; its ego is none.
-    traffic : NetworkTraffic or None
-        The traffic simulation; None for SUMO in this process, as the scenario describes it.
-    sumo_outputs : Path or None
-        As of `fogsim.run`.
-
-    Raises
-    ------
-    InputError
-        If the scenario has an ego, or the network lacks an edge of ``traffic.along``.
-    """
+    """The traffic of one simulation in fog, from command to finished step."""
 
     def __init__(
         self, scenario: Scenario, traffic: NetworkTraffic | None = None, sumo_outputs: Path | None = None
@@ -160,20 +131,7 @@ class TrafficRun:
     def start(self, seed: Seed) -> tuple[TrafficStep, float]:
         """Begin a run, or begin anew.
 
-        Parameters
-        ----------
-        seed : int
-            Seed of every random number of the run.
-
-        Returns
-        -------
-        tuple of TrafficStep and float
-            The first instant, and the highest speed limit where somebody drives [m/s].
-
-        Raises
-        ------
-        SimulationError
-            If SUMO cannot start, or runs already in this process.
+        Returns the first instant, and the highest speed limit where somebody drives [m/s].
         """
         self._step = None
         streams = spawn_streams(seed)
@@ -191,22 +149,7 @@ class TrafficRun:
     def advance(self, command: Command) -> tuple[TrafficStep, float]:
         """Move by one camera period with a command in force.
 
-        Parameters
-        ----------
-        command : Command
-            Advice to drivers.
-
-        Returns
-        -------
-        tuple of TrafficStep and float
-            As of `start`.
-
-        Raises
-        ------
-        InputError
-            If the command is none, or a speed in it is nan or negative.
-        SimulationError
-            If the run has not been started or is over.
+        Returns as of `start`.
         """
         if self._step is None or self._step.ending is not None:
             raise SimulationError("the run has not been started or is over: call start() before advance()")

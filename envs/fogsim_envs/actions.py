@@ -21,24 +21,7 @@ def checked_action(action: object, space: spaces.Space[Any], name: str) -> NDArr
     Members are taken as libraries give them: numbers, lists and tuples, and arrays of any type of numbers, as far as
     nothing is lost (3.0 is a level, 3.5 is none).
 
-    Parameters
-    ----------
-    action : array_like
-        What came.
-    space : gymnasium.spaces.Discrete or MultiDiscrete or Box
-        The space of actions.
-    name : str
-        Whose action it is: the id of the environment, or the agent.
-
-    Returns
-    -------
-    ndarray
-        Of the space's shape and type: () for a `Discrete`. It is the caller's own.
-
-    Raises
-    ------
-    InputError
-        If it is no member of the space: of another shape, no number, NaN, or outside the limits.
+    Returns of the space's shape and type: () for a `Discrete`. It is the caller's own.
     """
     if not isinstance(space, ActionSpace):
         raise InputError(f"action of {name}: {space} has no check; expected a Discrete, MultiDiscrete or Box")
@@ -59,20 +42,7 @@ def checked_action(action: object, space: spaces.Space[Any], name: str) -> NDArr
 
 
 def checked_options(kind: Callable[..., T], given: Mapping[str, Any] | None) -> T:
-    """Options of ``reset`` as one value.
-
-    Parameters
-    ----------
-    kind : callable
-        Makes the value; its parameters are the options that are known.
-    given : mapping or None
-        What came.
-
-    Raises
-    ------
-    InputError
-        If an option is unknown or does not fit.
-    """
+    """Options of ``reset`` as one value."""
     known = {} if given is None else given
     mistakes = [f"options[{name!r}]: {mistake}" for name, mistake in parameter_mistakes(kind, known, classes=True)]
     if mistakes:

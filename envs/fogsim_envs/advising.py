@@ -24,29 +24,13 @@ Observation = dict[str, NDArray[Any]]
 
 
 class ResetOptions(NamedTuple):
-    """What `AdvisingEnv.reset` takes as ``options``.
+    """What `AdvisingEnv.reset` takes as ``options``."""
 
-    Attributes
-    ----------
-    overrides : iterable of str
-        ``key.path=value`` each, for this episode.
-    """
-
-    overrides: Iterable[str] = ()
+    overrides: Iterable[str] = ()  # ``key.path=value`` each, for this episode
 
 
 class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
-    """One step is one decision period of a scenario; see `fogsim_envs.advisory.FogAdvisoryEnv` for the spaces.
-
-    Parameters
-    ----------
-    load : callable
-        Gives the scenario with overrides (``key.path=value`` each).
-    begin : callable
-        Starts a scenario's first run with a seed; gives the simulation and its first step.
-    overrides, image_size, continuous, reward_weights, render_mode
-        As of `FogAdvisoryEnv`.
-    """
+    """One step is one decision period of a scenario; see `fogsim_envs.advisory.FogAdvisoryEnv` for the spaces."""
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 2}  # noqa: RUF012 - Gymnasium's own way
 
@@ -94,20 +78,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
     def reset(
         self, *, seed: Seed | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begin an episode; ``options={"overrides": ["fog.visibility_m=80"]}`` changes the scenario for it.
-
-        Parameters
-        ----------
-        seed : int or None
-            Seed of this and the following episodes; None goes on with the numbers of before.
-        options : dict or None
-            ``overrides``: a list of ``key.path=value``.
-
-        Raises
-        ------
-        InputError
-            If an argument or option is unknown or does not fit; the episode before is then left as it was.
-        """
+        """Begin an episode; ``options={"overrides": ["fog.visibility_m=80"]}`` changes the scenario for it."""
         more = tuple(checked_options(ResetOptions, options).overrides)
         scenario = self._load([*self._overrides, *more]) if more else self._scenario
         if build.camera(scenario) != build.camera(self._scenario):
@@ -129,20 +100,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
         self._renderer.show(step, self._standard, self.metadata["render_fps"])
 
     def step(self, action: NDArray[Any]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Let an action be in force for one decision period.
-
-        Parameters
-        ----------
-        action : array_like of two numbers
-            A member of the action space.
-
-        Raises
-        ------
-        gymnasium.error.ResetNeeded
-            If the episode is over or none has begun.
-        InputError
-            If the action is no member of the action space.
-        """
+        """Let an action be in force for one decision period."""
         if self._simulation is None or self._step is None or self._step.ending is not None:
             raise gymnasium.error.ResetNeeded("the episode is over or none has begun: call reset() before step()")
         name = type(self).__name__ if self.spec is None else self.spec.id

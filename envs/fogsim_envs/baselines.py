@@ -23,34 +23,14 @@ class Policy(Protocol):
     """Chooses actions."""
 
     def __call__(self, observation: Any, info: Info) -> NDArray[Any]:
-        """Choose the next action.
-
-        Parameters
-        ----------
-        observation : object
-            What the agent sees.
-        info : mapping
-            What the environment tells beside it.
-        """
+        """Choose the next action."""
 
     def reset(self, seed: int) -> None:
-        """Forget earlier episodes.
-
-        Parameters
-        ----------
-        seed : int
-            Seed of the episode.
-        """
+        """Forget earlier episodes."""
 
 
 class Unremembering:
-    """A policy that remembers nothing, in an action space of advice and lamps.
-
-    Parameters
-    ----------
-    action_space : gymnasium.Space
-        The environment's.
-    """
+    """A policy that remembers nothing, in an action space of advice and lamps."""
 
     def __init__(self, action_space: spaces.Space[Any]) -> None:
         self._space = action_space
@@ -59,15 +39,7 @@ class Unremembering:
         """Do nothing: there is nothing to forget; see `Policy.reset`."""
 
     def action(self, speed: float, lamps: Lamp) -> NDArray[Any]:
-        """The action nearest to an advice, not above it, with lamps.
-
-        Parameters
-        ----------
-        speed : float
-            Advised speed [m/s]; ``inf`` for none.
-        lamps : Lamp
-            Lamps that are to be lit.
-        """
+        """The action nearest to an advice, not above it, with lamps (`speed` [m/s])."""
         return action_of(speed, lamps, isinstance(self._space, spaces.Box))
 
 
@@ -80,15 +52,7 @@ class NoAdvice(Unremembering):
 
 
 class FixedSpeed(Unremembering):
-    """Advise one speed always.
-
-    Parameters
-    ----------
-    action_space : gymnasium.Space
-        The environment's.
-    speed : float
-        The speed [m/s].
-    """
+    """Advise one speed always (`speed` [m/s])."""
 
     def __init__(self, action_space: spaces.Space[Any], speed: float = 50.0 / KMH_PER_MPS) -> None:
         super().__init__(action_space)
@@ -111,13 +75,6 @@ class Oracle(Unremembering):
     """Knows the sight ahead, and takes the speed at which each metre costs least by the reward's weights.
 
     It knows nothing of what others will do, so it is no upper bound.
-
-    Parameters
-    ----------
-    action_space : gymnasium.Space
-        The environment's.
-    weights : TaskWeights
-        The reward's weights.
     """
 
     def __init__(self, action_space: spaces.Space[Any], weights: TaskWeights | None = None) -> None:
@@ -146,13 +103,7 @@ class Oracle(Unremembering):
 
 
 class RandomActions:
-    """Any action, as likely as any other.
-
-    Parameters
-    ----------
-    action_space : gymnasium.Space
-        The environment's.
-    """
+    """Any action, as likely as any other."""
 
     def __init__(self, action_space: spaces.Space[Any]) -> None:
         self._space = action_space
@@ -174,20 +125,7 @@ BASELINES: Registry[Callable[..., Policy]] = Registry(
 
 
 def baseline(name: str, action_space: spaces.Space[Any]) -> Policy:
-    """Make a baseline for an environment.
-
-    Parameters
-    ----------
-    name : str
-        One of `BASELINES`, or for a message sign of `fogsim_envs.corridor.baselines.SIGN_BASELINES`.
-    action_space : gymnasium.Space
-        The environment's, or the sign's.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is none of that name.
-    """
+    """Make a baseline for an environment."""
     if isinstance(action_space, spaces.Discrete):
         # Who has signs has PettingZoo, without which that room cannot be imported.
         from fogsim_envs.corridor.baselines import SIGN_BASELINES  # noqa: PLC0415

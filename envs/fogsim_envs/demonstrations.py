@@ -20,32 +20,7 @@ def record_demonstrations(
 ) -> Any:
     """Run a baseline and keep its episodes.
 
-    Parameters
-    ----------
-    name : str
-        One of `fogsim_envs.baselines.BASELINES`.
-    env_id : str
-        The environment.
-    episodes : int
-        How many, with the seeds 0, 1, …; at least 1.
-    data_set : str
-        Id of the data set, such as ``fogsim/advisory/rule-v1``.
-    **arguments
-        Arguments of the environment.
-
-    Returns
-    -------
-    minari.MinariDataset
-        The data set.
-
-    Raises
-    ------
-    InputError
-        If there are to be no episodes, or there is such a data set already.
-    UnknownNameError
-        If there is no such baseline.
-    MissingDependencyError
-        If Minari is not installed.
+    Returns the data set.
     """
     minari = _import_minari()
     if data_set in minari.list_local_datasets():

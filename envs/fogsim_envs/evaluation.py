@@ -39,36 +39,16 @@ AnyPolicy = Policy | Predictor | Callable[..., Any] | str
 
 @dataclass(frozen=True, slots=True)
 class EpisodeResult:
-    """One episode.
+    """One episode."""
 
-    Attributes
-    ----------
-    seed : int
-        Its seed.
-    value : float
-        Sum of its rewards, discounted as asked [points].
-    steps : int
-        Decisions.
-    time : float
-        How long it took [s].
-    ending : str
-        Why it ended.
-    struck : bool
-        Whether the ego struck somebody; without an ego, whether anybody did.
-    cost : float
-        Sum of ``info["cost"]``.
-    terms : mapping from str to float
-        Undiscounted sums of the reward's terms.
-    """
-
-    seed: int
-    value: float
-    steps: int
-    time: float
-    ending: str
-    struck: bool
-    cost: float
-    terms: Mapping[str, float]
+    seed: int  # Its seed
+    value: float  # Sum of its rewards, discounted as asked [points]
+    steps: int  # Decisions
+    time: float  # How long it took [s]
+    ending: str  # Why it ended
+    struck: bool  # Whether the ego struck somebody; without an ego, whether anybody did
+    cost: float  # Sum of ``info["cost"]``
+    terms: Mapping[str, float]  # Undiscounted sums of the reward's terms
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,13 +168,7 @@ def _episode_of(policy: AnyPolicy, env: Any, seed: int, discount: float) -> Epis
 
 
 def summarise(episodes: Sequence[EpisodeResult]) -> Evaluation:
-    """Means and intervals over episodes.
-
-    Parameters
-    ----------
-    episodes : sequence of EpisodeResult
-        At least one.
-    """
+    """Means and intervals over episodes."""
     values = np.array([episode.value for episode in episodes])
     low, high = bootstrap_interval(values)
     return Evaluation(
@@ -208,13 +182,7 @@ def summarise(episodes: Sequence[EpisodeResult]) -> Evaluation:
 
 
 def bootstrap_interval(values: NDArray[np.float64]) -> tuple[float, float]:
-    """95 % interval of a mean, by percentiles of resampled means.
-
-    Parameters
-    ----------
-    values : (n,) float64
-        At least one value.
-    """
+    """95 % interval of a mean, by percentiles of resampled means (`values` (n,))."""
     rng = np.random.default_rng(0)
     means = values[rng.integers(len(values), size=(RESAMPLES, len(values)))].mean(axis=1)
     low, high = np.quantile(means, [(1.0 - CONFIDENCE) / 2.0, (1.0 + CONFIDENCE) / 2.0]).tolist()

@@ -92,15 +92,7 @@ def _begun(environment: Any, scenario: Scenario, seed: int) -> "tuple[HighwayLoo
 
 
 class HighwayLoop:
-    """A closed loop in an environment's traffic, built anew where the environment builds other roads.
-
-    Parameters
-    ----------
-    environment : highway_env.envs.common.abstract.AbstractEnv
-        The environment without wrappers.
-    scenario : Scenario
-        From `highway_scenario`.
-    """
+    """A closed loop in an environment's traffic, built anew where the environment builds other roads."""
 
     def __init__(self, environment: Any, scenario: Scenario) -> None:
         self._environment = environment
@@ -111,13 +103,7 @@ class HighwayLoop:
         return ClosedLoop(self._scenario, _traffic(self._environment, self._scenario))
 
     def start(self, seed: int) -> Step:
-        """Begin a run; see `ClosedLoop.start`.
-
-        Parameters
-        ----------
-        seed : int
-            Seed of every random number of the run.
-        """
+        """Begin a run; see `ClosedLoop.start`."""
         try:
             return self._loop.start(seed)
         except OtherRoadsError:
@@ -126,13 +112,7 @@ class HighwayLoop:
             return self._loop.start(seed)
 
     def advance(self, command: Command) -> Step:
-        """Move by one camera period; see `ClosedLoop.advance`.
-
-        Parameters
-        ----------
-        command : Command
-            Advice and lamps in force.
-        """
+        """Move by one camera period; see `ClosedLoop.advance`."""
         return self._loop.advance(command)
 
     def close(self) -> None:
@@ -141,20 +121,7 @@ class HighwayLoop:
 
 
 def highway_environment(environment: str, config: Mapping[str, Any]) -> Any:
-    """Make a highway-env environment.
-
-    Parameters
-    ----------
-    environment : str
-        Its id.
-    config : mapping
-        Its configuration.
-
-    Raises
-    ------
-    InputError
-        If it is none of highway-env's.
-    """
+    """Make a highway-env environment."""
     try:
         made: Any = gymnasium.make(environment).unwrapped
     except gymnasium.error.Error as error:
@@ -229,13 +196,7 @@ def _clocks(config: Mapping[str, Any]) -> list[str]:
 
 
 def one_frame_clocks(config: Mapping[str, Any]) -> list[str]:
-    """Overrides by which there is one frame a decision.
-
-    Parameters
-    ----------
-    config : mapping
-        The environment's configuration.
-    """
+    """Overrides by which there is one frame a decision."""
     step = 1.0 / config["simulation_frequency"]
     decision = step * max(1, round(DECISION_PERIOD / step))
     return clock_settings(step, decision, decision)

@@ -22,11 +22,6 @@ def serve(connection: "Connection[Any, Any]") -> None:
 
     While one is worked on, which takes minutes where kernels are to be compiled, ``("working", None)`` is sent every
     `HEARTBEAT_PERIOD`.
-
-    Parameters
-    ----------
-    connection : Connection
-        The pipe to the parent; its end ends the simulation.
     """
     loop: ClosedLoop | TrafficRun | None = None
     answer: Step | tuple[TrafficStep, float] | FogSimError | None
@@ -54,13 +49,7 @@ def serve(connection: "Connection[Any, Any]") -> None:
 
 
 def simulation_of(scenario: Scenario) -> ClosedLoop | TrafficRun:
-    """The simulation that a scenario asks for: about its ego, or of traffic alone.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """The simulation that a scenario asks for: about its ego, or of traffic alone."""
     return ClosedLoop(scenario) if scenario.traffic.has_ego else TrafficRun(scenario)
 
 

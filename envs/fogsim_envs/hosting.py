@@ -34,39 +34,17 @@ class Simulation(Protocol):
     """What an environment needs of a closed loop, wherever it runs."""
 
     def start(self, seed: int) -> Step:
-        """Begin a run; see `fogsim.loop.ClosedLoop.start`.
-
-        Parameters
-        ----------
-        seed : int
-            Seed of every random number of the run.
-        """
+        """Begin a run; see `fogsim.loop.ClosedLoop.start`."""
 
     def advance(self, command: Command) -> Step:
-        """Move by one camera period; see `fogsim.loop.ClosedLoop.advance`.
-
-        Parameters
-        ----------
-        command : Command
-            Advice and lamps in force.
-        """
+        """Move by one camera period; see `fogsim.loop.ClosedLoop.advance`."""
 
     def close(self) -> None:
         """End the simulation; closing twice is allowed."""
 
 
 def begin(scenario: Scenario, seed: int, timeout: float = TIMEOUT) -> tuple[Simulation, Step]:
-    """Start a scenario here, or in a child process if another simulation runs here.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    seed : int
-        Seed of the first run.
-    timeout : float
-        How long a child process may give no sign of life [s], more than 0; ``inf`` for ever.
-    """
+    """Start a scenario here, or in a child process if another simulation runs here (`timeout` [s])."""
     try:
         return _begun(ClosedLoop(scenario), seed)
     except SimulationRunningError:
@@ -76,19 +54,7 @@ def begin(scenario: Scenario, seed: int, timeout: float = TIMEOUT) -> tuple[Simu
 def begin_anew(
     simulation: Simulation, scenario: Scenario, seed: int, timeout: float = TIMEOUT
 ) -> tuple[Simulation, Step]:
-    """Start another scenario where a simulation runs, which is over then.
-
-    Parameters
-    ----------
-    simulation : Simulation
-        From `begin`.
-    scenario : Scenario
-        The scenario.
-    seed : int
-        Seed of the first run.
-    timeout : float
-        As of `begin` [s].
-    """
+    """Start another scenario where a simulation runs, which is over then (`timeout` [s])."""
     if not isinstance(simulation, HostedLoop):
         simulation.close()
         return begin(scenario, seed, timeout)
@@ -118,22 +84,10 @@ class TrafficSimulation(Protocol):
     """What an environment needs of traffic without an ego, wherever it runs."""
 
     def start(self, seed: int) -> tuple[TrafficStep, float]:
-        """Begin a run; see `fogsim.traffic_run.TrafficRun.start`.
-
-        Parameters
-        ----------
-        seed : int
-            Seed of every random number of the run.
-        """
+        """Begin a run; see `fogsim.traffic_run.TrafficRun.start`."""
 
     def advance(self, command: Command) -> tuple[TrafficStep, float]:
-        """Move by one camera period; see `fogsim.traffic_run.TrafficRun.advance`.
-
-        Parameters
-        ----------
-        command : Command
-            Advice to drivers.
-        """
+        """Move by one camera period; see `fogsim.traffic_run.TrafficRun.advance`."""
 
     def close(self) -> None:
         """End the simulation; closing twice is allowed."""
@@ -142,19 +96,7 @@ class TrafficSimulation(Protocol):
 def begin_traffic(
     simulation: TrafficSimulation | None, scenario: Scenario, seed: int, timeout: float = TIMEOUT
 ) -> tuple[TrafficSimulation, TrafficStep]:
-    """Start a scenario without an ego, here or in a child process if another simulation runs here.
-
-    Parameters
-    ----------
-    simulation : TrafficSimulation or None
-        What ran before, which is over then.
-    scenario : Scenario
-        The scenario.
-    seed : int
-        Seed of the run.
-    timeout : float
-        As of `begin` [s].
-    """
+    """Start a scenario without an ego, here or in a child process if another simulation runs here (`timeout` [s])."""
     begun: TrafficSimulation
     if isinstance(simulation, HostedTraffic):
         simulation.change(scenario)
@@ -174,16 +116,7 @@ def begin_traffic(
 
 
 class _Host:
-    """A simulation in a child process; one that is lost is replaced when a run is begun.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    timeout : float
-        How long the child may give no sign of life [s], more than 0; ``inf`` for ever. It gives one every second, also
-        while kernels are compiled.
-    """
+    """A simulation in a child process; one that is lost is replaced when a run is begun (`timeout` [s])."""
 
     def __init__(self, scenario: Scenario, timeout: float = TIMEOUT) -> None:
         self._scenario = scenario
@@ -237,13 +170,7 @@ class _Host:
         self._child.wait()
 
     def change(self, scenario: Scenario) -> None:
-        """Let the next run be of another scenario, in the same child process.
-
-        Parameters
-        ----------
-        scenario : Scenario
-            The scenario.
-        """
+        """Let the next run be of another scenario, in the same child process."""
         self._scenario = scenario
         if not self._connection.closed:
             self._ask("open", scenario)
@@ -266,23 +193,11 @@ class HostedLoop(_Host):
     """A closed loop in a child process; see `_Host` for parameters."""
 
     def start(self, seed: int) -> Step:
-        """Begin a run; see `fogsim.loop.ClosedLoop.start`.
-
-        Parameters
-        ----------
-        seed : int
-            Seed of every random number of the run.
-        """
+        """Begin a run; see `fogsim.loop.ClosedLoop.start`."""
         return cast("Step", self._start(seed))
 
     def advance(self, command: Command) -> Step:
-        """Move by one camera period; see `fogsim.loop.ClosedLoop.advance`.
-
-        Parameters
-        ----------
-        command : Command
-            Advice and lamps in force.
-        """
+        """Move by one camera period; see `fogsim.loop.ClosedLoop.advance`."""
         return cast("Step", self._ask("advance", command))
 
 
@@ -290,39 +205,16 @@ class HostedTraffic(_Host):
     """Traffic without an ego in a child process; see `_Host` for parameters."""
 
     def start(self, seed: int) -> tuple[TrafficStep, float]:
-        """Begin a run; see `fogsim.traffic_run.TrafficRun.start`.
-
-        Parameters
-        ----------
-        seed : int
-            Seed of every random number of the run.
-        """
+        """Begin a run; see `fogsim.traffic_run.TrafficRun.start`."""
         return cast("tuple[TrafficStep, float]", self._start(seed))
 
     def advance(self, command: Command) -> tuple[TrafficStep, float]:
-        """Move by one camera period; see `fogsim.traffic_run.TrafficRun.advance`.
-
-        Parameters
-        ----------
-        command : Command
-            Advice to drivers.
-        """
+        """Move by one camera period; see `fogsim.traffic_run.TrafficRun.advance`."""
         return cast("tuple[TrafficStep, float]", self._ask("advance", command))
 
 
 def checked_timeout(timeout: float) -> float | None:
-    """A time limit as the standard library takes it: None for ever.
-
-    Parameters
-    ----------
-    timeout : float
-        Time [s], more than 0; ``inf`` for ever.
-
-    Raises
-    ------
-    InputError
-        If it is no such time.
-    """
+    """A time limit as the standard library takes it: None for ever (`timeout` [s])."""
     if not timeout > 0:
         raise InputError(f"timeout: expected a time of more than 0 s, or inf for ever, got {timeout!r}")
     return timeout if timeout < _LONGEST_TIMEOUT else None

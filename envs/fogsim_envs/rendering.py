@@ -37,24 +37,7 @@ def render_modes() -> list[str]:
 
 
 class StepRenderer:
-    """Draws steps as an environment's ``render_mode`` asks.
-
-    Parameters
-    ----------
-    mode : str or None
-        One of `RENDER_MODES`, or None to draw nothing.
-    title : str
-        Of the window.
-    make_panel : callable
-        Makes the panel of an episode; with the camera's image beside it if not given.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such mode.
-    InputError
-        If a window is asked for, and there is no display.
-    """
+    """Draws steps as an environment's ``render_mode`` asks."""
 
     def __init__(self, mode: str | None, title: str, make_panel: Callable[[], FramePanel] = FramePanel) -> None:
         if mode is not None and mode not in RENDER_MODES:
@@ -77,28 +60,13 @@ class StepRenderer:
     def show(self, step: Step, standard: SafetyStandard, rate: float) -> None:
         """Show a step that was just made if there is a window; it stands there as long as the step takes.
 
-        Parameters
-        ----------
-        step : Step
-            The step.
-        standard : SafetyStandard
-            Of the metrics in the panel.
-        rate : float
-            Steps for each second [1/s].
+        Takes `rate` [1/s].
         """
         if self._mode == "human":
             self._window.show(self._picture(step, standard), rate)
 
     def render(self, step: Step, standard: SafetyStandard) -> NDArray[np.uint8] | None:
-        """What `gymnasium.Env.render` gives: the picture of the latest step; None with a window or without a mode.
-
-        Parameters
-        ----------
-        step : Step
-            The latest step.
-        standard : SafetyStandard
-            Of the metrics in the panel.
-        """
+        """What `gymnasium.Env.render` gives: the picture of the latest step; None with a window or without a mode."""
         if self._mode is None:
             gymnasium.logger.warn("render() was called, but no render_mode was given to gymnasium.make()")
         # A window shows the step already.

@@ -16,30 +16,14 @@ REAR_FOG_LAMP_VISIBILITY = 50.0
 @checked_parameters
 @dataclass(frozen=True, slots=True)
 class RewardWeights:
-    """Weights of the reward's terms; each term is about 1 where it matters.
+    """Weights of the reward's terms; each term is about 1 where it matters."""
 
-    Attributes
-    ----------
-    progress : float
-        For driving at the speed limit.
-    visibility_margin : float
-        Against driving so fast that one cannot stop within the visibility.
-    conflict : float
-        Against times to collision below the standard's, 3 s.
-    discomfort : float
-        Against decelerations above 2 m/s².
-    collision : float
-        Against a collision, once.
-    lamps : float
-        Against a rear fog lamp that blinds others in clear air or is dark in dense fog.
-    """
-
-    progress: float = 1.0
-    visibility_margin: float = 2.0
-    conflict: float = 2.0
-    discomfort: float = 0.3
-    collision: float = 50.0
-    lamps: float = 0.2
+    progress: float = 1.0  # For driving at the speed limit
+    visibility_margin: float = 2.0  # Against driving so fast that one cannot stop within the visibility
+    conflict: float = 2.0  # Against times to collision below the standard's, 3 s
+    discomfort: float = 0.3  # Against decelerations above 2 m/s²
+    collision: float = 50.0  # Against a collision, once
+    lamps: float = 0.2  # Against a rear fog lamp that blinds others in clear air or is dark in dense fog
 
 
 def reward_terms(
@@ -47,19 +31,7 @@ def reward_terms(
 ) -> dict[str, float]:
     """Weighted terms of the reward for one decision period.
 
-    Parameters
-    ----------
-    before, after : Step
-        First and last step of the period.
-    weights : RewardWeights
-        The weights.
-    standard : SafetyStandard
-        Reaction time and deceleration of the stopping sight distance, and the time to collision that is a conflict.
-
-    Returns
-    -------
-    dict of str to float
-        Terms by name; the reward is their sum.
+    Returns terms by name; the reward is their sum.
     """
     ego = after.traffic.ids[after.ego]
     speed = float(after.traffic.speed[after.ego])

@@ -75,13 +75,7 @@ def observation_space(camera: Camera) -> spaces.Dict:
 
 
 def action_space(continuous: bool) -> spaces.Space[Any]:
-    """Space of actions: a speed level and a lamp mode, or both as numbers in −1 … 1.
-
-    Parameters
-    ----------
-    continuous : bool
-        Whether actions are numbers in −1 … 1.
-    """
+    """Space of actions: a speed level and a lamp mode, or both as numbers in −1 … 1."""
     if continuous:
         return spaces.Box(-1.0, 1.0, (2,), np.float32)
     return spaces.MultiDiscrete([len(ADVISED_SPEEDS) + 1, len(LAMP_MODES)])
@@ -100,13 +94,7 @@ def observe(step: Step) -> dict[str, NDArray[Any]]:
 
 
 def observed_signs(step: Step) -> tuple[NDArray[np.float32], NDArray[np.int8]]:
-    """Rows of signs ahead by the map, float32 (slots, features) in −1 … 1, and which of them are filled.
-
-    Parameters
-    ----------
-    step : Step
-        The finished step.
-    """
+    """Rows of signs ahead by the map, float32 (slots, features) in −1 … 1, and which of them are filled."""
     features = np.zeros((SIGN_SLOTS, len(SIGN_FEATURES)), dtype=np.float32)
     mask = np.zeros(SIGN_SLOTS, dtype=np.int8)
     for slot, sign in enumerate(step.observation.signs[:SIGN_SLOTS]):
@@ -135,26 +123,12 @@ def _state(step: Step) -> NDArray[np.float32]:
 
 
 def scaled_visibility(visibility: float) -> float:
-    """Visibility on a logarithmic scale, 1 m … 10 km to 0 … 1.
-
-    Parameters
-    ----------
-    visibility : float
-        Visibility [m].
-    """
+    """Visibility on a logarithmic scale, 1 m … 10 km to 0 … 1 (`visibility` [m])."""
     return min(math.log(max(visibility, 1.0)) / LOG_VISIBILITY_SCALE, 1.0)
 
 
 def command_of(action: Any, continuous: bool) -> Command:
-    """Command that an action stands for.
-
-    Parameters
-    ----------
-    action : array_like of two numbers
-        A member of `action_space`.
-    continuous : bool
-        Which of the two action spaces it comes from.
-    """
+    """Command that an action stands for."""
     if continuous:
         speed_share, lamp_share = (float(np.clip((a + 1) / 2, 0.0, 1.0)) for a in np.asarray(action, dtype=float))
         lowest, highest = ADVISED_SPEEDS[0], ADVISED_SPEEDS[-1]
@@ -167,17 +141,7 @@ def command_of(action: Any, continuous: bool) -> Command:
 
 
 def action_of(speed: float, lamps: Lamp, continuous: bool) -> NDArray[Any]:
-    """Action that stands for an advice, or for the next lower one, the inverse of `command_of`.
-
-    Parameters
-    ----------
-    speed : float
-        Advised speed [m/s]; ``inf`` for none. Below the lowest level it is that level.
-    lamps : Lamp
-        Lamps that are to be lit: the last mode all of whose lamps are among them.
-    continuous : bool
-        Which of the two action spaces it is for.
-    """
+    """Action that stands for an advice, or for the next lower one, the inverse of `command_of` (`speed` [m/s])."""
     mode = max(number for number, lit in enumerate(LAMP_MODES) if lit & lamps == lit or number == 0)
     if not continuous:
         levels = [number for number, level in enumerate(ADVISED_SPEEDS) if level <= speed + _SAME_SPEED]

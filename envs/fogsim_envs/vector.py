@@ -39,27 +39,7 @@ def make_vector(
 ) -> AsyncVectorEnv:
     """Make a vector environment that tells of lost processes, unlike `gymnasium.make_vec` in its mode ``async``.
 
-    Parameters
-    ----------
-    id : str
-        Of the environment.
-    num_envs : int
-        How many.
-    timeout : float
-        How long one step or reset of all may take [s], more than 0; ``inf`` for ever. Then all are ended with a
-        `SimulationError`.
-    wrappers : sequence of callable
-        Put about each environment, the first innermost.
-    context : str or None
-        How workers are started: "fork", "spawn" or "forkserver"; None for Python's own way, or a clean server process
-        where this process has drawn pictures.
-    **kwargs
-        Arguments of each environment.
-
-    Raises
-    ------
-    InputError
-        If the time is none.
+    Takes `timeout` [s].
     """
     limit, make = checked_timeout(timeout), functools.partial(_wrapped, id, tuple(wrappers), kwargs)
     # A GL context does not survive a fork.
@@ -80,17 +60,7 @@ def _wrapped(
 
 
 class _Workers(AsyncVectorEnv):
-    """Gymnasium's own, which by itself waits for ever for a worker that is stopped.
-
-    Parameters
-    ----------
-    makers : sequence of callable
-        Make one environment each.
-    timeout : float or None
-        How long a step or reset of all may take [s]; None for ever.
-    context : str or None
-        How workers are started.
-    """
+    """Gymnasium's own, which by itself waits for ever for a worker that is stopped (`timeout` [s])."""
 
     def __init__(
         self, makers: Sequence[Callable[[], gymnasium.Env[Any, Any]]], timeout: float | None, context: str | None

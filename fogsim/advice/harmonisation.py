@@ -14,21 +14,10 @@ def harmonised_speeds(
     """Advised speeds, lowered where the next section downstream is advised much less.
 
     A section shows no more than the next one and a step, and no more than √(v² + 2 a d), from which a steady
-    deceleration a along its length d comes down to the next one's v. Motorways step down likewise: Dutch gantries by
-    20 km/h (90, 70, 50), I-77 in Virginia by at most 15 mph from sign to sign (VTRC 19-R6, 2018).
+    deceleration a along its length d comes down to the next one's v. Motorways step down likewise: Dutch gantries by 20
+    km/h (90, 70, 50), I-77 in Virginia by at most 15 mph from sign to sign (VTRC 19-R6, 2018).
 
-    Parameters
-    ----------
-    speeds : (n,) sequence of float
-        What each section is advised for itself, in the direction of travel [m/s]; ``inf`` for nothing.
-    lengths : (n,) sequence of float
-        Distance from each section's beginning to that of the next [m]; the last does not matter.
-    limits : (n,) sequence of float
-        Speed limit of each section, from which on nothing needs to be advised [m/s].
-    largest_step : float
-        Largest difference between two sections on the way down [m/s].
-    deceleration : float
-        Deceleration a [m/s²].
+    Takes `speeds` [m/s], `lengths` [m], `limits` [m/s], `largest_step` [m/s], `deceleration` [m/s²].
     """
     shown, down = list(speeds), speeds[-1] if speeds else math.inf
     for place in reversed(range(len(shown) - 1)):

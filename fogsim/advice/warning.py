@@ -51,21 +51,7 @@ def choose_warning(
 ) -> tuple[DriverWarning | None, WarningMemory]:
     """Choose the warning to give.
 
-    Parameters
-    ----------
-    belief : Belief
-        What is believed about the fog.
-    observation : Observation
-        Its speed and what is wrong with its camera are used.
-    time : float
-        Instant [s].
-    previous : Command
-        The command in force, with its warning and what was remembered of warnings.
-
-    Returns
-    -------
-    DriverWarning or None, and WarningMemory
-        The warning, and what to remember.
+    Returns the warning, and what to remember. Takes `time` [s].
     """
     before = previous.warning_memory
     cautious = belief.known_visibility(CAUTIOUS)
@@ -94,12 +80,7 @@ def is_fog_in_the_way(belief: Belief, speed: float) -> bool:
     that distance, e^(−2kd) of huang2015 (section 4.3.2), is below e^(−2 ln 20) = 1/400: no detector finds it, and the
     driver has to take over (section 1.2).
 
-    Parameters
-    ----------
-    belief : Belief
-        What is believed about the fog.
-    speed : float
-        Speed of the vehicle [m/s].
+    Takes `speed` [m/s].
     """
     needed = stopping_sight_distance(speed, REACTION_TIME, DECELERATION)
     if belief.denser is not None and visibility_from_extinction(belief.denser.extinction) < EDGE * needed:

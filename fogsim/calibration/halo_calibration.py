@@ -42,26 +42,7 @@ def random_scene(rng: np.random.Generator, strengths: tuple[float, float] = STRE
 def measure_halo_threshold(
     camera: Camera, scenes: int = 80, *, glare: float = GLARE, seed: int = 0, watch: Watch = lambda *_: None
 ) -> HaloThreshold:
-    """Draw scenes in clear air and in fog, and choose the thresholds that err as seldom in either.
-
-    Parameters
-    ----------
-    camera : Camera
-        The assumed calibration.
-    scenes : int
-        How many scenes are drawn, each in clear air and in all fogs.
-    glare : float
-        Share of lamps' light that the camera's lens scatters [-].
-    seed : int
-        Of scenes, exposures and noise.
-    watch : Watch
-        Called after every scene.
-
-    Raises
-    ------
-    InputError
-        If there are fewer than 4 scenes, or no picture has a halo.
-    """
+    """Draw scenes in clear air and in fog, and choose the thresholds that err as seldom in either."""
     if scenes < 4:
         raise InputError(f"scenes: expected at least 4, got {scenes}")
     watch(0, scenes)

@@ -41,27 +41,7 @@ def measure_operating_range(
 ) -> OperatingRange:
     """Drive up to signs in fog of each visibility, and see from how far they are detected.
 
-    Parameters
-    ----------
-    camera : Camera
-        The calibration.
-    diameter : float
-        Size of the signs [m].
-    visibilities : sequence of float
-        Meteorological visibilities, ascending [m].
-    approaches : int
-        How many signs are driven up to in each.
-    step : float
-        Way between two looks [m].
-    seed : int
-        Of places, errors and noise.
-    watch : Watch
-        Called after every approach.
-
-    Raises
-    ------
-    InputError
-        If a number does not fit, or no sign is detected at all.
+    Takes `diameter` [m], `visibilities` [m], `step` [m].
     """
     for name, value, least in (("approaches", approaches, 4), ("step", step, 0.5), ("diameter", diameter, 0.1)):
         if not value >= least:

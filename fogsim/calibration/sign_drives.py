@@ -30,52 +30,26 @@ SPEED = 20.0
 
 @dataclass(frozen=True, slots=True)
 class PoseNoise:
-    """How far off map and own pose are, as standard deviations.
+    """How far off map and own pose are, as standard deviations."""
 
-    Attributes
-    ----------
-    position : float
-        Of signs in the map, along and across [m].
-    heading, pitch : float
-        Of the believed heading and of the told pitch [rad].
-    fix : float
-        Of the own position along and across, from frame to frame [m].
-    """
-
-    position: float = 0.5
+    position: float = 0.5  # Of signs in the map, along and across [m]
+    # heading, pitch: of the believed heading and of the told pitch [rad]
     heading: float = math.radians(0.2)
     pitch: float = math.radians(0.1)
-    fix: float = 0.0
+    fix: float = 0.0  # Of the own position along and across, from frame to frame [m]
 
 
 @dataclass(frozen=True, slots=True)
 class SignDrive:
-    """A drive past signs along a straight road.
+    """A drive past signs along a straight road."""
 
-    Attributes
-    ----------
-    camera : Camera
-        The told calibration.
-    signs : tuple of Sign
-        Signs as they stand, along x.
-    places : tuple of float
-        Where the front bumper is at each frame [m].
-    noise : PoseNoise
-        How far off map and own pose are.
-    grey : float
-        Pixel value of the airlight, 0 … 255.
-    reach : float
-        How far ahead the map is read [m].
-    known : tuple of Sign or None
-        Signs as the map has them; None for those that stand there, each as far off as `noise` says.
-    """
-
-    camera: Camera
-    signs: tuple[Sign, ...]
-    places: tuple[float, ...]
-    noise: PoseNoise = PoseNoise()
-    grey: float = 200.0
-    reach: float = 400.0
+    camera: Camera  # The told calibration
+    signs: tuple[Sign, ...]  # Signs as they stand, along x
+    places: tuple[float, ...]  # Where the front bumper is at each frame [m]
+    noise: PoseNoise = PoseNoise()  # How far off map and own pose are
+    grey: float = 200.0  # Pixel value of the airlight, 0 … 255
+    reach: float = 400.0  # How far ahead the map is read [m]
+    # Signs as the map has them; None for those that stand there, each as far off as `noise` says
     known: tuple[Sign, ...] | None = None
 
 

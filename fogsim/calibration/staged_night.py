@@ -46,71 +46,29 @@ _CAR = StagedVehicle()
 
 @dataclass(frozen=True, slots=True)
 class NightVehicle:
-    """A vehicle with its lamps lit.
+    """A vehicle with its lamps lit."""
 
-    Attributes
-    ----------
-    distance : float
-        From the camera to its end that is nearer [m].
-    left : float
-        How far its middle is left of the camera [m].
-    lamps : Lamp
-        What is lit.
-    oncoming : bool
-        Whether it comes toward the camera.
-    vehicle : StagedVehicle
-        What it is.
-    """
-
-    distance: float
-    left: float = 0.0
-    lamps: Lamp = Lamp.POSITION | Lamp.LOW_BEAM
-    oncoming: bool = False
-    vehicle: StagedVehicle = _CAR
+    distance: float  # From the camera to its end that is nearer [m]
+    left: float = 0.0  # How far its middle is left of the camera [m]
+    lamps: Lamp = Lamp.POSITION | Lamp.LOW_BEAM  # What is lit
+    oncoming: bool = False  # Whether it comes toward the camera
+    vehicle: StagedVehicle = _CAR  # What it is
 
 
 @dataclass(frozen=True, slots=True)
 class NightScene:
-    """What there is at one instant.
+    """What there is at one instant."""
 
-    Attributes
-    ----------
-    place : float
-        Where along the road the camera is [m].
-    vehicles : tuple of NightVehicle
-        Others on the road.
-    street_lamps : bool
-        Whether street lamps are lit.
-    own : Lamp
-        Lit lamps of the vehicle that carries the camera.
-    strength : float
-        Intensity of all other lamps over the usual one [-].
-    pavement : float
-        What the road returns of the own lamps' light, over what dry asphalt does [-].
-    """
-
-    place: float = 0.0
-    vehicles: tuple[NightVehicle, ...] = ()
-    street_lamps: bool = False
-    own: Lamp = Lamp.POSITION | Lamp.LOW_BEAM
-    strength: float = 1.0
-    pavement: float = 1.0
+    place: float = 0.0  # Where along the road the camera is [m]
+    vehicles: tuple[NightVehicle, ...] = ()  # Others on the road
+    street_lamps: bool = False  # Whether street lamps are lit
+    own: Lamp = Lamp.POSITION | Lamp.LOW_BEAM  # Lit lamps of the vehicle that carries the camera
+    strength: float = 1.0  # Intensity of all other lamps over the usual one [-]
+    pavement: float = 1.0  # What the road returns of the own lamps' light, over what dry asphalt does [-]
 
 
 class NightRoad:
-    """A straight road by night, as a camera sees it.
-
-    Parameters
-    ----------
-    camera : Camera
-        The true calibration.
-    droplets : Droplets
-        What the fog is made of.
-    glare : float
-        Share of lamps' light that the lens scatters [-].
-    seed : int
-        Where signs and trees stand.
-    """
+    """A straight road by night, as a camera sees it."""
 
     def __init__(
         self, camera: Camera, droplets: Droplets = Droplets.MODERATE_RADIATION, glare: float = GLARE, seed: int = 0

@@ -50,29 +50,16 @@ def straight_road(length: float = _LENGTH) -> RoadNetwork:
 
 @dataclass(frozen=True, slots=True)
 class StagedVehicle:
-    """A vehicle on the road.
+    """A vehicle on the road."""
 
-    Attributes
-    ----------
-    kind : str
-        "car", "van", "truck".
-    length, width, height : float
-        Its size [m].
-    paint : tuple of float
-        Reflectance of its paint, red first [-].
-    left : float
-        How far its middle is left of the camera [m].
-    name : str
-        Its id, which chooses among the shapes that its size leaves open.
-    """
-
-    kind: str = "car"
+    kind: str = "car"  # "car", "van", "truck"
+    # length, width, height: its size [m]
     length: float = 4.5
     width: float = 1.8
     height: float = 1.5
-    paint: tuple[float, float, float] = (0.2, 0.2, 0.2)
-    left: float = 0.1
-    name: str = "followed"
+    paint: tuple[float, float, float] = (0.2, 0.2, 0.2)  # Reflectance of its paint, red first [-]
+    left: float = 0.1  # How far its middle is left of the camera [m]
+    name: str = "followed"  # Its id, which chooses among the shapes that its size leaves open
 
 
 @contextmanager

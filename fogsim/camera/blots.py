@@ -31,51 +31,25 @@ PUPIL = 0.5 * PUPIL_DIAMETER / GLASS_DISTANCE
 
 
 class Blots(NamedTuple):
-    """Round blots on the glass; lengths over the distance of the glass, so that a pixel is 1 / focal length wide.
+    """Round blots on the glass; lengths over the distance of the glass, so that a pixel is 1 / focal length wide."""
 
-    Attributes
-    ----------
-    right, down : (n,) float64
-        Middle, from the optical axis [-].
-    radius : (n,) float64
-        Radius [-].
-    """
-
+    # right, down (n,): middle, from the optical axis [-]
     right: Floats
     down: Floats
-    radius: Floats
+    radius: Floats  # (n,): Radius [-]
 
 
 class _BlotPixels(NamedTuple):
-    """Pixels that a blot dims.
+    """Pixels that a blot dims."""
 
-    Attributes
-    ----------
-    rows, columns : slice
-        The part of the image about it.
-    hidden : (rows, columns) float64
-        Share of each pixel's light that the blot takes, 0 … 1.
-    """
-
+    # rows, columns: the part of the image about it
     rows: slice
     columns: slice
-    hidden: Floats
+    hidden: Floats  # (rows, columns): Share of each pixel's light that the blot takes, 0 … 1
 
 
 def scattered_blots(camera: Camera, coverage: float, diameter: float, rng: np.random.Generator) -> Blots:
-    """Blots at random all over the glass.
-
-    Parameters
-    ----------
-    camera : Camera
-        The calibration.
-    coverage : float
-        Sum of their areas over that of the glass [-].
-    diameter : float
-        Median of their diameters [m]; their logarithms are normally distributed.
-    rng : numpy.random.Generator
-        Source of places and sizes.
-    """
+    """Blots at random all over the glass (`diameter` [m])."""
     usual = 0.5 * diameter / GLASS_DISTANCE
     margin = PUPIL + 3.0 * usual
     (u0, v0), focal = camera.principal_point, camera.focal_length
@@ -94,17 +68,7 @@ def scattered_blots(camera: Camera, coverage: float, diameter: float, rng: np.ra
 def passed_light(camera: Camera, blots: Blots) -> NDArray[np.float32]:
     """Share of each pixel's light that passes between blots; those that lie over one another do so by chance.
 
-    Parameters
-    ----------
-    camera : Camera
-        The calibration.
-    blots : Blots
-        The blots.
-
-    Returns
-    -------
-    (rows, cols, 1) float32
-        0 … 1.
+    Returns 0 … 1.
     """
     passed = np.ones((camera.height, camera.width))
     for blot in _blot_pixels(camera, blots):
@@ -134,17 +98,7 @@ def _pixels(first: float, last: float, count: int) -> slice:
 def shared_area(distance: Floats, one: float, other: float) -> Floats:
     """Area that two circles share.
 
-    Parameters
-    ----------
-    distance : (…) float64
-        Distance of their middles.
-    one, other : float
-        Their radii, in the same unit.
-
-    Returns
-    -------
-    (…) float64
-        In that unit squared.
+    Returns In that unit squared (…). Takes `distance` (…).
     """
     smaller = min(one, other)
     d = np.clip(distance, abs(one - other) + 1e-12, one + other)

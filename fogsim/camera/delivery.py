@@ -14,18 +14,10 @@ _ROUNDING = 1e-9
 
 
 class Delivered(NamedTuple):
-    """What comes out of a camera.
+    """What comes out of a camera."""
 
-    Attributes
-    ----------
-    time : float
-        The time that it bears [s].
-    pixels : (rows, cols, 3) uint8 or uint16
-        The picture.
-    """
-
-    time: float
-    pixels: Pixels
+    time: float  # The time that it bears [s]
+    pixels: Pixels  # (rows, cols, 3) uint8: The picture
 
 
 class FrameDelivery:
@@ -43,15 +35,7 @@ class FrameDelivery:
         self._last: Delivered | None = None
 
     def deliver(self, taken: Delivered, faults: Iterable[RunningFault]) -> Delivered:
-        """Take in a picture and hand out what there is now.
-
-        Parameters
-        ----------
-        taken : Delivered
-            The picture and the time of its exposure, which is now.
-        faults : iterable of RunningFault
-            What is wrong now; faults that are none of the camera's signal change nothing.
-        """
+        """Take in a picture and hand out what there is now."""
         self._under_way.append(taken)
         late, lost, stamp = 0.0, False, TimeStamp.EXPOSURE
         frozen: FrozenFrame | None = None

@@ -31,29 +31,14 @@ _DARKEST_METERED = 1e-4
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """What an image sensor does to light.
+    """What an image sensor does to light."""
 
-    Attributes
-    ----------
-    saturation_luminance : float
-        Luminance that just fills a pixel at its exposure [cd/m²].
-    full_well : float
-        Electrons that fill a pixel [e⁻]; a filled pixel's photon noise is 1 / √full_well.
-    read_noise : float
-        Standard deviation of the read-out noise [e⁻].
-    bits : int
-        Bit depth: 8, 10 or 12.
-    black_level : float
-        Share of full scale at which it reads no light [-].
-    gained_read_noise : float or None
-        Read-out noise at very high gain [e⁻], where what comes after the amplifier no longer counts; None for the same.
-    """
-
-    saturation_luminance: float
-    full_well: float = 10_000.0
-    read_noise: float = 5.0
-    bits: int = 8
-    black_level: float = 0.0
+    saturation_luminance: float  # Luminance that just fills a pixel at its exposure [cd/m²]
+    full_well: float = 10_000.0  # Electrons that fill a pixel [e⁻]; a filled pixel's photon noise is 1 / √full_well
+    read_noise: float = 5.0  # Standard deviation of the read-out noise [e⁻]
+    bits: int = 8  # Bit depth: 8, 10 or 12
+    black_level: float = 0.0  # Share of full scale at which it reads no light [-]
+    # Read-out noise at very high gain [e⁻], where what comes after the amplifier no longer counts; None for the same
     gained_read_noise: float | None = None
 
 
@@ -63,21 +48,7 @@ def expose(radiance: NDArray[np.float32], sensor: Sensor, response: Response, rn
     Photon noise is drawn as normal with the Poisson distribution's variance, which at the tens of electrons and more
     that fog gives is the same (EMVA 1288: σ² = σ_read² + electrons). No draw is further than 4.5 σ from the mean.
 
-    Parameters
-    ----------
-    radiance : (rows, cols, 3) float32
-        Linear luminance per channel at the camera [cd/m²].
-    sensor : Sensor
-        The sensor.
-    response : Response
-        Curve from exposure to pixel value.
-    rng : numpy.random.Generator
-        Source of the noise; one draw is taken for a frame.
-
-    Returns
-    -------
-    (rows, cols, 3) uint8, or uint16 for more than 8 bits
-        Pixel values 0 … 2^bits − 1.
+    Returns pixel values 0 … 2^bits − 1 (rows, cols, 3) uint8. Takes `radiance` (rows, cols, 3) [cd/m²].
     """
     table = response_table(response, sensor.bits)
     out = np.empty(radiance.shape, dtype=table.dtype)
@@ -105,15 +76,7 @@ def expose(radiance: NDArray[np.float32], sensor: Sensor, response: Response, rn
 def unexposed(camera: Camera) -> Pixels:
     """What a camera hands out before its first exposure: a black picture, read-only.
 
-    Parameters
-    ----------
-    camera : Camera
-        Its size and bit depth count.
-
-    Returns
-    -------
-    (rows, cols, 3) uint8, or uint16 for more than 8 bits
-        Zeros.
+    Returns zeros (rows, cols, 3) uint8.
     """
     shape = (camera.height, camera.width, 3)
     black: Pixels = np.zeros(shape, np.uint8) if camera.bits == 8 else np.zeros(shape, np.uint16)
@@ -125,17 +88,7 @@ def unexposed(camera: Camera) -> Pixels:
 def response_table(response: Response, bits: int = 8) -> Pixels:
     """Pixel value for exposure in even steps from 0 to saturation.
 
-    Parameters
-    ----------
-    response : Response
-        The curve.
-    bits : int
-        Bit depth: 8, 10 or 12.
-
-    Returns
-    -------
-    (RESPONSE_STEPS[bits] + 1,) uint8, or uint16 for more than 8 bits
-        Read-only.
+    Returns read-only.
     """
     exposure = np.linspace(0.0, 1.0, RESPONSE_STEPS[bits] + 1)
     levels = np.round((2**bits - 1) * respond(exposure, response))
@@ -153,42 +106,19 @@ class Metering(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class AutoExposure:
-    """How a camera sets its own exposure.
+    """How a camera sets its own exposure."""
 
-    Attributes
-    ----------
-    metering : Metering
-        What of a picture counts.
-    target : float
-        Exposure at which the metered luminance is held, relative to saturation, 0 … 1.
-    time_constant : float
-        Time in which 63 % of a change of light, in its logarithm, is followed [s]; 0 for the next frame.
-    brightest : float
-        Saturation luminance of the shortest exposure [cd/m²].
-    ungained : float
-        Saturation luminance of the longest exposure time without gain [cd/m²].
-    darkest : float
-        Saturation luminance of the longest exposure time with the most gain [cd/m²].
-    """
-
-    metering: Metering
-    target: float
+    metering: Metering  # What of a picture counts
+    target: float  # Exposure at which the metered luminance is held, relative to saturation, 0 … 1
+    # Time in which 63 % of a change of light, in its logarithm, is followed [s]; 0 for the next frame
     time_constant: float
-    brightest: float
-    ungained: float
-    darkest: float
+    brightest: float  # Saturation luminance of the shortest exposure [cd/m²]
+    ungained: float  # Saturation luminance of the longest exposure time without gain [cd/m²]
+    darkest: float  # Saturation luminance of the longest exposure time with the most gain [cd/m²]
 
 
 def metered_luminance(radiance: NDArray[np.float32], metering: Metering) -> float:
-    """Luminance that stands for a picture [cd/m²].
-
-    Parameters
-    ----------
-    radiance : (rows, cols, 3) float32
-        Linear luminance per channel at the camera [cd/m²].
-    metering : Metering
-        What of the picture counts.
-    """
+    """Luminance that stands for a picture [cd/m²] (`radiance` (rows, cols, 3) [cd/m²])."""
     rows, cols = radiance.shape[:2]
     stride = max(1, round(math.sqrt(rows * cols / SAMPLES)))
     samples = np.empty((rows // stride, cols // stride), np.float32)
@@ -202,12 +132,7 @@ def metered_luminance(radiance: NDArray[np.float32], metering: Metering) -> floa
 def wanted_saturation(luminance: float, auto: AutoExposure) -> float:
     """Saturation luminance that puts a metered luminance at the target, as far as the camera's limits allow [cd/m²].
 
-    Parameters
-    ----------
-    luminance : float
-        Metered luminance [cd/m²].
-    auto : AutoExposure
-        Target and limits.
+    Takes `luminance` [cd/m²].
     """
     return min(max(luminance / auto.target, auto.darkest), auto.brightest)
 
@@ -215,14 +140,7 @@ def wanted_saturation(luminance: float, auto: AutoExposure) -> float:
 def followed(saturation: float, wanted: float, auto: AutoExposure, period: float) -> float:
     """Saturation luminance one frame later: of first order in its logarithm, as photographers' stops are [cd/m²].
 
-    Parameters
-    ----------
-    saturation, wanted : float
-        Saturation luminance now, and the one that suits the light [cd/m²].
-    auto : AutoExposure
-        How the camera follows.
-    period : float
-        Time between two frames [s].
+    Takes `saturation`, `wanted` [cd/m²], `period` [s].
     """
     share = -math.expm1(-period / auto.time_constant) if auto.time_constant > 0 else 1.0
     return float(saturation * (wanted / saturation) ** share)
@@ -235,14 +153,7 @@ def sensor_at(sensor: Sensor, saturation: float, auto: AutoExposure) -> Sensor:
     that then fill a pixel's range make it noisier. What the read-out adds after the amplifier counts for ever less
     electrons, as EMVA 1288 cameras show.
 
-    Parameters
-    ----------
-    sensor : Sensor
-        The sensor without gain.
-    saturation : float
-        Saturation luminance [cd/m²].
-    auto : AutoExposure
-        Where gain begins.
+    Takes `saturation` [cd/m²].
     """
     share, noise = min(1.0, saturation / auto.ungained), sensor.read_noise
     if sensor.gained_read_noise is not None:

@@ -23,24 +23,15 @@ _RED, _GREEN, _BLUE = (np.float32(share) for share in LUMINANCE_WEIGHTS)
 
 
 class Exposure(NamedTuple):
-    """How light becomes a signal, and the noise in it.
+    """How light becomes a signal, and the noise in it."""
 
-    Attributes
-    ----------
-    gain : float32
-        Exposure relative to saturation per luminance [m²/cd].
-    shot_variance, read_variance : float32
-        Variance of the shot noise per exposure, and of the read noise, relative to saturation².
-    black_level : float32
-        What the sensor reads without light, relative to saturation.
-    first_key, second_key : uint32
-        What tells the noise of one frame from that of another.
-    """
-
-    gain: np.float32
+    gain: np.float32  # Exposure relative to saturation per luminance [m²/cd]
+    # shot_variance, read_variance: variance of the shot noise per exposure, and of the read noise, relative to
+    # saturation²
     shot_variance: np.float32
     read_variance: np.float32
-    black_level: np.float32
+    black_level: np.float32  # What the sensor reads without light, relative to saturation
+    # first_key, second_key: what tells the noise of one frame from that of another
     first_key: np.uint32
     second_key: np.uint32
 
@@ -56,23 +47,7 @@ def develop(
 ) -> None:
     """Pixel values of the samples from `begin` to before `end`.
 
-    Parameters
-    ----------
-    luminance : (samples,) float32
-        Of each channel of each pixel [cd/m²].
-    exposure : Exposure
-        Gain and noise.
-    response : (levels,) uint8 or uint16
-        Pixel value for exposure in even steps from 0 to saturation.
-    begin, end : int
-        Samples.
-    out : (samples,) uint8 or uint16
-        Pixel values; written to.
-
-    Notes
-    -----
-    Hash and arithmetic are loops that the compiler turns into vector instructions; only the response is read from a
-    table, one by one. Slices, since an offset index would be checked for its sign.
+    Takes `luminance` (samples,) [cd/m²], `response` (levels,) uint8, `out` (samples,) uint8.
     """
     gain, shot_variance, read_variance = exposure.gain, exposure.shot_variance, exposure.read_variance
     black_level = exposure.black_level
@@ -124,17 +99,7 @@ def _hash_counters(
 
 @kernel
 def block_means(fine: NDArray[np.float32], side: int, out: NDArray[np.float32]) -> None:
-    """Mean of each block of side × side samples.
-
-    Parameters
-    ----------
-    fine : (side · rows, side · cols · 3) float32
-        Samples.
-    side : int
-        Samples a pixel side.
-    out : (rows, cols, 3) float32
-        Means; written to.
-    """
+    """Mean of each block of side × side samples (`fine` (side · rows, side · cols · 3), `out` (rows, cols, 3))."""
     rows, cols, _ = out.shape
     share = np.float32(1.0 / (side * side))
     total = np.empty(fine.shape[1], np.float32)
@@ -158,14 +123,7 @@ def block_means(fine: NDArray[np.float32], side: int, out: NDArray[np.float32]) 
 def luminance_samples(image: NDArray[np.float32], stride: int, out: NDArray[np.float32]) -> None:
     """Luminance of every stride-th pixel of every stride-th row, from the middle of the first block.
 
-    Parameters
-    ----------
-    image : (rows, cols, 3) float32
-        Luminance per channel [cd/m²].
-    stride : int
-        Pixels between two samples.
-    out : (rows // stride, cols // stride) float32
-        Luminance [cd/m²]; written to.
+    Takes `image` (rows, cols, 3) [cd/m²], `out` [cd/m²].
     """
     rows, cols = out.shape
     for row in range(rows):

@@ -38,15 +38,7 @@ class _Glass(Protocol):
 
 
 class SunGlare:
-    """A small source of light that nothing hides, and the veil that the windscreen makes of it.
-
-    Parameters
-    ----------
-    camera : Camera
-        The true calibration.
-    glare : Glare
-        Where the source is, and how bright.
-    """
+    """A small source of light that nothing hides, and the veil that the windscreen makes of it."""
 
     def __init__(self, camera: Camera, glare: Glare) -> None:
         level = math.cos(glare.elevation)
@@ -65,13 +57,7 @@ class SunGlare:
         self._added: Floats32 = (glare.illuminance * (veil + disc)).astype(np.float32)[..., None]
 
     def look_through(self, radiance: Floats32) -> Floats32:
-        """Luminance behind the glass.
-
-        Parameters
-        ----------
-        radiance : (rows, cols, 3) float32
-            Linear luminance per channel before it [cd/m²].
-        """
+        """Luminance behind the glass (`radiance` (rows, cols, 3) [cd/m²])."""
         return radiance + self._added
 
 
@@ -86,17 +72,7 @@ class FaultyLens:
         self._glasses: list[tuple[RunningFault, Camera, _Glass]] = []
 
     def look_through(self, radiance: Floats32, camera: Camera, faults: Iterable[RunningFault]) -> Floats32:
-        """Luminance behind the glass; the same array where nothing is on it.
-
-        Parameters
-        ----------
-        radiance : (rows, cols, 3) float32
-            Linear luminance per channel before it [cd/m²].
-        camera : Camera
-            The true calibration.
-        faults : iterable of RunningFault
-            What is wrong now; faults that are none of the glass change nothing.
-        """
+        """Luminance behind the glass; the same array where nothing is on it (`radiance` (rows, cols, 3) [cd/m²])."""
         on_glass = [fault for fault in faults if isinstance(fault.kind, DirtyLens | WetLens | Glare)]
         # Light that glares comes through dirt and water.
         for fault in sorted(on_glass, key=lambda one: not isinstance(one.kind, Glare)):

@@ -61,13 +61,6 @@ class LensGlare:
     Of a pixel's light only what is above `BRIGHT` times saturation counts: the rest would lift the picture evenly by
     less than a camera's own black level correction takes away. Light that is scattered out of the picture is lost, and
     lamps outside it scatter none into it.
-
-    Parameters
-    ----------
-    camera : Camera
-        The true calibration.
-    share : float
-        Share of light that is scattered, 0 … 1.
     """
 
     def __init__(self, camera: Camera, share: float) -> None:
@@ -84,17 +77,8 @@ class LensGlare:
     def scatter(self, radiance: NDArray[np.float32], saturation: float) -> NDArray[np.float32]:
         """Luminance with what the lens scatters.
 
-        Parameters
-        ----------
-        radiance : (rows, cols, 3) float32
-            Linear luminance per channel at the camera [cd/m²].
-        saturation : float
-            Luminance that fills a pixel [cd/m²].
-
-        Returns
-        -------
-        (rows, cols, 3) float32
-            The image itself where nothing is brighter than `BRIGHT` times saturation.
+        Returns the image itself where nothing is brighter than `BRIGHT` times saturation (rows, cols, 3). Takes
+        `radiance` (rows, cols, 3) [cd/m²], `saturation` [cd/m²].
         """
         lines = np.ascontiguousarray(radiance, dtype=np.float32).reshape(radiance.shape[0], -1)
         counts, limit = np.empty(lines.shape[0], np.int32), np.float32(BRIGHT * saturation)

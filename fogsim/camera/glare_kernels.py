@@ -11,32 +11,17 @@ _ZERO, _ONE = np.float32(0.0), np.float32(1.0)
 
 
 class Places(NamedTuple):
-    """Where points of a finer grid lie between the cells of a coarser one, along rows or columns.
+    """Where points of a finer grid lie between the cells of a coarser one, along rows or columns."""
 
-    Attributes
-    ----------
-    at : (n,) int32
-        The cell before each point.
-    share : (n,) float32
-        How far beyond it the point is, in cells.
-    """
-
-    at: NDArray[np.int32]
-    share: NDArray[np.float32]
+    at: NDArray[np.int32]  # (n,) int32: The cell before each point
+    share: NDArray[np.float32]  # (n,): How far beyond it the point is, in cells
 
 
 @kernel
 def count_bright(lines: NDArray[np.float32], limit: np.float32, counts: NDArray[np.int32]) -> int:
     """Values above a limit in each row, and in all: a sum of integers, of which compilers make vector instructions.
 
-    Parameters
-    ----------
-    lines : (rows, 3 · cols) float32
-        Light.
-    limit : float32
-        The limit, in the light's unit.
-    counts : (rows,) int32
-        Values above it; written to.
+    Takes `lines` (rows, 3 · cols), `counts` (rows,) int32.
     """
     total = 0
     for row in range(lines.shape[0]):
@@ -67,16 +52,7 @@ def share_among_cells(
 ) -> None:
     """Add the light that bright pixels scatter to the four cells around each, so that its middle stays in place.
 
-    Parameters
-    ----------
-    lines, counts, limit
-        Light, as for `count_bright`, and what that found.
-    share : float32
-        Share of what is above the limit that is scattered.
-    rows, columns : Places
-        Of the pixels between the cells.
-    grid : (grid rows, 3 · grid cols) float32
-        Light in the cells; added to.
+    Takes `grid` (grid rows, 3 · grid cols).
     """
     for row in range(lines.shape[0]):
         if counts[row] == 0:
@@ -104,14 +80,7 @@ def coarsen_grid(
 ) -> None:
     """Add each cell's light to the four cells around it in a coarser grid.
 
-    Parameters
-    ----------
-    fine : (rows, 3 · cols) float32
-        Light.
-    rows, columns : Places
-        Of its cells between those of the coarser grid.
-    coarse : (coarse rows, 3 · coarse cols) float32
-        Light; added to.
+    Takes `fine` (rows, 3 · cols), `coarse` (coarse rows, 3 · coarse cols).
     """
     strip = np.zeros(coarse.shape[1], np.float32)
     for row in range(fine.shape[0]):
@@ -135,14 +104,7 @@ def coarsen_grid(
 def blur_grid(grid: NDArray[np.float32], taps: NDArray[np.float32], gain: np.float32, out: NDArray[np.float32]) -> None:
     """Add a grid, spread by the taps along rows and columns, to another; what leaves the grid is lost.
 
-    Parameters
-    ----------
-    grid, out : (rows, 3 · cols) float32
-        Light; `out` is added to.
-    taps : (2 n + 1,) float32
-        Weights.
-    gain : float32
-        Factor of all weights.
+    Takes `grid`, `out` (rows, 3 · cols), `taps` (2 n + 1,).
     """
     reach = taps.shape[0] // 2
     strip = np.empty(grid.shape[1] + 6 * reach, np.float32)
@@ -193,14 +155,7 @@ def interpolate_columns(
 ) -> None:
     """Interpolate the rows of a grid at the columns of a finer one.
 
-    Parameters
-    ----------
-    grid : (rows, 3 · cols) float32
-        Light.
-    columns : Places
-        Of the finer grid's columns.
-    wide : (rows, 3 · finer cols) float32
-        Light; written to.
+    Takes `grid` (rows, 3 · cols), `wide` (rows, 3 · finer cols).
     """
     for row in range(grid.shape[0]):
         line, out = grid[row], wide[row]
@@ -222,16 +177,7 @@ def add_interpolated_rows(
 ) -> None:
     """The lines from `begin` to before `end`, plus rows that are interpolated between those of a coarser grid.
 
-    Parameters
-    ----------
-    lines, out : (rows, 3 · cols) float32
-        Light before and after; `out` is written to.
-    wide : (coarse rows, 3 · cols) float32
-        Light to be added.
-    rows : Places
-        Of the lines between the coarse rows.
-    begin, end : int
-        Lines.
+    Takes `lines`, `out` (rows, 3 · cols), `wide` (coarse rows, 3 · cols).
     """
     for row in range(begin, end):
         line, upper, lower, sums = lines[row], wide[rows.at[row]], wide[rows.at[row] + 1], out[row]
@@ -253,16 +199,7 @@ def spread_core(
 ) -> None:
     """Take the scattered light from the bright pixels and give the part `gain` of it to those next to them.
 
-    Parameters
-    ----------
-    lines, counts, limit, share
-        As for `share_among_cells`.
-    taps : (2 n + 1,) float32
-        Weights by which the light is spread.
-    gain : float32
-        Share of the scattered light that is spread here.
-    out : (rows, 3 · cols) float32
-        Light; changed in place.
+    Takes `taps` (2 n + 1,), `out` (rows, 3 · cols).
     """
     reach, size = taps.shape[0] // 2, lines.shape[1]
     light = np.zeros(size, np.float32)

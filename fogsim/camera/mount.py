@@ -13,18 +13,10 @@ from fogsim.values.fault import FaultKind, Miscalibration
 
 
 class CameraMount(NamedTuple):
-    """Where on a vehicle a camera is.
+    """Where on a vehicle a camera is."""
 
-    Attributes
-    ----------
-    height : float
-        Height above the road [m].
-    setback : float
-        Distance behind the front bumper [m].
-    """
-
-    height: float
-    setback: float
+    height: float  # Height above the road [m]
+    setback: float  # Distance behind the front bumper [m]
 
 
 USUAL_MOUNTS = {
@@ -47,21 +39,7 @@ def mounted_pose(
 ) -> CameraPose:
     """Pose of a camera that is mounted behind a vehicle's front bumper, on its axis.
 
-    Parameters
-    ----------
-    camera : Camera
-        Its calibration, for the height of its mount.
-    front_bumper : (3,) float64
-        Middle of the front bumper on the road surface [m].
-    heading : float
-        Direction of travel, counterclockwise from east [rad].
-    setback : float
-        Distance of the optical centre behind the front bumper, along the road [m].
-    grade : float
-        Inclination of the road along the heading [rad], positive uphill. The vehicle stands on it with all that it
-        carries: the height of the mount is perpendicular to the road.
-    body_pitch : float
-        Upward inclination of the body on the road [rad]; it turns the camera, and is too small to move it.
+    Takes `front_bumper` (3,) [m], `heading` [rad], `setback` [m], `grade` [rad], `body_pitch` [rad].
     """
     forward, up = math.cos(grade), math.sin(grade)
     along = setback * forward + camera.mount_height * up
@@ -72,15 +50,7 @@ def mounted_pose(
 
 
 def knocked(camera: Camera, kinds: Iterable[FaultKind]) -> Camera:
-    """The true calibration of a camera that has been knocked, or whose lens has slipped.
-
-    Parameters
-    ----------
-    camera : Camera
-        Its true calibration before.
-    kinds : iterable of FaultKind
-        What is wrong now, with whatever sensor.
-    """
+    """The true calibration of a camera that has been knocked, or whose lens has slipped."""
     for kind in kinds:
         if isinstance(kind, Miscalibration):
             camera = replace(
@@ -94,30 +64,14 @@ def knocked(camera: Camera, kinds: Iterable[FaultKind]) -> Camera:
 
 @dataclass(frozen=True, slots=True)
 class Suspension:
-    """How a vehicle's body pitches when it brakes or accelerates.
+    """How a vehicle's body pitches when it brakes or accelerates."""
 
-    Attributes
-    ----------
-    pitch_per_deceleration : float
-        Steady pitch, nose down, for each unit of deceleration [rad per m/s²].
-    time_constant : float
-        Lag of first order with which the body follows [s].
-    """
-
-    pitch_per_deceleration: float
-    time_constant: float
+    pitch_per_deceleration: float  # Steady pitch, nose down, for each unit of deceleration [rad per m/s²]
+    time_constant: float  # Lag of first order with which the body follows [s]
 
 
 class BodyPitch:
-    """The pitch of a vehicle's body through a run.
-
-    Parameters
-    ----------
-    suspension : Suspension
-        How the body pitches.
-    period : float
-        Time between two updates [s].
-    """
+    """The pitch of a vehicle's body through a run (`period` [s])."""
 
     def __init__(self, suspension: Suspension, period: float) -> None:
         self._suspension = suspension
@@ -130,13 +84,7 @@ class BodyPitch:
         self._grade = None
 
     def update(self, acceleration: float) -> float:
-        """Upward inclination of the body on the road [rad]; braking makes it negative.
-
-        Parameters
-        ----------
-        acceleration : float
-            Acceleration along the heading [m/s²].
-        """
+        """Upward inclination of the body on the road [rad]; braking makes it negative (`acceleration` [m/s²])."""
         settled = self._suspension.pitch_per_deceleration * acceleration
         before = settled if self._grade is None else self._grade
         self._grade = before + self._share * (settled - before)

@@ -17,15 +17,8 @@ from fogsim.values import Camera, View
 def supersampled(camera: Camera, side: int) -> Camera:
     """Camera with side × side pixels in the place of each.
 
-    The centre of pixel u lies at integer u, so its left border is at u − ½ and what was at u is now at
-    side · (u + ½) − ½.
-
-    Parameters
-    ----------
-    camera : Camera
-        The camera.
-    side : int
-        Samples a pixel side, at least 1.
+    The centre of pixel u lies at integer u, so its left border is at u − ½ and what was at u is now at side · (u + ½) −
+    ½.
     """
     u0, v0 = (side * (centre + 0.5) - 0.5 for centre in camera.principal_point)
     return dataclasses.replace(
@@ -40,17 +33,8 @@ def supersampled(camera: Camera, side: int) -> Camera:
 def averaged(radiance: NDArray[np.float32], side: int) -> NDArray[np.float32]:
     """Mean luminance of each pixel's samples.
 
-    Parameters
-    ----------
-    radiance : (side · rows, side · cols, 3) float32
-        Linear luminance per channel of the samples [cd/m²].
-    side : int
-        Samples a pixel side, at least 1.
-
-    Returns
-    -------
-    (rows, cols, 3) float32
-        Linear luminance per channel of the pixels [cd/m²]; the samples themselves where there is one a pixel.
+    Returns linear luminance per channel of the pixels [cd/m²]; the samples themselves where there is one a pixel (rows,
+    cols, 3). Takes `radiance` (side · rows, side · cols, 3) [cd/m²].
     """
     if side == 1:
         return radiance
@@ -65,13 +49,6 @@ def middle_samples(view: View, side: int) -> View:
     """View with one sample a pixel: the one in the middle, or for an even number the next to its lower right.
 
     Samples are chosen, not averaged: a mean of distances is the distance of nothing.
-
-    Parameters
-    ----------
-    view : View
-        View of a supersampled camera.
-    side : int
-        Samples a pixel side, at least 1.
     """
     if side == 1:
         return view

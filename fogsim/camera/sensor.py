@@ -18,23 +18,7 @@ from fogsim.values import Camera
 
 
 class CameraSensor:
-    """Takes the pictures of one run; what it remembers from one to the next is the exposure.
-
-    Parameters
-    ----------
-    camera : Camera
-        The true calibration.
-    sensor : Sensor
-        The sensor; with automatic exposure its saturation luminance is not used.
-    auto : AutoExposure or None
-        How the camera sets its own exposure; None where it is fixed.
-    shading : float
-        Strength of the lens's shading; see `lens_shading`.
-    period : float
-        Time between two pictures [s].
-    glare : float
-        Share of lamps' light that the lens scatters; see `LensGlare`.
-    """
+    """Takes the pictures of one run; what it remembers from one to the next is the exposure (`period` [s])."""
 
     def __init__(
         self,
@@ -70,17 +54,7 @@ class CameraSensor:
     def take(self, radiance: NDArray[np.float32], rng: np.random.Generator) -> Pixels:
         """Take a picture at the exposure that the pictures before have set.
 
-        Parameters
-        ----------
-        radiance : (rows, cols, 3) float32
-            Linear luminance per channel at the camera [cd/m²].
-        rng : numpy.random.Generator
-            Source of the noise; one draw is taken for a picture.
-
-        Returns
-        -------
-        (rows, cols, 3) uint8, or uint16 for more than 8 bits
-            Pixel values.
+        Returns pixel values (rows, cols, 3) uint8. Takes `radiance` (rows, cols, 3) [cd/m²].
         """
         if self._shading is not None:
             radiance = radiance * self._shading
@@ -106,17 +80,7 @@ def lens_shading(camera: Camera, strength: float) -> NDArray[np.float32]:
     cos⁴ of the angle θ to the optical axis is the natural vignetting of a thin lens; designs of lenses and correction
     in the camera take part of it back.
 
-    Parameters
-    ----------
-    camera : Camera
-        The true calibration.
-    strength : float
-        0 for none, 1 for all of it.
-
-    Returns
-    -------
-    (rows, cols) float32
-        Greater than 0, 1 on the axis.
+    Returns greater than 0, 1 on the axis (rows, cols).
     """
     u0, v0 = camera.principal_point
     across = (np.arange(camera.width) - u0) / camera.focal_length

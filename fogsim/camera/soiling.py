@@ -27,15 +27,6 @@ class DirtyGlass:
     """Dirt takes light from the road and sends some of the light around into the camera: L' = L T + (1 − T) ρ L̄.
 
     T is what blots leave (Gu et al. 2009, eq. 3), L̄ the mean of the picture, which stands for the light around.
-
-    Parameters
-    ----------
-    camera : Camera
-        The calibration.
-    dirt : DirtyLens
-        How much dirt there is.
-    rng : numpy.random.Generator
-        Source of its places.
     """
 
     def __init__(self, camera: Camera, dirt: DirtyLens, rng: np.random.Generator) -> None:
@@ -43,13 +34,7 @@ class DirtyGlass:
         self._albedo = np.float32(dirt.albedo)
 
     def look_through(self, radiance: Floats32) -> Floats32:
-        """Luminance behind the glass.
-
-        Parameters
-        ----------
-        radiance : (rows, cols, 3) float32
-            Linear luminance per channel before it [cd/m²].
-        """
+        """Luminance behind the glass (`radiance` (rows, cols, 3) [cd/m²])."""
         around: Floats32 = radiance.mean(axis=(0, 1), dtype=np.float64).astype(np.float32)
         behind: Floats32 = radiance * self._passed + (1.0 - self._passed) * (self._albedo * around)
         return behind
@@ -62,15 +47,6 @@ class WetGlass:
     raindrop modeling, detection and removal in video): light comes through it from 165° about, and its upper part shows
     what is below. What is not in the picture is taken to be as what is at its border. Each pixel gets the mean of what
     the drops show over the pupil, whose disc a Gaussian of the same variance stands for.
-
-    Parameters
-    ----------
-    camera : Camera
-        The calibration.
-    water : WetLens
-        How much water there is.
-    rng : numpy.random.Generator
-        Source of the drops' places.
     """
 
     def __init__(self, camera: Camera, water: WetLens, rng: np.random.Generator) -> None:
@@ -86,13 +62,7 @@ class WetGlass:
         self._share = gaussian_filter(self._inside.astype(float), self._defocus)
 
     def look_through(self, radiance: Floats32) -> Floats32:
-        """Luminance behind the glass.
-
-        Parameters
-        ----------
-        radiance : (rows, cols, 3) float32
-            Linear luminance per channel before it [cd/m²].
-        """
+        """Luminance behind the glass (`radiance` (rows, cols, 3) [cd/m²])."""
         behind: Floats32 = radiance
         if self._blur > 0.0:
             behind = gaussian_filter(radiance, (self._blur, self._blur, 0.0), mode="nearest")

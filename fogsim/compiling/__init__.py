@@ -26,10 +26,7 @@ def prepare_economy() -> None:
 def begin_economy() -> Callable[[], None]:
     """Save work from now on, if this version of numba is known.
 
-    Returns
-    -------
-    end : callable
-        Ends it: numba is as it was.
+    Returns ends it: numba is as it was.
     """
     if numba.version_info.short not in KNOWN:
         return lambda: None

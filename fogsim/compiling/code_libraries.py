@@ -18,14 +18,9 @@ _CALLED_FROM_PYTHON = "_ZN7cpython"
 
 
 class LinkedLibrary(codegen.JITCodeLibrary):  # type: ignore[misc] # numba is untyped
-    """Compiled functions that others link; machine code is made of them when it is asked for.
+    """Compiled functions that others link; machine code is made of them when it is asked for."""
 
-    Attributes
-    ----------
-    deferring : bool
-        Whether what is compiled is put off so: within FogSim's kernels, and not within anybody else's.
-    """
-
+    # Whether what is compiled is put off so: within FogSim's kernels, and not within anybody else's
     deferring: ClassVar[bool] = False
 
     _put_off = False

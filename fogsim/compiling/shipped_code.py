@@ -26,18 +26,10 @@ FOLDER = PACKAGE / "_kernels"
 
 @dataclass(frozen=True)
 class Processors:
-    """A kind of processors that one machine code is for.
+    """A kind of processors that one machine code is for."""
 
-    Attributes
-    ----------
-    name : str
-        LLVM's name.
-    features : frozenset of str
-        What LLVM must find in a processor for it to be of the kind.
-    """
-
-    name: str
-    features: frozenset[str]
+    name: str  # LLVM's name
+    features: frozenset[str]  # What LLVM must find in a processor for it to be of the kind
 
 
 KINDS = {
@@ -57,10 +49,7 @@ It is as fast as code for the very processor; code for any x86-64 takes half as 
 def compiled_for() -> dict[str, str] | None:
     """Environment in which numba compiles kernels to be shipped; None where none are.
 
-    Returns
-    -------
-    dict or None
-        Variables of numba: LLVM's name of the processors, and nothing of this machine's.
+    Returns variables of numba: LLVM's name of the processors, and nothing of this machine's.
     """
     kind = KINDS.get(platform.machine())
     return None if kind is None else {"NUMBA_CPU_NAME": kind.name, "NUMBA_CPU_FEATURES": ""}
@@ -116,13 +105,7 @@ class ShippedCache(caching.Cache):  # type: ignore[misc] # numba is untyped
 
 
 def shipped_cache(function: FunctionType) -> ShippedCache | None:
-    """What came of a function with the installation; None where nothing did, or it is not for this processor.
-
-    Parameters
-    ----------
-    function : function
-        Under the name by which numba keeps it.
-    """
+    """What came of a function with the installation; None where nothing did, or it is not for this processor."""
     if not FOLDER.is_dir() or not Path(function.__code__.co_filename).is_relative_to(PACKAGE) or usable_kind() is None:
         return None
     return ShippedCache(function)

@@ -16,21 +16,11 @@ from numba.np import arrayobj
 
 
 class Shortcut(NamedTuple):
-    """A function that stands in for one of numba's.
+    """A function that stands in for one of numba's."""
 
-    Attributes
-    ----------
-    owner : module or class
-        Where that is found.
-    name : str
-        By which it is.
-    function : callable
-        What stands in for it.
-    """
-
-    owner: Any
-    name: str
-    function: Callable[..., Any]
+    owner: Any  # Where that is found
+    name: str  # By which it is
+    function: Callable[..., Any]  # What stands in for it
 
     def take(self) -> Callable[[], None]:
         """Put it in place; what is returned puts numba's own back."""

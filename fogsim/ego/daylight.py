@@ -10,34 +10,18 @@ from fogsim.values import FogField
 
 @dataclass(frozen=True, slots=True)
 class Ramp:
-    """A quantity that goes over from one value to another, evenly or by the same factor in each second.
+    """A quantity that goes over from one value to another, evenly or by the same factor in each second."""
 
-    Attributes
-    ----------
-    first : float
-        The value before.
-    last : float or None
-        The value after; None for the same.
-    begun, duration : float
-        When it begins to change, and how long that takes [s].
-    by_factors : bool
-        Whether its logarithm goes over evenly, and not the value itself; both values are positive then.
-    """
-
-    first: float
-    last: float | None = None
+    first: float  # The value before
+    last: float | None = None  # The value after; None for the same
+    # begun, duration: when it begins to change, and how long that takes [s]
     begun: float = 0.0
     duration: float = 0.0
+    # Whether its logarithm goes over evenly, and not the value itself; both values are positive then
     by_factors: bool = False
 
     def at(self, time: float) -> float:
-        """The value at a time.
-
-        Parameters
-        ----------
-        time : float
-            The time [s].
-        """
+        """The value at a time (`time` [s])."""
         if self.last is None or time <= self.begun:
             return self.first
         if time >= self.begun + self.duration:
@@ -47,31 +31,11 @@ class Ramp:
         return float(np.interp(time, [self.begun, self.begun + self.duration], [self.first, self.last]))
 
     def turned(self, time: float, value: float, duration: float, by_factors: bool = False) -> "Ramp":
-        """The quantity when from a time on it goes elsewhere.
-
-        Parameters
-        ----------
-        time : float
-            The time [s].
-        value : float
-            Value to come to.
-        duration : float
-            Time that it takes [s].
-        by_factors : bool
-            See `Ramp`; not where the value is 0 now.
-        """
+        """The quantity when from a time on it goes elsewhere (`time` [s], `duration` [s])."""
         first = self.at(time)
         return Ramp(first, value, time, duration, by_factors and first > 0.0)
 
 
 def in_daylight(fog: FogField, illuminance: float) -> FogField:
-    """Fog by another daylight.
-
-    Parameters
-    ----------
-    fog : FogField
-        The fog.
-    illuminance : float
-        Horizontal illuminance of the sky [lx].
-    """
+    """Fog by another daylight (`illuminance` [lx])."""
     return replace(fog, airlight=airlight_from_illuminance(illuminance, fog.airlight_share))

@@ -39,13 +39,7 @@ REACH = 300.0
 
 
 def is_of_sensor(report: FogReport) -> bool:
-    """Whether a report is of a sensor beside the road.
-
-    Parameters
-    ----------
-    report : FogReport
-        The report.
-    """
+    """Whether a report is of a sensor beside the road."""
     return report.source.startswith(SENSOR + " ")
 
 
@@ -81,15 +75,7 @@ class Beats:
 
 
 class FogReports:
-    """The senders of a scenario, and what is on its way from them.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    route : (n, 3) float64
-        Polyline along the ego's route [m].
-    """
+    """The senders of a scenario, and what is on its way from them (`route` (n, 3) [m])."""
 
     def __init__(self, scenario: Scenario, route: Floats) -> None:
         section = scenario.sensors.reports
@@ -99,13 +85,7 @@ class FogReports:
         self.reset(np.random.default_rng(0))
 
     def reset(self, rng: np.random.Generator) -> None:
-        """Begin a run.
-
-        Parameters
-        ----------
-        rng : numpy.random.Generator
-            Settles which vehicles are equipped, and is the source of all noise.
-        """
+        """Begin a run."""
         self._rng = rng
         self._draw = int(rng.integers(2**32))
         self._under_way: list[tuple[float, FogReport]] = []
@@ -115,21 +95,7 @@ class FogReports:
     def heard(
         self, time: float, state: TrafficState, ego: int, fog: FogField, sent: Iterable[tuple[str, FogReport]] = ()
     ) -> tuple[FogReport, ...]:
-        """Let all measure that are to, and tell what has come in by now.
-
-        Parameters
-        ----------
-        time : float
-            Simulated time [s].
-        state : TrafficState
-            Every vehicle.
-        ego : int
-            Row of the one that listens.
-        fog : FogField
-            The fog now.
-        sent : iterable of (str, FogReport)
-            Ids of equipped vehicles and names of sensors beside the road, and what their last pictures show.
-        """
+        """Let all measure that are to, and tell what has come in by now (`time` [s])."""
         sent = tuple(sent)
         if self._cameras is not None:
             self._take_from_cameras(self._cameras, sent, state, ego)
@@ -140,13 +106,7 @@ class FogReports:
         return self.heard_from_roadside(time, fog)
 
     def heard_from_roadside(self, time: float, fog: FogField) -> tuple[FogReport, ...]:
-        """Let sensors beside the road measure, and tell what has come in by now from anybody.
-
-        Parameters
-        ----------
-        time, fog
-            See `heard`.
-        """
+        """Let sensors beside the road measure, and tell what has come in by now from anybody."""
         if self._roadside is not None and self._roadside.camera is None:
             self._measure_roadside(self._roadside, time, fog)
         arrived = tuple(report for due, report in self._under_way if due <= time + 1e-9)

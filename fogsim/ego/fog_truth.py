@@ -25,17 +25,10 @@ _WAY = np.arange(-200.0, 1001.0, 25.0)
 
 
 class KnownWay(NamedTuple):
-    """What of the road does not change in a run.
+    """What of the road does not change in a run."""
 
-    Attributes
-    ----------
-    route : (n, 3) float64 or None
-        Polyline along the ego's route [m].
-    carriageways : mapping from str to tuple of str
-        Lanes for vehicles of each edge, from `carriageways`.
-    """
-
-    route: NDArray[np.float64] | None = None
+    route: NDArray[np.float64] | None = None  # (n, 3): Polyline along the ego's route [m]
+    # Lanes for vehicles of each edge, from `carriageways`
     carriageways: Mapping[str, tuple[str, ...]] = MappingProxyType({})
 
 
@@ -50,29 +43,7 @@ def fog_truth(
     faults: tuple[Fault, ...] = (),
     place: float | None = None,
 ) -> Truth:
-    """The fog at a camera, and as far as it sees along its heading, parallel to the road under it.
-
-    Parameters
-    ----------
-    fog : FogField
-        The fog now.
-    pose : CameraPose
-        Where the camera is.
-    camera : Camera
-        Its true calibration.
-    signs : SignMap
-        The signs that stand in the world.
-    traffic : TrafficState or None
-        Vehicles whose drivers have fog about them, too.
-    sections : tuple of RoadSection
-        What meters beside the road measure.
-    way : KnownWay or None
-        The ego's route, and the lanes.
-    faults : tuple of Fault
-        Faults of its sensors in force.
-    place : float or None
-        How far the ego has come along its route [m]; None where that does not matter.
-    """
+    """The fog at a camera, and as far as it sees along its heading, parallel to the road under it (`place` [m])."""
     eye, level = np.array(pose.position), math.cos(pose.road_grade)
     direction = np.array([math.cos(pose.heading) * level, math.sin(pose.heading) * level, math.sin(pose.road_grade)])
     sight = distance_at_depth(fog, eye, direction, _SIGHT_LINE, OPTICAL_DEPTH_AT_VISIBILITY)
@@ -118,13 +89,7 @@ def _extinctions(
 
 
 def carriageways(lanes: Iterable[Lane]) -> dict[str, tuple[str, ...]]:
-    """Ids of the lanes for vehicles of each edge, from the right.
-
-    Parameters
-    ----------
-    lanes : iterable of Lane
-        Every lane, named by its edge and its number from the right as SUMO does.
-    """
+    """Ids of the lanes for vehicles of each edge, from the right."""
     found: dict[str, list[str]] = {}
     for lane in lanes:
         if lane.kind is LaneKind.CARRIAGEWAY:

@@ -38,15 +38,7 @@ class FrameWatch:
         self._pixels: Pixels | None = None
 
     def why_no_news(self, frame: Frame, speed: float) -> str:
-        """Say why a frame is no news; empty if it is.
-
-        Parameters
-        ----------
-        frame : Frame
-            What the camera hands out.
-        speed : float
-            Own speed by the odometer [m/s].
-        """
+        """Say why a frame is no news; empty if it is (`speed` [m/s])."""
         before, earlier = self._pixels, self._time
         self._time, self._pixels = max(frame.time, earlier), frame.image
         if frame.time <= earlier:
@@ -57,15 +49,7 @@ class FrameWatch:
 
 
 def why_useless(frame: Frame, time: float) -> str:
-    """Say why a frame, news or not, does not show the road of now; empty if it may.
-
-    Parameters
-    ----------
-    frame : Frame
-        What the camera hands out.
-    time : float
-        Now [s].
-    """
+    """Say why a frame, news or not, does not show the road of now; empty if it may (`time` [s])."""
     if time - frame.time > LATEST:
         return f"the frame is {time - frame.time:.2f} s late"
     sample = frame.image[::_APART, ::_APART]
@@ -86,25 +70,11 @@ class LeadHistory:
         self._measured: deque[tuple[float, LeadMeasurement | None]] = deque()
 
     def add(self, time: float, measured: LeadMeasurement | None) -> None:
-        """Keep a measurement.
-
-        Parameters
-        ----------
-        time : float
-            When it was made [s].
-        measured : LeadMeasurement or None
-            The measurement.
-        """
+        """Keep a measurement (`time` [s])."""
         self._measured.append((time, measured))
 
     def at(self, time: float) -> LeadMeasurement | None:
-        """The last measurement until the time of a frame; earlier ones are forgotten.
-
-        Parameters
-        ----------
-        time : float
-            The time that the frame bears [s], not before that of the last call.
-        """
+        """The last measurement until the time of a frame; earlier ones are forgotten (`time` [s])."""
         while len(self._measured) > 1 and self._measured[1][0] <= time:
             self._measured.popleft()
         return self._measured[0][1] if self._measured else None

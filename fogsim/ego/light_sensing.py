@@ -27,38 +27,19 @@ HEAD_LAMPS, TAIL_LAMPS = 1200.0, 16.0
 
 
 class Other(NamedTuple):
-    """Another vehicle ahead, as the ego has it.
+    """Another vehicle ahead, as the ego has it."""
 
-    Attributes
-    ----------
-    row : int
-        Its row in the traffic.
-    ahead, aside : float
-        Where its front bumper is, ahead of the ego's and to its left [m].
-    distance : float
-        [m]
-    comes : bool
-        Whether it drives against the ego.
-    angle : float
-        Angle between its heading and the way to the ego [rad].
-    """
-
-    row: int
+    row: int  # Its row in the traffic
+    # ahead, aside: where its front bumper is, ahead of the ego's and to its left [m]
     ahead: float
     aside: float
-    distance: float
-    comes: bool
-    angle: float
+    distance: float  # [m]
+    comes: bool  # Whether it drives against the ego
+    angle: float  # Angle between its heading and the way to the ego [rad]
 
 
 class LightSensing:
-    """The light sensor behind the ego's windscreen, and what its lamps do.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """The light sensor behind the ego's windscreen, and what its lamps do."""
 
     def __init__(self, scenario: Scenario) -> None:
         section = scenario.sensors.light
@@ -68,16 +49,7 @@ class LightSensing:
     def measure(self, state: TrafficState, ego: int, fog: FogField, illuminance: float) -> LightMeasurement:
         """Tell how bright it is, and by night whether others' lamps are ahead; no vehicle hides another.
 
-        Parameters
-        ----------
-        state : TrafficState
-            Every vehicle.
-        ego : int
-            Row of the ego.
-        fog : FogField
-            The fog now.
-        illuminance : float
-            Horizontal illuminance of the sky [lx].
+        Takes `illuminance` [lx].
         """
         if illuminance >= DAY_ILLUMINANCE:
             return LightMeasurement(illuminance)
@@ -104,19 +76,7 @@ class LightSensing:
 
 
 def lamp_effects(state: TrafficState, ego: int, fog: FogField, extinction_ahead: float) -> LampEffects:
-    """What the ego's lamps do by night.
-
-    Parameters
-    ----------
-    state : TrafficState
-        Every vehicle.
-    ego : int
-        Row of the ego.
-    fog : FogField
-        The fog now.
-    extinction_ahead : float
-        Mean extinction coefficient ahead of the ego [1/m].
-    """
+    """What the ego's lamps do by night (`extinction_ahead` [1/m])."""
     lamps = int(state.lamps[ego])
     others = _others_ahead(state, ego, FARTHEST_DAZZLED) if head_lamps_that_burn(lamps) else []
     dazzled = [other for other in others if not other.comes or other.angle < 0.5 * math.pi]

@@ -33,13 +33,7 @@ BUMPER_HEIGHT = 0.6
 
 
 class EgoSensors:
-    """Radar, satellite positioning, sign map and scatterometer of an ego.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """Radar, satellite positioning, sign map and scatterometer of an ego."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._radar, self._gps = build.lead_sensor(scenario), build.gps(scenario)
@@ -48,38 +42,16 @@ class EgoSensors:
         self._shadow = RadarShadow(())
 
     def reset(self, streams: Streams) -> None:
-        """Begin a run.
-
-        Parameters
-        ----------
-        streams : Streams
-            Random numbers of the run.
-        """
+        """Begin a run."""
         if self._scatterometer is not None:
             self._scatterometer.reset(streams.scatterometer)
 
     def enter_road(self, structures: Sequence[Structure]) -> None:
-        """Let the radar reach only what is not behind these.
-
-        Parameters
-        ----------
-        structures : sequence of Structure
-            What stands beside the roads and over them.
-        """
+        """Let the radar reach only what is not behind these."""
         self._shadow = RadarShadow(structures)
 
     def lead(self, snapshot: TrafficSnapshot, faults: Faults, streams: Streams) -> LeadMeasurement | None:
-        """The vehicle ahead by radar.
-
-        Parameters
-        ----------
-        snapshot : TrafficSnapshot
-            The traffic now.
-        faults : sequence of RunningFault
-            What is wrong now.
-        streams : Streams
-            Random numbers of the run.
-        """
+        """The vehicle ahead by radar."""
         speed, radar = float(snapshot.state.speed[snapshot.ego]), faulty_lead_sensor(self._radar, faults)
         share = self._share_of_reach(snapshot)
         measured = measure_lead(snapshot.leader, speed, radar, streams.sensors, _bearing(snapshot), share)
@@ -95,19 +67,7 @@ class EgoSensors:
     def signs(
         self, snapshot: TrafficSnapshot, known: SignMap, faults: Faults, streams: Streams
     ) -> tuple[SignSighting, ...]:
-        """Signs ahead by the map, from where the vehicle takes itself to be.
-
-        Parameters
-        ----------
-        snapshot : TrafficSnapshot
-            The traffic now.
-        known : SignMap
-            The map without faults.
-        faults : sequence of RunningFault
-            What is wrong now.
-        streams : Streams
-            Random numbers of the run.
-        """
+        """Signs ahead by the map, from where the vehicle takes itself to be."""
         state, ego = snapshot.state, snapshot.ego
         fix = measure_fix(state.position[ego], float(state.heading[ego]), self._gps, streams.gps)
         measured: Fix | None = faulty_fix(fix, faults)
@@ -120,16 +80,7 @@ class EgoSensors:
     def scattering(self, snapshot: TrafficSnapshot, fog: FogField, time: float, faults: Faults) -> float | None:
         """What the scatterometer tells of the extinction coefficient at the front bumper [1/m]; None without one.
 
-        Parameters
-        ----------
-        snapshot : TrafficSnapshot
-            The traffic now.
-        fog : FogField
-            The fog now.
-        time : float
-            Time since the run began [s].
-        faults : sequence of RunningFault
-            What is wrong now.
+        Takes `time` [s].
         """
         if self._scatterometer is None:
             return None

@@ -57,15 +57,7 @@ class NearScene:
     def reach(self, camera: Camera, pose: CameraPose) -> bool:
         """Build what a picture may show and is not there yet.
 
-        Parameters
-        ----------
-        camera, pose
-            The pinhole, and where it is in the coordinates of the scene.
-
-        Returns
-        -------
-        bool
-            Whether the scene has changed.
+        Returns whether the scene has changed.
         """
         if self.is_whole:
             return False
@@ -97,13 +89,7 @@ class NearScene:
 
 
 class _Sector:
-    """Part of the ground that a picture may show.
-
-    Parameters
-    ----------
-    camera, pose
-        The pinhole, and where it is.
-    """
+    """Part of the ground that a picture may show."""
 
     def __init__(self, camera: Camera, pose: CameraPose) -> None:
         ends = ((-0.5, camera.width - 0.5), (-0.5, camera.height - 0.5))
@@ -120,17 +106,7 @@ class _Sector:
     def touches(
         self, away: NDArray[np.float64], overhang: float, ahead: float = 0.0, aside: float = 0.0
     ) -> NDArray[np.bool_]:
-        """Which squares may show.
-
-        Parameters
-        ----------
-        away : (n, 2) float64
-            Their middles, from the camera [m].
-        overhang : float
-            How far what belongs to them may reach beyond them [m].
-        ahead, aside : float
-            How much farther [m], and how much farther to each side [rad], the sector is taken to reach.
-        """
+        """Which squares may show (`away` (n, 2) [m], `overhang` [m], `ahead`, `aside` [m], [rad])."""
         radius, distance = GROUND_SQUARE * math.sqrt(0.5) + overhang, _length(away)
         turned = np.abs(_turned(np.arctan2(away[:, 1], away[:, 0]) - self.heading))
         breadth = np.arcsin(np.minimum(radius / np.maximum(distance, radius), 1.0))

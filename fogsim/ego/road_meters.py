@@ -14,17 +14,7 @@ from fogsim.values import FogField, FogReport, RoadSection
 
 
 class RoadMeters:
-    """The meters of a scenario along a route.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    route : (n, 3) float64
-        Polyline along the ego's route [m].
-    limits : (n,) float64
-        Speed limit of the road that leads to each of its points [m/s]; empty where it is not known.
-    """
+    """The meters of a scenario along a route (`route` (n, 3) [m], `limits` (n,) [m/s])."""
 
     def __init__(self, scenario: Scenario, route: NDArray[np.float64], limits: NDArray[np.float64]) -> None:
         self._stretches = road_sections(scenario, float(stations(route)[-1]))
@@ -38,24 +28,12 @@ class RoadMeters:
         self._reported = {}
 
     def hear(self, reports: Iterable[FogReport]) -> None:
-        """Let sensors beside the road report.
-
-        Parameters
-        ----------
-        reports : iterable of FogReport
-            What has come in, from others too.
-        """
+        """Let sensors beside the road report."""
         # Later ones come later: all are on their way for the same time.
         self._reported.update((one.source, (one.place, one.extinction)) for one in reports if is_of_sensor(one))
 
     def measure(self, fog: FogField) -> tuple[RoadSection, ...]:
-        """What they measure, in the direction of travel.
-
-        Parameters
-        ----------
-        fog : FogField
-            The fog now.
-        """
+        """What they measure, in the direction of travel."""
         if not self._stretches:
             return ()
         measured, reported = extinction(fog, self._places).tolist(), [self._nearest(at) for at in self._along]

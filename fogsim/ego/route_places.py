@@ -18,29 +18,16 @@ SAME_WAY = 0.5
 
 
 class Places(NamedTuple):
-    """Vehicles along a route.
+    """Vehicles along a route."""
 
-    Attributes
-    ----------
-    along, aside : (n,) float64
-        How far along the route they are, and how far to its left [m].
-    on_way : (n,) bool
-        Whether they are on its road and go its way.
-    """
-
+    # along, aside (n,): how far along the route they are, and how far to its left [m]
     along: Floats
     aside: Floats
-    on_way: NDArray[np.bool_]
+    on_way: NDArray[np.bool_]  # (n,) bool: Whether they are on its road and go its way
 
 
 class RoutePlaces:
-    """A route along which vehicles have places.
-
-    Parameters
-    ----------
-    route : (m, 3) float64
-        Polyline along it [m].
-    """
+    """A route along which vehicles have places (`route` (m, 3) [m])."""
 
     def __init__(self, route: Floats) -> None:
         self.stations = stations(route)
@@ -48,13 +35,7 @@ class RoutePlaces:
         self._lengths = np.maximum(np.hypot(*self._ways.T), 1e-6)
 
     def of(self, state: TrafficState) -> Places:
-        """Where vehicles are.
-
-        Parameters
-        ----------
-        state : TrafficState
-            The vehicles.
-        """
+        """Where vehicles are."""
         apart = state.position[:, None, :2] - self._starts
         shares = np.clip((apart * self._ways).sum(axis=-1) / self._lengths**2, 0.0, 1.0)
         beside = np.hypot(*np.moveaxis(apart - shares[:, :, None] * self._ways, -1, 0))

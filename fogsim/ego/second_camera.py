@@ -19,11 +19,6 @@ class SecondCamera:
 
     It is drawn before the first one. Faults of a lens are the first one's; what happens to pictures on their way
     happens to both.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        With `camera.stereo`.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -38,13 +33,7 @@ class SecondCamera:
         self._rng = np.random.default_rng(0)
 
     def reset(self, rng: np.random.Generator) -> None:
-        """Begin a run.
-
-        Parameters
-        ----------
-        rng : numpy.random.Generator
-            Source of its sensor's noise.
-        """
+        """Begin a run."""
         self._sensor.reset()
         self._rng = rng
 
@@ -59,25 +48,7 @@ class SecondCamera:
     ) -> NDArray[np.uint8] | NDArray[np.uint16] | None:
         """Take its picture.
 
-        Parameters
-        ----------
-        draw : callable
-            Draws traffic from a pose with a camera: view and radiance.
-        shutter : Shutter
-            How long it is open at the longest exposure.
-        state : TrafficState
-            The traffic.
-        ego : int
-            Row of the vehicle that carries the cameras.
-        pose : CameraPose
-            Where the first camera is.
-        camera : Camera
-            The true calibration of the first one.
-
-        Returns
-        -------
-        (rows, cols, 3) uint8 or uint16, or None
-            The picture; None where nothing is drawn.
+        Returns the picture; None where nothing is drawn (rows, cols, 3) uint8.
         """
         x, y, z = pose.position
         across = self._baseline * math.sin(pose.heading), -self._baseline * math.cos(pose.heading)

@@ -11,39 +11,19 @@ _ROUNDING = 1e-9
 
 
 class FaultSchedule:
-    """Faults that have been ordered, in this order.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        Each fault's generator is spawned from it, so that no fault shifts the chance of another.
-    """
+    """Faults that have been ordered, in this order."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         self._rng = rng
         self._ordered: list[RunningFault] = []
 
     def begin(self, faults: Iterable[Fault], time: float) -> None:
-        """Order faults.
-
-        Parameters
-        ----------
-        faults : iterable of Fault
-            The faults.
-        time : float
-            Time from which their delays count [s].
-        """
+        """Order faults (`time` [s])."""
         for fault in faults:
             begin = time + fault.delay
             self._ordered.append(RunningFault(fault, begin, begin + fault.duration, self._rng.spawn(1)[0]))
 
     def at(self, time: float) -> tuple[RunningFault, ...]:
-        """Faults in force at a time.
-
-        Parameters
-        ----------
-        time : float
-            [s].
-        """
+        """Faults in force at a time (`time` [s])."""
         now = time + _ROUNDING
         return tuple(one for one in self._ordered if one.begin <= now < one.end)

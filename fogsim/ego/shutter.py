@@ -16,30 +16,14 @@ Drawn = tuple[View, NDArray[np.float32] | None]
 
 @dataclass(frozen=True, slots=True)
 class Shutter:
-    """How long the camera looks, and how finely that is drawn.
+    """How long the camera looks, and how finely that is drawn."""
 
-    Attributes
-    ----------
-    open_time : float
-        Time for which it is open [s]; 0 freezes what moves.
-    instants : int
-        Instants in it that are drawn, odd, so that one is in the middle.
-    follows_exposure : bool
-        Whether that time is the longest of an automatic exposure.
-    """
-
-    open_time: float = 0.0
-    instants: int = 1
-    follows_exposure: bool = False
+    open_time: float = 0.0  # Time for which it is open [s]; 0 freezes what moves
+    instants: int = 1  # Instants in it that are drawn, odd, so that one is in the middle
+    follows_exposure: bool = False  # Whether that time is the longest of an automatic exposure
 
     def at(self, share: float) -> "Shutter":
-        """The shutter at an exposure.
-
-        Parameters
-        ----------
-        share : float
-            Time of the exposure relative to the longest [-].
-        """
+        """The shutter at an exposure."""
         return replace(self, open_time=share * self.open_time) if self.follows_exposure else self
 
     def offsets(self) -> tuple[float, ...]:
@@ -50,15 +34,7 @@ class Shutter:
 
 
 def moved(state: TrafficState, seconds: float) -> TrafficState:
-    """Traffic a little later or earlier: every vehicle goes straight on.
-
-    Parameters
-    ----------
-    state : TrafficState
-        The traffic.
-    seconds : float
-        How much later [s].
-    """
+    """Traffic a little later or earlier: every vehicle goes straight on (`seconds` [s])."""
     pieces = state.pieces
     if pieces.kind:
         along = seconds * state.speed[pieces.row]
@@ -73,26 +49,6 @@ def exposed(
     """Draw what a camera gets while its shutter is open.
 
     Vehicles, the camera's own among them, go straight on for the time; what they turn and speed up in it is left out.
-
-    Parameters
-    ----------
-    draw : callable
-        Draws traffic from a pose: view and radiance, whose arrays may be those of the call before.
-    shutter : Shutter
-        How long it is open.
-    state : TrafficState
-        The traffic in the middle of that time.
-    ego : int
-        Row of the vehicle that carries the camera.
-    pose : CameraPose
-        Where the camera is then.
-
-    Returns
-    -------
-    View
-        What is seen in the middle.
-    (rows, cols, 3) float32 or None
-        Mean radiance [cd/m²]; None where nothing is drawn.
     """
     if shutter.open_time * float(np.max(state.speed)) < LEAST_WAY:
         return draw(state, pose)

@@ -63,45 +63,21 @@ _USUAL = (Lamp.LOW_BEAM, Lamp.LOW_BEAM | Lamp.FRONT_FOG, Lamp.LOW_BEAM | Lamp.HI
 
 
 class Surrounding(NamedTuple):
-    """What is around a camera, in the coordinates of its scene.
+    """What is around a camera, in the coordinates of its scene."""
 
-    Attributes
-    ----------
-    scene : Scene
-        What stands still.
-    vehicles : sequence of Batch
-        Every vehicle but the camera's own, persons and traffic lights.
-    camera : Camera
-        The pinhole.
-    pose : CameraPose
-        Where it is.
-    lights : Lights
-        Lit lamps, by night only.
-    illuminance : float
-        Horizontal illuminance of the daylight [lx].
-    """
-
-    scene: Scene
-    vehicles: Sequence[Batch]
-    camera: Camera
-    pose: CameraPose
-    lights: Lights
-    illuminance: float
+    scene: Scene  # What stands still
+    vehicles: Sequence[Batch]  # Every vehicle but the camera's own, persons and traffic lights
+    camera: Camera  # The pinhole
+    pose: CameraPose  # Where it is
+    lights: Lights  # Lit lamps, by night only
+    illuminance: float  # Horizontal illuminance of the daylight [lx]
 
 
 class EgoView(Protocol):
-    """What the ego's camera gets.
+    """What the ego's camera gets."""
 
-    Attributes
-    ----------
-    signs : SignMap
-        The signs.
-    fog : FogField
-        The fog at the start of a run.
-    """
-
-    signs: SignMap
-    fog: FogField
+    signs: SignMap  # The signs
+    fog: FogField  # The fog at the start of a run
 
     def enter_fog(self, fog: FogField) -> None:
         """Look through another fog; see `ViewRenderer.enter_fog`."""
@@ -147,13 +123,7 @@ class NoView:
         self._view = View(np.zeros((*size, 3), np.float32), *empty)
 
     def enter_fog(self, fog: FogField) -> None:
-        """Look through another fog; see `ViewRenderer.enter_fog`.
-
-        Parameters
-        ----------
-        fog : FogField
-            The fog over time.
-        """
+        """Look through another fog; see `ViewRenderer.enter_fog`."""
         self.fog = fog
 
     def render(self, *_: object) -> tuple[View, None]:
@@ -161,13 +131,7 @@ class NoView:
         return self._view, None
 
     def surrounding(self, *_: object) -> Surrounding:
-        """Refuse; see `ViewRenderer.surrounding`.
-
-        Raises
-        ------
-        InputError
-            Always: there is no scene.
-        """
+        """Refuse; see `ViewRenderer.surrounding`."""
         raise InputError("renderer: none builds no scene that could be shown; choose another renderer")
 
     def close(self) -> None:
@@ -175,20 +139,7 @@ class NoView:
 
 
 def prepare_lamplight(scenario: Scenario, body: str = build.CAR) -> None:
-    """Compute what every `ViewRenderer` by lamplight needs, whatever its road: once a process, else when first needed.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Its camera and droplets count.
-    body : str
-        Body kind of the ego.
-
-    Raises
-    ------
-    InputError
-        If the beam of a lamp has holes.
-    """
+    """Compute once a process what every `ViewRenderer` by lamplight needs, whatever its road, before it is needed."""
     camera, setback = build.camera(scenario, body), build.camera_mount(scenario, body).setback
     mount, air = LampMount(), Air(FogField(0.0, airlight=(0.0, 0.0, 0.0)), scenario.fog.droplets)
     lamps = [own_head_lamps(lit, camera.mount_height, setback, mount) for lit in _USUAL]
@@ -294,13 +245,7 @@ class ViewRenderer:
         self._renderer = self._unlit_renderer = None
 
     def enter_fog(self, fog: FogField) -> None:
-        """Look through another fog from now on.
-
-        Parameters
-        ----------
-        fog : FogField
-            The fog over time.
-        """
+        """Look through another fog from now on."""
         self.fog = self._air.field = fog
 
     def render(
@@ -312,31 +257,7 @@ class ViewRenderer:
         camera: Camera | None = None,
         illuminance: float | None = None,
     ) -> tuple[View, NDArray[np.float32]]:
-        """Draw what is there, and what of it reaches the camera through the air.
-
-        Parameters
-        ----------
-        state : TrafficState
-            Every vehicle.
-        ego : int or None
-            Row of the one that carries the camera; None for a roadside camera.
-        pose : CameraPose
-            Where the camera is.
-        time : float
-            Time since the run began [s].
-        camera : Camera or None
-            Its true calibration now, if it is another than the ego's at the beginning.
-        illuminance : float or None
-            Horizontal illuminance of the daylight now [lx]; None for the scenario's. The fog's airlight is that of the
-            fog that was entered.
-
-        Returns
-        -------
-        View
-            The scene without air, one sample a pixel.
-        (rows, cols, 3) float32
-            Linear radiance at the camera [cd/m²], the mean of a pixel's samples.
-        """
+        """Draw what is there, and what of it reaches the camera through the air (`time` [s], `illuminance` [lx])."""
         self._set_daylight(self._scenario.light.illuminance_lx if illuminance is None else illuminance)
         self._go_to(np.array(pose.position) if ego is None else state.position[ego])
         drawn = self._drawn_camera
@@ -356,13 +277,7 @@ class ViewRenderer:
         return middle_samples(view, self._samples), averaged(radiance, self._samples)
 
     def surrounding(self, state: TrafficState, ego: int, pose: CameraPose) -> Surrounding:
-        """Tell what `render` draws.
-
-        Parameters
-        ----------
-        state, ego, pose
-            See `render`.
-        """
+        """Tell what `render` draws."""
         self._go_to(state.position[ego])
         near, seen_from = self._from_origin(state, pose)
         lights = self._lights(state, ego, pose)

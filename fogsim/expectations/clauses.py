@@ -8,27 +8,13 @@ from fogsim.conditions import Condition
 
 @dataclass(frozen=True, slots=True)
 class Always:
-    """A condition holds at every step.
+    """A condition holds at every step."""
 
-    Attributes
-    ----------
-    name : str
-        Of the expectation.
-    condition : Condition
-        What must hold.
-    is_never : bool
-        True if it is the contrary that must.
-    during : Condition or None
-        Only the steps at which this holds count.
-    for_at_least : float
-        Time that must have counted, or nothing was tested [s].
-    """
-
-    name: str
-    condition: Condition
-    is_never: bool = False
-    during: Condition | None = None
-    for_at_least: float = 0.0
+    name: str  # Of the expectation
+    condition: Condition  # What must hold
+    is_never: bool = False  # True if it is the contrary that must
+    during: Condition | None = None  # Only the steps at which this holds count
+    for_at_least: float = 0.0  # Time that must have counted, or nothing was tested [s]
 
     @property
     def clause(self) -> str:
@@ -43,24 +29,12 @@ class Always:
 
 @dataclass(frozen=True, slots=True)
 class Eventually:
-    """A condition holds at some step.
+    """A condition holds at some step."""
 
-    Attributes
-    ----------
-    name : str
-        Of the expectation.
-    condition : Condition
-        What must hold once.
-    during : Condition or None
-        Only the steps at which this holds count.
-    within : float
-        Time since the run began within which it must [s]; ``inf`` for the whole run.
-    """
-
-    name: str
-    condition: Condition
-    during: Condition | None = None
-    within: float = math.inf
+    name: str  # Of the expectation
+    condition: Condition  # What must hold once
+    during: Condition | None = None  # Only the steps at which this holds count
+    within: float = math.inf  # Time since the run began within which it must [s]; ``inf`` for the whole run
 
     @property
     def clause(self) -> str:
@@ -76,30 +50,14 @@ class Eventually:
 
 @dataclass(frozen=True, slots=True)
 class Whenever:
-    """Each time a condition becomes true another holds soon, or from then on for a while.
+    """Each time a condition becomes true another holds soon, or from then on for a while."""
 
-    Attributes
-    ----------
-    name : str
-        Of the expectation.
-    trigger : Condition
-        What must become true.
-    require : Condition
-        What must hold then.
-    within : float
-        Time since then within which it must hold once, or for which it must hold [s]; 0 for at once.
-    throughout : bool
-        Whether it must hold all that time.
-    at_least : int
-        How often it must have been tried, or nothing was tested.
-    """
-
-    name: str
-    trigger: Condition
-    require: Condition
-    within: float = 0.0
-    throughout: bool = False
-    at_least: int = 1
+    name: str  # Of the expectation
+    trigger: Condition  # What must become true
+    require: Condition  # What must hold then
+    within: float = 0.0  # Time since then within which it must hold once, or for which it must hold [s]; 0 for at once
+    throughout: bool = False  # Whether it must hold all that time
+    at_least: int = 1  # How often it must have been tried, or nothing was tested
 
     @property
     def clause(self) -> str:
@@ -116,21 +74,11 @@ class Whenever:
 
 @dataclass(frozen=True, slots=True)
 class Happened:
-    """Something of the script begins.
+    """Something of the script begins."""
 
-    Attributes
-    ----------
-    name : str
-        Of the expectation.
-    event : str
-        Name of what begins.
-    within : float
-        Time since the run began within which it must [s]; ``inf`` for the whole run.
-    """
-
-    name: str
-    event: str
-    within: float = math.inf
+    name: str  # Of the expectation
+    event: str  # Name of what begins
+    within: float = math.inf  # Time since the run began within which it must [s]; ``inf`` for the whole run
 
     @property
     def clause(self) -> str:
@@ -145,24 +93,12 @@ class Happened:
 
 @dataclass(frozen=True, slots=True)
 class MetricCheck:
-    """A metric of the run lies on the right side of a value.
+    """A metric of the run lies on the right side of a value."""
 
-    Attributes
-    ----------
-    name : str
-        Of the expectation.
-    metric : str
-        Key of the metric; keys within one are parted by dots.
-    relation : str
-        ``<``, ``<=``, ``>``, ``>=``, ``==`` or ``!=``.
-    value : float or str
-        What it is compared with, in the metric's own unit.
-    """
-
-    name: str
-    metric: str
-    relation: str
-    value: float | str
+    name: str  # Of the expectation
+    metric: str  # Key of the metric; keys within one are parted by dots
+    relation: str  # ``<``, ``<=``, ``>``, ``>=``, ``==`` or ``!=``
+    value: float | str  # What it is compared with, in the metric's own unit
 
     @property
     def clause(self) -> str:

@@ -23,11 +23,6 @@ class ExpectationWatch:
     """Watches every clause of what is expected of a run.
 
     Verdicts are of the truth, which no estimator and no adviser sees.
-
-    Parameters
-    ----------
-    clauses : iterable of Clause
-        What is expected.
     """
 
     def __init__(self, clauses: Iterable[Clause]) -> None:
@@ -35,25 +30,13 @@ class ExpectationWatch:
         self._watches = [(clause, _watch_of(clause)) for clause in clauses]
 
     def update(self, step: TrafficStep) -> None:
-        """Take in the next step of the run.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            The step.
-        """
+        """Take in the next step of the run."""
         moment = self._history.moment(step)
         for _, watch in self._watches:
             watch.look(moment)
 
     def findings(self, metrics: Mapping[str, object]) -> tuple[Finding, ...]:
-        """What came of each clause in the steps so far, in their order.
-
-        Parameters
-        ----------
-        metrics : mapping
-            Metrics of the run.
-        """
+        """What came of each clause in the steps so far, in their order."""
         found = []
         for clause, watch in self._watches:
             verdict, sight, came, reason = watch.result(metrics)

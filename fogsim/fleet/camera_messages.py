@@ -12,11 +12,6 @@ def camera_messages(step: Step) -> tuple[tuple[str, FogReport], ...]:
 
     What is told is the surest estimate of one picture and not what is believed: whoever believes what others tell, and
     tells it on, would hear it come back as if it were news. It counts for the middle of the road that it was seen on.
-
-    Parameters
-    ----------
-    step : Step
-        What was finished last.
     """
     seen = [(step.traffic.ids[step.ego], step.route_position, step.estimates)]
     seen += [(one.vehicle_id, one.place, one.estimates) for one in step.equipped]

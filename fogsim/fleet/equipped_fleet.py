@@ -28,13 +28,6 @@ class EquippedFleet:
     """All equipped vehicles beside the ego that are read and on its way.
 
     What they see does not go by who draws it: each has random numbers of its own, by its id.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario; nobody is equipped where its ``traffic`` does not say so.
-    processes : int
-        Processes that draw for them; 0 for this one.
     """
 
     def __init__(self, scenario: Scenario, processes: int = 0) -> None:
@@ -49,15 +42,7 @@ class EquippedFleet:
         self._routes: tuple[RoutePlaces, RoadNetwork] | None = None
 
     def start_run(self, seed: int, network: Callable[[], tuple[RoadNetwork, SignMap]]) -> None:
-        """Begin a run.
-
-        Parameters
-        ----------
-        seed : int
-            Of the run.
-        network : callable
-            Gives roads and signs; asked the first time only.
-        """
+        """Begin a run."""
         if not self._pools:
             return
         roads = network()
@@ -67,27 +52,13 @@ class EquippedFleet:
             pool.start_run(seed, roads)
 
     def begin(self, actions: Actions, time: float, first_time: float) -> None:
-        """Let begin what a script asks of fog and light; see `OnBoardUnit.begin`.
-
-        Parameters
-        ----------
-        actions, time, first_time
-            See there.
-        """
+        """Let begin what a script asks of fog and light; see `OnBoardUnit.begin`."""
         if actions.fog or actions.light:
             for pool in self._pools:
                 pool.begin(actions, time, first_time)
 
     def ask(self, index: int, time: float, snapshot: TrafficSnapshot, sent: Sequence[tuple[str, FogReport]]) -> None:
-        """Let all see, measure, estimate, believe and decide; `answer` waits for them.
-
-        Parameters
-        ----------
-        index, time, sent
-            See `Instant`.
-        snapshot : TrafficSnapshot
-            The traffic about the ego.
-        """
+        """Let all see, measure, estimate, believe and decide; `answer` waits for them."""
         if self._routes is None:
             return
         lookouts = self._lookouts(snapshot, *self._routes)
@@ -129,15 +100,7 @@ class EquippedFleet:
         return name in self._named or zlib.crc32(f"{self._draw} {name}".encode()) < self._share * 2**32
 
     def advised(self, command: Command, equipped: Sequence[EquippedVehicle]) -> Command:
-        """A command with what equipped vehicles are advised and light; what it says of them itself counts more.
-
-        Parameters
-        ----------
-        command : Command
-            The ego's.
-        equipped : sequence of EquippedVehicle
-            The others, after the last step.
-        """
+        """A command with what equipped vehicles are advised and light; what it says of them itself counts more."""
         if not equipped:
             return command
         speeds = {one.vehicle_id: one.advice.speed for one in equipped}

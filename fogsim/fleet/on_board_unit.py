@@ -24,48 +24,23 @@ from fogsim.values.script import Actions
 
 @dataclass(frozen=True, slots=True)
 class Lookout:
-    """Where an equipped vehicle is at one instant.
+    """Where an equipped vehicle is at one instant."""
 
-    Attributes
-    ----------
-    vehicle_id : str
-        Its id.
-    place : float
-        How far along the ego's route it is [m].
-    speed_limit : float
-        Of its road [m/s].
-    leader : Leader or None
-        The vehicle ahead in its lane.
-    """
-
-    vehicle_id: str
-    place: float
-    speed_limit: float
-    leader: Leader | None
+    vehicle_id: str  # Its id
+    place: float  # How far along the ego's route it is [m]
+    speed_limit: float  # Of its road [m/s]
+    leader: Leader | None  # The vehicle ahead in its lane
 
 
 @dataclass(frozen=True, slots=True)
 class Instant:
-    """What all equipped vehicles have in common.
+    """What all equipped vehicles have in common."""
 
-    Attributes
-    ----------
-    index : int
-        Number of the camera period.
-    time : float
-        Simulated time since the run began [s].
-    traffic : TrafficState
-        Every vehicle.
-    route_length : float
-        Of the ego's route [m].
-    sent : tuple of (str, FogReport)
-        Ids of vehicles and names of sensors beside the road, and what their cameras saw in their last pictures.
-    """
-
-    index: int
-    time: float
-    traffic: TrafficState
-    route_length: float
+    index: int  # Number of the camera period
+    time: float  # Simulated time since the run began [s]
+    traffic: TrafficState  # Every vehicle
+    route_length: float  # Of the ego's route [m]
+    # Ids of vehicles and names of sensors beside the road, and what their cameras saw in their last pictures
     sent: tuple[tuple[str, FogReport], ...]
 
 
@@ -74,11 +49,6 @@ class OnBoardUnit:
 
     Faults of sensors that a scenario asks for are the ego's alone. Where drivers are advised by signs, in every car or
     by law, it hears what all hear there, and has no advice of its own.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -90,42 +60,16 @@ class OnBoardUnit:
         self._command = Command()
 
     def start(self, seed: int, vehicle: str, body: str, network: Callable[[], tuple[RoadNetwork, SignMap]]) -> None:
-        """Begin to ride in a vehicle.
-
-        Parameters
-        ----------
-        seed : int
-            Of the run.
-        vehicle, body : str
-            Its id and kind of body.
-        network : callable
-            Gives roads and signs.
-        """
+        """Begin to ride in a vehicle."""
         self._policy, self._command = AdvisedDriving(self._scenario), Command()
         self._equipment.start_run(spawn_streams(seed, vehicle), network, body)
 
     def begin(self, actions: Actions, time: float, first_time: float) -> None:
-        """Let begin what a script asks of fog and light; see `EgoEquipment.begin`.
-
-        Parameters
-        ----------
-        actions : Actions
-            What begins.
-        time, first_time : float
-            When, and the first step in which it is in force [s].
-        """
+        """Let begin what a script asks of fog and light; see `EgoEquipment.begin` (`time`, `first_time` [s])."""
         self._equipment.begin(replace(actions, faults=()), time, first_time)
 
     def look(self, lookout: Lookout, now: Instant) -> EquippedVehicle:
-        """See, measure, estimate, believe and decide.
-
-        Parameters
-        ----------
-        lookout : Lookout
-            Where it is.
-        now : Instant
-            The traffic.
-        """
+        """See, measure, estimate, believe and decide."""
         row = now.traffic.ids.index(lookout.vehicle_id)
         snapshot = TrafficSnapshot(
             now.traffic, row, lookout.place, now.route_length, lookout.speed_limit, lookout.leader, ()
@@ -149,13 +93,7 @@ class OnBoardUnit:
 
 
 class UnitPool:
-    """On-board units of several vehicles in one process; one that is free again rides in the next vehicle.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """On-board units of several vehicles in one process; one that is free again rides in the next vehicle."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
@@ -167,40 +105,20 @@ class UnitPool:
         self._asked: tuple[Sequence[Lookout], Instant] | None = None
 
     def start_run(self, seed: int, network: tuple[RoadNetwork, SignMap]) -> None:
-        """Begin a run in which nobody is equipped yet.
-
-        Parameters
-        ----------
-        seed : int
-            Of the run.
-        network : tuple
-            Roads and signs.
-        """
+        """Begin a run in which nobody is equipped yet."""
         if self._network is not None and self._network[0] is not network[0]:
             self.close()
         self._seed, self._network, self._begun, self._asked = seed, network, [], None
         self._release(self._riding)
 
     def begin(self, actions: Actions, time: float, first_time: float) -> None:
-        """Let begin what a script asks of fog and light, for those who come later too.
-
-        Parameters
-        ----------
-        actions, time, first_time
-            See `OnBoardUnit.begin`.
-        """
+        """Let begin what a script asks of fog and light, for those who come later too."""
         self._begun.append((actions, time, first_time))
         for unit in self._riding.values():
             unit.begin(actions, time, first_time)
 
     def ask(self, lookouts: Sequence[Lookout], now: Instant) -> None:
-        """Say who is to look; `answer` lets them.
-
-        Parameters
-        ----------
-        lookouts, now
-            See `look`.
-        """
+        """Say who is to look; `answer` lets them."""
         self._asked = lookouts, now
 
     def answer(self) -> list[EquippedVehicle]:
@@ -208,15 +126,7 @@ class UnitPool:
         return [] if self._asked is None else self.look(*self._asked)
 
     def look(self, lookouts: Sequence[Lookout], now: Instant) -> list[EquippedVehicle]:
-        """Let all look; who is not among them any more has left.
-
-        Parameters
-        ----------
-        lookouts : sequence of Lookout
-            Where they are.
-        now : Instant
-            The traffic.
-        """
+        """Let all look; who is not among them any more has left."""
         self._release([one for one in self._riding if one not in {lookout.vehicle_id for lookout in lookouts}])
         return [self._unit(lookout.vehicle_id, now.traffic).look(lookout, now) for lookout in lookouts]
 

@@ -18,13 +18,7 @@ LONGEST_END = 5.0
 
 
 class UnitProcess:
-    """A `UnitPool` in another process, which is asked and answers when it is done.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """A `UnitPool` in another process, which is asked and answers when it is done."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
@@ -33,13 +27,7 @@ class UnitProcess:
         self._is_asked = False
 
     def start_run(self, seed: int, network: tuple[RoadNetwork, SignMap]) -> None:
-        """Begin a run; see `UnitPool.start_run`.
-
-        Parameters
-        ----------
-        seed, network
-            See there.
-        """
+        """Begin a run; see `UnitPool.start_run`."""
         if self._process is None:
             open_standard_streams()
             # None of this process's simulation, threads and contexts in it.
@@ -53,36 +41,16 @@ class UnitProcess:
         self._call("start_run", seed, network)
 
     def begin(self, actions: Actions, time: float, first_time: float) -> None:
-        """Let begin what a script asks for; see `UnitPool.begin`.
-
-        Parameters
-        ----------
-        actions, time, first_time
-            See there.
-        """
+        """Let begin what a script asks for; see `UnitPool.begin`."""
         self._call("begin", actions, time, first_time)
 
     def ask(self, lookouts: Sequence[Lookout], now: Instant) -> None:
-        """Begin to let vehicles look; `answer` must follow.
-
-        Parameters
-        ----------
-        lookouts, now
-            See `UnitPool.look`.
-        """
+        """Begin to let vehicles look; `answer` must follow."""
         self._send("look", lookouts, now)
         self._is_asked = True
 
     def answer(self) -> list[EquippedVehicle]:
-        """What they have seen.
-
-        Raises
-        ------
-        SimulationError
-            If the process has died.
-        Exception
-            What the unit there has raised.
-        """
+        """What they have seen."""
         if self._link is None:
             raise SimulationError("the run has not been started, or is closed")
         self._is_asked = False

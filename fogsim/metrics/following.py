@@ -12,21 +12,14 @@ _MOST_EMPTY = 8
 
 
 class Following(NamedTuple):
-    """Followers and the vehicles ahead of them on the same course.
+    """Followers and the vehicles ahead of them on the same course."""
 
-    Attributes
-    ----------
-    follower, leader : (n,) intp
-        Rows of the two in the traffic.
-    gap : (n,) float64
-        Distance from the follower's front bumper to the leader's rear bumper [m], at least 0.
-    speed, leader_speed : (n,) float64
-        Speeds of the two [m/s].
-    """
-
+    # follower, leader (n,) int: rows of the two in the traffic
     follower: NDArray[np.intp]
     leader: NDArray[np.intp]
+    # (n,): Distance from the follower's front bumper to the leader's rear bumper [m], at least 0
     gap: NDArray[np.float64]
+    # speed, leader_speed (n,): speeds of the two [m/s]
     speed: NDArray[np.float64]
     leader_speed: NDArray[np.float64]
 
@@ -55,18 +48,8 @@ def pair_on_courses(
     180° from its first vehicle to its last. Gaps are straight lines: in a curve of radius R they are too short by about
     gap³ / 24 R².
 
-    Parameters
-    ----------
-    position : (n, 3) float64
-        Middle of the front bumper [m].
-    heading, length, speed : (n,) float64
-        Headings [rad], lengths [m] and speeds [m/s].
-    course : (n,) intp
-        Numbers of courses, from 0; one number for each at each instant.
-    across : (n,) float64
-        As of `TrafficState` [m]; a vehicle whose width does not overlap is not ahead. Empty where all overlap.
-    width : (n,) float64
-        Widths [m].
+    Takes `position` (n, 3) [m], `heading`, `length`, `speed` (n,) [rad], [m], [m/s], `course` (n,) int, `across` (n,)
+    [m], `width` (n,) [m].
     """
     course = course - course.min(initial=0)
     if course.max(initial=0) > _MOST_EMPTY * len(course):

@@ -103,11 +103,5 @@ class Metric(Protocol):
 
 
 def share(part: float, whole: float) -> float | None:
-    """Part of a whole [-], None where there is no whole.
-
-    Parameters
-    ----------
-    part, whole : float
-        Of the same unit.
-    """
+    """Part of a whole [-], None where there is no whole."""
     return part / whole if whole > 0 else None

@@ -72,15 +72,9 @@ class Comfort:
 
 @dataclass(slots=True)
 class Compliance:
-    """Speed against the advice in force, over the time in which there was one.
+    """Speed against the advice in force, over the time in which there was one."""
 
-    Attributes
-    ----------
-    tolerance : float
-        Speed above the advice that still counts as following it [m/s].
-    """
-
-    tolerance: float
+    tolerance: float  # Speed above the advice that still counts as following it [m/s]
     definitions: ClassVar[Mapping[str, Definition]] = definitions_of("compliance")
     _time: float = 0.0
     _distance: float = 0.0

@@ -34,17 +34,10 @@ _MOST_PENDING = 200_000
 
 
 class _Squares(NamedTuple):
-    """Sums over the vehicles in squares of the plan, apart by eighths of the compass.
+    """Sums over the vehicles in squares of the plan, apart by eighths of the compass."""
 
-    Attributes
-    ----------
-    key : (n,) int64
-        The square and the eighth.
-    sums : (n, 7) float64
-        Of time [s], way [m], and, times the time, extinction, east, north, and cosine and sine of the heading.
-    """
-
-    key: NDArray[np.int64]
+    key: NDArray[np.int64]  # (n,) int64: The square and the eighth
+    # (n, 7): Of time [s], way [m], and, times the time, extinction, east, north, and cosine and sine of the heading
     sums: NDArray[np.float64]
 
 
@@ -95,11 +88,8 @@ class RoadSpeeds:
     def sums(self) -> NDArray[np.float64]:
         """Sums over all steps so far, a row for each stretch of road that somebody was on.
 
-        Returns
-        -------
-        (n, 7) float64
-            `ROAD_COLUMNS`: middle of the stretch [m]; time [s], way [m] and extinction over time [s/m] of the ego, and
-            of everybody.
+        Returns `ROAD_COLUMNS`: middle of the stretch [m]; time [s], way [m] and extinction over time [s/m] of the ego,
+        and of everybody (n, 7).
         """
         everybody, nobody = self._everybody(), np.zeros(3)
         cells = sorted(self._ego.keys() | everybody.keys())
@@ -109,10 +99,8 @@ class RoadSpeeds:
     def means(self) -> NDArray[np.float64]:
         """Means over everybody on the road and all steps so far, a row for each stretch that somebody was on.
 
-        Returns
-        -------
-        (n, 4) float64
-            Middle of the stretch [m], speed as way over time [m/s], extinction [1/m], and time of the vehicles [s].
+        Returns middle of the stretch [m], speed as way over time [m/s], extinction [1/m], and time of the vehicles [s]
+        (n, 4).
         """
         place, *_, time, way, extinction = self.sums().T
         met = time > 0.0

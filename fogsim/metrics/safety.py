@@ -83,14 +83,9 @@ class Conflict:
     """Surrogate safety of the ego at 5 m/s or more and its leader, moving or standing.
 
     A slower ego only closes up to a queue, which shows how the traffic simulation's drivers do so, whatever the policy.
-
-    Attributes
-    ----------
-    threshold : float
-        Time to collision below which the ego counts as exposed [s].
     """
 
-    threshold: float
+    threshold: float  # Time to collision below which the ego counts as exposed [s]
     definitions: ClassVar[Mapping[str, Definition]] = definitions_of("conflict")
     _all: _Approach = field(default_factory=_Approach)
     _moving: _Approach = field(default_factory=_Approach)
@@ -140,18 +135,10 @@ class Conflict:
 
 @dataclass(slots=True)
 class Sight:
-    """True visibility ahead against the distance in which the ego could stop.
+    """True visibility ahead against the distance in which the ego could stop."""
 
-    Attributes
-    ----------
-    reaction_time : float
-        Perception and reaction time in that distance [s].
-    deceleration : float
-        Deceleration in it [m/s²].
-    """
-
-    reaction_time: float
-    deceleration: float
+    reaction_time: float  # Perception and reaction time in that distance [s]
+    deceleration: float  # Deceleration in it [m/s²]
     definitions: ClassVar[Mapping[str, Definition]] = definitions_of("sight")
     _least_visibility: float | None = None
     _least_margin: float | None = None

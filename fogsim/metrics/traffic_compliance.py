@@ -12,15 +12,9 @@ from fogsim.metrics.traffic_span import Exposure, TrafficMetric, TrafficSpan
 
 @dataclass(slots=True)
 class TrafficCompliance(TrafficMetric):
-    """Speeds against the advice in force that drivers have heard, whether they follow it, and whether they have yet.
+    """Speeds against the advice in force that drivers have heard, whether they follow it, and whether they have yet."""
 
-    Attributes
-    ----------
-    tolerance : float
-        Speed above the advice that still counts as following it [m/s].
-    """
-
-    tolerance: float
+    tolerance: float  # Speed above the advice that still counts as following it [m/s]
     definitions: ClassVar[Mapping[str, Definition]] = definitions_of("traffic_compliance")
     _exposure: Exposure = field(default_factory=Exposure)
     _advised_time: float = 0.0

@@ -28,15 +28,9 @@ _MOMENTS = 1 << 32
 
 @dataclass(slots=True)
 class TrafficConflicts(TrafficMetric):
-    """Conflicts between followers at 5 m/s or more and their leaders, moving or standing.
+    """Conflicts between followers at 5 m/s or more and their leaders, moving or standing."""
 
-    Attributes
-    ----------
-    threshold : float
-        Time to collision below which a driver counts as exposed [s].
-    """
-
-    threshold: float
+    threshold: float  # Time to collision below which a driver counts as exposed [s]
     definitions: ClassVar[Mapping[str, Definition]] = definitions_of("traffic_conflicts")
     _exposure: Exposure = field(default_factory=Exposure)
     _times: NDArray[np.float64] = field(default_factory=lambda: np.zeros((11, 2)))

@@ -18,18 +18,10 @@ from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 
 @dataclass(slots=True)
 class TrafficSight(TrafficMetric):
-    """Meteorological visibility where each driver is against the distance in which they could stop.
+    """Meteorological visibility where each driver is against the distance in which they could stop."""
 
-    Attributes
-    ----------
-    reaction_time : float
-        Perception and reaction time in that distance [s].
-    deceleration : float
-        Deceleration in it [m/s²].
-    """
-
-    reaction_time: float
-    deceleration: float
+    reaction_time: float  # Perception and reaction time in that distance [s]
+    deceleration: float  # Deceleration in it [m/s²]
     definitions: ClassVar[Mapping[str, Definition]] = definitions_of("traffic_sight")
     _sums: NDArray[np.float64] = field(default_factory=lambda: np.zeros(8))
     _margins: Histogram = field(default_factory=lambda: Histogram(-FOG_LIMIT, FOG_LIMIT, 0.5))

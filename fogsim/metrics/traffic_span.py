@@ -35,78 +35,43 @@ _FIRST_COURSE = 1 << 20
 
 @dataclass(frozen=True)
 class TrafficSpan:
-    """Some consecutive steps; row i is one vehicle on a lane in one of them.
+    """Some consecutive steps; row i is one vehicle on a lane in one of them."""
 
-    Attributes
-    ----------
-    moment : (n,) intp
-        Number of the step, counted on from span to span.
-    vehicle, lane, kind : (n,) intp
-        Numbers of vehicle, lane and body kind, the same throughout a run.
-    elapsed : (n,) float64
-        Time since the step before [s]: what was found at the step is held to be true for it.
-    time : (n,) float64
-        Time of the step since the first one of the run [s].
-    position : (n, 3) float64
-        As of `TrafficState`, and so are the next seven.
-    heading, speed, acceleration, length, width : (n,) float64
-        As of `TrafficState`.
-    free_speed : (n,) float64
-        As of `TrafficState`; nan where it is not known.
-    advised_speed : (n,) float64
-        As of `TrafficState`; ``inf`` where a driver has heard none.
-    extinction : (n,) float64
-        Extinction coefficient at the driver's eyes [1/m]; nan where it is not known.
-    duration : float
-        Length of the span [s].
-    collisions : tuple of Collision
-        What happened in it, between vehicles of which one was near the ego.
-    lane_names, kind_names : tuple of str
-        Lanes and body kinds so far, by their numbers.
-    route : (m, 3) float64 or None
-        As of `Truth`.
-    cohort : Cohort or None
-        The cohort at the last step; None without one.
-    in_cohort : (vehicles,) bool
-        Whether each vehicle so far, by its number, is in the cohort.
-    cohort_waiting_time : float
-        Time that the cohort's vehicles have waited to enter the road [s].
-    ego : (k,) intp or None
-        Rows of the ego, one in each step in which it is on a lane; None without an ego.
-    reading_radius : float
-        As of `Step` [m]; ``inf`` without an ego.
-    course : (n,) intp
-        Number of the course of each, the same throughout a run.
-    across : (n,) float64
-        As of `TrafficState`; empty where vehicles do not share lanes.
-    """
-
-    moment: NDArray[np.intp]
+    moment: NDArray[np.intp]  # (n,) int: Number of the step, counted on from span to span
+    # vehicle, lane, kind (n,) int: numbers of vehicle, lane and body kind, the same throughout a run
     vehicle: NDArray[np.intp]
     lane: NDArray[np.intp]
     kind: NDArray[np.intp]
+    # (n,): Time since the step before [s]: what was found at the step is held to be true for it
     elapsed: NDArray[np.float64]
-    time: NDArray[np.float64]
-    position: NDArray[np.float64]
+    time: NDArray[np.float64]  # (n,): Time of the step since the first one of the run [s]
+    position: NDArray[np.float64]  # (n, 3): As of `TrafficState`, and so are the next seven
+    # heading, speed, acceleration, length, width (n,): as of `TrafficState`
     heading: NDArray[np.float64]
     speed: NDArray[np.float64]
     acceleration: NDArray[np.float64]
     length: NDArray[np.float64]
     width: NDArray[np.float64]
-    free_speed: NDArray[np.float64]
-    advised_speed: NDArray[np.float64]
+    free_speed: NDArray[np.float64]  # (n,): As of `TrafficState`; nan where it is not known
+    advised_speed: NDArray[np.float64]  # (n,): As of `TrafficState`; ``inf`` where a driver has heard none
+    # (n,): Extinction coefficient at the driver's eyes [1/m]; nan where it is not known
     extinction: NDArray[np.float64]
-    duration: float
-    collisions: tuple[Collision, ...]
+    duration: float  # Length of the span [s]
+    collisions: tuple[Collision, ...]  # What happened in it, between vehicles of which one was near the ego
+    # lane_names, kind_names: lanes and body kinds so far, by their numbers
     lane_names: tuple[str, ...]
     kind_names: tuple[str, ...]
-    route: NDArray[np.float64] | None = None
-    cohort: Cohort | None = None
+    route: NDArray[np.float64] | None = None  # (m, 3): As of `Truth`
+    cohort: Cohort | None = None  # The cohort at the last step; None without one
+    # (vehicles,) bool: Whether each vehicle so far, by its number, is in the cohort
     in_cohort: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
-    cohort_waiting_time: float = 0.0
+    cohort_waiting_time: float = 0.0  # Time that the cohort's vehicles have waited to enter the road [s]
+    # (k,) int: Rows of the ego, one in each step in which it is on a lane; None without an ego
     ego: NDArray[np.intp] | None = None
-    reading_radius: float = math.inf
+    reading_radius: float = math.inf  # As of `Step` [m]; ``inf`` without an ego
+    # (n,) int: Number of the course of each, the same throughout a run
     course: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))
+    # (n,): As of `TrafficState`; empty where vehicles do not share lanes
     across: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
     @cached_property

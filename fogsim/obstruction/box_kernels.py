@@ -21,12 +21,7 @@ _Array = NDArray[np.float64]
 def share_inside(start: _Array, end: _Array, box: _Array) -> float:
     """Share of a straight line that lies inside a box [-]; the same from either end, and 0 for one that touches it.
 
-    Parameters
-    ----------
-    start, end : (3,) float64
-        Its ends [m].
-    box : (10,) float64
-        The box.
+    Takes `start`, `end` (3,) [m], `box` (10,).
     """
     # Rounding must not depend on who looks at whom.
     if (start[0], start[1], start[2]) > (end[0], end[1], end[2]):
@@ -56,14 +51,7 @@ def share_inside(start: _Array, end: _Array, box: _Array) -> float:
 def add_ways_inside(starts: _Array, ends: _Array, boxes: _Array, ways: _Array) -> None:
     """Add to each line's way what of it lies inside boxes.
 
-    Parameters
-    ----------
-    starts, ends : (n, 3) float64
-        Ends of the lines [m].
-    boxes : (m, 10) float64
-        The boxes.
-    ways : (n,) float64
-        Added to, in place [m].
+    Takes `starts`, `ends` (n, 3) [m], `boxes` (m, 10), `ways` (n,) [m].
     """
     for line in range(len(starts)):
         x, y, z = ends[line] - starts[line]
@@ -76,18 +64,7 @@ def add_ways_inside(starts: _Array, ends: _Array, boxes: _Array, ways: _Array) -
 def find_hidden(eyes: _Array, targets: _Array, boxes: _Array, bounds: _Array, hidden: NDArray[np.bool_]) -> None:
     """Tell for each pair of eyes whether boxes hide all points of its target.
 
-    Parameters
-    ----------
-    eyes : (n, 3) float64
-        Where the lines begin [m].
-    targets : (n, k, 3) float64
-        The points at which each pair of eyes looks [m].
-    boxes : (m, 10) float64
-        The boxes.
-    bounds : (m, 4) float64
-        Least and most of x, and of y, that each box has [m].
-    hidden : (n,) bool
-        Written to, in place.
+    Takes `eyes` (n, 3) [m], `targets` (n, k, 3) [m], `boxes` (m, 10), `bounds` (m, 4) [m], `hidden` (n,) bool.
     """
     near = np.empty(len(boxes), np.int64)
     for one in range(len(eyes)):

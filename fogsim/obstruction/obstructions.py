@@ -16,13 +16,7 @@ _SHORTEST = 1e-6
 
 
 class Obstructions:
-    """Boxes that hide what is behind them; ``bool`` of it is false where there are none.
-
-    Parameters
-    ----------
-    boxes : (m, 10) float64
-        The boxes, as `fogsim.obstruction.box_kernels` has them.
-    """
+    """Boxes that hide what is behind them; ``bool`` of it is false where there are none (`boxes` (m, 10))."""
 
     def __init__(self, boxes: NDArray[np.float64]) -> None:
         self._boxes = boxes
@@ -35,17 +29,8 @@ class Obstructions:
     def hide(self, eyes: ArrayLike, targets: ArrayLike) -> NDArray[np.bool_]:
         """Whether targets are hidden: each of their points, from where they are looked at.
 
-        Parameters
-        ----------
-        eyes : (n, 3) array_like
-            Where they are looked at from [m].
-        targets : (n, k, 3) array_like
-            Points of each target [m].
-
-        Returns
-        -------
-        (n,) bool
-            The same if eyes and a single point change places.
+        Returns the same if eyes and a single point change places (n,) bool. Takes `eyes` (n, 3) [m], `targets` (n, k,
+        3) [m].
         """
         starts = np.asarray(eyes, np.float64).reshape(-1, 3)
         hidden = np.zeros(len(starts), np.bool_)
@@ -57,15 +42,7 @@ class Obstructions:
     def way_through(self, starts: ArrayLike, ends: ArrayLike) -> NDArray[np.float64]:
         """How much of straight lines lies inside [m].
 
-        Parameters
-        ----------
-        starts, ends : (n, 3) array_like
-            Ends of the lines [m].
-
-        Returns
-        -------
-        (n,) float64
-            Where boxes overlap, what is in both counts twice.
+        Returns where boxes overlap, what is in both counts twice (n,). Takes `starts`, `ends` (n, 3) [m].
         """
         first, last = (np.ascontiguousarray(points, np.float64).reshape(-1, 3) for points in (starts, ends))
         ways = np.zeros(len(first))
@@ -87,13 +64,7 @@ CLEAR_SIGHT = Obstructions(np.zeros((0, NUMBERS)))
 
 
 def obstructions_of(structures: Iterable[Structure]) -> Obstructions:
-    """Obstructions that structures are.
-
-    Parameters
-    ----------
-    structures : iterable of Structure
-        What stands beside the roads and over them.
-    """
+    """Obstructions that structures are."""
     boxes = [box for one in structures for box in box_rows(one.line, 0.5 * one.width, (one.bottom, one.top))]
     return Obstructions(np.array(boxes)) if boxes else CLEAR_SIGHT
 
@@ -101,14 +72,7 @@ def obstructions_of(structures: Iterable[Structure]) -> Obstructions:
 def box_rows(line: NDArray[np.float64], half_width: float, heights: tuple[float, float]) -> list[tuple[float, ...]]:
     """A box for each piece of a line that is straight to a centimetre; where two pieces meet, nobody looks between.
 
-    Parameters
-    ----------
-    line : (n, 3) float64
-        The middle [m].
-    half_width : float
-        To either side of it [m].
-    heights : tuple of float
-        Above it, between which the boxes are [m].
+    Takes `line` (n, 3) [m], `half_width` [m], `heights` [m].
     """
     line = _straightened(line)
     found, steps = list[tuple[float, ...]](), np.diff(line, axis=0).tolist()

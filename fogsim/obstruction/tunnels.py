@@ -21,21 +21,11 @@ So what is seen of ceiling and walls from within is in it, and what is seen from
 
 @dataclass(frozen=True, slots=True)
 class Tunnel:
-    """A space with a roof and walls, open at both ends.
+    """A space with a roof and walls, open at both ends."""
 
-    Attributes
-    ----------
-    line : (n, 3) float64
-        Its middle on the road, from one portal to the other [m].
-    half_width : float
-        Half of its width, walls included [m].
-    height : float
-        Height of its ceiling above the road [m].
-    """
-
-    line: NDArray[np.float64]
-    half_width: float
-    height: float
+    line: NDArray[np.float64]  # (n, 3): Its middle on the road, from one portal to the other [m]
+    half_width: float  # Half of its width, walls included [m]
+    height: float  # Height of its ceiling above the road [m]
 
     @property
     def length(self) -> float:
@@ -54,13 +44,7 @@ class Tunnel:
 
 
 def tunnels_of(structures: Iterable[Structure]) -> tuple[Tunnel, ...]:
-    """Tunnels among structures: what is under their roofs.
-
-    Parameters
-    ----------
-    structures : iterable of Structure
-        What stands beside the roads and over them.
-    """
+    """Tunnels among structures: what is under their roofs."""
     return tuple(
         Tunnel(one.line, 0.5 * one.width, one.bottom)
         for one in structures

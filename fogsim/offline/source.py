@@ -119,21 +119,11 @@ def _red_first(stored: Pixels) -> Pixels:
 
 @dataclass(frozen=True, slots=True)
 class Animation:
-    """A GIF, WebP or PNG file with several frames.
+    """A GIF, WebP or PNG file with several frames."""
 
-    Attributes
-    ----------
-    path : Path
-        The file.
-    temporal : bool
-        Whether its frames are used in order.
-    times : tuple of float
-        When each frame begins [s].
-    """
-
-    path: Path
-    temporal: bool
-    times: tuple[float, ...]
+    path: Path  # The file
+    temporal: bool  # Whether its frames are used in order
+    times: tuple[float, ...]  # When each frame begins [s]
 
     @classmethod
     def open(cls, path: Path, temporal: bool = True) -> "Animation | None":

@@ -49,11 +49,6 @@ class EventRecorder:
     """Writes ``events.parquet``: a row for each event, in the order of time; equal steps give equal bytes.
 
     Until it is closed, rows are in ``events.arrows`` beside it, from the step on in which they happened.
-
-    Parameters
-    ----------
-    path : Path
-        The file; nothing is written before the first step.
     """
 
     def __init__(self, path: Path) -> None:
@@ -70,15 +65,7 @@ class EventRecorder:
         self._open = True
 
     def record(self, step: TrafficStep, _derived: Derived | None = None) -> None:
-        """Add the events of a step.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            The finished step.
-        _derived : mapping from str to float or None
-            Not needed.
-        """
+        """Add the events of a step."""
         rows = [self._row(step, event) for event in self._events(step)]
         self._warning = step.command.warning
         self._faults, self._last = frozenset(fault.name for fault in step.truth.faults), step.traffic.time
@@ -122,13 +109,7 @@ class EventRecorder:
         return (step.index, event.time, event.event, *told, *place, event.why)
 
     def close(self, complete: bool) -> None:
-        """Make the parquet file of the rows, and say in it whether the run was complete.
-
-        Parameters
-        ----------
-        complete : bool
-            False if the run was cut short.
-        """
+        """Make the parquet file of the rows, and say in it whether the run was complete."""
         if not self._open:
             return
         log = self._log or RowLog(self._path.with_name(EVENT_LOG), self._schema)
@@ -139,22 +120,5 @@ class EventRecorder:
 
 
 def write_event_table(path: Path, log: Path, complete: bool) -> None:
-    """Make a parquet file of a log of events, whole or not at all.
-
-    Parameters
-    ----------
-    path : Path
-        The parquet file.
-    log : Path
-        The log, which may have been cut off.
-    complete : bool
-        Whether it is of a whole run.
-
-    Raises
-    ------
-    InputError
-        If it is no log.
-    OSError
-        If the file cannot be written; the message names it.
-    """
+    """Make a parquet file of a log of events, whole or not at all."""
     write_table(path, pa.Table.from_batches(row_batches(log), schema=row_schema(log)), complete)

@@ -31,25 +31,12 @@ class StepRecorder(Protocol[AnyStep_contra]):
     """Writes what happens to a file; under its final name a file is always whole."""
 
     def record(self, step: AnyStep_contra, derived: Derived) -> None:
-        """Take in one finished step.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            The step; a `Step` where the run has an ego.
-        derived : mapping from str to float or None
-            `DERIVED_QUANTITIES` of the step.
-        """
+        """Take in one finished step."""
 
     def close(self, complete: bool) -> None:
         """Finish the file and give it its final name; closing twice does nothing.
 
         KeyboardInterrupt may cut it off where `complete` is True; it is called once more then, with False.
-
-        Parameters
-        ----------
-        complete : bool
-            False if the run was cut short: the file then says so, and is finished within a second.
         """
 
 
@@ -70,41 +57,21 @@ def _no_road() -> NDArray[np.float64]:
 
 @dataclass(frozen=True, slots=True)
 class RunInformation:
-    """What a recorder may want to know before the first step.
+    """What a recorder may want to know before the first step."""
 
-    Attributes
-    ----------
-    directory : RunDirectory
-        Where the files go.
-    title, description : str
-        Name and description of the scenario.
-    seed : int
-        Seed of the run.
-    methods : tuple of str
-        Estimators, in the order in which they are to be shown.
-    frame_period : float
-        Time between two steps [s].
-    summary : callable
-        Gives the metrics of the run by key when the run is over; a key ends in its unit.
-    meanings : mapping from str to str
-        One line on each of those keys.
-    along_road : callable
-        Gives means over everybody on the road of traffic alone when the run is over (n, 4): middle of a stretch [m],
-        speed [m/s], extinction [1/m], and time of the vehicles [s]; empty where no road was named.
-    topics : mapping from str to tuple of str
-        Those keys by topic, for the report's folded tables.
-    settings : callable
-        Returns paragraphs on how the run was set up, by their headings.
-    """
-
-    directory: RunDirectory
+    directory: RunDirectory  # Where the files go
+    # title, description: name and description of the scenario
     title: str
     description: str
-    seed: int
-    methods: tuple[str, ...]
-    frame_period: float
+    seed: int  # Seed of the run
+    methods: tuple[str, ...]  # Estimators, in the order in which they are to be shown
+    frame_period: float  # Time between two steps [s]
+    # Gives the metrics of the run by key when the run is over; a key ends in its unit
     summary: Callable[[], Mapping[str, object]] = _no_summary
-    meanings: Mapping[str, str] = field(default_factory=dict)
+    meanings: Mapping[str, str] = field(default_factory=dict)  # One line on each of those keys
+    # Gives means over everybody on the road of traffic alone when the run is over (n, 4): middle of a stretch [m],
+    # speed [m/s], extinction [1/m], and time of the vehicles [s]; empty where no road was named
     along_road: Callable[[], NDArray[np.float64]] = _no_road
+    # Those keys by topic, for the report's folded tables
     topics: Mapping[str, Sequence[str]] = field(default_factory=dict)
-    settings: Callable[[], Mapping[str, str]] = dict
+    settings: Callable[[], Mapping[str, str]] = dict  # Returns paragraphs on how the run was set up, by their headings

@@ -64,62 +64,28 @@ footer { margin-top: 2.5rem; font-size: .8rem; color: #5d6975; border-top: 2px s
 
 @dataclass(frozen=True, slots=True)
 class ReportContent:
-    """Everything that a report shows.
+    """Everything that a report shows."""
 
-    Attributes
-    ----------
-    title, description : str
-        Name and description of the scenario.
-    interrupted_at : float or None
-        Instant at which the run was cut short [s], None if it was complete.
-    recorded : bool
-        Whether there was a step.
-    not_played : sequence of str
-        What of the script was not played, a line each.
-    metrics : mapping from str to object
-        Summary of the run; a key ends in its unit, and a mapping under ``estimators`` has one entry per method.
-    meanings : mapping from str to str
-        One line on each key.
-    topics : mapping from str to sequence of str
-        Keys by topic.
-    settings : mapping from str to str
-        Paragraphs on how the run was set up, by their headings.
-    figures : sequence of (str, bytes)
-        Caption and PNG of each figure.
-    decisive : sequence of (str, ReportPicture)
-        Captions and camera images of the decisive moments.
-    pictures : sequence of ReportPicture
-        Camera images, spread evenly over the run.
-    signs : sequence of SignRow
-        Signs of the map that were ahead.
-    footer : mapping from str to str
-        Seed and versions.
-    """
-
+    # title, description: name and description of the scenario
     title: str
     description: str
-    interrupted_at: float | None
-    recorded: bool
-    not_played: Sequence[str]
+    interrupted_at: float | None  # Instant at which the run was cut short [s], None if it was complete
+    recorded: bool  # Whether there was a step
+    not_played: Sequence[str]  # What of the script was not played, a line each
+    # Summary of the run; a key ends in its unit, and a mapping under ``estimators`` has one entry per method
     metrics: Mapping[str, object]
-    meanings: Mapping[str, str]
-    topics: Mapping[str, Sequence[str]]
-    settings: Mapping[str, str]
-    figures: Sequence[tuple[str, bytes]]
-    decisive: Sequence[tuple[str, ReportPicture]]
-    pictures: Sequence[ReportPicture]
-    signs: Sequence[SignRow]
-    footer: Mapping[str, str]
+    meanings: Mapping[str, str]  # One line on each key
+    topics: Mapping[str, Sequence[str]]  # Keys by topic
+    settings: Mapping[str, str]  # Paragraphs on how the run was set up, by their headings
+    figures: Sequence[tuple[str, bytes]]  # (str, bytes): Caption and PNG of each figure
+    decisive: Sequence[tuple[str, ReportPicture]]  # Captions and camera images of the decisive moments
+    pictures: Sequence[ReportPicture]  # Camera images, spread evenly over the run
+    signs: Sequence[SignRow]  # Signs of the map that were ahead
+    footer: Mapping[str, str]  # Seed and versions
 
 
 def render_report(content: ReportContent) -> str:
-    """Render a report as HTML; nothing in it is loaded from elsewhere.
-
-    Parameters
-    ----------
-    content : ReportContent
-        What it holds.
-    """
+    """Render a report as HTML; nothing in it is loaded from elsewhere."""
     title = escape(content.title)
     return "\n".join(
         [

@@ -21,14 +21,10 @@ AHEAD = 200.0
 
 @dataclass(slots=True)
 class AheadCurves:
-    """Visibility at a place `AHEAD` of the ego over time [m]: true (None in clear air), and believed.
+    """Visibility at a place `AHEAD` of the ego over time [m]: true (None in clear air), and believed."""
 
-    Attributes
-    ----------
-    time, truth, low, belief, high : list
-        Time [s]; `low` and `high` are the ends of the 90 % interval. Empty where nothing is believed of places.
-    """
-
+    # time, truth, low, belief, high: time [s]; `low` and `high` are the ends of the 90 % interval. Empty where nothing
+    # is believed of places
     time: list[float] = field(default_factory=list)
     truth: list[float | None] = field(default_factory=list)
     low: list[float] = field(default_factory=list)
@@ -36,13 +32,7 @@ class AheadCurves:
     high: list[float] = field(default_factory=list)
 
     def add(self, step: Step) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        step : Step
-            The finished step.
-        """
+        """Take in one step."""
         believed, true = step.belief.profile, step.truth.profile
         if believed is None or true is None or not true.distance.size or true.distance[-1] < AHEAD:
             return
@@ -54,23 +44,10 @@ class AheadCurves:
 
 @dataclass(slots=True)
 class Curves:
-    """Quantities over time, one entry a step; None where a quantity is undefined or without limit.
+    """Quantities over time, one entry a step; None where a quantity is undefined or without limit."""
 
-    Attributes
-    ----------
-    time, speed, limit, advice, gap, time_to_collision, margin, truth, low, belief, high : list
-        In s, m/s and m as their names say; the last four are visibilities, `low` and `high` the ends of the belief's
-        90 % interval.
-    estimates : dict from str to list of tuple
-        By method, (time [s], visibility [m]) of each valid estimate of fog.
-    collisions : list of float
-        Instants of collisions [s].
-    warning : list of DriverWarning or None
-        What the driver was warned of, one entry a step.
-    ahead : AheadCurves
-        What was believed of a place ahead.
-    """
-
+    # time, speed, limit, advice, gap, time_to_collision, margin, truth, low, belief, high: in s, m/s and m as their
+    # names say; the last four are visibilities, `low` and `high` the ends of the belief's 90 % interval
     time: list[float] = field(default_factory=list)
     speed: list[float] = field(default_factory=list)
     limit: list[float | None] = field(default_factory=list)
@@ -82,21 +59,14 @@ class Curves:
     low: list[float] = field(default_factory=list)
     belief: list[float] = field(default_factory=list)
     high: list[float] = field(default_factory=list)
+    # By method, (time [s], visibility [m]) of each valid estimate of fog
     estimates: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
-    collisions: list[float] = field(default_factory=list)
-    warning: list[DriverWarning | None] = field(default_factory=list)
-    ahead: AheadCurves = field(default_factory=AheadCurves)
+    collisions: list[float] = field(default_factory=list)  # Instants of collisions [s]
+    warning: list[DriverWarning | None] = field(default_factory=list)  # What the driver was warned of, one entry a step
+    ahead: AheadCurves = field(default_factory=AheadCurves)  # What was believed of a place ahead
 
     def add(self, step: Step, derived: Derived) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        step : Step
-            The finished step.
-        derived : mapping from str to float or None
-            `DERIVED_QUANTITIES` of the step.
-        """
+        """Take in one step."""
         self.time.append(step.time)
         self.speed.append(float(step.traffic.speed[step.ego]))
         self.limit.append(finite_or_none(step.speed_limit))
@@ -121,37 +91,21 @@ class Curves:
 
 @dataclass(frozen=True, slots=True)
 class ReportPicture:
-    """One camera image and what was known when it was taken.
+    """One camera image and what was known when it was taken."""
 
-    Attributes
-    ----------
-    time, route_position : float
-        When [s] and where [m].
-    truth : float or None
-        True visibility ahead [m]; None in clear air.
-    low, belief, high : float
-        Believed visibility with its 90 % interval [m].
-    image : (rows, cols[, 3]) uint8
-        The image.
-    """
-
+    # time, route_position: when [s] and where [m]
     time: float
     route_position: float
-    truth: float | None
+    truth: float | None  # True visibility ahead [m]; None in clear air
+    # low, belief, high: believed visibility with its 90 % interval [m]
     low: float
     belief: float
     high: float
-    image: NDArray[np.uint8]
+    image: NDArray[np.uint8]  # The image
 
     @classmethod
     def of_step(cls, step: Step) -> "ReportPicture":
-        """Take the picture of a step; the image is copied, since a camera may use its memory again.
-
-        Parameters
-        ----------
-        step : Step
-            The step.
-        """
+        """Take the picture of a step; the image is copied, since a camera may use its memory again."""
         low, middle, high = (step.belief.visibility_quantile(share) for share in (0.05, 0.5, 0.95))
         truth = finite_or_none(step.truth.visibility_ahead)
         return cls(step.time, step.route_position, truth, low, middle, high, shown_image(step.observation).copy())
@@ -171,13 +125,7 @@ class Album:
         self._last: Step | None = None
 
     def add(self, step: Step) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        step : Step
-            The finished step.
-        """
+        """Take in one step."""
         if self._count % self._stride == 0:
             if len(self._pictures) == 2 * MOST_PICTURES:
                 self._pictures = self._pictures[::2]
@@ -238,25 +186,14 @@ class DecisiveFrames:
 
 @dataclass(frozen=True, slots=True)
 class SignRow:
-    """What became of a sign of the map in a run.
+    """What became of a sign of the map in a run."""
 
-    Attributes
-    ----------
-    sign_id, kind : str
-        The sign by the map.
-    mapped_at : float
-        Distance at which the map first had it ahead [m].
-    first_seen : float or None
-        Distance at which it was first detected in a picture [m]; None if it never was.
-    nearest : float
-        Least distance at which it was ahead [m].
-    """
-
+    # sign_id, kind: the sign by the map
     sign_id: str
     kind: str
-    mapped_at: float
-    first_seen: float | None
-    nearest: float
+    mapped_at: float  # Distance at which the map first had it ahead [m]
+    first_seen: float | None  # Distance at which it was first detected in a picture [m]; None if it never was
+    nearest: float  # Least distance at which it was ahead [m]
 
 
 class SignBook:
@@ -271,13 +208,7 @@ class SignBook:
         return tuple(self._rows.values())
 
     def add(self, step: Step) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        step : Step
-            The finished step.
-        """
+        """Take in one step."""
         if not step.observation.signs:
             return
         seen = {look.sign_id: look.first_seen for look in sign_looks(step)}

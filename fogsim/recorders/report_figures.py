@@ -30,17 +30,7 @@ _WARNINGS = {DriverWarning.FOG_AHEAD: "#e39a1f", DriverWarning.CANNOT_SEE: MUTED
 def draw_figures(curves: Curves, time_to_collision_threshold: float = 3.0) -> list[tuple[str, bytes]]:
     """Draw every figure of the report.
 
-    Parameters
-    ----------
-    curves : Curves
-        The run, of at least one step.
-    time_to_collision_threshold : float
-        Time to collision at which a line is drawn [s].
-
-    Returns
-    -------
-    list of (str, bytes)
-        Caption and PNG of each figure.
+    Returns caption and PNG of each figure (str, bytes). Takes `time_to_collision_threshold` [s].
     """
 
     def figure(heights: Sequence[float], draw: Callable[[Sequence[Axes]], None]) -> bytes:
@@ -79,19 +69,7 @@ def figure_over_time(
     heights: Sequence[float],
     draw: Callable[[Sequence[Axes]], None],
 ) -> bytes:
-    """Draw quantities over time, collisions marked, as PNG.
-
-    Parameters
-    ----------
-    time : sequence of float
-        Instants of the steps, at least one [s].
-    collisions : sequence of float
-        Instants of collisions [s].
-    heights : sequence of float
-        Height of each axis, from above [inch].
-    draw : callable
-        Draws into the axes.
-    """
+    """Draw quantities over time, collisions marked, as PNG (`time` [s], `collisions` [s], `heights` [inch])."""
 
     def draw_marked(axes: Sequence[Axes]) -> None:
         draw(axes)
@@ -105,17 +83,7 @@ def figure_over_time(
 
 
 def drawn_figure(heights: Sequence[float], draw: Callable[[Sequence[Axes]], None], across: str) -> bytes:
-    """Draw a figure in the look of the report, as PNG.
-
-    Parameters
-    ----------
-    heights : sequence of float
-        Height of each axis, from above [inch].
-    draw : callable
-        Draws into the axes.
-    across : str
-        What the common horizontal axis is of.
-    """
+    """Draw a figure in the look of the report, as PNG (`heights` [inch])."""
     figure = Figure(figsize=(9.2, sum(heights)), dpi=144)
     # The same margins in every figure, in inches, so that all time axes stand under one another.
     height = sum(heights)
@@ -182,13 +150,7 @@ def _draw_ahead(axis: Axes, curves: AheadCurves) -> None:
 
 
 def scale_visibility(axis: Axes) -> None:
-    """Let an axis be of visibility [m].
-
-    Parameters
-    ----------
-    axis : Axes
-        The axis.
-    """
+    """Let an axis be of visibility [m]."""
     axis.set_yscale("log")
     axis.set_ylim(*_ends())
     axis.yaxis.set_major_locator(FixedLocator(_VISIBILITY_TICKS))
@@ -198,13 +160,7 @@ def scale_visibility(axis: Axes) -> None:
 
 
 def shown_visibility(values: Sequence[float | None]) -> NDArray[np.float64]:
-    """Visibilities to plot [m]; clear air is at the upper end of the axis.
-
-    Parameters
-    ----------
-    values : sequence of float or None
-        Visibilities [m]; None for clear air.
-    """
+    """Visibilities to plot [m]; clear air is at the upper end of the axis (`values` [m])."""
     return np.clip(np.nan_to_num(plottable(values), nan=_ends()[1]), *_ends())
 
 
@@ -246,11 +202,5 @@ def _ends() -> tuple[float, float]:
 
 
 def plottable(values: Sequence[float | None]) -> NDArray[np.float64]:
-    """Make an array to plot; matplotlib leaves a gap where a value is missing.
-
-    Parameters
-    ----------
-    values : sequence of float or None
-        The values.
-    """
+    """Make an array to plot; matplotlib leaves a gap where a value is missing."""
     return np.array(values, dtype=np.float64)

@@ -17,20 +17,7 @@ LonLat = tuple[float, float]
 def write_sign_map(
     path: Path, signs: SignMap, name: str, geographic: Callable[[float, float], LonLat] | None = None
 ) -> None:
-    """Write a sign map as a GeoJSON FeatureCollection of points.
-
-    Parameters
-    ----------
-    path : Path
-        The file, written whole or not at all.
-    signs : SignMap
-        The map.
-    name : str
-        Name of the collection.
-    geographic : callable, optional
-        From the network's x, y [m] to longitude and latitude [deg]. Without it the points are x, y; the member
-        ``coordinates`` of the collection says which of the two it is.
-    """
+    """Write a sign map as a GeoJSON FeatureCollection of points (`geographic` [m], [deg])."""
     place = geographic or _as_they_are
     write_json(
         path,

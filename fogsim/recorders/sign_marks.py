@@ -16,13 +16,7 @@ MOST = 8
 
 
 def sign_looks(step: Step) -> tuple[SignLook, ...]:
-    """What is known of the signs ahead: by the first method that looks for them, else by the map alone.
-
-    Parameters
-    ----------
-    step : Step
-        The finished step.
-    """
+    """What is known of the signs ahead: by the first method that looks for them, else by the map alone."""
     observation = step.observation
     looked = next((found for one in step.estimates if (found := looks_of(one.diagnostics.get("sign_looks")))), ())
     if not isinstance(observation.frame, Frame):
@@ -37,13 +31,7 @@ def sign_looks(step: Step) -> tuple[SignLook, ...]:
 
 
 def looks_of(diagnostic: object) -> tuple[SignLook, ...]:
-    """Looks for signs in a diagnostic of an estimate; none if it is something else.
-
-    Parameters
-    ----------
-    diagnostic : object
-        ``Estimate.diagnostics["sign_looks"]``.
-    """
+    """Looks for signs in a diagnostic of an estimate; none if it is something else."""
     if not isinstance(diagnostic, tuple):
         return ()
     return tuple(look for look in diagnostic if isinstance(look, SignLook))
@@ -54,18 +42,7 @@ def draw_signs(
 ) -> None:
     """Mark signs: a thin circle where the map has one, a bright one with its distances where it was detected.
 
-    Parameters
-    ----------
-    draw : ImageDraw
-        Onto the drawing.
-    signs : iterable of SignLook
-        The signs.
-    scale : float
-        Pixels of the drawing for one of the image [-].
-    origin : tuple of int
-        Column and row of the drawing at which the image begins [px].
-    size : tuple of int
-        Columns and rows of the image in the drawing [px].
+    Takes `origin` [px], `size` [px].
     """
     written: list[tuple[float, float, float, float]] = []
     for sign in sorted(signs, key=lambda one: one.distance)[:MOST]:
@@ -98,13 +75,7 @@ def _circle(draw: ImageDraw.ImageDraw, u: float, v: float, radius: float, width:
 
 
 def sign_text(sign: SignLook) -> str:
-    """Distance by the map, and that at which the sign was first seen.
-
-    Parameters
-    ----------
-    sign : SignLook
-        The sign.
-    """
+    """Distance by the map, and that at which the sign was first seen."""
     if sign.first_seen is None:
         return f"{sign.distance:.0f} m"
     return f"{sign.distance:.0f} m, seen from {sign.first_seen:.0f} m"

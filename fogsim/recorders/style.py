@@ -25,15 +25,7 @@ AMBER: Colour = (240, 160, 60)
 
 @cache
 def font(size: int, *, bold: bool = False) -> ImageFont.FreeTypeFont:
-    """DejaVu Sans, which comes with matplotlib, in a size [px]; loaded once per size.
-
-    Parameters
-    ----------
-    size : int
-        Height of the letters [px].
-    bold : bool
-        Whether they are bold.
-    """
+    """DejaVu Sans, which comes with matplotlib, in a size [px]; loaded once per size (`size` [px])."""
     name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
     path = Path(mpl.get_data_path(), "fonts", "ttf", name)
     return ImageFont.truetype(str(path), size, layout_engine=ImageFont.Layout.BASIC)
@@ -117,16 +109,7 @@ Named methods keep their colour where it is dark enough and far from the report'
 
 
 def method_colours(methods: Sequence[str], table: Sequence[Colour] = ON_DARK) -> dict[str, Colour]:
-    """Colour of each method: of those that come with FogSim always the same, whichever others stand beside it.
-
-    Parameters
-    ----------
-    methods : sequence of str
-        Names; others than FogSim's get the colours that are left, in their order, again from the start where there are
-        more.
-    table : sequence of Colour
-        `ON_DARK` or `ON_LIGHT`.
-    """
+    """Colour of each method: of those that come with FogSim always the same, whichever others stand beside it."""
     named, left = dict(zip(_NAMED, table, strict=False)), table[len(_NAMED) :]
     others = dict.fromkeys(name for name in methods if name not in named)
     free = {name: left[i % len(left)] for i, name in enumerate(others)}

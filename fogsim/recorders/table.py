@@ -32,16 +32,7 @@ class StepTable(Generic[AnyStep_contra]):
     and ``fogsim.columns`` (JSON, one line on each column). Equal steps give equal bytes. Until it is closed, rows are
     in ``steps.arrows`` beside it, at most `LOG_PERIOD` after they were recorded.
 
-    Parameters
-    ----------
-    path : Path
-        The file; nothing is written before the first row.
-    columns : sequence of Column
-        What is taken from each step.
-    methods : sequence of str
-        Estimators that have columns of their own.
-    clock : callable
-        Gives the time that passes [s].
+    Takes `clock` [s].
     """
 
     def __init__(
@@ -67,15 +58,7 @@ class StepTable(Generic[AnyStep_contra]):
         self._open = True
 
     def record(self, step: AnyStep_contra, derived: Derived) -> None:
-        """Add a row; a step that comes once more, with its ending, takes the place of the one before.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            The finished step.
-        derived : mapping from str to float or None
-            `DERIVED_QUANTITIES` of the step.
-        """
+        """Add a row; a step that comes once more, with its ending, takes the place of the one before."""
         self._rows.append([column.value(step, derived) for column in self._columns])
         now = self._clock()
         if now - self._logged >= LOG_PERIOD:
@@ -94,13 +77,7 @@ class StepTable(Generic[AnyStep_contra]):
         return self._log
 
     def close(self, complete: bool) -> None:
-        """Make the table of the rows and say in it whether the run was complete.
-
-        Parameters
-        ----------
-        complete : bool
-            False if the run was cut short.
-        """
+        """Make the table of the rows and say in it whether the run was complete."""
         if not self._open:
             return
         if self._log is not None:
@@ -113,39 +90,14 @@ class StepTable(Generic[AnyStep_contra]):
 
 
 class TableRecorder(StepTable[Step]):
-    """Writes the table of a run about an ego.
-
-    Parameters
-    ----------
-    path : Path
-        As of `StepTable`.
-    methods : sequence of str
-        Estimators that get columns of their own.
-    clock : callable
-        Gives the time that passes [s].
-    """
+    """Writes the table of a run about an ego (`clock` [s])."""
 
     def __init__(self, path: Path, methods: Sequence[str], clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__(path, table_columns(methods), methods, clock)
 
 
 def write_table(path: Path, rows: Any, complete: bool) -> None:
-    """Write the rows of a log as a table, whole or not at all.
-
-    Parameters
-    ----------
-    path : Path
-        The parquet file.
-    rows : pyarrow.Table
-        The rows, with the metadata of a log.
-    complete : bool
-        Whether they are of a whole run.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written; the message names the file.
-    """
+    """Write the rows of a log as a table, whole or not at all."""
     table = rows.replace_schema_metadata(None).combine_chunks()
     file = io.BytesIO()
     # Without a stored copy of the schema readers take its metadata from the end of the file.

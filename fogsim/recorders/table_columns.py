@@ -20,34 +20,17 @@ CLEAR_AIR = 100_000.0
 
 @dataclass(frozen=True, slots=True)
 class Column(Generic[AnyStep_contra]):
-    """One column of the table.
+    """One column of the table."""
 
-    Attributes
-    ----------
-    name : str
-        Its name, which ends in its unit.
-    kind : pyarrow.DataType
-        Its type.
-    meaning : str
-        One line on it, stored in the file.
-    value : callable
-        Takes it from a step and what was derived from it; None is stored as null.
-    """
-
-    name: str
-    kind: Any
-    meaning: str
+    name: str  # Its name, which ends in its unit
+    kind: Any  # Its type
+    meaning: str  # One line on it, stored in the file
+    # Takes it from a step and what was derived from it; None is stored as null
     value: Callable[[AnyStep_contra, Derived], object]
 
 
 def table_columns(methods: Sequence[str]) -> list[Column[Step]]:
-    """List the columns of the table for given estimators, in their order.
-
-    Parameters
-    ----------
-    methods : sequence of str
-        Names of the estimators.
-    """
+    """List the columns of the table for given estimators, in their order."""
     columns: list[Column[Step]] = [*_CLOCK_COLUMNS, *_EGO_COLUMNS, *_NEAR_COLUMNS, *_EVENT_COLUMNS]
     columns += [*map(_derived_column, DERIVED_QUANTITIES), *_FOG_COLUMNS]
     columns += [column for distance in PLACES for column in _place_columns(distance)]
@@ -155,13 +138,7 @@ def _estimator_columns(method: str) -> list[Column[Step]]:
 
 
 def lowest_advice(step: TrafficStep) -> float:
-    """Lowest advice in force at a step, to anybody and anywhere [m/s]; ``inf`` for none.
-
-    Parameters
-    ----------
-    step : TrafficStep
-        The step.
-    """
+    """Lowest advice in force at a step, to anybody and anywhere [m/s]; ``inf`` for none."""
     command = step.command
     stretches = (advice.speed for advice in command.stretches)
     return min((command.advice.speed, *stretches, *command.advised_speeds.values()))
@@ -172,13 +149,7 @@ def _mean_speed(step: TrafficStep) -> float | None:
 
 
 def least_visibility(step: TrafficStep) -> float | None:
-    """Least true visibility at the eyes of any driver [m]; None for clear air, or without any.
-
-    Parameters
-    ----------
-    step : TrafficStep
-        The step.
-    """
+    """Least true visibility at the eyes of any driver [m]; None for clear air, or without any."""
     extinctions = step.truth.vehicle_extinctions
     if extinctions is None or not len(extinctions):
         return None

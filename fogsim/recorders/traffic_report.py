@@ -31,39 +31,25 @@ _SPREAD = (15.0, 85.0)
 
 @dataclass(slots=True)
 class TrafficCurves:
-    """Quantities of everybody over time, one entry a step; None where a quantity is undefined or without limit.
+    """Quantities of everybody over time, one entry a step; None where a quantity is undefined or without limit."""
 
-    Attributes
-    ----------
-    time, mean_speed, slow, fast, advice : list
-        In s and m/s; `slow` and `fast` are the 15th and 85th percentile of speed, `advice` is the lowest anywhere.
-    vehicles, advised : list of int
-        Vehicles in the network, and those of them whose drivers have heard an advice in force.
-    metered, least : list of float or None
-        Visibility at the meter that sees least, and least at the eyes of any driver [m].
-    collisions : list of float
-        Instants of collisions [s].
-    """
-
+    # time, mean_speed, slow, fast, advice: in s and m/s; `slow` and `fast` are the 15th and 85th percentile of speed,
+    # `advice` is the lowest anywhere
     time: list[float] = field(default_factory=list)
     mean_speed: list[float | None] = field(default_factory=list)
     slow: list[float | None] = field(default_factory=list)
     fast: list[float | None] = field(default_factory=list)
     advice: list[float | None] = field(default_factory=list)
+    # vehicles, advised: vehicles in the network, and those of them whose drivers have heard an advice in force
     vehicles: list[int] = field(default_factory=list)
     advised: list[int] = field(default_factory=list)
+    # metered, least: visibility at the meter that sees least, and least at the eyes of any driver [m]
     metered: list[float | None] = field(default_factory=list)
     least: list[float | None] = field(default_factory=list)
-    collisions: list[float] = field(default_factory=list)
+    collisions: list[float] = field(default_factory=list)  # Instants of collisions [s]
 
     def add(self, step: TrafficStep) -> None:
-        """Take in one step.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            The finished step.
-        """
+        """Take in one step."""
         speed = step.traffic.speed
         slow, fast = np.percentile(speed, _SPREAD).tolist() if len(speed) else (None, None)
         self.time.append(step.time)
@@ -102,15 +88,7 @@ class TrafficReportRecorder(StepReport[TrafficStep]):
 def draw_traffic_figures(curves: TrafficCurves) -> list[tuple[str, bytes]]:
     """Draw every figure of the report of traffic alone.
 
-    Parameters
-    ----------
-    curves : TrafficCurves
-        The run, of at least one step.
-
-    Returns
-    -------
-    list of (str, bytes)
-        Caption and PNG of each figure.
+    Returns caption and PNG of each figure (str, bytes).
     """
     time, collisions = curves.time, curves.collisions
     return [
@@ -133,15 +111,7 @@ def draw_traffic_figures(curves: TrafficCurves) -> list[tuple[str, bytes]]:
 def road_figure(along_road: NDArray[np.float64]) -> tuple[str, bytes]:
     """Draw speed over the road, and the visibility there.
 
-    Parameters
-    ----------
-    along_road : (n, 4) float64
-        As of `RunInformation`; at least one row.
-
-    Returns
-    -------
-    tuple of str and bytes
-        Caption and PNG.
+    Returns caption and PNG. Takes `along_road` (n, 4).
     """
     # Nobody's mean is a line across a stretch that nobody was on.
     place, speed, extinction, _ = np.insert(along_road, _breaks(along_road[:, 0]), np.nan, axis=0).T

@@ -66,12 +66,7 @@ class TrajectoryRecorder:
     Until it is closed, rows are in a log beside it (``trajectories.arrows``), at most 0.5 s after they were recorded,
     whatever ends the process. Memory does not grow with the run.
 
-    Parameters
-    ----------
-    path : Path
-        The file; its name ends in ``.parquet``. Nothing is written before the first step.
-    clock : callable
-        Gives the time that passes [s].
+    Takes `clock` [s].
     """
 
     def __init__(self, path: Path, clock: Callable[[], float] = time.monotonic) -> None:
@@ -89,20 +84,7 @@ class TrajectoryRecorder:
         self._open = True
 
     def record(self, step: TrafficStep, _derived: Derived | None = None) -> None:
-        """Add the vehicles of a step; one in which no time has passed adds nothing.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            The finished step.
-        _derived : mapping from str to float or None
-            Not needed.
-
-        Raises
-        ------
-        OSError
-            If the disk is full; the message names the file.
-        """
+        """Add the vehicles of a step; one in which no time has passed adds nothing."""
         traffic = step.traffic
         # The step that ends a run may show once more what was last seen.
         if traffic.time > self._last:
@@ -124,13 +106,7 @@ class TrajectoryRecorder:
         return self._log
 
     def close(self, complete: bool) -> None:
-        """Make the parquet file of the rows, and say in it whether the run was complete.
-
-        Parameters
-        ----------
-        complete : bool
-            False if the run was cut short.
-        """
+        """Make the parquet file of the rows, and say in it whether the run was complete."""
         if not self._open:
             return
         if self._log is not None:
@@ -151,23 +127,7 @@ class TrajectoryRecorder:
 def with_trajectories(steps: Iterable[_AnyStep], path: Path) -> Iterator[_AnyStep]:
     """Pass steps on, and write the trajectories of all vehicles in them into a parquet file.
 
-    Parameters
-    ----------
-    steps : iterable of TrafficStep
-        Steps of one run, as `fogsim.run` or `fogsim.run_traffic` yields them.
-    path : Path
-        The file, ``….parquet``, in a folder that is there. It is whole when the last step was taken, and also, marked
-        as partial, when whoever takes them leaves off or something fails.
-
-    Yields
-    ------
-    TrafficStep
-        The steps.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
+    Yields the steps.
     """
     with TrajectoryRecorder(path) as recorder:
         for step in steps:
@@ -237,24 +197,7 @@ def _advised_speeds(step: TrafficStep) -> list[float | None]:
 
 
 def write_trajectory_table(path: Path, log: Path, complete: bool) -> None:
-    """Make a parquet file of a log of trajectories, whole or not at all, group of rows by group.
-
-    Parameters
-    ----------
-    path : Path
-        The parquet file.
-    log : Path
-        The log, which may have been cut off.
-    complete : bool
-        Whether it is of a whole run.
-
-    Raises
-    ------
-    InputError
-        If it is no log.
-    OSError
-        If the file cannot be written; the message names it.
-    """
+    """Make a parquet file of a log of trajectories, whole or not at all, group of rows by group."""
     schema = row_schema(log)
     plain = schema.remove_metadata()
     with (

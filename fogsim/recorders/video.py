@@ -25,19 +25,7 @@ class VideoRecorder:
 
     A run without steps leaves no video.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    frame_period : float
-        Time between two steps [s]; the video plays at real speed.
-    draw_picture : callable
-        Draws what stands beside the panel; the camera's image if not given.
-
-    Raises
-    ------
-    MissingDependencyError
-        If there is no ffmpeg.
+    Takes `frame_period` [s].
     """
 
     def __init__(
@@ -49,28 +37,14 @@ class VideoRecorder:
         self._encoder: Encoder | None = None
 
     def record(self, step: Step, derived: Derived) -> None:
-        """Add a frame.
-
-        Parameters
-        ----------
-        step : Step
-            The finished step.
-        derived : mapping from str to float or None
-            `DERIVED_QUANTITIES` of the step.
-        """
+        """Add a frame."""
         frame = self._panel.draw(step, derived).tobytes()
         if self._encoder is None:
             self._encoder = Encoder(self._command)
         self._encoder.write(frame)
 
     def close(self, complete: bool) -> None:
-        """Finish the video; after an interruption it holds what was recorded until then.
-
-        Parameters
-        ----------
-        complete : bool
-            False if the run was cut short.
-        """
+        """Finish the video; after an interruption it holds what was recorded until then."""
         if self._encoder is None:
             return
         try:
@@ -83,13 +57,7 @@ class VideoRecorder:
 
 
 class Encoder:
-    """An ffmpeg process that eats raw frames.
-
-    Parameters
-    ----------
-    command : list of str
-        Its command line.
-    """
+    """An ffmpeg process that eats raw frames."""
 
     def __init__(self, command: list[str]) -> None:
         # Its complaints go to a file, since nobody reads a pipe while frames are written.
@@ -106,18 +74,7 @@ class Encoder:
         )
 
     def write(self, frame: bytes) -> None:
-        """Hand over one frame.
-
-        Parameters
-        ----------
-        frame : bytes
-            Pixel values of the size and kind in its command line.
-
-        Raises
-        ------
-        FogSimError
-            If the encoder has ended, with what it said.
-        """
+        """Hand over one frame."""
         assert self._process.stdin is not None  # noqa: S101 - it was opened as a pipe
         rest = memoryview(frame)
         try:
@@ -127,18 +84,7 @@ class Encoder:
             raise FogSimError(f"the video encoder has ended: {self._said()}") from error
 
     def finish(self, limit: float | None = None) -> None:
-        """Let the encoder write what it has and wait for its end.
-
-        Parameters
-        ----------
-        limit : float or None
-            Time that it gets before it is killed [s]; None for as long as it needs.
-
-        Raises
-        ------
-        FogSimError
-            If it failed, with what it said, or took longer.
-        """
+        """Let the encoder write what it has and wait for its end (`limit` [s])."""
         assert self._process.stdin is not None  # noqa: S101 - it was opened as a pipe
         self._process.stdin.close()
         try:
@@ -163,21 +109,7 @@ def encoder_command(
 ) -> list[str]:
     """Command line of an encoder that takes raw frames and writes an mp4 file that browsers can play.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    frame_period : float
-        Time between two frames [s].
-    size : tuple of int
-        Columns and rows of a frame [px], both even; those of the panel if not given.
-    rate_factor : int
-        libx264's constant rate factor, 0 … 51 [-]: 20 is made to be looked at, less keeps more.
-
-    Raises
-    ------
-    MissingDependencyError
-        If there is no ffmpeg.
+    Takes `frame_period` [s], `size` [px].
     """
     rate = Fraction(1.0 / frame_period).limit_denominator(1001)
     source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(rate)]
@@ -192,25 +124,13 @@ def encoding_command(path: Path, source: list[str], rate_factor: int) -> list[st
 
 
 def encoder_report() -> str:
-    """Say in a few words which video encoder is there.
-
-    Raises
-    ------
-    MissingDependencyError
-        If there is none.
-    """
+    """Say in a few words which video encoder is there."""
     path = ffmpeg_program()
     return f"ffmpeg {imageio_ffmpeg.get_ffmpeg_version()} at {path}"
 
 
 def ffmpeg_program() -> str:
-    """Path of the ffmpeg that comes with imageio-ffmpeg.
-
-    Raises
-    ------
-    MissingDependencyError
-        If there is none.
-    """
+    """Path of the ffmpeg that comes with imageio-ffmpeg."""
     try:
         return str(imageio_ffmpeg.get_ffmpeg_exe())
     except RuntimeError as error:

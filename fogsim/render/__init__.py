@@ -61,26 +61,7 @@ LIMITED = ("auto", "cpu", "opengl")
 
 
 def make_renderer(name: str, scene: Scene, illuminance: float) -> Renderer:
-    """Make a renderer.
-
-    Parameters
-    ----------
-    name : str
-        Name in `RENDERERS`, or "auto" for the one that `best_renderer` names, or "reference" for "pyrender".
-    scene : Scene
-        What stands still.
-    illuminance : float
-        Horizontal illuminance of the daylight E [lx], not negative.
-
-    Raises
-    ------
-    UnknownNameError
-        If no renderer has that name.
-    InputError
-        If the illuminance is negative or not finite.
-    MissingDependencyError
-        If the renderer needs a library that is not there.
-    """
+    """Make a renderer (`illuminance` [lx])."""
     if not 0.0 <= illuminance < float("inf"):
         raise InputError(f"illuminance must be a finite number of lux ≥ 0, got {illuminance!r}")
     if name in ROLES:
@@ -89,13 +70,7 @@ def make_renderer(name: str, scene: Scene, illuminance: float) -> Renderer:
 
 
 def gl_report() -> str:
-    """Say which OpenGL draws here.
-
-    Raises
-    ------
-    MissingDependencyError
-        If OpenGL or EGL is not there or does not work.
-    """
+    """Say which OpenGL draws here."""
     from fogsim.render.opengl.context import context  # noqa: PLC0415 - OpenGL is loaded only where it is used
 
     return context().description

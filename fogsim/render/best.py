@@ -10,10 +10,7 @@ from fogsim.render.protocol import RenderError
 def best_renderer() -> tuple[str, str]:
     """Choose the renderer that "auto" stands for.
 
-    Returns
-    -------
-    tuple of str
-        Its name in `RENDERERS`, and why.
+    Returns Its name in `RENDERERS`, and why.
     """
     if not _may_have_card():
         return "cpu", "OpenGL would be drawn by software: there is no graphics card (/dev/dri/render*, /dev/nvidia*)"

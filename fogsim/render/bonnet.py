@@ -29,21 +29,11 @@ _AT_REST = CameraPose((0.0, 0.0, 0.0), 0.0)
 
 @dataclass(frozen=True, slots=True)
 class Bonnet:
-    """A flat bonnet with rounded corners, as high as its front edge, which is all of it that hides something.
+    """A flat bonnet with rounded corners, as high as its front edge, which is all of it that hides something."""
 
-    Attributes
-    ----------
-    reach : float
-        How far ahead of the camera its front edge is [m].
-    height : float
-        Its height above the road [m].
-    half_width : float
-        Half its width [m].
-    """
-
-    reach: float
-    height: float = 0.75
-    half_width: float = 0.8
+    reach: float  # How far ahead of the camera its front edge is [m]
+    height: float = 0.75  # Its height above the road [m]
+    half_width: float = 0.8  # Half its width [m]
 
 
 class _Seen(NamedTuple):
@@ -57,18 +47,7 @@ class _Seen(NamedTuple):
 def with_bonnet(view: View, camera: Camera, bonnet: Bonnet, instance: int, illuminance: float) -> View:
     """A drawn view with the own bonnet before it, lit by the sky alone: own head lamps shine away from it.
 
-    Parameters
-    ----------
-    view : View
-        What is seen without it; it is not changed.
-    camera : Camera
-        The camera.
-    bonnet : Bonnet
-        The bonnet.
-    instance : int
-        Label of its pixels.
-    illuminance : float
-        Horizontal illuminance of the sky [lx].
+    Takes `illuminance` [lx].
     """
     seen = _seen(camera, bonnet)
     if not len(seen.pixels):

@@ -25,73 +25,35 @@ Index = NDArray[np.int64]
 
 
 class Shapes(NamedTuple):
-    """Shapes by number.
+    """Shapes by number."""
 
-    Attributes
-    ----------
-    centre, half_extent : (n, 3) float64
-        Middle and half the extents of each shape's bounding box.
-    coarser : (n,) int64
-        The simpler shape that is drawn for each where it is small, −1 if there is none.
-    detail : (n,) float64
-        Half the breadth in the picture below which it does [px].
-    faces : (n,) int64
-        Number of triangles.
-    smallest : (n,) float64
-        Radius in the picture below which a copy is left out [px].
-    """
-
+    # centre, half_extent (n, 3): middle and half the extents of each shape's bounding box
     centre: Wide
     half_extent: Wide
-    coarser: Index
-    detail: Wide
-    faces: Index
-    smallest: Wide
+    coarser: Index  # (n,) int64: The simpler shape that is drawn for each where it is small, −1 if there is none
+    detail: Wide  # (n,): Half the breadth in the picture below which it does [px]
+    faces: Index  # (n,) int64: Number of triangles
+    smallest: Wide  # (n,): Radius in the picture below which a copy is left out [px]
 
 
 class Copies(NamedTuple):
-    """Copies of shapes.
+    """Copies of shapes."""
 
-    Attributes
-    ----------
-    shape : (n,) int64
-        Number of each copy's shape.
-    place : (n, 3) float64
-        Last column of its transform: where its origin is [m].
-    record : (n, 17) float32
-        Its `RECORD`, as numbers.
-    middle : (n, 3) float64
-        Middle of its bounding sphere [m].
-    radius : (n,) float64
-        Its radius [m].
-    breadth : (n,) float64
-        Half of the second largest of its three extents [m], which says how much of it there is to see.
-    """
-
-    shape: Index
-    place: Wide
-    record: Array
-    middle: Wide
-    radius: Wide
+    shape: Index  # (n,) int64: Number of each copy's shape
+    place: Wide  # (n, 3): Last column of its transform: where its origin is [m]
+    record: Array  # (n, 17): Its `RECORD`, as numbers
+    middle: Wide  # (n, 3): Middle of its bounding sphere [m]
+    radius: Wide  # (n,): Its radius [m]
+    # (n,): Half of the second largest of its three extents [m], which says how much of it there is to see
     breadth: Wide
 
 
 class Cells(NamedTuple):
-    """Squares of the ground with the copies in them.
+    """Squares of the ground with the copies in them."""
 
-    Attributes
-    ----------
-    first : (k + 1,) int64
-        First copy of each square, and the number of all copies.
-    middle : (k, 3) float64
-        Middle of a sphere around all the copies of each square [m].
-    radius : (k,) float64
-        Its radius [m].
-    """
-
-    first: Index
-    middle: Wide
-    radius: Wide
+    first: Index  # (k + 1,) int64: First copy of each square, and the number of all copies
+    middle: Wide  # (k, 3): Middle of a sphere around all the copies of each square [m]
+    radius: Wide  # (k,): Its radius [m]
 
 
 class Selection(NamedTuple):
@@ -108,21 +70,7 @@ class Selection(NamedTuple):
 def shapes_of(
     numbers: Mapping[str, int], low: Wide, high: Wide, faces: Index, plain: NDArray[np.bool_], endings: tuple[str, ...]
 ) -> Shapes:
-    """Measure shapes.
-
-    Parameters
-    ----------
-    numbers : mapping from str to int
-        Number of each shape.
-    low, high : (n, 3) float64
-        Corners of their bounding boxes.
-    faces : (n,) int64
-        Numbers of their triangles.
-    plain : (n,) bool
-        Whether they have neither paint nor lamps nor sheeting, and so may be simpler than others.
-    endings : tuple of str
-        Endings of the names of levels of detail, the most detailed first.
-    """
+    """Measure shapes (`low`, `high` (n, 3), `faces` (n,) int64, `plain` (n,) bool)."""
     coarser = np.full(len(numbers), -1, np.int64)
     for name in numbers:
         if not name.endswith(endings):
@@ -142,15 +90,7 @@ def shapes_of(
 
 
 def copies_of(shape: Index, record: Array, place: Wide, shapes: Shapes) -> Copies:
-    """Measure copies.
-
-    Parameters
-    ----------
-    shape, record, place
-        See `Copies`.
-    shapes : Shapes
-        All shapes.
-    """
+    """Measure copies."""
     count = len(shape)
     copies = Copies(shape, place, record, np.empty((count, 3)), np.empty(count), np.empty(count))
     measure(shapes, copies, 0, count)
@@ -158,15 +98,7 @@ def copies_of(shape: Index, record: Array, place: Wide, shapes: Shapes) -> Copie
 
 
 def with_room(copies: Copies, count: int) -> Copies:
-    """Add room for so many more copies.
-
-    Parameters
-    ----------
-    copies : Copies
-        The copies.
-    count : int
-        How many more.
-    """
+    """Add room for so many more copies."""
 
     def longer(column: NDArray[Any]) -> NDArray[Any]:
         return np.concatenate((column, np.zeros((count, *column.shape[1:]), column.dtype)))
@@ -175,15 +107,7 @@ def with_room(copies: Copies, count: int) -> Copies:
 
 
 def cells_of(copies: Copies, side: float) -> tuple[Copies, Cells]:
-    """Sort copies by squares of the ground with a side [m].
-
-    Parameters
-    ----------
-    copies : Copies
-        The copies.
-    side : float
-        Side of the squares [m].
-    """
+    """Sort copies by squares of the ground with a side [m] (`side` [m])."""
     square = np.floor(copies.middle[:, :2] / side).astype(np.int64)
     _, number = np.unique(square, axis=0, return_inverse=True)
     order = np.argsort(number.ravel(), kind="stable")
@@ -200,17 +124,7 @@ def cells_of(copies: Copies, side: float) -> tuple[Copies, Cells]:
 
 @kernel
 def measure(shapes: Shapes, copies: Copies, begin: int, end: int) -> None:
-    """Set middle, radius and breadth of copies from `begin` to `end`.
-
-    Parameters
-    ----------
-    shapes : Shapes
-        All shapes.
-    copies : Copies
-        Is filled.
-    begin, end : int
-        First copy, and the one after the last.
-    """
+    """Set middle, radius and breadth of copies from `begin` to `end`."""
     shape, record, place = copies.shape, copies.record, copies.place
     centre, half_extent = shapes.centre, shapes.half_extent
     for copy in range(begin, end):
@@ -243,27 +157,7 @@ def select_copies(
 ) -> int:
     """Choose the copies that a picture may show, near ones first.
 
-    Parameters
-    ----------
-    shapes : Shapes
-        All shapes.
-    copies, cells : Copies, Cells
-        What stands still, and after it what moves.
-    end : int
-        Number of all copies.
-    planes : (5, 3) float64
-        Inward unit normals of the planes that bound the picture, the forward one last.
-    eye : (3,) float64
-        Where the camera is [m].
-    focal : float
-        Its focal length [px].
-    selection : Selection
-        Is filled; has room for all copies.
-
-    Returns
-    -------
-    int
-        Number of copies selection.
+    Returns number of copies selection. Takes `planes` (5, 3), `eye` (3,) [m], `focal` [px].
     """
     middle, radius, first, smallest = copies.middle, copies.radius, cells.first, shapes.smallest
     begin = first[len(first) - 1]

@@ -29,49 +29,28 @@ RECORD = np.dtype([("transform", "<f4", (3, 4)), ("paint", "<f4", (3,)), ("lamps
 
 @dataclass(frozen=True, slots=True)
 class MeshTable:
-    """All meshes of a scene one after another.
+    """All meshes of a scene one after another."""
 
-    Attributes
-    ----------
-    numbers : mapping from str to int
-        Number of each mesh by its name.
-    positions, normals, reflectance : (n, 3) float32
-        As in `Mesh`.
-    surface, instance : (n,) int32
-        As in `Mesh`.
-    road : (n, 4) float32
-        As in `Mesh`.
-    faces : (m, 3) int32
-        Vertices of each triangle, numbered through all meshes.
-    in_solid : (m,) bool
-        Whether a triangle is part of a closed solid that no camera is in: its inner side need not be drawn.
-    first_vertex, first_face : (k + 1,) int64
-        Where the vertices and triangles of each of the k meshes begin, and their numbers n and m at the end.
-    """
-
-    numbers: Mapping[str, int]
+    numbers: Mapping[str, int]  # Number of each mesh by its name
+    # positions, normals, reflectance (n, 3): as in `Mesh`
     positions: NDArray[np.float32]
     normals: NDArray[np.float32]
     reflectance: NDArray[np.float32]
+    # surface, instance (n,) int32: as in `Mesh`
     surface: NDArray[np.int32]
     instance: NDArray[np.int32]
-    road: NDArray[np.float32]
-    faces: NDArray[np.int32]
+    road: NDArray[np.float32]  # (n, 4): As in `Mesh`
+    faces: NDArray[np.int32]  # (m, 3) int32: Vertices of each triangle, numbered through all meshes
+    # (m,) bool: Whether a triangle is part of a closed solid that no camera is in: its inner side need not be drawn
     in_solid: NDArray[np.bool_]
+    # first_vertex, first_face (k + 1,) int64: where the vertices and triangles of each of the k meshes begin, and their
+    # numbers n and m at the end
     first_vertex: NDArray[np.int64]
     first_face: NDArray[np.int64]
 
     @classmethod
     def of(cls, meshes: Mapping[str, Mesh], never_inside: Callable[[str], bool] = lambda _: False) -> "MeshTable":
-        """Put meshes one after another and number them in their order.
-
-        Parameters
-        ----------
-        meshes : mapping from str to Mesh
-            The meshes by name.
-        never_inside : callable
-            Tells by a name whether no camera is ever inside what the mesh shows.
-        """
+        """Put meshes one after another and number them in their order."""
         parts = list(meshes.values())
         first_vertex = np.cumsum([0, *(len(part.positions) for part in parts)], dtype=np.int64)
         in_solid = [
@@ -109,21 +88,13 @@ def _joined(parts: list[NDArray[Any]], kind: type[np.generic], columns: int = 0)
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """The copies of meshes that a picture may show, the nearest first as far as that is cheap.
+    """The copies of meshes that a picture may show, the nearest first as far as that is cheap."""
 
-    Attributes
-    ----------
-    mesh : (c,) int64
-        Number of each copy's mesh in the `MeshTable`.
-    record : (c,) `RECORD`
-        Each copy; its transform leads from coordinates of the mesh to offsets from the camera in world axes [m].
-    first : (c + 1,) int64
-        Id of the first triangle of each copy, and the number of all ids at the end: triangle i of the mesh of
-        copy j has id ``first[j] + i``.
-    """
-
-    mesh: NDArray[np.int64]
+    mesh: NDArray[np.int64]  # (c,) int64: Number of each copy's mesh in the `MeshTable`
+    # Each copy; its transform leads from coordinates of the mesh to offsets from the camera in world axes [m]
     record: NDArray[np.void]
+    # (c + 1,) int64: Id of the first triangle of each copy, and the number of all ids at the end: triangle i of the
+    # mesh of copy j has id ``first[j] + i``
     first: NDArray[np.int64]
 
 
@@ -135,24 +106,7 @@ class Rasteriser(Protocol):
 
         Both sides of a triangle are seen; nothing nearer than a depth of `NEAR` is.
 
-        Parameters
-        ----------
-        drawing : Drawing
-            What may be seen.
-        camera : Camera
-            The pinhole; pixel centres lie at integer coordinates.
-        pose : CameraPose
-            Where it is.
-
-        Returns
-        -------
-        (rows, cols) int32
-            Id of the triangle, `NOTHING` where there is none; valid until the next call.
-
-        Raises
-        ------
-        RenderError
-            If the rasteriser cannot be used in this process any more.
+        Returns Id of the triangle, `NOTHING` where there is none; valid until the next call (rows, cols) int32.
         """
         ...
 

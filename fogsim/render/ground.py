@@ -11,34 +11,16 @@ from fogsim.values.scene import GROUND_SQUARE, Mesh, Surface
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """Level ground to the horizon, and what lies on it.
+    """Level ground to the horizon, and what lies on it."""
 
-    Attributes
-    ----------
-    height : float
-        Height of the terrain [m], −inf if there is none.
-    reflectance : (3,) float64
-        Its reflectance.
-    pieces : mapping from str to Mesh
-        All else by names of its own, each piece in coordinates from its place.
-    places : (k, 3) float64
-        Where the origin of each piece is [m].
-    """
-
-    height: float
-    reflectance: NDArray[np.float64]
-    pieces: Mapping[str, Mesh]
-    places: NDArray[np.float64]
+    height: float  # Height of the terrain [m], −inf if there is none
+    reflectance: NDArray[np.float64]  # (3,): Its reflectance
+    pieces: Mapping[str, Mesh]  # All else by names of its own, each piece in coordinates from its place
+    places: NDArray[np.float64]  # (k, 3): Where the origin of each piece is [m]
 
 
 def split_ground(ground: Mesh) -> Ground:
-    """Take a ground apart.
-
-    Parameters
-    ----------
-    ground : Mesh
-        Of a `Scene`.
-    """
+    """Take a ground apart."""
     flat = ground.surface[ground.faces[:, 0]] == int(Surface.TERRAIN)
     height, reflectance = -np.inf, np.zeros(3)
     if flat.any():

@@ -14,41 +14,19 @@ Wide = NDArray[np.float64]
 
 
 class Lens(NamedTuple):
-    """Where the camera is and how it looks.
+    """Where the camera is and how it looks."""
 
-    Attributes
-    ----------
-    eye : (3,) float64
-        Where it is [m].
-    axes : (3, 3) float64
-        Its axes in the world as rows.
-    rays : (3, 3) float64
-        From a pixel (column, row, 1) to its viewing ray, 1 long along the optical axis.
-    lens : (3,) float64
-        Focal length and principal point [px].
-    planes : (5, 3) float64
-        Inward unit normals in the world of the planes that bound the picture, the forward one last.
-    """
-
-    eye: Wide
-    axes: Wide
-    rays: Wide
-    lens: Wide
-    planes: Wide
+    eye: Wide  # (3,): Where it is [m]
+    axes: Wide  # (3, 3): Its axes in the world as rows
+    rays: Wide  # (3, 3): From a pixel (column, row, 1) to its viewing ray, 1 long along the optical axis
+    lens: Wide  # (3,): Focal length and principal point [px]
+    planes: Wide  # (5, 3): Inward unit normals in the world of the planes that bound the picture, the forward one last
 
 
 # The parts of a renderer ask for the same one in turn.
 @functools.lru_cache(maxsize=8)
 def lens_of(camera: Camera, pose: CameraPose) -> Lens:
-    """Geometry of a picture; the arrays belong to all who asked and are not to be written to.
-
-    Parameters
-    ----------
-    camera : Camera
-        The pinhole.
-    pose : CameraPose
-        Where it is.
-    """
+    """Geometry of a picture; the arrays belong to all who asked and are not to be written to."""
     axes = camera_axes(camera, pose)
     lens, planes = _of_camera(camera)
     return Lens(
@@ -63,13 +41,7 @@ def _of_camera(camera: Camera) -> tuple[Wide, Wide]:
 
 
 def frustum(camera: Camera) -> Wide:
-    """Inward unit normals (5, 3) of the planes that bound the picture, in camera axes, the forward one last.
-
-    Parameters
-    ----------
-    camera : Camera
-        The pinhole.
-    """
+    """Inward unit normals (5, 3) of the planes that bound the picture, in camera axes, the forward one last."""
     (u0, v0), focal = camera.principal_point, camera.focal_length
     planes = np.array(
         [

@@ -43,24 +43,12 @@ square metre [M], a lens of a traffic light of 200 cd and 200 mm (`SIGNAL_INTENS
 
 
 def zenith_luminance(illuminance: float) -> float:
-    """Luminance of the zenith of the CIE standard overcast sky, 9 E / (7 π) [cd/m²].
-
-    Parameters
-    ----------
-    illuminance : float
-        Horizontal illuminance E [lx].
-    """
+    """Luminance of the zenith of the CIE standard overcast sky, 9 E / (7 π) [cd/m²] (`illuminance` [lx])."""
     return 9.0 * illuminance / (7.0 * math.pi)
 
 
 def lamp_radiance(surface: Surface) -> NDArray[np.float64]:
-    """Radiance of a lit lamp's surface per channel [cd/m²]; zero for what is no lamp.
-
-    Parameters
-    ----------
-    surface : Surface
-        The surface.
-    """
+    """Radiance of a lit lamp's surface per channel [cd/m²]; zero for what is no lamp."""
     if surface not in LAMPS:
         return np.zeros(3)
     _, luminance, colour = LAMPS[surface]
@@ -68,13 +56,7 @@ def lamp_radiance(surface: Surface) -> NDArray[np.float64]:
 
 
 def lighting_bits(surface: Surface) -> int:
-    """Bits of `Lamp` any of which lights a surface: −1 for one that is always lit, 0 for what is no lamp.
-
-    Parameters
-    ----------
-    surface : Surface
-        The surface.
-    """
+    """Bits of `Lamp` any of which lights a surface: −1 for one that is always lit, 0 for what is no lamp."""
     if surface == Surface.LAMP_STREET:
         return -1
     return int(LAMPS[surface][0]) if surface in LAMPS else 0

@@ -13,11 +13,6 @@ def clip_from_camera(camera: Camera) -> NDArray[np.float64]:
     """Projection (4, 4) from camera axes to clip coordinates, whose rows run downward like those of an image.
 
     The far plane lies at infinity; pixel (u, v) has its centre at window coordinates (u + 1/2, v + 1/2).
-
-    Parameters
-    ----------
-    camera : Camera
-        The pinhole.
     """
     u0, v0 = camera.principal_point
     projection = np.zeros((4, 4))
@@ -31,30 +26,14 @@ def clip_from_camera(camera: Camera) -> NDArray[np.float64]:
 
 
 def clip_from_offset(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
-    """Projection (4, 4) of offsets from the camera in world axes [m] to clip coordinates.
-
-    Parameters
-    ----------
-    camera : Camera
-        The pinhole.
-    pose : CameraPose
-        Where it is.
-    """
+    """Projection (4, 4) of offsets from the camera in world axes [m] to clip coordinates."""
     turn = np.eye(4)
     turn[:3, :3] = camera_axes(camera, pose)
     return matrix_product(clip_from_camera(camera), turn)
 
 
 def highest_terrain_row(camera: Camera, pose: CameraPose) -> int:
-    """First row of the picture [px] in which any ray points below the horizon; the picture's height if none does.
-
-    Parameters
-    ----------
-    camera : Camera
-        The pinhole.
-    pose : CameraPose
-        Where it is.
-    """
+    """First row of the picture [px] in which any ray points below the horizon; the picture's height if none does."""
     up = ray_from_pixel(camera, pose)[2]
     ends = np.array([-0.5, camera.width - 0.5])
     rows = np.arange(camera.height)[:, None]

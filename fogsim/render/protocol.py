@@ -21,40 +21,13 @@ class Renderer(Protocol):
     """Draws one scene for any camera."""
 
     def set_daylight(self, illuminance: float, sides: SideLight = EVEN_LIGHT) -> None:
-        """Draw by another daylight from now on.
-
-        Parameters
-        ----------
-        illuminance : float
-            Horizontal illuminance of the sky [lx], not negative.
-        sides : SideLight
-            What of it reaches surfaces that are not level.
-        """
+        """Draw by another daylight from now on (`illuminance` [lx])."""
         ...
 
     def render(self, vehicles: Sequence[Batch], camera: Camera, pose: CameraPose, lamplight: bool = False) -> View:
         """Draw the scene and the vehicles as they are now.
 
-        Parameters
-        ----------
-        vehicles : sequence of Batch
-            What moves.
-        camera : Camera
-            The pinhole.
-        pose : CameraPose
-            Where it is.
-        lamplight : bool
-            Whether `View.lamp_response` is wanted.
-
-        Returns
-        -------
-        View
-            Arrays of its own that later frames do not touch.
-
-        Raises
-        ------
-        RenderError
-            If the renderer is closed or belongs to another process.
+        Returns arrays of its own that later frames do not touch.
         """
         ...
 

@@ -35,19 +35,7 @@ class PyrenderReference:
     Distance is pyrender's depth; instance ids are its segmentation; radiance is its colours, 8 bits of them, taken back
     to linear. FogSim's own is the radiance of the sky and of lit lamps, which are brighter than pyrender's white.
 
-    Parameters
-    ----------
-    scene : Scene
-        What stands still.
-    illuminance : float
-        Horizontal illuminance E [lx].
-
-    Raises
-    ------
-    MissingDependencyError
-        If OpenGL or pyrender is missing or does not work.
-    RenderError
-        If this process was forked from one that had drawn.
+    Takes `illuminance` [lx].
     """
 
     def __init__(self, scene: Scene, illuminance: float) -> None:
@@ -63,31 +51,12 @@ class PyrenderReference:
         self._drawer: Any = None
 
     def set_daylight(self, illuminance: float, sides: SideLight = EVEN_LIGHT) -> None:  # noqa: ARG002 - see below
-        """Draw by another daylight from now on; what pyrender draws is a share of it.
-
-        Parameters
-        ----------
-        illuminance : float
-            Horizontal illuminance of the sky [lx], not negative.
-        sides : SideLight
-            Not looked at: pyrender's shapes are lit once, as under an even sky.
-        """
+        """Draw by another daylight from now on; what pyrender draws is a share of it (`illuminance` [lx])."""
         self._white = max(illuminance / np.pi, 1e-6)
         self._zenith = zenith_luminance(illuminance) * np.array(SKY_TINT)
 
     def render(self, vehicles: Sequence[Batch], camera: Camera, pose: CameraPose, lamplight: bool = False) -> View:
-        """Draw the scene and the vehicles (see `Renderer.render`).
-
-        Parameters
-        ----------
-        vehicles, camera, pose, lamplight
-            See `Renderer.render`.
-
-        Raises
-        ------
-        InputError
-            If lamplight is wanted.
-        """
+        """Draw the scene and the vehicles (see `Renderer.render`)."""
         if self._scene is None:
             raise RenderError("this renderer is closed; make a new one")
         if lamplight:
@@ -157,14 +126,7 @@ class PyrenderReference:
 def offscreen_renderer(library: Any, shared: Context, width: int, height: int) -> Any:
     """Make pyrender's renderer in this process's context: the end of one of its own would end all others.
 
-    Parameters
-    ----------
-    library : module
-        pyrender.
-    shared : Context
-        The context.
-    width, height : int
-        Size of pictures [px].
+    Takes `width`, `height` [px].
     """
 
     class Renderer(library.OffscreenRenderer):  # type: ignore[misc]  # pyrender has no types

@@ -35,24 +35,12 @@ _FAR = 1e5  # depth beyond which nothing is seen, which is beyond the terrain [m
 
 
 class Part(NamedTuple):
-    """A node of meshes that show the same thing.
+    """A node of meshes that show the same thing."""
 
-    Attributes
-    ----------
-    node : pyrender.Node
-        The node.
-    instance : int
-        Instance id of what it shows.
-    radiance : (3,) float64 or None
-        Of a lit lamp, its radiance per channel [cd/m²].
-    is_asphalt : bool
-        Whether it is road without paint.
-    """
-
-    node: "pyrender.Node"
-    instance: int
-    radiance: NDArray[np.float64] | None
-    is_asphalt: bool = False
+    node: "pyrender.Node"  # The node
+    instance: int  # Instance id of what it shows
+    radiance: NDArray[np.float64] | None  # (3,): Of a lit lamp, its radiance per channel [cd/m²]
+    is_asphalt: bool = False  # Whether it is road without paint
 
 
 def to_pyrender(
@@ -70,30 +58,8 @@ def to_pyrender(
     pyrender's lights cannot do), and the ambient light is its strength; lines on roads are triangles. There is no fog.
     Of lamps, pyrender lets the four nearest of a kind light each node.
 
-    Parameters
-    ----------
-    scene : Scene
-        What stands still, and the shapes.
-    pose : CameraPose
-        Where the camera is.
-    lights : Lights or None
-        Lamps: each becomes a node, head lamps and street lamps a `SpotLight`, other vehicles' lamps a `PointLight`.
-    vehicles : sequence of Batch
-        What moves.
-    camera : Camera or None
-        The pinhole; None for one of 1280 × 720 px and 58° across.
-    illuminance : float
-        Horizontal illuminance of the daylight E [lx], not negative.
-
-    Returns
-    -------
-    pyrender.Scene
-        With linear luminance 1 for that of a white surface in daylight, E/π, or for 5 cd/m² if that is more.
-
-    Raises
-    ------
-    MissingDependencyError
-        If pyrender or OpenGL cannot be loaded.
+    Returns with linear luminance 1 for that of a white surface in daylight, E/π, or for 5 cd/m² if that is more. Takes
+    `illuminance` [lx].
     """
     library = load_pyrender()
     white = max(illuminance / math.pi, _DARKEST_WHITE)
@@ -109,13 +75,7 @@ def to_pyrender(
 
 
 def load_pyrender() -> Any:
-    """Import pyrender, for drawing off-screen where there is no display and nothing else is asked for.
-
-    Raises
-    ------
-    MissingDependencyError
-        If it cannot be loaded.
-    """
+    """Import pyrender, for drawing off-screen where there is no display and nothing else is asked for."""
     if "OpenGL" not in sys.modules and not os.environ.get("DISPLAY") and sys.platform.startswith("linux"):
         from fogsim.render.opengl.context import choose_platform  # noqa: PLC0415 - only where it is needed
 
@@ -135,14 +95,7 @@ def load_pyrender() -> Any:
 def empty_scene(library: Any, illuminance: float, white: float) -> Any:
     """A scene with nothing but daylight: ambient light, and the sky just above the horizon as its background.
 
-    Parameters
-    ----------
-    library : module
-        pyrender.
-    illuminance : float
-        Horizontal illuminance [lx].
-    white : float
-        Luminance that is drawn as 1 [cd/m²].
+    Takes `illuminance` [lx], `white` [cd/m²].
     """
     sky = min(zenith_luminance(illuminance) / 3.0 / white, 1.0) ** (1.0 / GAMMA)
     ambient = illuminance / math.pi / white
@@ -150,15 +103,7 @@ def empty_scene(library: Any, illuminance: float, white: float) -> Any:
 
 
 def pinhole(library: Any, camera: Camera) -> Any:
-    """Pyrender's camera, whose pixel centres lie at halves and not at integers.
-
-    Parameters
-    ----------
-    library : module
-        pyrender.
-    camera : Camera
-        The pinhole.
-    """
+    """Pyrender's camera, whose pixel centres lie at halves and not at integers."""
     (u0, v0), focal = camera.principal_point, camera.focal_length
     return library.IntrinsicsCamera(focal, focal, u0 + 0.5, v0 + 0.5, znear=NEAR, zfar=_FAR)
 
@@ -166,34 +111,14 @@ def pinhole(library: Any, camera: Camera) -> Any:
 def camera_matrix(camera: Camera | None, pose: CameraPose) -> NDArray[np.float64]:
     """From axes right, up and back of a camera to the world.
 
-    Parameters
-    ----------
-    camera : Camera or None
-        The pinhole; None for the default of `to_pyrender`.
-    pose : CameraPose
-        Where it is.
-
-    Returns
-    -------
-    (4, 4) float64
-        The matrix.
+    Returns the matrix (4, 4).
     """
     right, down, forward = camera_axes(camera or _CAMERA, pose)
     return _matrix((right, -down, -forward), pose.position)
 
 
 def still_parts(library: Any, scene: Scene, white: float) -> Iterator[Part]:
-    """Nodes of what stands still.
-
-    Parameters
-    ----------
-    library : module
-        pyrender.
-    scene : Scene
-        The scene.
-    white : float
-        Luminance that is drawn as 1 [cd/m²].
-    """
+    """Nodes of what stands still (`white` [cd/m²])."""
     ground = scene.ground
     kinds = np.column_stack((ground.instance, ground.surface))[ground.faces[:, 0]]
     for instance, surface in np.unique(kinds, axis=0).tolist():
@@ -247,18 +172,7 @@ def _tiled(terrain: Mesh, middle: NDArray[np.float64]) -> Mesh:
 def copied_parts(library: Any, scene: Scene, batches: Sequence[Batch], white: float, name: str) -> Iterator[Part]:
     """Nodes of copies of shapes: one for the copies that look alike, and one more for each kind of lamp that is lit.
 
-    Parameters
-    ----------
-    library : module
-        pyrender.
-    scene : Scene
-        Has the shapes.
-    batches : sequence of Batch
-        The copies.
-    white : float
-        Luminance that is drawn as 1 [cd/m²].
-    name : str
-        What the nodes' names begin with.
+    Takes `white` [cd/m²].
     """
     for batch in batches:
         looks = np.column_stack((batch.instance, batch.lamps, batch.paint))

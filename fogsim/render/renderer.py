@@ -21,22 +21,7 @@ _CELL = 120.0  # side of the squares in which copies are culled together [m]
 
 
 class SceneRenderer:
-    """Draws a scene in overcast daylight, with one sample a pixel and without clamping.
-
-    Parameters
-    ----------
-    scene : Scene
-        What stands still; its triangles of TERRAIN stand for one level plane without an edge.
-    illuminance : float
-        Horizontal illuminance E [lx].
-    make_rasteriser : callable
-        Makes what finds the triangle that each pixel sees.
-
-    Raises
-    ------
-    MissingDependencyError
-        If the rasteriser needs a library that is not there.
-    """
+    """Draws a scene in overcast daylight, with one sample a pixel and without clamping (`illuminance` [lx])."""
 
     def __init__(self, scene: Scene, illuminance: float, make_rasteriser: Callable[[MeshTable], Rasteriser]) -> None:
         ground = split_ground(scene.ground)
@@ -54,25 +39,11 @@ class SceneRenderer:
         self._chosen = _room(0)
 
     def set_daylight(self, illuminance: float, sides: SideLight = EVEN_LIGHT) -> None:
-        """Draw by another daylight from now on.
-
-        Parameters
-        ----------
-        illuminance : float
-            Horizontal illuminance of the sky [lx], not negative.
-        sides : SideLight
-            What of it reaches surfaces that are not level.
-        """
+        """Draw by another daylight from now on (`illuminance` [lx])."""
         self._shading.set_daylight(illuminance, sides)
 
     def render(self, vehicles: Sequence[Batch], camera: Camera, pose: CameraPose, lamplight: bool = False) -> View:
-        """Draw the scene and the vehicles (see `Renderer.render`).
-
-        Parameters
-        ----------
-        vehicles, camera, pose, lamplight
-            See `Renderer.render`.
-        """
+        """Draw the scene and the vehicles (see `Renderer.render`)."""
         if self._rasteriser is None:
             raise RenderError("this renderer is closed; make a new one")
         drawing = self._drawing(vehicles, camera, pose)

@@ -15,15 +15,7 @@ _REFLECTANCE, _ALONG, _ACROSS, _HALF_WIDTH, _LINES = slice(6, 9), 9, 10, 11, 12 
 def painted_road(road: Mesh) -> Mesh:
     """Cut painted lines out of a road, so that they are triangles with a reflectance of their own.
 
-    Parameters
-    ----------
-    road : Mesh
-        Triangles of ROAD, all with the same instance id.
-
-    Returns
-    -------
-    Mesh
-        The same surface; no triangles share vertices.
+    Returns the same surface; no triangles share vertices.
     """
     columns = (road.positions, road.normals, road.reflectance, road.road)
     rest = np.concatenate(columns, axis=1).astype(np.float64)[road.faces]

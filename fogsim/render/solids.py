@@ -9,16 +9,8 @@ from fogsim.values.scene import Mesh
 def in_solids(mesh: Mesh) -> NDArray[np.bool_]:
     """Find the triangles that belong to closed solids.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        Any; corners of a solid's triangles run counter-clockwise seen from outside.
-
-    Returns
-    -------
-    (m,) bool
-        For each triangle whether every edge of it and of all that hang together with it has one other triangle on its
-        other side, and they enclose what lies behind them.
+    Returns for each triangle whether every edge of it and of all that hang together with it has one other triangle on
+    its other side, and they enclose what lies behind them (m,) bool.
     """
     if not len(mesh.faces):
         return np.zeros(0, np.bool_)

@@ -20,13 +20,7 @@ _AHEAD = 20.0  # how far before the camera lies what the viewer turns about [m]
 
 
 def require_display() -> None:
-    """Make sure that there is a display to open a window on.
-
-    Raises
-    ------
-    InputError
-        If there is none, and what to do then.
-    """
+    """Make sure that there is a display to open a window on."""
     if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
         raise InputError(
             "there is no display here to open a window on (DISPLAY is not set): --out FILE.png writes what the window "
@@ -35,24 +29,7 @@ def require_display() -> None:
 
 
 def open_viewer(scene: "pyrender.Scene", size: tuple[int, int], title: str) -> None:
-    """Open a scene in pyrender's viewer; comes back when the window is closed.
-
-    Parameters
-    ----------
-    scene : pyrender.Scene
-        From `to_pyrender`.
-    size : tuple of int
-        Width and height of the window [px].
-    title : str
-        Its title.
-
-    Raises
-    ------
-    InputError
-        If there is no display.
-    RenderError
-        If no window can be opened there.
-    """
+    """Open a scene in pyrender's viewer; comes back when the window is closed (`size` [px])."""
     require_display()
     eye = scene.get_pose(scene.main_camera_node)
     try:
@@ -75,22 +52,7 @@ def open_viewer(scene: "pyrender.Scene", size: tuple[int, int], title: str) -> N
 def first_picture(scene: "pyrender.Scene", size: tuple[int, int]) -> NDArray[np.uint8]:
     """Draw what the viewer shows first, without a display.
 
-    Parameters
-    ----------
-    scene : pyrender.Scene
-        From `to_pyrender`.
-    size : tuple of int
-        Width and height [px].
-
-    Returns
-    -------
-    (rows, cols, 3) uint8
-        Colours, encoded with 1/2.2.
-
-    Raises
-    ------
-    MissingDependencyError
-        If OpenGL or pyrender does not work here.
+    Returns colours, encoded with 1/2.2 (rows, cols, 3) uint8. Takes `size` [px].
     """
     shared = context()
     drawer = offscreen_renderer(load_pyrender(), shared, *size)

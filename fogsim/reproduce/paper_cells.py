@@ -15,39 +15,20 @@ _SIGNS = {"equal": "", "at_most": "≤ ", "at_least": "≥ "}
 
 @dataclass(frozen=True, slots=True)
 class PaperCell:
-    """One published figure, and what FogSim's frames give in its place.
+    """One published figure, and what FogSim's frames give in its place."""
 
-    Attributes
-    ----------
-    place : str
-        Where the paper has it, such as "table 5.1".
-    row, column : str
-        What it is about, with units.
-    paper : float
-        The published figure; infinite where the paper prints ∞.
-    as_published : float or None
-        Result of the method as its authors describe it; None where it gives no valid estimate.
-    corrected : float or None
-        Result of the default method, with repairs; None where it gives no valid estimate.
-    claim : {"equal", "at_most", "at_least"}
-        Whether the paper states a value or a limit.
-    tolerance : float
-        Largest deviation that counts as reached: relative for values, 0 for limits; in the figure's unit if `absolute`.
-    absolute : bool
-        Whether the tolerance is in the figure's own unit, as for shares in percent.
-    truth : float or None
-        What was estimated, if known: a corrected result no farther from it than the published one is reached, too.
-    """
-
-    place: str
+    place: str  # Where the paper has it, such as "table 5.1"
+    # row, column: what it is about, with units
     row: str
     column: str
-    paper: float
-    as_published: float | None
-    corrected: float | None
-    claim: Literal["equal", "at_most", "at_least"] = "equal"
+    paper: float  # The published figure; infinite where the paper prints ∞
+    as_published: float | None  # Result of the method as its authors describe it; None where it gives no valid estimate
+    corrected: float | None  # Result of the default method, with repairs; None where it gives no valid estimate
+    claim: Literal["equal", "at_most", "at_least"] = "equal"  # Whether the paper states a value or a limit
+    # Largest deviation that counts as reached: relative for values, 0 for limits; in the figure's unit if `absolute`
     tolerance: float = 0.1
-    absolute: bool = False
+    absolute: bool = False  # Whether the tolerance is in the figure's own unit, as for shares in percent
+    # What was estimated, if known: a corrected result no farther from it than the published one is reached, too
     truth: float | None = None
 
     def agrees(self, ours: float | None) -> bool:
@@ -102,13 +83,7 @@ def reached_counts(cells: Sequence[PaperCell]) -> tuple[int, int]:
 
 
 def chosen_tables(known: Sequence[str], table: str | None) -> tuple[str, ...]:
-    """Tables of a paper that are run: all by default.
-
-    Raises
-    ------
-    InputError
-        If the paper has no such table.
-    """
+    """Tables of a paper that are run: all by default."""
     if table is not None and not known:
         raise InputError(f"table {table}: this evaluation has no numbered tables, so none can be chosen")
     if table is not None and table not in known:

@@ -51,36 +51,20 @@ class TitledTable:
 
 @dataclass(frozen=True, slots=True)
 class Reproduction:
-    """A paper's evaluation on our frames.
+    """A paper's evaluation on our frames."""
 
-    Attributes
-    ----------
-    paper : str
-        Its name.
-    records : tuple of mappings
-        One flat record for each case: what was set, what each variant of the method found; None where it cannot tell.
-    table : tuple of tuples of str
-        What is shown: the headings, then the rows; the paper's figure stands beside ours. The first of `tables`, if
-        there are several.
-    notes : tuple of str
-        What the paper leaves open, and where and why we do not reach it.
-    picture : (rows, cols, 3) uint8
-        A picture like the paper's.
-    tables : tuple of TitledTable
-        All tables, of a paper that has several.
-    sweeps : tuple of mappings
-        Further records: what becomes of the method where the paper leaves something open, or a repair is left out.
-    cells : tuple of PaperCell
-        Every figure of the paper's evaluation that can be compared, whether it is reached or not.
-    """
-
-    paper: str
+    paper: str  # Its name
+    # One flat record for each case: what was set, what each variant of the method found; None where it cannot tell
     records: tuple[Mapping[str, Cell], ...]
+    # What is shown: the headings, then the rows; the paper's figure stands beside ours. The first of `tables`, if there
+    # are several
     table: Rows
-    notes: tuple[str, ...]
-    picture: NDArray[np.uint8]
-    tables: tuple[TitledTable, ...] = ()
+    notes: tuple[str, ...]  # What the paper leaves open, and where and why we do not reach it
+    picture: NDArray[np.uint8]  # (rows, cols, 3) uint8: A picture like the paper's
+    tables: tuple[TitledTable, ...] = ()  # All tables, of a paper that has several
+    # Further records: what becomes of the method where the paper leaves something open, or a repair is left out
     sweeps: tuple[Mapping[str, Cell], ...] = ()
+    # Every figure of the paper's evaluation that can be compared, whether it is reached or not
     cells: tuple[PaperCell, ...] = ()
 
     @property

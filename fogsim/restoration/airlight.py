@@ -30,19 +30,7 @@ def horizon_airlight(pixels: Pixels, camera: Camera, full: int) -> Light:
 
     The median of the brightest third of each band, of each channel.
 
-    Parameters
-    ----------
-    pixels : (rows, cols, channels) uint8 or uint16
-        Pixel values.
-    camera : Camera
-        The assumed calibration. Where its horizon is above the image, the uppermost rows are taken.
-    full : int
-        Largest pixel value.
-
-    Returns
-    -------
-    (channels,) float64
-        Light relative to full scale.
+    Returns light relative to full scale (channels,). Takes `pixels` (rows, cols, channels) uint8.
     """
     rows = pixels.shape[0]
     bottom = round(min(max(camera.horizon_row, BAND * rows), rows))
@@ -66,11 +54,6 @@ def dark_channel_airlight(pixels: Pixels, camera: Camera, full: int) -> Light:
 
     He, Sun & Tang 2011 (IEEE TPAMI 33(12), section 4.4), on means of blocks of 4 × 4 pixels and neighbourhoods of 4 × 4
     of them, since single pixels are noise.
-
-    Parameters
-    ----------
-    pixels, camera, full
-        As of `horizon_airlight`.
     """
     rows, cols = max(pixels.shape[0] // SIDE, 1), max(pixels.shape[1] // SIDE, 1)
     light = _blocks(pixels, camera, full)

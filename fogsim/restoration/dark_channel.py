@@ -25,15 +25,7 @@ def dark_channel(picture: FoggyPicture) -> Floats:
     The paper works on pixel values and bounds the gain by t₀ = 0.1; here it is light, as the law has it, and the bound
     is the picture's `most_gain`. The transmission is refined by the guided filter of the same authors.
 
-    Parameters
-    ----------
-    picture : FoggyPicture
-        The picture; its calibration is not used but for the response.
-
-    Returns
-    -------
-    (rows, cols) float32
-        Transmission.
+    Returns transmission (rows, cols).
     """
     tables = picture.relative_tables()
     light = light_kernels.relative_light(picture.pixels, tables)
@@ -45,12 +37,6 @@ def dark_channel(picture: FoggyPicture) -> Floats:
 
 
 def least_channel(light: Floats) -> Floats:
-    """Smallest channel of each pixel, (rows, cols).
-
-    Parameters
-    ----------
-    light : (rows, cols, channels) float32
-        Light.
-    """
+    """Smallest channel of each pixel, (rows, cols) (`light` (rows, cols, channels))."""
     # Along the short last axis numpy's own minimum takes ten times as long.
     return np.asarray(np.minimum.reduce([light[..., channel] for channel in range(light.shape[2])]))

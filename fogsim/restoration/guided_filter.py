@@ -10,32 +10,14 @@ Floats = NDArray[np.float32]
 def guided_filter(guide: Floats, source: Floats, radius: int, regulariser: float) -> Floats:
     """Filter an image by a grey guide (He, Sun & Tang 2010, ECCV, eqs. 4–8).
 
-    Parameters
-    ----------
-    guide, source : (rows, cols) float32
-        The guide and what is filtered.
-    radius : int
-        Of the square windows, which are 2 r + 1 wide [px].
-    regulariser : float
-        ε: variance of the guide above which there is an edge.
-
-    Returns
-    -------
-    (rows, cols) float32
-        The filtered image.
+    Returns the filtered image (rows, cols). Takes `guide`, `source` (rows, cols), `radius` [px].
     """
     slope, offset = guided_coefficients(guide, source, radius, regulariser)
     return slope * guide + offset
 
 
 def guided_coefficients(guide: Floats, source: Floats, radius: int, regulariser: float) -> tuple[Floats, Floats]:
-    """Coefficients a and b of the guided filter's q = a I + b, averaged over windows.
-
-    Parameters
-    ----------
-    guide, source, radius, regulariser
-        As of `guided_filter`.
-    """
+    """Coefficients a and b of the guided filter's q = a I + b, averaged over windows."""
     mean_guide, mean_source = box_mean(guide, radius), box_mean(source, radius)
     covariance = box_mean(guide * source, radius) - mean_guide * mean_source
     variance = box_mean(guide * guide, radius) - mean_guide * mean_guide
@@ -44,14 +26,6 @@ def guided_coefficients(guide: Floats, source: Floats, radius: int, regulariser:
 
 
 def box_mean(image: Floats, radius: int) -> Floats:
-    """Mean over square windows, of what of them is within the image.
-
-    Parameters
-    ----------
-    image : (rows, cols) float32
-        Values.
-    radius : int
-        The windows are 2 r + 1 wide [px].
-    """
+    """Mean over square windows, of what of them is within the image (`image` (rows, cols), `radius` [px])."""
     side = (2 * radius + 1, 2 * radius + 1)
     return np.asarray(cv2.boxFilter(image, cv2.CV_32F, side, borderType=cv2.BORDER_REFLECT), np.float32)

@@ -15,22 +15,16 @@ Floats = NDArray[np.float32]
 
 
 class Smoothing(NamedTuple):
-    """What is smoothed where the gain is large: luminance toward its mean, colours toward grey.
+    """What is smoothed where the gain is large: luminance toward its mean, colours toward grey."""
 
-    Attributes
-    ----------
-    luminance, mean, square : (rows, cols) float32
-        Luminance relative to the airlight, and means of it and of its square over windows; (0, 0) without smoothing.
-    noise : float32
-        Variance of the luminance that is taken for noise where nothing comes through; 0 smooths nothing.
-    colour : float32
-        How many times that, in the sum of the channels' squared differences to the luminance, is noise of colour.
-    """
-
+    # luminance, mean, square (rows, cols): luminance relative to the airlight, and means of it and of its square over
+    # windows; (0, 0) without smoothing
     luminance: Floats
     mean: Floats
     square: Floats
+    # Variance of the luminance that is taken for noise where nothing comes through; 0 smooths nothing
     noise: np.float32
+    # How many times that, in the sum of the channels' squared differences to the luminance, is noise of colour
     colour: np.float32
 
 
@@ -38,12 +32,7 @@ class Smoothing(NamedTuple):
 def relative_light(pixels: Pixels, tables: Floats) -> Floats:
     """Light relative to the airlight, (rows, cols, channels) float32.
 
-    Parameters
-    ----------
-    pixels : (rows, cols, channels) uint8 or uint16
-        Pixel values.
-    tables : (channels, levels) float32
-        Light of each value.
+    Takes `pixels` (rows, cols, channels) uint8, `tables` (channels, levels).
     """
     rows, cols, channels = pixels.shape
     out = np.empty((rows, cols, channels), np.float32)
@@ -58,14 +47,7 @@ def relative_light(pixels: Pixels, tables: Floats) -> Floats:
 def least_block_means(pixels: Pixels, tables: Floats, side: int) -> Floats:
     """Smallest channel of the mean relative light of square blocks, (rows // side, cols // side) float32.
 
-    Parameters
-    ----------
-    pixels : (rows, cols, channels) uint8 or uint16
-        Pixel values.
-    tables : (channels, levels) float32
-        Light of each value.
-    side : int
-        Of a block [px].
+    Takes `pixels` (rows, cols, channels) uint8, `tables` (channels, levels), `side` [px].
     """
     rows, cols, channels = pixels.shape[0] // side, pixels.shape[1] // side, pixels.shape[2]
     out = np.empty((rows, cols), np.float32)
@@ -90,12 +72,7 @@ def least_block_means(pixels: Pixels, tables: Floats, side: int) -> Floats:
 def luminance(pixels: Pixels, tables: Floats) -> Floats:
     """Weighted sum of the channels' light, (rows, cols) float32.
 
-    Parameters
-    ----------
-    pixels : (rows, cols, channels) uint8 or uint16
-        Pixel values.
-    tables : (channels, levels) float32
-        What each value adds.
+    Takes `pixels` (rows, cols, channels) uint8, `tables` (channels, levels).
     """
     rows, cols, channels = pixels.shape
     out = np.empty((rows, cols), np.float32)
@@ -112,17 +89,7 @@ def luminance(pixels: Pixels, tables: Floats) -> Floats:
 def restored_light(pixels: Pixels, tables: Floats, transmission: Floats, smoothing: Smoothing, stride: int) -> Floats:
     """Koschmieder's law undone, relative to the airlight, of every so manyeth pixel of every so manyeth row.
 
-    Parameters
-    ----------
-    pixels, tables, transmission, smoothing
-        As of `restored_pixels`.
-    stride : int
-        From one pixel to the next [px].
-
-    Returns
-    -------
-    (rows / stride, cols / stride, channels) float32
-        1 + (I − 1) / t.
+    Returns 1 + (I − 1) / t. Takes `stride` [px].
     """
     rows, cols, channels = pixels.shape
     out = np.empty(((rows + stride - 1) // stride, (cols + stride - 1) // stride, channels), np.float32)
@@ -151,20 +118,8 @@ def restored_pixels(
 ) -> Pixels:
     """Koschmieder's law undone, in pixel values, (rows, cols, channels) of the dtype of `values`.
 
-    Parameters
-    ----------
-    pixels : (rows, cols, channels) uint8 or uint16
-        Pixel values.
-    tables : (channels, levels) float32
-        Light I of each value, relative to the airlight.
-    transmission : (rows, cols) float32
-        t > 0.
-    smoothing : Smoothing
-        What is smoothed.
-    scale : (channels,) float32
-        Entries of `values` in the light of the airlight.
-    values : (steps,) uint8 or uint16
-        Pixel values of light; what is beyond is taken to its ends.
+    Takes `pixels` (rows, cols, channels) uint8, `tables` (channels, levels), `transmission` (rows, cols), `scale`
+    (channels,), `values` (steps,) uint8.
     """
     rows, cols, channels = pixels.shape
     out = np.empty((rows, cols, channels), values.dtype)

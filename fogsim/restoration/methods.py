@@ -14,24 +14,15 @@ from fogsim.values.camera import Camera
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """A method of contrast restoration.
+    """A method of contrast restoration."""
 
-    Attributes
-    ----------
-    transmission : callable
-        Gives the transmission (rows, cols) of a picture, which is then undone.
-    airlight : callable
-        Finds the airlight of pixels of a camera and its largest pixel value, where none is given.
-    needs_extinction : bool
-        Whether it reckons with an extinction coefficient; the others find the veil in the picture.
-    smooths : bool
-        Whether noise is smoothed before it is amplified.
-    """
-
+    # Gives the transmission (rows, cols) of a picture, which is then undone
     transmission: Callable[[FoggyPicture], Floats]
+    # Finds the airlight of pixels of a camera and its largest pixel value, where none is given
     airlight: Callable[[Pixels, Camera, int], Light]
+    # Whether it reckons with an extinction coefficient; the others find the veil in the picture
     needs_extinction: bool = False
-    smooths: bool = False
+    smooths: bool = False  # Whether noise is smoothed before it is amplified
 
 
 METHODS: Registry[Method] = Registry(

@@ -45,30 +45,14 @@ class Restoration:
 
 @dataclass(frozen=True, slots=True)
 class FoggyPicture:
-    """A picture as the methods read it.
+    """A picture as the methods read it."""
 
-    Attributes
-    ----------
-    pixels : (rows, cols, channels) uint8 or uint16
-        Pixel values, contiguous.
-    camera : Camera
-        The assumed calibration.
-    full : float
-        Largest pixel value.
-    airlight : (channels,) float64
-        Light of the airlight, relative to full scale.
-    extinction : float or None
-        Extinction coefficient k [1/m], for methods that reckon with it.
-    most_gain : float
-        Most by which light, and so noise, may be amplified [-].
-    """
-
-    pixels: Pixels
-    camera: Camera
-    full: float
-    airlight: Light
-    extinction: float | None
-    most_gain: float
+    pixels: Pixels  # (rows, cols, channels) uint8: Pixel values, contiguous
+    camera: Camera  # The assumed calibration
+    full: float  # Largest pixel value
+    airlight: Light  # (channels,): Light of the airlight, relative to full scale
+    extinction: float | None  # Extinction coefficient k [1/m], for methods that reckon with it
+    most_gain: float  # Most by which light, and so noise, may be amplified [-]
 
     def relative_tables(self) -> Floats:
         """Light of each pixel value relative to the airlight, (channels, levels)."""
@@ -80,19 +64,7 @@ class FoggyPicture:
 def light_table(response: Response, full: int, black_level: float) -> Light:
     """Light behind each pixel value, relative to full scale.
 
-    Parameters
-    ----------
-    response : Response
-        Of the camera.
-    full : int
-        Largest pixel value.
-    black_level : float
-        Share of full scale at which the sensor reads no light [-].
-
-    Returns
-    -------
-    (full + 1,) float64
-        Read-only.
+    Returns read-only (full + 1,).
     """
     table = exposure_of(np.arange(full + 1) / full, response, black_level)
     table.flags.writeable = False
@@ -115,15 +87,7 @@ def _values_of(light: Light, response: Response, full: int, black_level: float) 
 
 
 def written_values(picture: FoggyPicture, curve: ToneCurve | None = None) -> Pixels:
-    """Pixel value of each step of light from none to full scale, as the picture's camera would have written it.
-
-    Parameters
-    ----------
-    picture : FoggyPicture
-        The picture.
-    curve : callable or None
-        What is made of the light before it is written.
-    """
+    """Pixel value of each step of light from none to full scale, as the picture's camera would have written it."""
     full, camera = int(picture.full), picture.camera
     if curve is None:
         return _pixel_table(camera.response, full, camera.black_level)
@@ -132,20 +96,7 @@ def written_values(picture: FoggyPicture, curve: ToneCurve | None = None) -> Pix
 
 
 def largest_value(image: Pixels, camera: Camera) -> float:
-    """Largest pixel value that an image can have.
-
-    Parameters
-    ----------
-    image : array of uint8 or uint16
-        Pixel values.
-    camera : Camera
-        Its bit depth, for images of 16 bits; one of 8 uses all 16.
-
-    Raises
-    ------
-    InputError
-        If the camera has more bits than the image, or the image values beyond the camera's.
-    """
+    """Largest pixel value that an image can have."""
     if image.dtype == np.uint8:
         if camera.bits > 8:
             raise InputError(f"the image has 8 bits, the camera {camera.bits}; they must be the same")

@@ -37,20 +37,7 @@ def planar(picture: FoggyPicture) -> Floats:
     roll. A pixel that is darker than the veil before the road there is nearer than the road, t ≥ 1 − I / A; a run of
     such up a column of blocks has the d of its foot. The bound on the gain is soft, t = √(e^(−2kd) + 1 / most_gain²).
 
-    Parameters
-    ----------
-    picture : FoggyPicture
-        The picture, with an extinction.
-
-    Returns
-    -------
-    (rows, cols) float32
-        Transmission.
-
-    Raises
-    ------
-    InputError
-        If the extinction is missing.
+    Returns transmission (rows, cols).
     """
     if picture.extinction is None:
         raise InputError("planar restores by an extinction coefficient k [1/m], and none is given")
@@ -89,15 +76,7 @@ def _road_luminance(light: Floats, road: Floats) -> float:
 def road_distance(camera: Camera) -> tuple[Floats, Floats]:
     """Distance along the rays to a flat road, of pixels and of blocks of them.
 
-    Parameters
-    ----------
-    camera : Camera
-        The assumed calibration; its mount height, pitch and roll tell where the road is.
-
-    Returns
-    -------
-    tuple of (rows, cols) float32 and (rows // 4, cols // 4) float32
-        Distances [m], read-only; `FARTHEST` at and above the horizon.
+    Returns distances [m], read-only; `FARTHEST` at and above the horizon (rows, cols).
     """
     whole = _distance(camera, np.arange(camera.height, dtype=np.float64), np.arange(camera.width, dtype=np.float64))
     rows, cols = (

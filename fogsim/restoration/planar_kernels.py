@@ -21,24 +21,7 @@ def standing_transmission(
     Restored as road, what stands on it becomes darker the farther the road behind it is. A run of such pixels up a
     column stands where the lowest of them is, if some pixel of it comes out darker than black.
 
-    Parameters
-    ----------
-    light : (rows, cols) float32
-        Light relative to the airlight, the smallest channel.
-    plane : (rows, cols) float32
-        Transmission of the road, at least `least`.
-    distance : (rows, cols) float32
-        Distance of the road [m].
-    tall : float
-        Rows of 1 m at 1 m distance over which a run may be bright: a vehicle's boot between shadow and window [px·m].
-    least : float
-        Least transmission [-].
-    road : float
-        Luminance of the road relative to the airlight [-].
-    dark : float
-        Share of that below which a pixel may be the foot of something [-].
-    sure : float
-        How far below black a pixel must come out, relative to the airlight [-].
+    Takes `light` (rows, cols), `plane` (rows, cols), `distance` (rows, cols) [m], `tall` [px·m].
     """
     rows, cols = light.shape
     out = np.zeros((rows, cols), np.float32)
@@ -82,20 +65,8 @@ def bounded_transmission(
 
     The bound is soft, √(t² + t_min²): where it is hard, the road ends in an edge across it.
 
-    Parameters
-    ----------
-    pixels : (rows, cols, channels) uint8 or uint16
-        Pixel values.
-    tables : (channels, levels) float32
-        Light of each value, relative to the airlight.
-    plane : (rows, cols) float32
-        Transmission of the road.
-    standing : (rows, cols) float32
-        By how much that of what stands there is more; where a pixel comes out as bright as the road, it is road beside.
-    least : float
-        Least transmission t_min [-].
-    road : float
-        Luminance of the road relative to the airlight [-].
+    Takes `pixels` (rows, cols, channels) uint8, `tables` (channels, levels), `plane` (rows, cols), `standing` (rows,
+    cols).
     """
     rows, cols, channels = pixels.shape
     out = np.empty((rows, cols), np.float32)

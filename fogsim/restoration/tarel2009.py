@@ -27,15 +27,7 @@ def tarel2009(picture: FoggyPicture) -> Floats:
     airlight, which is the papers' white balance; their medians are taken of 8 bits; their smoothing and tone map are
     left out.
 
-    Parameters
-    ----------
-    picture : FoggyPicture
-        The picture.
-
-    Returns
-    -------
-    (rows, cols) float32
-        Transmission 1 − V.
+    Returns transmission 1 − V (rows, cols).
     """
     tables = picture.relative_tables()
     least = least_channel(light_kernels.relative_light(picture.pixels, tables))

@@ -16,17 +16,10 @@ counts as that [-]."""
 def tone_curve(light: Floats, transmission: Floats, picture: FoggyPicture) -> ToneCurve:
     """Curve that brings out what the fog lets through: L (1 + L / L_w²) / (1 + L) (Reinhard et al. 2002, eq. 4).
 
-    L is light over its logarithmic mean, times 0.18. Unlike the paper's, the mean is weighted by transmission: the
-    sky and what the fog has hidden, which are brighter than all else, do not make the road black.
+    L is light over its logarithmic mean, times 0.18. Unlike the paper's, the mean is weighted by transmission: the sky
+    and what the fog has hidden, which are brighter than all else, do not make the road black.
 
-    Parameters
-    ----------
-    light : (rows, cols, channels) float32
-        Restored light relative to the airlight, of some of the pixels.
-    transmission : (rows, cols) float32
-        Of each of them [-].
-    picture : FoggyPicture
-        The picture that it was restored from.
+    Takes `light` (rows, cols, channels), `transmission` (rows, cols).
     """
     some = light.astype(np.float64) * picture.airlight
     luminance = some[..., 0] if some.shape[2] == 1 else (some * LUMINANCE_WEIGHTS).sum(axis=2)

@@ -20,22 +20,7 @@ scatter, and three channels have more of it than their mean. Chosen on pool 0 of
 def without_veil(picture: FoggyPicture, transmission: Floats, *, smooths: bool, tone_map: bool) -> Pixels:
     """Undo Koschmieder's law, R = A + (I − A) / t, in pixel values.
 
-    Parameters
-    ----------
-    picture : FoggyPicture
-        The picture.
-    transmission : (rows, cols) float32
-        t > 0.
-    smooths : bool
-        Whether luminance is smoothed by local statistics (Lee 1980, IEEE TPAMI 2(2), eqs. 5–7) and colour shrunk where
-        they drown in noise, the more the less light comes through.
-    tone_map : bool
-        Whether tones are made to be looked at (`fogsim.restoration.tone_map`).
-
-    Returns
-    -------
-    (rows, cols, channels) uint8 or uint16
-        Like the picture's.
+    Returns like the picture's (rows, cols, channels) uint8. Takes `transmission` (rows, cols).
     """
     tables = picture.relative_tables()
     smoothing = _smoothing(picture, tables, transmission) if smooths else _no_smoothing()

@@ -9,13 +9,7 @@ from fogsim.values import Display, Stretch, StretchAdvice
 
 
 def driver_sight(scenario: Scenario) -> DriverSight | None:
-    """Eyes of the drivers; None if they see through the fog.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """Eyes of the drivers; None if they see through the fog."""
     drivers = scenario.drivers
     if drivers.see_through_fog:
         return None
@@ -28,13 +22,7 @@ def driver_sight(scenario: Scenario) -> DriverSight | None:
 
 
 def driver_setup(scenario: Scenario) -> DriverSetup:
-    """How drivers choose their speed and follow advice.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """How drivers choose their speed and follow advice."""
     drivers = scenario.drivers
     compliance, given = _compliance(drivers.compliance), drivers.compliance_by_display
     by_display = {
@@ -66,14 +54,6 @@ def _compliance(written: ComplianceSection) -> Compliance:
 
 
 def stretch_advice(scenario: Scenario, speed: float) -> StretchAdvice:
-    """Advice to all on the scenario's advised stretch.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    speed : float
-        Advised speed [m/s].
-    """
+    """Advice to all on the scenario's advised stretch (`speed` [m/s])."""
     stretch = scenario.drivers.advised_stretch
     return StretchAdvice(speed, Stretch(stretch.start_m, stretch.end_m, scenario.traffic.along), stretch.display)

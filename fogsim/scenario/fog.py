@@ -224,19 +224,7 @@ class Fog(Section):
 def fog_along(
     fog: Fog, airlight: tuple[float, float, float], route: NDArray[np.float64], tunnels: Sequence[Tunnel] = ()
 ) -> FogField:
-    """Fog laid along a route.
-
-    Parameters
-    ----------
-    fog : Fog
-        What the scenario says.
-    airlight : tuple of float
-        Airlight near the ground per channel [cd/m²].
-    route : (n, 3) float64
-        Polyline along the route [m].
-    tunnels : sequence of Tunnel
-        Tunnels that keep it out.
-    """
+    """Fog laid along a route (`airlight` [cd/m²], `route` (n, 3) [m])."""
     visibility = fog.visibility_m if fog.visibility_m is not None else fog.outside_visibility_m
     outside = extinction_from_visibility(math.inf if visibility is None else visibility)
     ground = float(route[:, 2].min())

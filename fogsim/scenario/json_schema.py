@@ -54,13 +54,7 @@ def scenario_json_schema() -> dict[str, Any]:
 
 
 def json_schema(model: type[BaseModel]) -> dict[str, Any]:
-    """JSON Schema of a file, with every way to write its values: with a unit, in per cent, or as a name of ``vary``.
-
-    Parameters
-    ----------
-    model : type
-        The file's schema.
-    """
+    """JSON Schema of a file, with every way to write its values: with a unit, in per cent, or as a name of ``vary``."""
     schema = model.model_json_schema()
     blocks = [schema, *schema.get("$defs", {}).values()]
     for block in blocks:

@@ -22,15 +22,7 @@ DISPLAYS = {"signs": Display.MESSAGE_SIGN, "equipped": Display.IN_CAR, "law": Di
 
 
 def road_sections(scenario: Scenario, length: float) -> tuple[Stretch, ...]:
-    """Sections of the ego's route that are advised each by itself, in the direction of travel.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Its ``drivers.advised`` says whether there are any, and ``drivers.signs`` where signs stand.
-    length : float
-        Length of the route [m].
-    """
+    """Sections of the ego's route that are advised each by itself, in the direction of travel (`length` [m])."""
     drivers = scenario.drivers
     if drivers.advised not in DISPLAYS:
         return ()
@@ -51,19 +43,7 @@ def road_sections(scenario: Scenario, length: float) -> tuple[Stretch, ...]:
 def meter_places(scenario: Scenario, sections: tuple[Stretch, ...], route: NDArray[np.float64]) -> NDArray[np.float64]:
     """Where the visibility of each section is measured: at its sign; in the middle where there are none.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    sections : tuple of Stretch
-        From `road_sections`.
-    route : (n, 3) float64
-        Polyline along the route [m].
-
-    Returns
-    -------
-    (m, 3) float64
-        Places at the height of drivers' eyes [m].
+    Returns places at the height of drivers' eyes [m] (m, 3). Takes `route` (n, 3) [m].
     """
     if not sections:
         return np.empty((0, 3))
@@ -78,14 +58,7 @@ def section_limits(
 ) -> tuple[float, ...]:
     """Speed limit where each section begins [m/s]; ``inf`` where no limits are known.
 
-    Parameters
-    ----------
-    sections : tuple of Stretch
-        From `road_sections`.
-    route : (n, 3) float64
-        Polyline along the route [m].
-    limits : (n,) float64
-        Speed limit of the road that leads to each of its points [m/s], as of `RoadNetwork.route_limits`; or empty.
+    Takes `route` (n, 3) [m], `limits` (n,) [m/s].
     """
     if not len(limits):
         return (math.inf,) * len(sections)
@@ -94,11 +67,5 @@ def section_limits(
 
 
 def stations(route: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Positions of a route's points along it (n,) [m].
-
-    Parameters
-    ----------
-    route : (n, 3) float64
-        Polyline along the route [m].
-    """
+    """Positions of a route's points along it (n,) [m] (`route` (n, 3) [m])."""
     return np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(route, axis=0), axis=1))))

@@ -13,18 +13,7 @@ KEYS = ("estimators", "fusion", "advice", "lighting")
 
 
 def without_sut(document: Document) -> Document:
-    """Copy of a document in which the keys of ``sut`` stand by themselves.
-
-    Parameters
-    ----------
-    document : Document
-        What was read.
-
-    Raises
-    ------
-    InputError
-        If the block is none, has other keys, or one that stands outside it too.
-    """
+    """Copy of a document in which the keys of ``sut`` stand by themselves."""
     if BLOCK not in document.data:
         return document
     block = document.data[BLOCK]
@@ -44,11 +33,5 @@ def without_sut(document: Document) -> Document:
 
 
 def without_sut_in_path(override: str) -> str:
-    """An override of a key in ``sut`` as one of the key itself.
-
-    Parameters
-    ----------
-    override : str
-        ``key.path=value``.
-    """
+    """An override of a key in ``sut`` as one of the key itself."""
     return override.strip().removeprefix(f"{BLOCK}.")

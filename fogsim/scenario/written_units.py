@@ -12,22 +12,7 @@ from fogsim.units.quantities import UNIT_OF_SUFFIX, is_quantity, parse_quantity
 
 
 def with_units_in_keys(document: Document, model: type[BaseModel]) -> tuple[Document, list[str]]:
-    """Copy of a document in which values that are written with their units are numbers, under the keys of the schema.
-
-    Parameters
-    ----------
-    document : Document
-        What was read.
-    model : type
-        Its schema, whose keys end in their units.
-
-    Returns
-    -------
-    Document
-        The copy; what could not be read is as it was.
-    list of str
-        A line for each mistake: a unit that is not known or does not fit, or a key that stands there twice.
-    """
+    """Copy of a document in which values written with their units are numbers, under the keys of the schema."""
     conversion = _Conversion(document)
     data = conversion.block(document.data, (model,), ())
     return replace(document, data=data, origins=conversion.origins), conversion.mistakes

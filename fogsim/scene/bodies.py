@@ -33,40 +33,20 @@ LAMPLESS = (BOX, PEDESTRIAN)
 
 @dataclass(frozen=True, slots=True)
 class BodyLamp:
-    """A lamp of a body.
+    """A lamp of a body."""
 
-    Attributes
-    ----------
-    surface : Surface
-        Which lamp.
-    front : bool
-        True if it shines forwards, else backwards.
-    centre : (3,) float64
-        Its middle in the unit box.
-    area : float
-        Area as seen from straight ahead or behind, in units of the box's width times its height.
-    """
-
-    surface: Surface
-    front: bool
-    centre: NDArray[np.float64]
-    area: float
+    surface: Surface  # Which lamp
+    front: bool  # True if it shines forwards, else backwards
+    centre: NDArray[np.float64]  # (3,): Its middle in the unit box
+    area: float  # Area as seen from straight ahead or behind, in units of the box's width times its height
 
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """What all vehicles of a shape have in common.
+    """What all vehicles of a shape have in common."""
 
-    Attributes
-    ----------
-    size : tuple of float
-        Length, width and height of the vehicle that it is modelled after [m].
-    lamps : tuple of BodyLamp
-        Its lamps.
-    """
-
-    size: tuple[float, float, float]
-    lamps: tuple[BodyLamp, ...]
+    size: tuple[float, float, float]  # Length, width and height of the vehicle that it is modelled after [m]
+    lamps: tuple[BodyLamp, ...]  # Its lamps
 
 
 def body_shapes() -> dict[str, Mesh]:
@@ -132,18 +112,7 @@ def bodies() -> Mapping[str, Body]:
 
 @lru_cache(maxsize=65536)
 def body_of(vehicle_id: str, kind: str, length: float, height: float) -> str:
-    """Name of the shape of a vehicle, the same whenever it is asked.
-
-    Parameters
-    ----------
-    vehicle_id : str
-        Its id, by which vehicles of a kind and size are told apart.
-    kind : str
-        "car", "van", "truck", "bus", "motorcycle", "box", "pedestrian" or a piece of a body; any other is a car.
-    length, height : float
-        Its size [m]: trucks from 11 m are semitrailers, those below 2.9 m high flatbeds; cars shorter than 4.2 m are
-        hatchbacks, those higher than 1.6 m sport utility vehicles, and none longer than 4.6 m is a hatchback.
-    """
+    """Name of the shape of a vehicle, the same whenever it is asked (`length`, `height` [m])."""
     chance = zlib.crc32(vehicle_id.encode()) / 2**32
     if kind == "trailer" or (kind == "truck" and length >= 11.0):
         name = "trailer" if kind == "trailer" else "semitrailer"

@@ -41,28 +41,7 @@ def build_scene(
 ) -> Scene:
     """Build road, roadside and shapes of vehicles from any network of lanes.
 
-    Parameters
-    ----------
-    network : RoadNetwork
-        The lanes; lanes shorter than 0.05 m are left out.
-    signs : SignMap
-        The signs.
-    rng : numpy Generator
-        What scatters and shapes the trees.
-    street_lamps : bool
-        Whether lamps stand along the roads (see `street_lamp_heads`).
-    pavement : Pavement
-        What roads are like.
-
-    Returns
-    -------
-    Scene
-        Shapes have levels of detail for when they are small in the picture (see `LEVELS_OF_DETAIL`).
-
-    Raises
-    ------
-    InputError
-        If no lane has a length.
+    Returns shapes have levels of detail for when they are small in the picture (see `LEVELS_OF_DETAIL`).
     """
     return ScenePlan(network, signs, rng, street_lamps=street_lamps, pavement=pavement).scene()
 

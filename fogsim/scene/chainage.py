@@ -16,14 +16,9 @@ _DASH = 6.0  # length of a dash; dashes start at multiples of their period [m]
 class Chainage:
     """Distance along the carriageway of any point of a lane.
 
-    All lanes of an edge are measured along the same one of them, and an edge goes on counting where the edge that
-    leads into it has ended. Where an edge runs beside one in the other direction, both are measured so that dashes of
-    the line between them coincide.
-
-    Parameters
-    ----------
-    lanes : sequence of Lane
-        Lanes with at least two distinct points each.
+    All lanes of an edge are measured along the same one of them, and an edge goes on counting where the edge that leads
+    into it has ended. Where an edge runs beside one in the other direction, both are measured so that dashes of the
+    line between them coincide.
     """
 
     def __init__(self, lanes: Sequence[Lane]) -> None:
@@ -38,15 +33,7 @@ class Chainage:
         self._other = {edge: other for edge, other in opposites.items() if edge > other}
 
     def along(self, lane: Lane, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distance along the lane's carriageway of points on it (n,) [m].
-
-        Parameters
-        ----------
-        lane : Lane
-            The lane.
-        points : (n, 3) float64
-            Points on it [m].
-        """
+        """Distance along the lane's carriageway of points on it (n,) [m] (`points` (n, 3) [m])."""
         other = self._other.get(lane.edge_id)
         if other is not None:
             # Distances of both directions add up to the length of a dash, so that their dashes coincide.
@@ -54,13 +41,7 @@ class Chainage:
         return self._offset[lane.edge_id] + project(points, self._reference[lane.edge_id])
 
     def follows(self, lane: Lane) -> bool:
-        """Whether the lane is measured along the other direction of its road.
-
-        Parameters
-        ----------
-        lane : Lane
-            The lane.
-        """
+        """Whether the lane is measured along the other direction of its road."""
         return lane.edge_id in self._other
 
 

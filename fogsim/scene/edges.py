@@ -30,33 +30,16 @@ _DECK = 1.0  # height of a bridge's deck as seen from the side [m]
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """One free side of a lane or of a junction.
+    """One free side of a lane or of a junction."""
 
-    Attributes
-    ----------
-    line : (n, 3) float64
-        Line along it in the direction of travel [m].
-    side : int
-        1 if the land lies to the left of it, −1 if to the right.
-    inner : float
-        Distance from the line to where the pavement ends [m].
-    speed_limit : float
-        Speed limit of the road [m/s].
-    shoulder : float
-        Width of the paved shoulder, or of a street's footway, where there is room for it [m].
-    room : (n,) float64
-        How far from the pavement there is room for shoulder and verge at each of the line's points [m].
-    marking : LaneMarking
-        Line painted where the pavement ends.
-    """
-
-    line: Points
-    side: int
-    inner: float
-    speed_limit: float
-    shoulder: float
+    line: Points  # (n, 3): Line along it in the direction of travel [m]
+    side: int  # 1 if the land lies to the left of it, −1 if to the right
+    inner: float  # Distance from the line to where the pavement ends [m]
+    speed_limit: float  # Speed limit of the road [m/s]
+    shoulder: float  # Width of the paved shoulder, or of a street's footway, where there is room for it [m]
+    # (n,): How far from the pavement there is room for shoulder and verge at each of the line's points [m]
     room: NDArray[np.float64]
-    marking: LaneMarking = LaneMarking.NONE
+    marking: LaneMarking = LaneMarking.NONE  # Line painted where the pavement ends
 
 
 def lane_edge(lane: Lane, side: int, line: Points, index: LaneIndex) -> Edge:
@@ -64,16 +47,7 @@ def lane_edge(lane: Lane, side: int, line: Points, index: LaneIndex) -> Edge:
 
     Beside a footway there is nothing more, and of the room up to another lane each side gets half.
 
-    Parameters
-    ----------
-    lane : Lane
-        The lane.
-    side : int
-        1 for its left, −1 for its right.
-    line : (n, 3) float64
-        The free part of its centreline [m].
-    index : LaneIndex
-        All lanes.
+    Takes `line` (n, 3) [m].
     """
     width = 0.0 if lane.kind is LaneKind.FOOTWAY else _shoulder_width(lane.speed_limit, side)
     inner, marking = lane.width / 2, lane.left if side > 0 else lane.right
@@ -83,19 +57,7 @@ def lane_edge(lane: Lane, side: int, line: Points, index: LaneIndex) -> Edge:
 
 
 def border_edge(line: Points, speed_limit: float, footways: bool, index: LaneIndex) -> Edge:
-    """Free part of a junction's border, with the land on its right.
-
-    Parameters
-    ----------
-    line : (n, 3) float64
-        The part of the border [m].
-    speed_limit : float
-        That of the roads that lead to the junction [m/s].
-    footways : bool
-        Whether footways of the network lead along it.
-    index : LaneIndex
-        All lanes.
-    """
+    """Free part of a junction's border, with the land on its right (`line` (n, 3) [m], `speed_limit` [m/s])."""
     width = 0.0 if footways else _shoulder_width(speed_limit, -1)
     along, there = _thinned(line, _room_beside(line, -0.0, width + _VERGE, index, 1.0))
     return Edge(along, -1, 0.0, speed_limit, width, there)
@@ -144,19 +106,7 @@ def _shoulder_width(speed_limit: float, side: int) -> float:
 
 
 def edge_meshes(edge: Edge, terrain: Terrain, index: LaneIndex, along: NDArray[np.float64] | None = None) -> list[Mesh]:
-    """Shoulder and gravel verge or kerb and footway, and what leads from there down to the land.
-
-    Parameters
-    ----------
-    edge : Edge
-        The free side.
-    terrain : Terrain
-        The land.
-    index : LaneIndex
-        All lanes: where one passes below, the road lies on a bridge.
-    along : (n,) float64, optional
-        Distance of the line's points along the road [m], if not along the line itself.
-    """
+    """Shoulder and gravel verge or kerb and footway, and what leads from there down to the land (`along` (n,) [m])."""
     distance = arc_length(edge.line) if along is None else along
     paved = edge.inner + np.minimum(edge.shoulder, edge.room)
     if edge.speed_limit <= TOWN:
@@ -223,17 +173,7 @@ def _over_road(top: Points, foot: Points, deep: NDArray[np.float64], index: Lane
 
 
 def guard_rail(line: NDArray[np.float64], side: int, distance: float) -> Mesh:
-    """W-beam along a line, facing the road.
-
-    Parameters
-    ----------
-    line : (n, 3) float64
-        Centreline of the lane [m].
-    side : int
-        1 left, −1 right of the lane.
-    distance : float
-        From the centreline to the beam's face [m].
-    """
+    """W-beam along a line, facing the road (`line` (n, 3) [m], `distance` [m])."""
     # Depth behind the face and height of the folds of the beam [m].
     profile = [(0.05, 0.76), (0.0, 0.69), (0.08, 0.60), (0.01, 0.46)]
     # What faces down gets little light; a fold's own shade makes the beam read as a W from afar.

@@ -35,13 +35,7 @@ _LONG = 45.0  # no triangle is longer than this [m] (see `LONGEST`), but for tho
 
 
 class Squares:
-    """Some squares of the ground.
-
-    Parameters
-    ----------
-    squares : (k, 2) int64
-        Columns and rows of the squares, at least one: places over `GROUND_SQUARE`, rounded down.
-    """
+    """Some squares of the ground (`squares` (k, 2) int64)."""
 
     def __init__(self, squares: NDArray[np.int64]) -> None:
         self._corner = squares.min(axis=0)
@@ -52,15 +46,7 @@ class Squares:
         self._counts[1:, 1:] = self._has.cumsum(axis=0).cumsum(axis=1)
 
     def touched_by(self, bounds: Bounds, margin: float) -> NDArray[np.bool_]:
-        """Which bounds (n, 4) come nearer to one of the squares than a margin [m].
-
-        Parameters
-        ----------
-        bounds : (n, 4) float64
-            See `Bounds`.
-        margin : float
-            The margin [m].
-        """
+        """Which bounds (n, 4) come nearer to one of the squares than a margin [m] (`bounds` (n, 4), `margin` [m])."""
         most = np.array(self._has.shape)
         low = np.floor((bounds[:, :2] - margin) / GROUND_SQUARE).astype(np.int64) - self._corner
         high = np.floor((bounds[:, 2:] + margin) / GROUND_SQUARE).astype(np.int64) - self._corner + 1
@@ -69,13 +55,7 @@ class Squares:
         return np.asarray(counts[east, north] - counts[west, north] - counts[east, south] + counts[west, south] > 0)
 
     def part_of(self, ground: Mesh) -> Mesh:
-        """Triangles of a mesh whose middles lie in the squares, in their order.
-
-        Parameters
-        ----------
-        ground : Mesh
-            The mesh.
-        """
+        """Triangles of a mesh whose middles lie in the squares, in their order."""
         middle = ground.positions[ground.faces, :2].mean(axis=1)
         square = np.floor(middle / GROUND_SQUARE).astype(np.int64) - self._corner
         inside = np.all((square >= 0) & (square < self._has.shape), axis=1)
@@ -96,15 +76,7 @@ class Squares:
 
 
 class Spread(Generic[T]):
-    """Things that lie here and there.
-
-    Parameters
-    ----------
-    things : sequence
-        The things.
-    lines : sequence of (n, 2 or 3) float64
-        Where each lies, none without a point [m].
-    """
+    """Things that lie here and there (`lines` (n, 2 or 3) [m])."""
 
     def __init__(self, things: Sequence[T], lines: Sequence[NDArray[np.float64]]) -> None:
         self._things = things
@@ -117,12 +89,7 @@ class Spread(Generic[T]):
     def near(self, squares: Squares | None, margin: float) -> Sequence[T]:
         """Those that come nearer to some squares than a margin [m], in their order; all, if no squares are given.
 
-        Parameters
-        ----------
-        squares : Squares or None
-            The squares.
-        margin : float
-            The margin [m].
+        Takes `margin` [m].
         """
         if squares is None:
             return self._things
@@ -132,37 +99,19 @@ class Spread(Generic[T]):
 
 @dataclass(frozen=True, slots=True)
 class Rail:
-    """A guard rail.
+    """A guard rail."""
 
-    Attributes
-    ----------
-    line : (n, 3) float64
-        The road's line along it [m].
-    side : int
-        1 on its left, −1 on its right.
-    distance : float
-        How far beside that line it stands [m].
-    """
-
-    line: Points
-    side: int
-    distance: float
+    line: Points  # (n, 3): The road's line along it [m]
+    side: int  # 1 on its left, −1 on its right
+    distance: float  # How far beside that line it stands [m]
 
 
 @dataclass(frozen=True, slots=True)
 class Border:
-    """A free side of a lane.
+    """A free side of a lane."""
 
-    Attributes
-    ----------
-    edge : Edge
-        The side.
-    rails : tuple of Rail
-        Guard rails along it.
-    """
-
-    edge: Edge
-    rails: tuple[Rail, ...] = ()
+    edge: Edge  # The side
+    rails: tuple[Rail, ...] = ()  # Guard rails along it
 
 
 class GroundPlan:
@@ -226,13 +175,7 @@ class GroundPlan:
         self.overhang = max(_LONG, self._widest)
 
     def mesh(self, squares: Squares | None = None) -> Mesh:
-        """Build the ground.
-
-        Parameters
-        ----------
-        squares : Squares, optional
-            Where; there it is complete but for the plain, triangle for triangle as in the whole.
-        """
+        """Build the ground."""
         parts = itertools.chain(
             [self.plain] if squares is None else [],
             self._pavement(squares),

@@ -94,21 +94,7 @@ def _pane(x: float, low: float, width: float, height: float, y: float, material:
 def houses(
     edges: Sequence[Edge], index: LaneIndex, terrain: Terrain, rng: np.random.Generator, buildings: Points
 ) -> list[Batch]:
-    """Houses that face the streets, where there is room.
-
-    Parameters
-    ----------
-    edges : sequence of Edge
-        Free sides of roads; only those of streets have houses.
-    index : LaneIndex
-        All lanes.
-    terrain : Terrain
-        The land.
-    rng : numpy Generator
-        What chooses them.
-    buildings : (n, 3) float64
-        Places along the walls of buildings that the network's files tell of, near which there are no others [m].
-    """
+    """Houses that face the streets, where there is room (`buildings` (n, 3) [m])."""
     found: dict[str, list[tuple[Points, float, float]]] = {}
     taken = Spacing(1.8 * HOUSE_RADIUS)
     plots = [_plots(edge) for edge in edges if edge.speed_limit <= TOWN]
@@ -136,25 +122,11 @@ def _built(name: str, members: Sequence[tuple[Points, float, float]], terrain: T
 
 
 def house_places(batches: Sequence[Batch]) -> Points:
-    """Middles of houses (n, 3) [m].
-
-    Parameters
-    ----------
-    batches : sequence of Batch
-        The houses.
-    """
+    """Middles of houses (n, 3) [m]."""
     return np.concatenate([np.zeros((0, 3)), *(batch.transforms[:, :3, 3].astype(np.float64) for batch in batches)])
 
 
 def shapes_in_use(shapes: Mapping[str, Mesh], batches: Sequence[Batch]) -> dict[str, Mesh]:
-    """Those shapes, with their levels of detail, that batches refer to.
-
-    Parameters
-    ----------
-    shapes : mapping from str to Mesh
-        Shapes by name.
-    batches : sequence of Batch
-        The copies.
-    """
+    """Those shapes, with their levels of detail, that batches refer to."""
     used = {batch.shape for batch in batches}
     return {name: shape for name, shape in shapes.items() if name.split(":", maxsplit=1)[0] in used}

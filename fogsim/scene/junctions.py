@@ -22,13 +22,7 @@ _TOUCHING = 6.0  # lanes that end no farther than this from a corner lead to the
 
 
 def area_mesh(area: PavedArea) -> Mesh | None:
-    """Pavement of an area without a hole; None where the area is too narrow to see.
-
-    Parameters
-    ----------
-    area : PavedArea
-        The area.
-    """
+    """Pavement of an area without a hole; None where the area is too narrow to see."""
     outline = _counterclockwise(area)
     if len(outline) < 3 or abs(_area(outline)) < 0.05:
         return None
@@ -46,15 +40,7 @@ def area_mesh(area: PavedArea) -> Mesh | None:
 
 
 def walkable(areas: Sequence[PavedArea], lanes: Sequence[Lane]) -> list[PavedArea]:
-    """Areas without those for walking that vehicles drive over, as where a footway ends at a junction.
-
-    Parameters
-    ----------
-    areas : sequence of PavedArea
-        The areas.
-    lanes : sequence of Lane
-        The lanes of vehicles.
-    """
+    """Areas without those for walking that vehicles drive over, as where a footway ends at a junction."""
     if not any(area.kind is LaneKind.FOOTWAY for area in areas):
         return list(areas)
     places = np.concatenate([refined(cleaned(lane.centreline), _PIECE)[:, :2] for lane in lanes])
@@ -84,17 +70,7 @@ def _counterclockwise(area: PavedArea) -> Points:
 
 
 def free_borders(areas: Sequence[PavedArea], lanes: Sequence[Lane], everything: LaneIndex) -> Iterator[Edge]:
-    """Parts of the borders of junctions where no road leads on.
-
-    Parameters
-    ----------
-    areas : sequence of PavedArea
-        The junctions.
-    lanes : sequence of Lane
-        All lanes of carriageways and footways, those across junctions left out.
-    everything : LaneIndex
-        All lanes; where those across a junction stick out of it, its border is not free.
-    """
+    """Parts of the borders of junctions where no road leads on."""
     index, ends = LaneIndex(lanes), _Ends(lanes)
     for outline in map(_counterclockwise, areas):
         if len(outline) > 2:
@@ -106,13 +82,7 @@ def free_borders(areas: Sequence[PavedArea], lanes: Sequence[Lane], everything: 
 
 
 class _Ends:
-    """Both ends of lanes.
-
-    Parameters
-    ----------
-    lanes : sequence of Lane
-        The lanes.
-    """
+    """Both ends of lanes."""
 
     def __init__(self, lanes: Sequence[Lane]) -> None:
         lines = [cleaned(lane.centreline) for lane in lanes]
@@ -180,13 +150,7 @@ def _spans_around(chosen: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
 
 
 class Areas:
-    """Which places lie on a paved area.
-
-    Parameters
-    ----------
-    areas : sequence of PavedArea
-        The areas.
-    """
+    """Which places lie on a paved area."""
 
     def __init__(self, areas: Sequence[PavedArea]) -> None:
         outlines = [_counterclockwise(area)[:, :2] for area in areas]
@@ -196,10 +160,7 @@ class Areas:
     def cover_all(self, lines: Sequence[Points]) -> list[bool]:
         """Whether one area has all points of a line inside or on its border, for each of some lines.
 
-        Parameters
-        ----------
-        lines : sequence of (n, 3) float64
-            The lines [m].
+        Takes `lines` (n, 3) [m].
         """
         points = np.concatenate([np.zeros((0, 2)), *(line[:, :2] for line in lines)])
         covered: list[bool] = _covered(points, np.cumsum([0, *map(len, lines)]), self._corners, self._first).tolist()

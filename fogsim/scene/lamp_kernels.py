@@ -18,69 +18,34 @@ luminous area as the eye sees it [m²], its intensity along its axis [cd], and i
 
 
 class LampTable(NamedTuple):
-    """Lamps of all bodies in their unit boxes.
+    """Lamps of all bodies in their unit boxes."""
 
-    Attributes
-    ----------
-    place : (n, 3) float64
-        Middles.
-    area : (n,) float64
-        Luminous areas over width times height of the body.
-    mask : (n,) int64
-        Bits of `Lamp` that light each.
-    intensity : (n,) float64
-        Along its axis [cd].
-    dark_shift : (n,) int64
-        By how many bits the lit ones are shifted to tell where a lamp is dark; see `fogsim.values.light.DARK_SHIFT`.
-    forwards : (n,) float64
-        1 for a lamp that shines ahead, −1 for one that shines back.
-    of_body : (bodies, most) int64
-        Lamps of each body, then −1.
-    signals : int
-        Bits of lamps whose intensity is that of the table; that of others is left at 0.
-    lobe : (n,) int64
-        Number of the way each shines.
-    azimuths, elevations : (a,) and (e,) float64
-        Ascending angles beside and above a lamp's axis from 0 on [rad].
-    log_share : (lobes, e, a) float64
-        ln of the share of its axial intensity that a lamp shines there, alike on both sides.
-    fall_off : float
-        How fast that falls beyond the axes' ends [1/rad].
-    """
-
-    place: NDArray[np.float64]
-    area: NDArray[np.float64]
-    mask: NDArray[np.int64]
-    intensity: NDArray[np.float64]
+    place: NDArray[np.float64]  # (n, 3): Middles
+    area: NDArray[np.float64]  # (n,): Luminous areas over width times height of the body
+    mask: NDArray[np.int64]  # (n,) int64: Bits of `Lamp` that light each
+    intensity: NDArray[np.float64]  # (n,): Along its axis [cd]
+    # (n,) int64: By how many bits the lit ones are shifted to tell where a lamp is dark; see
+    # `fogsim.values.light.DARK_SHIFT`
     dark_shift: NDArray[np.int64]
-    forwards: NDArray[np.float64]
-    of_body: NDArray[np.int64]
-    signals: int
-    lobe: NDArray[np.int64]
+    forwards: NDArray[np.float64]  # (n,): 1 for a lamp that shines ahead, −1 for one that shines back
+    of_body: NDArray[np.int64]  # (bodies, most) int64: Lamps of each body, then −1
+    signals: int  # Bits of lamps whose intensity is that of the table; that of others is left at 0
+    lobe: NDArray[np.int64]  # (n,) int64: Number of the way each shines
+    # azimuths, elevations (e,): ascending angles beside and above a lamp's axis from 0 on [rad]
     azimuths: NDArray[np.float64]
     elevations: NDArray[np.float64]
+    # (lobes, e, a): ln of the share of its axial intensity that a lamp shines there, alike on both sides
     log_share: NDArray[np.float64]
-    fall_off: float
+    fall_off: float  # How fast that falls beyond the axes' ends [1/rad]
 
 
 class LampCarriers(NamedTuple):
-    """Vehicles with lamps.
+    """Vehicles with lamps."""
 
-    Attributes
-    ----------
-    position : (v, 3) float64
-        Middles of the front bumpers [m].
-    turned : (4, v) float64
-        Cosine and sine of their headings, and of their grades.
-    size : (3, v) float64
-        Length, width and height [m].
-    lit, body : (v,) int64
-        Bits of lit lamps, and number of the body.
-    """
-
-    position: NDArray[np.float64]
-    turned: NDArray[np.float64]
-    size: NDArray[np.float64]
+    position: NDArray[np.float64]  # (v, 3): Middles of the front bumpers [m]
+    turned: NDArray[np.float64]  # (4, v): Cosine and sine of their headings, and of their grades
+    size: NDArray[np.float64]  # (3, v): Length, width and height [m]
+    # lit, body (v,) int64: bits of lit lamps, and number of the body
     lit: NDArray[np.int64]
     body: NDArray[np.int64]
 
@@ -120,18 +85,7 @@ def find_lamps(
 ) -> int:
     """Find the lit lamps on the side of their vehicle that the eye is on; their count.
 
-    Parameters
-    ----------
-    vehicles, lamps
-        The vehicles, and the lamps of bodies.
-    eye : (3,) float64
-        Where the eye is [m].
-    farthest : float
-        Distance beyond which vehicles are left out [m].
-    found : (n, FOUND) float64
-        Is filled.
-    which : (2, n) int64
-        Is filled: number of each lamp, and the bits that light it.
+    Takes `eye` (3,) [m], `farthest` [m], `which` (2, n) int64.
     """
     position, turned, size = vehicles.position, vehicles.turned, vehicles.size
     count = 0

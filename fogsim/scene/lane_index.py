@@ -19,37 +19,17 @@ _STEP = 0.1  # shortest step in the search for room [m]
 
 
 class _Pieces(NamedTuple):
-    """Straight pieces of lanes by the cells that their middles lie in.
+    """Straight pieces of lanes by the cells that their middles lie in."""
 
-    Attributes
-    ----------
-    corner : (2,) int64
-        Column and row of the first cell.
-    rows : int
-        Number of rows.
-    key : (n,) int64
-        Cell of each piece, in order: its column times the number of rows, and its row.
-    columns : (m + 1,) int64
-        Where the pieces of each column begin, and their number.
-    pieces : (n, 7) float64
-        Start (x, y, z), step to the end (x, y, z) and half the width [m] of each.
-    """
-
-    corner: NDArray[np.int64]
-    rows: int
-    key: NDArray[np.int64]
-    columns: NDArray[np.int64]
-    pieces: NDArray[np.float64]
+    corner: NDArray[np.int64]  # (2,) int64: Column and row of the first cell
+    rows: int  # Number of rows
+    key: NDArray[np.int64]  # (n,) int64: Cell of each piece, in order: its column times the number of rows, and its row
+    columns: NDArray[np.int64]  # (m + 1,) int64: Where the pieces of each column begin, and their number
+    pieces: NDArray[np.float64]  # (n, 7): Start (x, y, z), step to the end (x, y, z) and half the width [m] of each
 
 
 class LaneIndex:
-    """Distances from points to the paved lanes of a network, by a grid of square cells.
-
-    Parameters
-    ----------
-    lanes : sequence of Lane
-        The lanes, each with a length.
-    """
+    """Distances from points to the paved lanes of a network, by a grid of square cells."""
 
     def __init__(self, lanes: Sequence[Lane]) -> None:
         points, counts = refined_lines([lane.centreline for lane in lanes], _LONGEST)
@@ -75,14 +55,7 @@ class LaneIndex:
     ) -> NDArray[np.float64]:
         """Distance from points (n, 3) to the nearest lane's edge [m], negative on a lane, at most `within`.
 
-        Parameters
-        ----------
-        points : (n, 3) float64
-            Points [m].
-        same_level : float, optional
-            Lanes higher or lower than the point by more than this [m] are left out.
-        within : float
-            Distances beyond this, at most `FARTHEST`, need not be told apart [m]: short ones are soon found.
+        Takes `points` (n, 3) [m], `same_level` [m], `within` [m].
         """
         places = np.ascontiguousarray(points, np.float64)
         level = np.inf if same_level is None else same_level
@@ -91,16 +64,7 @@ class LaneIndex:
     def room(self, points: Points, normal: NDArray[np.float64], most: float, same_level: float) -> NDArray[np.float64]:
         """How far one gets from points (n, 3) along their normals (n, 2) before a lane begins [m].
 
-        Parameters
-        ----------
-        points : (n, 3) float64
-            Points beside lanes [m].
-        normal : (n, 2) float64
-            Vectors from there, as from `left_normals`; the room is counted in their lengths.
-        most : float
-            More than this is not asked for [m].
-        same_level : float
-            Lanes higher or lower than the point by more than this [m] are left out.
+        Takes `points` (n, 3) [m], `normal` (n, 2), `most` [m], `same_level` [m].
         """
         places, directions = np.ascontiguousarray(points, np.float64), np.ascontiguousarray(normal, np.float64)
         return _rooms(places, directions, most, same_level, self._reach(most), self._pieces)

@@ -92,23 +92,7 @@ def light_sources(
 ) -> LightSources:
     """Every lit lamp that shines toward a camera, whatever stands between.
 
-    Parameters
-    ----------
-    state : TrafficState
-        All vehicles and their lit lamps, and traffic lights.
-    skip : int or None
-        Row that is left out, as a rule the vehicle that carries the camera.
-    eye : (3,) float64
-        Where the camera is [m].
-    beams : mapping of Lamp to Beam
-        Beam of one head lamp (LOW_BEAM, HIGH_BEAM) and one front fog lamp (FRONT_FOG); one that is not there is dark.
-    street_lamps : (n, 3) float64, optional
-        Middles of the luminous surfaces of street lamps [m], from `street_lamp_heads`.
-
-    Returns
-    -------
-    LightSources
-        Lamps that face away are left out.
+    Returns lamps that face away are left out. Takes `eye` (3,) [m], `street_lamps` (n, 3) [m].
     """
     here = np.asarray(eye, np.float64)
     parts = [_of_vehicles(state, skip, here, beams)] if len(state.ids) else []
@@ -198,15 +182,7 @@ def _of_streets(heads: NDArray[np.float64], eye: NDArray[np.float64]) -> LightSo
 
 
 def street_lighting(heads: NDArray[np.float64], sky_illuminance: float) -> StreetLighting:
-    """Street lamps as what lights the road.
-
-    Parameters
-    ----------
-    heads : (n, 3) float64
-        Middles of their luminous surfaces [m], from `street_lamp_heads`.
-    sky_illuminance : float
-        Horizontal illuminance of the sky in which the scene is drawn [lx].
-    """
+    """Street lamps as what lights the road (`heads` (n, 3) [m], `sky_illuminance` [lx])."""
     tint = _luminance_one(_WARM)
     colour = (float(tint[0]), float(tint[1]), float(tint[2]))
     return StreetLighting(heads, HEIGHT, STREET_ANGLES, STREET_INTENSITIES, colour, sky_illuminance)

@@ -20,66 +20,31 @@ SHORTEST = 0.05
 
 
 def cleaned(points: Points, shortest: float = SHORTEST) -> Points:
-    """Polyline without its shortest segments.
-
-    Parameters
-    ----------
-    points : (n, 2 or 3) float64
-        The polyline [m].
-    shortest : float
-        Length below which a segment is joined to the next [m].
-    """
+    """Polyline without its shortest segments (`points` (n, 2 or 3) [m], `shortest` [m])."""
     array = np.ascontiguousarray(points, np.float64)
     kept = _kept_vertices(array, shortest)
     return array if len(kept) == len(array) else array[kept]
 
 
 def arc_length(points: Points) -> NDArray[np.float64]:
-    """Distance of each vertex from the first along the polyline in the plane [m].
-
-    Parameters
-    ----------
-    points : (n, 2 or 3) float64
-        The polyline [m].
-    """
+    """Distance of each vertex from the first along the polyline in the plane [m] (`points` (n, 2 or 3) [m])."""
     return _arc_length(np.ascontiguousarray(points, np.float64))
 
 
 def at_distance(points: Points, distance: NDArray[np.float64]) -> Points:
-    """Points (k, 3) along a polyline.
-
-    Parameters
-    ----------
-    points : (n, 3) float64
-        The polyline [m].
-    distance : (k,) float64
-        Distances from its first vertex [m].
-    """
+    """Points (k, 3) along a polyline (`points` (n, 3) [m], `distance` (k,) [m])."""
     return _at_distance(np.ascontiguousarray(points, np.float64), np.ascontiguousarray(distance, np.float64))
 
 
 def refined(points: Points, longest: float) -> Points:
-    """Polyline with all its vertices and more between them.
-
-    Parameters
-    ----------
-    points : (n, 2 or 3) float64
-        The polyline [m].
-    longest : float
-        Length above which a segment is divided evenly [m].
-    """
+    """Polyline with all its vertices and more between them (`points` (n, 2 or 3) [m], `longest` [m])."""
     return _refined(np.ascontiguousarray(points, np.float64), longest)
 
 
 def refined_lines(lines: Sequence[Points], longest: float) -> tuple[Points, NDArray[np.int64]]:
     """Points of many polylines, one after another, each `cleaned` and then `refined`, and how many each has.
 
-    Parameters
-    ----------
-    lines : sequence of (n, 3) float64
-        The polylines [m].
-    longest : float
-        Length above which a segment is divided evenly [m].
+    Takes `lines` (n, 3) [m], `longest` [m].
     """
     ends = np.cumsum([0, *map(len, lines)])
     points = np.concatenate(lines)
@@ -88,13 +53,7 @@ def refined_lines(lines: Sequence[Points], longest: float) -> tuple[Points, NDAr
 
 
 def all_cleaned(lines: Sequence[Points]) -> list[Points]:
-    """Each of many polylines `cleaned`, as parts of one array.
-
-    Parameters
-    ----------
-    lines : sequence of (n, 3) float64
-        The polylines [m].
-    """
+    """Each of many polylines `cleaned`, as parts of one array (`lines` (n, 3) [m])."""
     if not lines:
         return []
     points, counts = refined_lines(lines, np.inf)
@@ -107,10 +66,7 @@ def left_normals(points: Points) -> NDArray[np.float64]:
 
     A mitre is at most twice as long as the distance; sharper corners are cut.
 
-    Parameters
-    ----------
-    points : (n, 2 or 3) float64
-        The polyline [m].
+    Takes `points` (n, 2 or 3) [m].
     """
     return _left_normals(np.ascontiguousarray(points, np.float64))
 
@@ -121,14 +77,7 @@ def parallel(points: Points, left: float | NDArray[np.float64], lift: float = 0.
     On the inside of a bend that is tighter than the distance it is cut short, so that it never runs backwards; it has a
     vertex for each of the line's all the same.
 
-    Parameters
-    ----------
-    points : (n, 3) float64
-        The polyline [m].
-    left : float or (n,) float64
-        How far to the left of it the other lies [m].
-    lift : float
-        How far above it [m].
+    Takes `points` (n, 3) [m], `left` (n,) [m], `lift` [m].
     """
     distance = np.empty(len(points))
     distance[:] = left
@@ -138,26 +87,13 @@ def parallel(points: Points, left: float | NDArray[np.float64], lift: float = 0.
 def project(points: NDArray[np.float64], line: Points) -> NDArray[np.float64]:
     """Distance along a polyline [m] of the place on it that is nearest to each point.
 
-    Parameters
-    ----------
-    points : (k, 2 or 3) float64
-        The points [m].
-    line : (n, 2 or 3) float64
-        The polyline [m].
+    Takes `points` (k, 2 or 3) [m], `line` (n, 2 or 3) [m].
     """
     return _project(np.ascontiguousarray(points, np.float64), np.ascontiguousarray(line, np.float64))
 
 
 def true_spans(chosen: NDArray[np.bool_], *, least: int = 1) -> list[tuple[int, int]]:
-    """First indices of spans of neighbours that are all true, and those after their last.
-
-    Parameters
-    ----------
-    chosen : (n,) bool
-        Which are.
-    least : int
-        Shorter spans are left out.
-    """
+    """First indices of spans of neighbours that are all true, and those after their last (`chosen` (n,) bool)."""
     return [(first, end) for first, end in _true_spans(np.ascontiguousarray(chosen), least).tolist()]
 
 

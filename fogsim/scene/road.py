@@ -45,15 +45,7 @@ _INSET = 0.16  # the middle of each of two lines between directions lies this fa
 
 
 def lane_mesh(lane: Lane, chainage: Chainage) -> Mesh:
-    """One lane as a strip with its road attributes.
-
-    Parameters
-    ----------
-    lane : Lane
-        The lane.
-    chainage : Chainage
-        Distances along carriageways.
-    """
+    """One lane as a strip with its road attributes."""
     centre = refined(cleaned(lane.centreline), LONGEST)
     half = lane.width / 2
     lines = 3 * LINE_CODE[lane.left] + LINE_CODE[lane.right]
@@ -85,20 +77,7 @@ def strip(
 ) -> Mesh:
     """Strip of road along a line.
 
-    Parameters
-    ----------
-    line : (n, 3) float64
-        The line [m].
-    left : tuple of float or (n,) float64
-        How far to the left of it the strip's two edges lie [m].
-    lift : float
-        How far above it [m].
-    half, lines, along
-        Road attributes: half the width between the painted lines [m], their code, distance along the road [m].
-    material : Material
-        A ROAD material.
-    middle : float
-        How far to the left of the line the middle between the painted lines lies [m].
+    Takes `line` (n, 3) [m], `left` (n,) [m], `lift` [m], `half`, `lines`, `along` [m], `middle` [m].
     """
     points = np.stack([parallel(line, side, lift) for side in left], axis=1)
     road = np.empty((*points.shape[:2], 4))
@@ -109,15 +88,7 @@ def strip(
 
 
 def footway_mesh(line: Points, left: tuple[float, float | NDArray[np.float64]]) -> Mesh:
-    """Footway with kerbs along a line, `KERB` above it.
-
-    Parameters
-    ----------
-    line : (n, 3) float64
-        The line, at the height of the street [m].
-    left : tuple of float or (n,) float64
-        Distances to its left between which the footway lies [m].
-    """
+    """Footway with kerbs along a line, `KERB` above it (`line` (n, 3) [m], `left` (n,) [m])."""
     low, high = np.minimum(left[0], left[1]), np.maximum(left[0], left[1])
     stone = np.minimum(0.13, (high - low) / 2)
     # A kerbstone on each side, and how far above the line each fold of the profile lies.
@@ -131,18 +102,8 @@ def footway_mesh(line: Points, left: tuple[float, float | NDArray[np.float64]]) 
 def free_edges(lane: Lane, index: LaneIndex) -> Iterator[tuple[int, NDArray[np.float64]]]:
     """Spans of a lane's sides with nothing paved beside them.
 
-    Parameters
-    ----------
-    lane : Lane
-        The lane.
-    index : LaneIndex
-        All lanes.
-
-    Yields
-    ------
-    tuple of int and (n, 3) float64
-        1 for the left or −1 for the right side, and the lane's centreline along the free span [m], with a vertex at
-        least every 2 m.
+    Yields 1 for the left or −1 for the right side, and the lane's centreline along the free span [m], with a vertex at
+    least every 2 m (n, 3).
     """
     centre = refined(cleaned(lane.centreline), _LOOK)
     for side in (1, -1):
@@ -166,13 +127,7 @@ def _looked_at(line: Points, left: float, index: LaneIndex) -> tuple[Points, NDA
 
 
 def transverse_markings(lanes: Sequence[Lane]) -> list[Mesh]:
-    """Stop lines, lines to give way at, and zebra crossings of all lanes.
-
-    Parameters
-    ----------
-    lanes : sequence of Lane
-        The lanes.
-    """
+    """Stop lines, lines to give way at, and zebra crossings of all lanes."""
     parts = []
     for lane in lanes:
         line = cleaned(lane.centreline)

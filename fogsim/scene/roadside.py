@@ -41,17 +41,7 @@ def post_shapes() -> dict[str, Mesh]:
 
 
 def tube(bottom: float, top: float, half_depth: float, half_width: float, material: Material) -> Mesh:
-    """Four upright sides of a box; the ends do not show.
-
-    Parameters
-    ----------
-    bottom, top : float
-        Heights of its ends [m].
-    half_depth, half_width : float
-        Half its extents along x and y [m].
-    material : Material
-        Its material.
-    """
+    """Four upright sides of a box; the ends do not show (`bottom`, `top` [m], `half_depth`, `half_width` [m])."""
     upright = box((-half_depth, -half_width, bottom), (half_depth, half_width, top), material)
     level = np.abs(upright.normals[upright.faces[:, 0], 2]) > 0.5
     return replace(upright, faces=upright.faces[~level])
@@ -60,14 +50,7 @@ def tube(bottom: float, top: float, half_depth: float, half_width: float, materi
 def stations(line: Points, spacing: float, left: float) -> tuple[Points, NDArray[np.float64]]:
     """Places (n, 3) at regular distances along a parallel of a line, and the directions [rad] of the line there.
 
-    Parameters
-    ----------
-    line : (n, 3) float64
-        The line [m].
-    spacing : float
-        Distance between places along the line [m].
-    left : float
-        How far to the left of it they lie [m].
+    Takes `line` (n, 3) [m], `spacing` [m], `left` [m].
     """
     length = arc_length(line)
     distance = np.arange(0.5 * spacing, length[-1], spacing)
@@ -85,21 +68,7 @@ def placed(
     *,
     instance: int = Instance.ROADSIDE,
 ) -> Batch:
-    """Batch of upright copies of a shape.
-
-    Parameters
-    ----------
-    shape : str
-        Name of the shape.
-    places : (n, 3) float64
-        Where the copies stand [m].
-    heading : (n,) float64
-        Their headings [rad].
-    size : (n, 3) float64 or float
-        Their scales.
-    instance : int
-        Their instance id.
-    """
+    """Batch of upright copies of a shape (`places` (n, 3) [m], `heading` (n,) [rad], `size` (n, 3))."""
     count = len(places)
     scale = np.broadcast_to(np.asarray(size, np.float64), (count, 3))
     transforms = np.zeros((count, 4, 4), np.float32)
@@ -118,13 +87,7 @@ def placed(
 
 
 class Spacing:
-    """Places that keep a distance from one another.
-
-    Parameters
-    ----------
-    distance : float
-        What places that are taken are farther apart than [m].
-    """
+    """Places that keep a distance from one another (`distance` [m])."""
 
     def __init__(self, distance: float) -> None:
         self._distance = distance
@@ -132,13 +95,7 @@ class Spacing:
         self._cells: dict[tuple[int, int], list[tuple[float, float]]] = {}
 
     def takes(self, place: NDArray[np.float64]) -> bool:
-        """Take a place unless one is taken that is too near.
-
-        Parameters
-        ----------
-        place : (2 or 3,) float64
-            The place [m].
-        """
+        """Take a place unless one is taken that is too near (`place` (2 or 3,) [m])."""
         x, y = float(place[0]), float(place[1])
         column, row = math.floor(x / self._distance), math.floor(y / self._distance)
         for cell in product((column - 1, column, column + 1), (row - 1, row, row + 1)):
@@ -156,23 +113,7 @@ def trees(
     terrain: Terrain,
     rng: np.random.Generator,
 ) -> list[Batch]:
-    """Trees near the road and woods behind them, clear of every lane.
-
-    Parameters
-    ----------
-    free : sequence of tuple of int and (n, 3) float64
-        Side (1 left, −1 right) and centreline of the lanes' free sides.
-    index : LaneIndex
-        The lanes.
-    taken : (n, 3) float64
-        Where something else stands [m].
-    shapes : mapping from str to Mesh
-        Among others the shapes of the trees.
-    terrain : Terrain
-        The land.
-    rng : numpy Generator
-        What scatters them.
-    """
+    """Trees near the road and woods behind them, clear of every lane (`free` (n, 3), `taken` (n, 3) [m])."""
     near = _scatter(free, rng, spacing=10.0, nearest=13.0, reach=38.0, clumps=90.0)
     near = near[(index.clearance(near) > TREE_CLEARANCE) & apart(near, taken, 11.0)]
     conifers = _clumps(near[:, :2], 160.0, rng) + 0.35 * rng.normal(size=len(near)) > 0.1
@@ -189,12 +130,7 @@ def trees(
 def apart(places: Points, taken: Points, distance: float) -> NDArray[np.bool_]:
     """Which places lie farther than a distance from every place that is taken.
 
-    Parameters
-    ----------
-    places, taken : (n, 3) and (m, 3) float64
-        The places [m].
-    distance : float
-        The distance, across heights [m].
+    Takes `places`, `taken` (m, 3) [m], `distance` [m].
     """
     order = np.argsort(places[:, 0], kind="stable")
     apart = np.empty(len(places), np.bool_)

@@ -17,18 +17,10 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """What a surface is made of.
+    """What a surface is made of."""
 
-    Attributes
-    ----------
-    reflectance : tuple of float
-        Linear diffuse reflectance, red, green, blue, 0 … 1.
-    surface : Surface
-        How it gets its radiance.
-    """
-
-    reflectance: Vector
-    surface: Surface = Surface.MATT
+    reflectance: Vector  # Linear diffuse reflectance, red, green, blue, 0 … 1
+    surface: Surface = Surface.MATT  # How it gets its radiance
 
 
 GLASS = Material((0.035, 0.045, 0.055))
@@ -44,23 +36,7 @@ def mesh(
     road: ArrayLike | None = None,
     instance: int = Instance.ROADSIDE,
 ) -> Mesh:
-    """Mesh of one material.
-
-    Parameters
-    ----------
-    positions, normals : (n, 3)
-        Vertices [m] and their directions, of any length.
-    faces : (m, 3)
-        Vertices of each triangle.
-    material : Material
-        Surface and reflectance of all vertices.
-    reflectance : (n, 3), optional
-        Reflectance of each vertex in place of the material's.
-    road : (n, 4), optional
-        Road attributes (see `Mesh`); zero if not given.
-    instance : int
-        Instance id.
-    """
+    """Mesh of one material (`positions`, `normals` (n, 3) [m], `faces` (m, 3))."""
     points, directions = _rows(positions), _rows(normals)
     colour = np.array(material.reflectance if reflectance is None else reflectance, np.float32, ndmin=2)
     snapped, facing, colours = _vertices(points, directions, colour)
@@ -106,13 +82,7 @@ def _snapped(positions: NDArray[np.float64]) -> NDArray[np.float32]:
 
 @lru_cache(maxsize=256)
 def grid_faces(rows: int, columns: int) -> NDArray[np.int64]:
-    """Two triangles for each cell of a grid of vertices numbered row by row.
-
-    Parameters
-    ----------
-    rows, columns : int
-        Vertices of the grid.
-    """
+    """Two triangles for each cell of a grid of vertices numbered row by row."""
     corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     lower = np.stack((corner, corner + 1, corner + columns), axis=1)
     upper = np.stack((corner + 1, corner + columns + 1, corner + columns), axis=1)
@@ -127,12 +97,7 @@ def grid_normals(points: NDArray[np.float64], toward: ArrayLike) -> NDArray[np.f
 
     Where points coincide, the normal is `toward` itself.
 
-    Parameters
-    ----------
-    points : (n, m, 3) float64
-        The grid [m].
-    toward : (3,)
-        Direction to whose side the normals are turned.
+    Takes `points` (n, m, 3) [m], `toward` (3,).
     """
     return _grid_normals(np.ascontiguousarray(points, np.float64), np.array(toward, np.float64))
 
@@ -172,19 +137,7 @@ def grid(
     road: ArrayLike | None = None,
     instance: int = Instance.ROADSIDE,
 ) -> Mesh:
-    """Smooth patch through a grid of points.
-
-    Parameters
-    ----------
-    points : (n, m, 3)
-        Its points [m], n and m at least 2.
-    material : Material
-        Its material.
-    toward : (3,)
-        Direction to whose side the normals are turned.
-    reflectance, road, instance
-        As in `mesh`, one row per point in row-major order.
-    """
+    """Smooth patch through a grid of points (`points` (n, m, 3) [m], `toward` (3,))."""
     array = np.asarray(points, np.float64)
     rows, columns = array.shape[:2]
     normals = grid_normals(array, toward)
@@ -202,14 +155,7 @@ def grid(
 def folds(rows: NDArray[np.float64], materials: Sequence[Material], toward: NDArray[np.float64]) -> Mesh:
     """Strips between neighbouring lines, with an edge where two of them meet.
 
-    Parameters
-    ----------
-    rows : (k + 1, n, 3) float64
-        The lines [m].
-    materials : sequence of k Material
-        Material of each strip, all of one surface.
-    toward : (k, 3) float64
-        Direction to whose side each strip's normals are turned.
+    Takes `rows` (k + 1, n, 3) [m], `toward` (k, 3).
     """
     strips, count = len(materials), 2 * rows.shape[1]
     points = np.stack((rows[:-1], rows[1:]), axis=2)
@@ -220,35 +166,13 @@ def folds(rows: NDArray[np.float64], materials: Sequence[Material], toward: NDAr
 
 
 def quad(corners: ArrayLike, material: Material, toward: ArrayLike) -> Mesh:
-    """Rectangle or any flat convex quadrilateral.
-
-    Parameters
-    ----------
-    corners : (4, 3)
-        Its corners, in order around it [m].
-    material : Material
-        Its material.
-    toward : (3,)
-        Direction to whose side it faces.
-    """
+    """Rectangle or any flat convex quadrilateral (`corners` (4, 3) [m], `toward` (3,))."""
     a, b, c, d = np.asarray(corners, np.float64)
     return grid([[a, b], [d, c]], material, toward)
 
 
 def polygon(corners: ArrayLike, material: Material, toward: ArrayLike, instance: int = Instance.ROADSIDE) -> Mesh:
-    """Flat convex polygon.
-
-    Parameters
-    ----------
-    corners : (n, 3)
-        Its corners, in order around it [m].
-    material : Material
-        Its material.
-    toward : (3,)
-        Its normal.
-    instance : int
-        Instance id.
-    """
+    """Flat convex polygon (`corners` (n, 3) [m], `toward` (3,))."""
     points = np.asarray(corners, np.float64)
     index = np.arange(1, len(points) - 1)
     faces = np.stack((np.zeros_like(index), index, index + 1), axis=1)
@@ -259,10 +183,7 @@ def polygon(corners: ArrayLike, material: Material, toward: ArrayLike, instance:
 def concave_faces(outline: NDArray[np.float64]) -> NDArray[np.int64]:
     """Triangles (m, 3) of a flat polygon that may be concave, by cutting off one ear after the other.
 
-    Parameters
-    ----------
-    outline : (n, 2) float64
-        Corners, counterclockwise.
+    Takes `outline` (n, 2).
     """
     return _triangles(np.ascontiguousarray(outline, np.float64))
 
@@ -309,15 +230,7 @@ def _turn(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]
 
 
 def facetted(triangles: NDArray[np.float64], material: Material) -> Mesh:
-    """Mesh of triangles that each have their own normal.
-
-    Parameters
-    ----------
-    triangles : (n, 3, 3) float64
-        Corners, counterclockwise as seen from outside [m].
-    material : Material
-        Its material.
-    """
+    """Mesh of triangles that each have their own normal (`triangles` (n, 3, 3) [m])."""
     a, b, c = triangles.transpose(1, 0, 2)
     normals = np.repeat(np.cross(b - a, c - a), 3, axis=0)
     return mesh(triangles, np.arange(3 * len(triangles)).reshape(-1, 3), normals, material)
@@ -333,15 +246,7 @@ _BOX_FACES = np.array(
 
 
 def box(low: ArrayLike, high: ArrayLike, material: Material) -> Mesh:
-    """Box, facetted.
-
-    Parameters
-    ----------
-    low, high : (3,)
-        Two opposite corners [m].
-    material : Material
-        Its material.
-    """
+    """Box, facetted (`low`, `high` (3,) [m])."""
     start, end = np.sort(np.stack((np.asarray(low, float), np.asarray(high, float))), axis=0)
     return facetted(_BOX_CORNERS[_BOX_FACES] * (end - start) + start, material)
 
@@ -357,19 +262,7 @@ def disc(
     hole: float = 0.0,
     instance: int = Instance.ROADSIDE,
 ) -> Mesh:
-    """Disc or ring.
-
-    Parameters
-    ----------
-    centre : (3,)
-        Its middle [m].
-    radius, hole : float
-        Outer and inner radius [m].
-    right, up : (3,)
-        Unit vectors in its plane, as its viewer sees them: it faces right × up.
-    material, sides, instance
-        Material, number of sides and instance id.
-    """
+    """Disc or ring (`centre` (3,) [m], `radius`, `hole` [m], `right`, `up` (3,))."""
     angle = np.linspace(0.0, 2 * np.pi, sides + 1)
     rim = np.cos(angle)[:, None] * np.asarray(right, float) + np.sin(angle)[:, None] * np.asarray(up, float)
     rings = np.asarray(centre, float) + np.stack((hole * rim, radius * rim), axis=1)
@@ -379,13 +272,7 @@ def disc(
 
 
 def merge(parts: Sequence[Mesh]) -> Mesh:
-    """One mesh of many.
-
-    Parameters
-    ----------
-    parts : sequence of Mesh
-        The meshes.
-    """
+    """One mesh of many."""
     offsets = np.cumsum([0, *(len(part.positions) for part in parts)])
     names = ("positions", "normals", "reflectance", "surface", "road", "instance")
     if not parts:
@@ -396,15 +283,7 @@ def merge(parts: Sequence[Mesh]) -> Mesh:
 
 
 def moved(part: Mesh, matrix: NDArray[np.float64]) -> Mesh:
-    """Place a part by a rigid transform (4, 4).
-
-    Parameters
-    ----------
-    part : Mesh
-        The part.
-    matrix : (4, 4) float64
-        Rigid transform.
-    """
+    """Place a part by a rigid transform (4, 4) (`matrix` (4, 4))."""
     rotation = matrix[:3, :3]
     positions = matrix_product(part.positions, rotation.T) + matrix[:3, 3]
     return replace(

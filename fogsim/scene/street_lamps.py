@@ -41,15 +41,7 @@ def street_lamp_shapes() -> dict[str, Mesh]:
 
 
 def lamp_posts(edges: Sequence[Edge], index: LaneIndex) -> list[Batch]:
-    """Lamps about every 35 m along the outer sides of roads, on one side of roads of two directions, off all lanes.
-
-    Parameters
-    ----------
-    edges : sequence of Edge
-        Free sides of lanes.
-    index : LaneIndex
-        All lanes.
-    """
+    """Lamps about every 35 m along the outer sides of roads, on one side of roads of two directions, off all lanes."""
     side = _outer_side(edges)
     places, turns, spacing = [], [], Spacing(_APART)
     for edge in edges:
@@ -73,13 +65,7 @@ def _outer_side(edges: Sequence[Edge]) -> int:
 
 
 def street_lamp_heads(scene: Scene) -> Points:
-    """Middles of the luminous surfaces of all street lamps of a scene (n, 3) [m].
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    """
+    """Middles of the luminous surfaces of all street lamps of a scene (n, 3) [m]."""
     batches = [batch.transforms for batch in scene.scenery if batch.shape == STREET_LAMP]
     if not batches:
         return np.zeros((0, 3))

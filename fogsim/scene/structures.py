@@ -24,35 +24,17 @@ _UP = np.array([0.0, 0.0, 1.0])
 
 
 def structure_shapes(structures: Sequence[Structure]) -> dict[str, Mesh]:
-    """Shapes of structures, in pieces short enough to be culled.
-
-    Parameters
-    ----------
-    structures : sequence of Structure
-        The structures.
-    """
+    """Shapes of structures, in pieces short enough to be culled."""
     return {name: _box(one, line - line[0]) for name, one, line in _pieces(structures)}
 
 
 def structure_batches(structures: Sequence[Structure]) -> list[Batch]:
-    """Where these shapes stand.
-
-    Parameters
-    ----------
-    structures : sequence of Structure
-        The structures.
-    """
+    """Where these shapes stand."""
     return [placed(name, line[:1], np.zeros(1)) for name, _, line in _pieces(structures)]
 
 
 def building_places(structures: Sequence[Structure]) -> Points:
-    """Places along the walls of buildings (n, 3) [m], near which nothing is put by chance.
-
-    Parameters
-    ----------
-    structures : sequence of Structure
-        Structures of all kinds.
-    """
+    """Places along the walls of buildings (n, 3) [m], near which nothing is put by chance."""
     walls = [refined(one.line, _SPACING) for one in structures if one.kind is StructureKind.BUILDING]
     return np.concatenate([np.zeros((0, 3)), *walls])
 

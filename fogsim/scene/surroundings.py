@@ -21,38 +21,17 @@ _ORIGINS = 10_000.0  # origins are multiples of this [m], so that networks near 
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """Part of a network.
+    """Part of a network."""
 
-    Attributes
-    ----------
-    network : RoadNetwork
-        Its lanes, areas and traffic lights; its route is the whole one. Places are counted from the origin.
-    signs : SignMap
-        Its signs, likewise.
-    origin : (3,) float64
-        Where that origin is in the network's own coordinates [m].
-    whole : bool
-        True if nothing has been left out.
-    """
-
+    # Its lanes, areas and traffic lights; its route is the whole one. Places are counted from the origin
     network: RoadNetwork
-    signs: SignMap
-    origin: NDArray[np.float64]
-    whole: bool
+    signs: SignMap  # Its signs, likewise
+    origin: NDArray[np.float64]  # (3,): Where that origin is in the network's own coordinates [m]
+    whole: bool  # True if nothing has been left out
 
 
 def surroundings(network: RoadNetwork, signs: SignMap, line: Points) -> Surroundings:
-    """Surroundings of a line, as a rule the route.
-
-    Parameters
-    ----------
-    network : RoadNetwork
-        The network.
-    signs : SignMap
-        Its signs.
-    line : (n, 3) float64
-        The line [m].
-    """
+    """Surroundings of a line, as a rule the route (`line` (n, 3) [m])."""
     plane = line[:, :2]
     origin = np.append(np.round(0.5 * (plane.min(axis=0) + plane.max(axis=0)) / _ORIGINS) * _ORIGINS, 0.0)
     near = Corridor(line, REACH)
@@ -92,15 +71,7 @@ def _moved(position: tuple[float, float, float], origin: NDArray[np.float64]) ->
 
 
 class Corridor:
-    """Places near a line.
-
-    Parameters
-    ----------
-    line : (n, 3) float64
-        The line [m].
-    reach : float
-        How far from it they may be at least [m].
-    """
+    """Places near a line (`line` (n, 3) [m], `reach` [m])."""
 
     def __init__(self, line: Points, reach: float) -> None:
         corner = line[:, :2].min(axis=0) - reach - _SQUARE
@@ -118,13 +89,7 @@ class Corridor:
         return np.asarray(np.floor((places[:, :2] - self._corner) / _SQUARE), np.int64)
 
     def contains(self, places: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Which places are near.
-
-        Parameters
-        ----------
-        places : (n, 2 or 3) float64
-            The places [m].
-        """
+        """Which places are near (`places` (n, 2 or 3) [m])."""
         squares = self._squares(places)
         inside = np.all((squares >= 0) & (squares < self._near.shape), axis=1)
         result = np.zeros(len(places), np.bool_)
@@ -132,13 +97,7 @@ class Corridor:
         return result
 
     def reaches(self, lines: Sequence[NDArray[np.float64]]) -> list[bool]:
-        """Which lines have any part near.
-
-        Parameters
-        ----------
-        lines : sequence of (n, 2 or 3) float64
-            The lines [m].
-        """
+        """Which lines have any part near (`lines` (n, 2 or 3) [m])."""
         if not lines:
             return []
         dense = _dense_lines(lines)

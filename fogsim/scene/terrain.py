@@ -58,13 +58,7 @@ class Terrain:
         self._heights = np.maximum(np.minimum(fallen, risen), self.plain)
 
     def height(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Height of the land at places (n,) [m].
-
-        Parameters
-        ----------
-        places : (n, 2 or 3) float64
-            The places [m].
-        """
+        """Height of the land at places (n,) [m] (`places` (n, 2 or 3) [m])."""
         if self._heights is None:
             return np.full(len(places), self.plain)
         at = (places[:, :2] - self._corner) / self._cell
@@ -133,15 +127,7 @@ def _spread(
 
 
 def plain_mesh(lanes: Sequence[Lane], height: float) -> Mesh:
-    """Level grassland around all lanes, as two triangles that reach beyond the horizon.
-
-    Parameters
-    ----------
-    lanes : sequence of Lane
-        The lanes.
-    height : float
-        Its height [m].
-    """
+    """Level grassland around all lanes, as two triangles that reach beyond the horizon (`height` [m])."""
     everything = np.concatenate([lane.centreline[:, :2] for lane in lanes])
     low, high = everything.min(axis=0) - 40e3, everything.max(axis=0) + 40e3
     corners = [(low[0], low[1]), (high[0], low[1]), (low[0], high[1]), (high[0], high[1])]

@@ -160,15 +160,7 @@ def _woodland(rng: np.random.Generator, level: int) -> Mesh:
 
 
 def tree_shapes(rng: np.random.Generator, kinds: int = 5) -> dict[str, Mesh]:
-    """Shapes of all trees by name, each with its levels of detail.
-
-    Parameters
-    ----------
-    rng : numpy Generator
-        What makes them differ.
-    kinds : int
-        Number of conifers, of broad-leaved trees and of woods.
-    """
+    """Shapes of all trees by name, each with its levels of detail."""
     shapes: dict[str, Mesh] = {}
     for name, grow in (("conifer", _conifer), ("broad_leaved", _broad_leaved), ("woodland", _woodland)):
         for i in range(kinds):

@@ -15,15 +15,7 @@ from fogsim.values.traffic import NO_PERSONS, PEDESTRIAN, PersonState, TrafficSt
 
 
 def traffic_batches(state: TrafficState, skip: int | None) -> tuple[Batch, ...]:
-    """Build one batch for each shape of a vehicle, a traffic light or a person.
-
-    Parameters
-    ----------
-    state : TrafficState
-        The traffic.
-    skip : int or None
-        See `vehicle_batches`.
-    """
+    """Build one batch for each shape of a vehicle, a traffic light or a person."""
     standing = (*vehicle_batches(state, skip), *signal_batches(state.signals, state.time))
     return (*standing, *person_batches(state.persons), *person_batches(_on_foot(state)))
 
@@ -41,17 +33,7 @@ def _on_foot(state: TrafficState) -> PersonState:
 def vehicle_batches(state: TrafficState, skip: int | None) -> tuple[Batch, ...]:
     """Build one batch for each shape that is on the road.
 
-    Parameters
-    ----------
-    state : TrafficState
-        Every vehicle, without persons among them; a body kind without a shape is drawn as a car.
-    skip : int or None
-        Row that is left out, as a rule the vehicle that carries the camera.
-
-    Returns
-    -------
-    tuple of Batch
-        Shapes fill a unit box, so the transforms scale them to length, width and height.
+    Returns shapes fill a unit box, so the transforms scale them to length, width and height.
     """
     state, owner = with_pieces(state, skip)
     shapes, rows = _grouped(state.ids, state.types, state.length.tobytes(), state.height.tobytes(), skip)
@@ -125,13 +107,7 @@ def _grouped(
 
 
 def body_names(state: TrafficState) -> tuple[str, ...]:
-    """Name of the shape of every vehicle.
-
-    Parameters
-    ----------
-    state : TrafficState
-        The vehicles.
-    """
+    """Name of the shape of every vehicle."""
     return _names(state.ids, state.types, state.length.tobytes(), state.height.tobytes())
 
 

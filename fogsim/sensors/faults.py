@@ -28,15 +28,7 @@ from fogsim.values.fault import (
 
 
 def faulty_lead_sensor(sensor: LeadSensor, faults: Iterable[RunningFault]) -> LeadSensor:
-    """A radar as it is with faults.
-
-    Parameters
-    ----------
-    sensor : LeadSensor
-        The radar.
-    faults : iterable of RunningFault
-        What is wrong now, with whatever sensor.
-    """
+    """A radar as it is with faults."""
     for fault in faults:
         match fault.kind:
             case LeadNoise(factor):
@@ -50,17 +42,7 @@ def faulty_lead_sensor(sensor: LeadSensor, faults: Iterable[RunningFault]) -> Le
 def faulty_lead(measured: LeadMeasurement | None, faults: Iterable[RunningFault]) -> LeadMeasurement | None:
     """What a radar with faults makes of what it measures.
 
-    Parameters
-    ----------
-    measured : LeadMeasurement or None
-        What it measures.
-    faults : iterable of RunningFault
-        What is wrong now, with whatever sensor.
-
-    Returns
-    -------
-    LeadMeasurement or None
-        None if it has lost the vehicle ahead, or there is none.
+    Returns None if it has lost the vehicle ahead, or there is none.
     """
     for fault in faults:
         match fault.kind:
@@ -77,17 +59,7 @@ def faulty_lead(measured: LeadMeasurement | None, faults: Iterable[RunningFault]
 def faulty_fix(fix: Fix, faults: Iterable[RunningFault]) -> Fix | None:
     """Where a vehicle with faults takes itself to be.
 
-    Parameters
-    ----------
-    fix : Fix
-        What is measured without them.
-    faults : iterable of RunningFault
-        What is wrong now, with whatever sensor.
-
-    Returns
-    -------
-    Fix or None
-        None if it does not know.
+    Returns None if it does not know.
     """
     for fault in faults:
         match fault.kind:
@@ -104,12 +76,7 @@ def faulty_fix(fix: Fix, faults: Iterable[RunningFault]) -> Fix | None:
 def faulty_scattering(measured: float, faults: Iterable[RunningFault]) -> float | None:
     """What a scatterometer with faults tells of the extinction coefficient [1/m]; None if nothing.
 
-    Parameters
-    ----------
-    measured : float
-        What it tells without them [1/m].
-    faults : iterable of RunningFault
-        What is wrong now, with whatever sensor.
+    Takes `measured` [1/m].
     """
     for fault in faults:
         match fault.kind:
@@ -121,17 +88,7 @@ def faulty_scattering(measured: float, faults: Iterable[RunningFault]) -> float 
 
 
 def faulty_signs(signs: SignMap, kinds: Iterable[FaultKind], where: Where) -> SignMap:
-    """Signs of the world, or of a vehicle's map, with faults.
-
-    Parameters
-    ----------
-    signs : SignMap
-        All signs as they were.
-    kinds : iterable of FaultKind
-        What is wrong now, with whatever sensor.
-    where : Where
-        Whether the world is asked for, or the map.
-    """
+    """Signs of the world, or of a vehicle's map, with faults."""
     left = signs.signs
     for kind in kinds:
         match kind:
@@ -150,20 +107,7 @@ def _moved(sign: Sign, by: SignsMoved) -> Sign:
 
 
 def check_sign_ids(kinds: Iterable[FaultKind], signs: SignMap) -> None:
-    """Refuse faults of signs that there are none of.
-
-    Parameters
-    ----------
-    kinds : iterable of FaultKind
-        Faults, of whatever sensor.
-    signs : SignMap
-        All signs.
-
-    Raises
-    ------
-    InputError
-        If a fault names a sign that is not there.
-    """
+    """Refuse faults of signs that there are none of."""
     known = [sign.sign_id for sign in signs.signs]
     for kind in kinds:
         if isinstance(kind, SignsMissing | SignsMoved):

@@ -10,24 +10,12 @@ from fogsim.values import Leader, LeadMeasurement
 
 @dataclass(frozen=True, slots=True)
 class LeadSensor:
-    """A long-range automotive radar.
+    """A long-range automotive radar."""
 
-    Attributes
-    ----------
-    reach : float
-        Largest distance at which it tracks a vehicle [m].
-    distance_deviation : float
-        Standard deviation of the distance [m].
-    speed_deviation : float
-        Standard deviation of the relative speed [m/s].
-    field_of_view : float
-        Full horizontal angle within which it measures [rad].
-    """
-
-    reach: float = 200.0
-    distance_deviation: float = 0.25
-    speed_deviation: float = 0.1
-    field_of_view: float = math.inf
+    reach: float = 200.0  # Largest distance at which it tracks a vehicle [m]
+    distance_deviation: float = 0.25  # Standard deviation of the distance [m]
+    speed_deviation: float = 0.1  # Standard deviation of the relative speed [m/s]
+    field_of_view: float = math.inf  # Full horizontal angle within which it measures [rad]
 
 
 def measure_lead(
@@ -42,25 +30,7 @@ def measure_lead(
 
     Two numbers are drawn in every call, with a leader or without, so that what comes later never depends on it.
 
-    Parameters
-    ----------
-    leader : Leader or None
-        The vehicle ahead as it truly is.
-    own_speed : float
-        The ego's speed [m/s].
-    sensor : LeadSensor
-        Reach and noise.
-    rng : numpy.random.Generator
-        Source of the noise.
-    bearing : float
-        Angle from the own axis to the middle of its rear [rad].
-    share_of_reach : float
-        What things in the way leave of the sensor's reach toward it, 0 … 1; 0 behind something solid.
-
-    Returns
-    -------
-    LeadMeasurement or None
-        None if nothing is within reach and field of view.
+    Returns None if nothing is within reach and field of view. Takes `own_speed` [m/s], `bearing` [rad].
     """
     distance_noise, speed_noise = rng.standard_normal(2).tolist()
     if leader is None or share_of_reach <= 0.0 or leader.gap > share_of_reach * sensor.reach:

@@ -25,12 +25,7 @@ def foliage_loss(way: float, frequency: float = FREQUENCY) -> float:
     Source: Weissberger, M. A. (1982), An initial critical summary of models for predicting the attenuation of radio
     waves by trees, ESD-TR-81-101: the modified exponential decay model, for 0.23 to 95 GHz and trees in leaf.
 
-    Parameters
-    ----------
-    way : float
-        Way through the leaves [m], up to 400.
-    frequency : float
-        [GHz]
+    Takes `way` [m], `frequency` [GHz].
     """
     if way <= 0.0:
         return 0.0
@@ -39,13 +34,7 @@ def foliage_loss(way: float, frequency: float = FREQUENCY) -> float:
 
 
 class RadarShadow:
-    """How much less far a radar reaches because of what stands beside the road.
-
-    Parameters
-    ----------
-    structures : sequence of Structure
-        What stands there; hedges are leaves, all else is solid.
-    """
+    """How much less far a radar reaches because of what stands beside the road."""
 
     def __init__(self, structures: Sequence[Structure]) -> None:
         self._solid = obstructions_of(one for one in structures if one.kind is not StructureKind.HEDGE)
@@ -60,12 +49,7 @@ class RadarShadow:
 
         By the radar equation a loss of L dB on the way there and on the way back shortens the reach by 10^(−2 L / 40).
 
-        Parameters
-        ----------
-        radar : (3,) array_like
-            Where the radar is [m].
-        rear : (k, 3) array_like
-            Points of the vehicle that send its waves back [m]; the one that is best to be reached counts.
+        Takes `radar` (3,) [m], `rear` (k, 3) [m].
         """
         points = np.asarray(rear, np.float64).reshape(-1, 3)
         starts = np.broadcast_to(np.asarray(radar, np.float64), points.shape)

@@ -12,14 +12,7 @@ class Scatterometer:
     deviation is that of the values that come out, however often they are asked for. The volume that it looks at is some
     0.1 dm³ (of Vaisala's FD12P: de Haij, KNMI): it tells the fog at its place and nothing of the road ahead.
 
-    Parameters
-    ----------
-    relative_deviation : float
-        Standard deviation of its values in ln k [-].
-    calibration_deviation : float
-        Standard deviation in ln k of the error that all values of one run share [-].
-    averaging_time : float
-        Time constant of the average [s]; 0 for none.
+    Takes `averaging_time` [s].
     """
 
     def __init__(self, relative_deviation: float, calibration_deviation: float, averaging_time: float) -> None:
@@ -28,13 +21,7 @@ class Scatterometer:
         self.reset(np.random.default_rng(0))
 
     def reset(self, rng: np.random.Generator) -> None:
-        """Begin a run.
-
-        Parameters
-        ----------
-        rng : numpy.random.Generator
-            Draws the error of the calibration, and is the source of all noise.
-        """
+        """Begin a run."""
         self._rng = rng
         self._calibration = self._calibration_deviation * float(rng.standard_normal())
         self._average: tuple[float, float, float] | None = None
@@ -42,17 +29,7 @@ class Scatterometer:
     def measure(self, extinction: float, time: float) -> float:
         """Measure.
 
-        Parameters
-        ----------
-        extinction : float
-            Extinction coefficient at its place [1/m].
-        time : float
-            When [s]; not before that of an earlier call of the run.
-
-        Returns
-        -------
-        float
-            What it tells of the extinction coefficient [1/m].
+        Returns what it tells of the extinction coefficient [1/m]. Takes `extinction` [1/m], `time` [s].
         """
         noise = float(self._rng.standard_normal())
         if self._average is not None:

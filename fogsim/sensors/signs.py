@@ -21,25 +21,8 @@ def signs_ahead(
 ) -> tuple[SignSighting, ...]:
     """Signs ahead of a vehicle by the map, nearest first.
 
-    Parameters
-    ----------
-    signs : SignMap
-        The map.
-    position : (3,) float64
-        Middle of the front bumper [m].
-    heading : float
-        Direction of travel, counterclockwise from east [rad].
-    reach : float
-        Largest distance ahead [m].
-    corridor : float
-        Largest lateral offset [m].
-    grade : float
-        Inclination of the road under the vehicle, positive uphill [rad]; heights count from this plane.
-
-    Returns
-    -------
-    tuple of SignSighting
-        Signs that face the vehicle.
+    Returns signs that face the vehicle. Takes `position` (3,) [m], `heading` [rad], `reach` [m], `corridor` [m],
+    `grade` [rad].
     """
     forward = (math.cos(heading), math.sin(heading))
     seen = []

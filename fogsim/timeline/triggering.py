@@ -31,34 +31,19 @@ _TICK = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Due:
-    """What of a timeline begins in a camera period.
+    """What of a timeline begins in a camera period."""
 
-    Attributes
-    ----------
-    actions : Actions
-        What is to be done.
-    parts : tuple of (Begun, tuple of TrafficAction)
-        Entries that begin, and what each asks of the traffic.
-    over : tuple of Begun
-        Entries that are over.
-    """
-
-    actions: Actions = field(default_factory=Actions)
+    actions: Actions = field(default_factory=Actions)  # What is to be done
+    # Entries that begin, and what each asks of the traffic
     parts: tuple[tuple[Begun, tuple[TrafficAction, ...]], ...] = ()
-    over: tuple[Begun, ...] = ()
+    over: tuple[Begun, ...] = ()  # Entries that are over
 
 
 NOTHING_DUE = Due()
 
 
 class Timeline:
-    """Watches the conditions of a scenario's timeline, and says what begins.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """Watches the conditions of a scenario's timeline, and says what begins."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._entries = tuple(_Entry(written, number) for number, written in enumerate(scenario.timeline))
@@ -74,11 +59,6 @@ class Timeline:
         """Take in a finished step, and say what begins after it.
 
         An entry begins when its condition holds (and its delay is over) and all its vehicles are on the road.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            The step; each of a run, in their order.
         """
         if not self._entries:
             return NOTHING_DUE
@@ -98,25 +78,11 @@ class Timeline:
         return Due(_together([actions for _, actions in parts]), tuple((b, a.traffic) for b, a in parts), over)
 
     def ended(self, step: TrafficStep) -> Ending | None:
-        """Whether a finished step is the last one by the scenario's ``end_when``; None if the run goes on.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            The step; each of a run, in their order.
-        """
+        """Whether a finished step is the last one by the scenario's ``end_when``; None if the run goes on."""
         return Ending.END_CONDITION if self._end is not None and self._end.update(step) else None
 
     def begun(self, due: Due, refused: Collection[TrafficAction]) -> tuple[Begun, ...]:
-        """What has begun, or is over, of what was due.
-
-        Parameters
-        ----------
-        due : Due
-            From `due`.
-        refused : collection of TrafficAction
-            What the traffic could not begin: its entries have not begun.
-        """
+        """What has begun, or is over, of what was due."""
         failed = {begun.name for begun, actions in due.parts if any(action in refused for action in actions)}
         for entry in self._entries:
             entry.was_refused |= entry.name in failed
@@ -124,13 +90,7 @@ class Timeline:
         return (*due.over, *(begun for begun, _ in due.parts if begun.name not in failed))
 
     def unplayed(self, step: TrafficStep) -> Unplayed:
-        """What has not begun when a run is over.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            Its last step.
-        """
+        """What has not begun when a run is over."""
         reasons = [(entry, entry.why_not(self._seen, step)) for entry in self._entries]
         names = {vehicle for entry in self._entries for vehicle in entry.vehicles(step)}
         return Unplayed(

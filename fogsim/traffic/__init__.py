@@ -22,40 +22,12 @@ from fogsim.traffic.user_simulation import AttachedTraffic, step_length
 
 
 def libsumo_traffic(setup: TrafficSetup, outputs: Path | None = None) -> Traffic:
-    """SUMO inside this process; one at a time.
-
-    Parameters
-    ----------
-    setup : TrafficSetup
-        The simulation and its ego.
-    outputs : Path or None
-        Folder of all files that SUMO writes, whatever folders its configuration and its detectors name; None to keep
-        none of them.
-
-    Warns
-    -----
-    UserWarning
-        If its configuration has options that cannot hold here and are left out; later, if SUMO writes files that are
-        not kept.
-    """
+    """SUMO inside this process; one at a time."""
     return _libsumo(setup, outputs)
 
 
 def libsumo_network_traffic(setup: TrafficSetup, outputs: Path | None = None) -> NetworkTraffic:
-    """SUMO inside this process, without an ego; one at a time.
-
-    Parameters
-    ----------
-    setup : TrafficSetup
-        The simulation; its ego is None.
-    outputs : Path or None
-        As of `libsumo_traffic`.
-
-    Warns
-    -----
-    UserWarning
-        As of `libsumo_traffic`.
-    """
+    """SUMO inside this process, without an ego; one at a time."""
     return _libsumo(setup, outputs)
 
 
@@ -66,15 +38,7 @@ def _libsumo(setup: TrafficSetup, outputs: Path | None) -> SumoTraffic:
 
 
 def traci_traffic(setup: TrafficSetup, link: TraciLink) -> Traffic:
-    """SUMO in another process, which the user has started.
-
-    Parameters
-    ----------
-    setup : TrafficSetup
-        The simulation and its ego.
-    link : TraciLink
-        Where it listens.
-    """
+    """SUMO in another process, which the user has started."""
     return SumoTraffic(setup, link)
 
 

@@ -91,17 +91,7 @@ OTHERS_LAMPS = Lamp.POSITION | Lamp.LOW_BEAM
 
 
 def body_kind(vehicle_class: str, shape: str = "", length: float = 0.0) -> str:
-    """Body kind of a SUMO vehicle.
-
-    Parameters
-    ----------
-    vehicle_class : str
-        Its class.
-    shape : str
-        Its ``guiShape``, which tells what a type is meant to be whose class is left at that of a car.
-    length : float
-        Its length [m].
-    """
+    """Body kind of a SUMO vehicle (`length` [m])."""
     known = BODY_KINDS.get(vehicle_class) or SHAPE_KINDS.get(shape) or SHAPE_KINDS.get(shape.split("/", maxsplit=1)[0])
     return known or ("truck" if length > LONGEST_CAR else "car")
 
@@ -109,27 +99,14 @@ def body_kind(vehicle_class: str, shape: str = "", length: float = 0.0) -> str:
 def cross_section(kind: str, width: float, height: float) -> tuple[float, float]:
     """Width and height [m] of a vehicle, those of a truck where its type says no more than that it is long.
 
-    Parameters
-    ----------
-    kind : str
-        Body kind.
-    width, height : float
-        The vehicle's own [m].
+    Takes `width`, `height` [m].
     """
     large = kind in {"truck", "bus"} and math.isclose(width, CAR_SECTION[0]) and math.isclose(height, CAR_SECTION[1])
     return LARGE_SECTION if large else (width, height)
 
 
 def paint(vehicle_id: str, colour: tuple[int, ...]) -> tuple[float, float, float]:
-    """Linear reflectance of a vehicle's paint, 0 … 1.
-
-    Parameters
-    ----------
-    vehicle_id : str
-        Its id, which picks a common paint where the simulation gives no colour.
-    colour : tuple of int
-        SUMO's colour, 0 … 255; its default yellow counts as none.
-    """
+    """Linear reflectance of a vehicle's paint, 0 … 1."""
     if tuple(colour[:3]) == SUMO_DEFAULT_COLOUR:
         return PAINTS[zlib.crc32(vehicle_id.encode()) % len(PAINTS)]
     red, green, blue = ((c / 255.0) ** 2.2 for c in colour[:3])
@@ -138,13 +115,7 @@ def paint(vehicle_id: str, colour: tuple[int, ...]) -> tuple[float, float, float
 
 @functools.lru_cache(maxsize=1024)
 def lamps_from_signals(signals: int) -> int:
-    """Lamps, as bits of `Lamp`, that SUMO's vehicle signals stand for.
-
-    Parameters
-    ----------
-    signals : int
-        Bits of SUMO's vehicle signals.
-    """
+    """Lamps, as bits of `Lamp`, that SUMO's vehicle signals stand for."""
     lamps = 0
     for bit, lamp in _SIGNALS:
         if signals & bit:
@@ -156,13 +127,7 @@ _LAMPS_OF_SIGNALS = np.array([lamps_from_signals(signals) for signals in range(_
 
 
 def lamps_from_many_signals(signals: Sequence[int]) -> NDArray[np.int32]:
-    """Lamps as bits of `Lamp` (n,), as `lamps_from_signals` gives them for each.
-
-    Parameters
-    ----------
-    signals : (n,) sequence of int
-        Bits of SUMO's vehicle signals.
-    """
+    """Lamps as bits of `Lamp` (n,), as `lamps_from_signals` gives them for each."""
     known = len(_LAMPS_OF_SIGNALS) - 1
     return np.asarray(_LAMPS_OF_SIGNALS[np.asarray(signals, dtype=np.intp) & known])
 

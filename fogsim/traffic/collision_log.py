@@ -13,13 +13,7 @@ class CollisionLog:
         self._pending: list[Collision] = []
 
     def add(self, collisions: Iterable[Collision]) -> None:
-        """Take in the collisions of a step; those of pairs that have collided before are left out.
-
-        Parameters
-        ----------
-        collisions : iterable of Collision
-            What has happened.
-        """
+        """Take in the collisions of a step; those of pairs that have collided before are left out."""
         for collision in collisions:
             pair = frozenset((collision.collider, collision.victim))
             if pair not in self._pairs:

@@ -12,41 +12,16 @@ class AnyTraffic(Protocol):
     """A running traffic simulation."""
 
     def enter_fog(self, fog: FogAccess) -> None:
-        """Let drivers see only what this fog lets them see, from now on and in every later run.
-
-        Parameters
-        ----------
-        fog : FogAccess
-            The fog.
-        """
+        """Let drivers see only what this fog lets them see, from now on and in every later run."""
 
     def begin(self, actions: Sequence[TrafficAction]) -> tuple[TrafficAction, ...]:
         """Begin what a script asks for, with the next step.
 
-        Parameters
-        ----------
-        actions : sequence of TrafficAction
-            What begins.
-
-        Returns
-        -------
-        tuple of TrafficAction
-            Those that could not begin: the vehicle has left, or there is no such lane.
-
-        Raises
-        ------
-        InputError
-            If this simulation cannot do it at all.
+        Returns those that could not begin: the vehicle has left, or there is no such lane.
         """
 
     def advance(self, command: Command) -> None:
-        """Move by one traffic step with a command in force.
-
-        Parameters
-        ----------
-        command : Command
-            Advised speeds and lamps.
-        """
+        """Move by one traffic step with a command in force."""
 
     def unplayed(self) -> Unplayed:
         """Tell what of the script has not been played since the start; before `close`."""
@@ -59,18 +34,7 @@ class Traffic(AnyTraffic, Protocol):
     """A running traffic simulation with one ego vehicle."""
 
     def start(self, seed: int) -> None:
-        """Begin, or begin anew, and run until the ego is on the road.
-
-        Parameters
-        ----------
-        seed : int
-            Seed of the simulation's own random numbers; the same seed replays exactly.
-
-        Raises
-        ------
-        SimulationError
-            If the simulation cannot start or the ego does not appear in time.
-        """
+        """Begin, or begin anew, and run until the ego is on the road."""
 
     def planned_network(self) -> tuple[RoadNetwork, SignMap] | None:
         """Roads and signs along the ego's way before `start`; None where no file has it written out."""
@@ -86,18 +50,7 @@ class NetworkTraffic(AnyTraffic, Protocol):
     """A running traffic simulation without an ego vehicle."""
 
     def start(self, seed: int) -> None:
-        """Begin, or begin anew.
-
-        Parameters
-        ----------
-        seed : int
-            Seed of the simulation's own random numbers; the same seed replays exactly.
-
-        Raises
-        ------
-        SimulationError
-            If the simulation cannot start.
-        """
+        """Begin, or begin anew."""
 
     def observe_network(self) -> NetworkSnapshot:
         """Tell where everybody is and what has happened since the last call."""

@@ -25,55 +25,24 @@ class AfterCollision(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class TrafficSetup:
-    """A SUMO simulation, and who the ego is if there is one.
+    """A SUMO simulation, and who the ego is if there is one."""
 
-    Attributes
-    ----------
-    net : Path or None
-        SUMO network; None for the one that the simulation says it has loaded.
-    routes, additional : tuple of Path
-        SUMO route and additional files.
-    ego : str or None
-        Id of the ego vehicle, or `ANY_EGO`; None for traffic alone.
-    step_length : float
-        SUMO's step [s].
-    keep_lane : tuple of str
-        Vehicles that never change lane.
-    warm_up_limit : float
-        Simulated time within which the ego must appear [s].
-    advice_deceleration : float
-        Deceleration with which an advised vehicle slows down to the advice [m/s²].
-    reading_radius : float
-        Vehicles farther from the ego than this are not read [m].
-    events : tuple of Event
-        What is scripted.
-    sight : DriverSight or None
-        Eyes of the drivers; None lets them see through the fog, as SUMO's do by themselves.
-    drivers : DriverSetup
-        How drivers choose their speed in fog and follow advice.
-    after_collision : AfterCollision
-        What becomes of vehicles that have collided.
-    warm_up : float
-        Without an ego, simulated time before the run begins [s].
-    config : Path or None
-        SUMO configuration, in place of net, routes and additional files.
-    sumo_options : tuple of (str, str)
-        Further options of SUMO, named without dashes, and their values as on its command line.
-    """
-
-    net: Path | None
+    net: Path | None  # SUMO network; None for the one that the simulation says it has loaded
+    # routes, additional: SUMO route and additional files
     routes: tuple[Path, ...]
     additional: tuple[Path, ...]
-    ego: str | None
-    step_length: float
-    keep_lane: tuple[str, ...]
-    warm_up_limit: float
-    advice_deceleration: float
-    reading_radius: float
-    events: tuple[Event, ...] = ()
+    ego: str | None  # Id of the ego vehicle, or `ANY_EGO`; None for traffic alone
+    step_length: float  # SUMO's step [s]
+    keep_lane: tuple[str, ...]  # Vehicles that never change lane
+    warm_up_limit: float  # Simulated time within which the ego must appear [s]
+    advice_deceleration: float  # Deceleration with which an advised vehicle slows down to the advice [m/s²]
+    reading_radius: float  # Vehicles farther from the ego than this are not read [m]
+    events: tuple[Event, ...] = ()  # What is scripted
+    # Eyes of the drivers; None lets them see through the fog, as SUMO's do by themselves
     sight: DriverSight | None = None
-    drivers: DriverSetup = UNTOUCHED
-    after_collision: AfterCollision = AfterCollision.STOP
-    config: Path | None = None
+    drivers: DriverSetup = UNTOUCHED  # How drivers choose their speed in fog and follow advice
+    after_collision: AfterCollision = AfterCollision.STOP  # What becomes of vehicles that have collided
+    config: Path | None = None  # SUMO configuration, in place of net, routes and additional files
+    # (str, str): Further options of SUMO, named without dashes, and their values as on its command line
     sumo_options: tuple[tuple[str, str], ...] = ()
-    warm_up: float = 0.0
+    warm_up: float = 0.0  # Without an ego, simulated time before the run begins [s]

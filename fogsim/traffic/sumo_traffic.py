@@ -114,15 +114,7 @@ def _translates_errors(
 
 
 class SumoTraffic:
-    """A SUMO simulation with one ego vehicle, or without: see `Traffic` and `NetworkTraffic`.
-
-    Parameters
-    ----------
-    setup : TrafficSetup
-        The simulation and its ego, if it has one.
-    link : SumoLink
-        How it is reached.
-    """
+    """A SUMO simulation with one ego vehicle, or without: see `Traffic` and `NetworkTraffic`."""
 
     def __init__(self, setup: TrafficSetup, link: SumoLink) -> None:
         self._setup = setup
@@ -150,13 +142,7 @@ class SumoTraffic:
 
     @_translates_errors
     def start(self, seed: int) -> None:
-        """Begin, or begin anew, and run until the ego is on the road or, without one, through the warm-up.
-
-        Parameters
-        ----------
-        seed : int
-            SUMO's seed.
-        """
+        """Begin, or begin anew, and run until the ego is on the road or, without one, through the warm-up."""
         arguments = command_line(self._setup, seed)
         api = self._link.begin(arguments)
         if self._any_ego and self._ego_of_seed != seed:
@@ -254,13 +240,7 @@ class SumoTraffic:
         run.collisions.take()
 
     def enter_fog(self, fog: FogAccess) -> None:
-        """Let drivers see only what this fog lets them see; see `Traffic.enter_fog`.
-
-        Parameters
-        ----------
-        fog : FogAccess
-            The fog.
-        """
+        """Let drivers see only what this fog lets them see; see `Traffic.enter_fog`."""
         self._fog = fog
         if self._run is not None:
             setup, api, roster, session = self._setup, self._run.api, self._run.roster, self._run.session
@@ -320,13 +300,7 @@ class SumoTraffic:
 
     @_translates_errors
     def begin(self, actions: Sequence[TrafficAction]) -> tuple[TrafficAction, ...]:
-        """Begin actions with the next step; see `Traffic.begin`.
-
-        Parameters
-        ----------
-        actions : sequence of TrafficAction
-            What begins.
-        """
+        """Begin actions with the next step; see `Traffic.begin`."""
         run = self._running
         run.roster.update()
         refused = run.actions.begin(actions, self._elapsed(run), run.roster.present)
@@ -340,26 +314,14 @@ class SumoTraffic:
 
     @_translates_errors
     def advance(self, command: Command) -> None:
-        """Move by one traffic step; see `Traffic.advance`.
-
-        Parameters
-        ----------
-        command : Command
-            Advised speeds and lamps.
-        """
+        """Move by one traffic step; see `Traffic.advance`."""
         self.obey(command)
         self._link.step()
         self.look()
 
     @_translates_errors
     def obey(self, command: Command) -> None:
-        """Put a command in force for the next step of a simulation that somebody else steps.
-
-        Parameters
-        ----------
-        command : Command
-            Advised speeds and lamps.
-        """
+        """Put a command in force for the next step of a simulation that somebody else steps."""
         run = self._running
         self._command = command
         orders = self._play_script(run, command)

@@ -15,20 +15,7 @@ from fogsim.values import Command, Unplayed
 
 
 class AttachedLink:
-    """A simulation that runs already, and is neither stepped nor ended by this link.
-
-    Parameters
-    ----------
-    api : module or traci.Connection
-        libsumo, traci, or one connection of traci.
-
-    Raises
-    ------
-    InputError
-        If it is something else.
-    SimulationError
-        If it is libsumo, and no simulation has been started.
-    """
+    """A simulation that runs already, and is neither stepped nor ended by this link."""
 
     shared = True
 
@@ -44,13 +31,7 @@ class AttachedLink:
             raise SimulationError("no simulation runs in libsumo: call libsumo.start first")
 
     def begin(self, arguments: Sequence[str]) -> Api:  # noqa: ARG002 - the simulation has its own
-        """Take the simulation as it is; see `SumoLink.begin`.
-
-        Parameters
-        ----------
-        arguments : sequence of str
-            SUMO's command line without the program's name.
-        """
+        """Take the simulation as it is; see `SumoLink.begin`."""
         return self._api
 
     def step(self) -> None:
@@ -112,13 +93,7 @@ class AttachedTraffic(SumoTraffic):
         return self.ego in present
 
     def obey(self, command: Command) -> None:
-        """Put a command in force for the next step; see `SumoTraffic.obey`.
-
-        Parameters
-        ----------
-        command : Command
-            Advised speeds and lamps.
-        """
+        """Put a command in force for the next step; see `SumoTraffic.obey`."""
         # The owner may have taken a vehicle away since the look, or loaded another simulation.
         with self._attached.translated_errors():
             self._running.roster.check_count()
@@ -141,17 +116,6 @@ class AttachedTraffic(SumoTraffic):
 
 
 def step_length(api: Api) -> float:
-    """Step of a simulation that runs [s].
-
-    Parameters
-    ----------
-    api : module or traci.Connection
-        libsumo, traci, or one connection of traci.
-
-    Raises
-    ------
-    SimulationError
-        If none does.
-    """
+    """Step of a simulation that runs [s]."""
     with AttachedLink(api).translated_errors():
         return float(api.simulation.getDeltaT())

@@ -31,24 +31,12 @@ _UNIT = re.compile(r"[^\W\d_][^\W_]*(?:\s?[/*·^]?\s?-?[^\W_]+)*\Z|%\Z|°\Z")
 
 
 def is_quantity(text: object) -> bool:
-    """Tell whether something is text that begins like a number.
-
-    Parameters
-    ----------
-    text : object
-        What a file has.
-    """
+    """Tell whether something is text that begins like a number."""
     return isinstance(text, str) and _WRITTEN.match(text) is not None
 
 
 def split_quantity(text: str) -> tuple[float, str] | None:
-    """Number and unit of text as it is written: 10 and ``m`` of ``10 m``; None if it is no finite quantity.
-
-    Parameters
-    ----------
-    text : str
-        What a file has.
-    """
+    """Number and unit of text as it is written: 10 and ``m`` of ``10 m``; None if it is no finite quantity."""
     match = _WRITTEN.match(text)
     if match is None or not math.isfinite(float(match[1])) or not (match[2] is None or _UNIT.match(match[2])):
         return None
@@ -56,21 +44,7 @@ def split_quantity(text: str) -> tuple[float, str] | None:
 
 
 def parse_quantity(text: str, unit: str) -> float:
-    """Number of a quantity in a unit: ``parse_quantity("90 km/h", "m/s")`` is 25.
-
-    Parameters
-    ----------
-    text : str
-        A number and a unit of the same dimension; without a unit it counts in the one asked for only where it is
-        dimensionless, infinite or zero.
-    unit : str
-        The unit that is asked for, as pint names it; "" for a pure number.
-
-    Raises
-    ------
-    ValueError
-        If it is no quantity, its unit is not known, or is of another dimension.
-    """
+    """Number of a quantity in a unit: ``parse_quantity("90 km/h", "m/s")`` is 25."""
     match = _WRITTEN.match(text)
     if match is None:
         raise ValueError(f"expected a number and a unit such as {example_of(unit)!r}, got {text!r}")
@@ -85,13 +59,7 @@ def parse_quantity(text: str, unit: str) -> float:
 
 
 def example_of(unit: str) -> str:
-    """A quantity of a unit, for messages.
-
-    Parameters
-    ----------
-    unit : str
-        The unit; "" for a pure number.
-    """
+    """A quantity of a unit, for messages."""
     return f"10 {unit}" if unit else "10"
 
 

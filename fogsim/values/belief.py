@@ -185,12 +185,7 @@ def _moments(values: NDArray[np.float64], probability: NDArray[np.float64]) -> t
 def put_quantiles(values: NDArray[np.float64], probability: NDArray[np.float64], shares: NDArray[np.float64]) -> None:
     """Put quantiles in the place of shares, by straight lines between the middles of cells.
 
-    Parameters
-    ----------
-    values, probability : (n,) float64
-        Centres of the cells, ascending, and their probabilities.
-    shares : (m,) float64
-        Probabilities in 0 … 1; written to.
+    Takes `values`, `probability` (n,), `shares` (m,).
     """
     last = len(values) - 1
     for i in range(len(shares)):
@@ -214,11 +209,5 @@ THINNEST = 1e-6
 
 
 def certain_belief(extinction: float) -> Belief:
-    """Belief of somebody who knows the fog, as a visibility meter beside the road does.
-
-    Parameters
-    ----------
-    extinction : float
-        Extinction coefficient [1/m]; 0 in clear air.
-    """
+    """Belief of somebody who knows the fog, as a visibility meter beside the road does (`extinction` [1/m])."""
     return Belief(np.log([max(extinction, THINNEST)]), np.ones(1))

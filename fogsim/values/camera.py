@@ -76,14 +76,7 @@ class Camera:
     black_level: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse a calibration that no camera can have.
-
-        Raises
-        ------
-        InputError
-            If a size, length or angle is no number, not finite or out of range, or a size or depth not whole, or there
-            is no such response.
-        """
+        """Refuse a calibration that no camera can have."""
         self._check_kinds()
         for name in ("width", "height"):
             if not (_whole(getattr(self, name)) and getattr(self, name) >= 1):

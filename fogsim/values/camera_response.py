@@ -10,17 +10,7 @@ GAMMA = 2.2
 
 
 def respond(exposure: NDArray[np.float64], response: Response, black_level: float = 0.0) -> NDArray[np.float64]:
-    """Signal for a relative exposure, both 0 … 1 (sRGB: IEC 61966-2-1).
-
-    Parameters
-    ----------
-    exposure : float64 array
-        Exposure relative to saturation.
-    response : Response
-        The curve.
-    black_level : float
-        Share of full scale at which the sensor reads no light, beneath the curve [-].
-    """
+    """Signal for a relative exposure, both 0 … 1 (sRGB: IEC 61966-2-1)."""
     if black_level > 0:
         exposure = black_level + (1.0 - black_level) * exposure
     match response:
@@ -34,15 +24,7 @@ def respond(exposure: NDArray[np.float64], response: Response, black_level: floa
 
 
 def eight_bit(image: NDArray[np.uint8] | NDArray[np.uint16], bits: int) -> NDArray[np.uint8]:
-    """Return an image in 8 bits, as screens show it; one that has them is returned itself.
-
-    Parameters
-    ----------
-    image : (rows, cols[, 3]) uint8, or uint16 for more than 8 bits
-        Pixel values 0 … 2^bits − 1.
-    bits : int
-        Their bit depth, at least 8.
-    """
+    """Return an image in 8 bits, as screens show it; one that has them is returned itself."""
     return (image >> (bits - 8)).astype(np.uint8) if bits > 8 else image.astype(np.uint8, copy=False)
 
 
@@ -50,15 +32,6 @@ def exposure_of(signal: NDArray[np.float64], response: Response, black_level: fl
     """Relative exposure behind a signal, both 0 … 1: the inverse of `respond` (sRGB: IEC 61966-2-1).
 
     Of a signal below the black level, as noise makes some, it is negative, so that means over pixels stay right.
-
-    Parameters
-    ----------
-    signal : float64 array
-        Signal relative to the largest pixel value.
-    response : Response
-        The curve.
-    black_level : float
-        Share of full scale at which the sensor reads no light [-].
     """
     linear = signal
     if response is Response.GAMMA:

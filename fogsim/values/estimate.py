@@ -69,19 +69,12 @@ class SignLook:
 
 @dataclass(frozen=True, slots=True)
 class ExtinctionBounds:
-    """What is known of the extinction coefficient where it cannot be estimated: that it is at most or at least so much.
+    """What is known of the extinction where it cannot be estimated: that it is at most or at least so much."""
 
-    Attributes
-    ----------
-    most, least : float
-        k is likely at most, and at least, this [1/m]; ``inf`` and 0 where nothing is known.
-    softness : float
-        Standard deviation of either end in ln k [-].
-    """
-
+    # most, least: k is likely at most, and at least, this [1/m]; ``inf`` and 0 where nothing is known
     most: float = math.inf
     least: float = 0.0
-    softness: float = 0.1
+    softness: float = 0.1  # Standard deviation of either end in ln k [-]
 
 
 @dataclass(frozen=True, slots=True)

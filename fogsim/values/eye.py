@@ -18,13 +18,7 @@ LEAST_ANGLE = math.radians(1.0)
 
 
 def flux_root(luminance: ArrayLike) -> NDArray[np.float64]:
-    """√φ of Adrian's formula (1989), that of Ricco's law for small targets.
-
-    Parameters
-    ----------
-    luminance : array_like
-        Adaptation luminance [cd/m²].
-    """
+    """√φ of Adrian's formula (1989), that of Ricco's law for small targets (`luminance` [cd/m²])."""
     value = np.asarray(luminance, dtype=np.float64)
     log = np.log10(np.maximum(value, LEAST_LUMINANCE))
     bright = np.log10(4.1925 * 10.0 ** (0.1556 * log)) + 0.1684 * 10.0 ** (0.5867 * log)
@@ -34,13 +28,7 @@ def flux_root(luminance: ArrayLike) -> NDArray[np.float64]:
 
 
 def luminance_root(luminance: ArrayLike) -> NDArray[np.float64]:
-    """√L of Adrian's formula (1989), that of Weber's law for large targets.
-
-    Parameters
-    ----------
-    luminance : array_like
-        Adaptation luminance [cd/m²].
-    """
+    """√L of Adrian's formula (1989), that of Weber's law for large targets (`luminance` [cd/m²])."""
     value = np.asarray(luminance, dtype=np.float64)
     log = np.log10(np.maximum(value, LEAST_LUMINANCE))
     bright = 0.05946 * 10.0 ** (0.466 * log)
@@ -79,18 +67,6 @@ def disability_glare(
     """Veil of disability glare by the general formula of CIE 146:2002, from 0.1° to 100° [cd/m²].
 
     L_v / E = 10/θ³ + (5/θ² + 0.1 p/θ) (1 + (A/62.5)⁴) + 0.0025 p, θ in degrees. Several sources add.
-
-    Parameters
-    ----------
-    illuminance, angle, age
-        As of `veiling_luminance`; an angle of less than 0.1° counts as 0.1°.
-    pigmentation : float
-        p [-]: 0 for black eyes, 0.5 for brown, 1 for light blue, 1.2 for very light ones.
-
-    Raises
-    ------
-    InputError
-        As `veiling_luminance`, or if the pigmentation is not in 0 … 1.2.
     """
     light, theta = _checked_glare(illuminance, angle, age)
     if not 0.0 <= pigmentation <= 1.2:

@@ -25,233 +25,137 @@ class Blackout:
 
 @dataclass(frozen=True, slots=True)
 class FrozenFrame:
-    """One frame again and again, the last before the fault.
-
-    Attributes
-    ----------
-    time_stamp : TimeStamp
-        Whether its time stays that of its exposure, or moves on as if each were new.
-    """
+    """One frame again and again, the last before the fault."""
 
     sensor: ClassVar[str] = "camera"
     name: ClassVar[str] = "frozen"
+    # Whether its time stays that of its exposure, or moves on as if each were new
     time_stamp: TimeStamp = TimeStamp.DELIVERY
 
 
 @dataclass(frozen=True, slots=True)
 class DroppedFrames:
-    """Frames that get lost, each by chance; until the next arrives, the last one is all there is.
-
-    Attributes
-    ----------
-    share : float
-        Share of frames that get lost, 0 … 1.
-    """
+    """Frames that get lost, each by chance; until the next arrives, the last one is all there is."""
 
     sensor: ClassVar[str] = "camera"
     name: ClassVar[str] = "dropped_frames"
-    share: float = 1.0
+    share: float = 1.0  # Share of frames that get lost, 0 … 1
 
 
 @dataclass(frozen=True, slots=True)
 class Latency:
-    """Frames that come late.
-
-    Attributes
-    ----------
-    delay : float
-        From exposure to delivery [s].
-    time_stamp : TimeStamp
-        Which of both times the frames bear.
-    """
+    """Frames that come late."""
 
     sensor: ClassVar[str] = "camera"
     name: ClassVar[str] = "latency"
-    delay: float = 0.3
-    time_stamp: TimeStamp = TimeStamp.EXPOSURE
+    delay: float = 0.3  # From exposure to delivery [s]
+    time_stamp: TimeStamp = TimeStamp.EXPOSURE  # Which of both times the frames bear
 
 
 @dataclass(frozen=True, slots=True)
 class Miscalibration:
-    """A camera that is knocked out of place, or whose lens slips, of which the estimators are told nothing.
-
-    Attributes
-    ----------
-    pitch, roll : float
-        What is added to the true angles [rad].
-    focal_length_ratio : float
-        True focal length over that before [-].
-    """
+    """A camera that is knocked out of place, or whose lens slips, of which the estimators are told nothing."""
 
     sensor: ClassVar[str] = "camera"
     name: ClassVar[str] = "calibration"
+    # pitch, roll: what is added to the true angles [rad]
     pitch: float = 0.0
     roll: float = 0.0
-    focal_length_ratio: float = 1.0
+    focal_length_ratio: float = 1.0  # True focal length over that before [-]
 
 
 @dataclass(frozen=True, slots=True)
 class DirtyLens:
-    """Dirt on the glass before the camera.
-
-    Attributes
-    ----------
-    coverage : float
-        Sum of the areas of all blots over that of the glass [-].
-    diameter : float
-        Median of their diameters [m].
-    albedo : float
-        Luminance of a blot over the mean of the picture [-].
-    """
+    """Dirt on the glass before the camera."""
 
     sensor: ClassVar[str] = "camera"
     name: ClassVar[str] = "dirty_lens"
-    coverage: float = 0.1
-    diameter: float = 0.002
-    albedo: float = 0.3
+    coverage: float = 0.1  # Sum of the areas of all blots over that of the glass [-]
+    diameter: float = 0.002  # Median of their diameters [m]
+    albedo: float = 0.3  # Luminance of a blot over the mean of the picture [-]
 
 
 @dataclass(frozen=True, slots=True)
 class WetLens:
-    """Water on the glass before the camera.
-
-    Attributes
-    ----------
-    coverage : float
-        Sum of the areas of all drops over that of the glass [-].
-    diameter : float
-        Median of their diameters [m].
-    blur : float
-        Standard deviation of the blur by the film between them [rad].
-    """
+    """Water on the glass before the camera."""
 
     sensor: ClassVar[str] = "camera"
     name: ClassVar[str] = "wet_lens"
-    coverage: float = 0.15
-    diameter: float = 0.003
-    blur: float = math.radians(0.1)
+    coverage: float = 0.15  # Sum of the areas of all drops over that of the glass [-]
+    diameter: float = 0.003  # Median of their diameters [m]
+    blur: float = math.radians(0.1)  # Standard deviation of the blur by the film between them [rad]
 
 
 @dataclass(frozen=True, slots=True)
 class Glare:
-    """A small source, such as a low sun, that shines into the camera.
-
-    Attributes
-    ----------
-    azimuth : float
-        Its direction, counterclockwise from the vehicle's axis [rad].
-    elevation : float
-        Its height over the road's plane [rad].
-    illuminance : float
-        What it makes on a surface that faces it, at the camera [lx].
-    haze : float
-        What the windscreen scatters over what a clean one does [-].
-    """
+    """A small source, such as a low sun, that shines into the camera."""
 
     sensor: ClassVar[str] = "camera"
     name: ClassVar[str] = "glare"
-    azimuth: float = 0.0
-    elevation: float = math.radians(8.0)
-    illuminance: float = 10_000.0
-    haze: float = 1.0
+    azimuth: float = 0.0  # Its direction, counterclockwise from the vehicle's axis [rad]
+    elevation: float = math.radians(8.0)  # Its height over the road's plane [rad]
+    illuminance: float = 10_000.0  # What it makes on a surface that faces it, at the camera [lx]
+    haze: float = 1.0  # What the windscreen scatters over what a clean one does [-]
 
 
 @dataclass(frozen=True, slots=True)
 class LeadDropout:
-    """A radar that loses the vehicle ahead, in each measurement by chance.
-
-    Attributes
-    ----------
-    share : float
-        Share of measurements that get lost, 0 … 1.
-    """
+    """A radar that loses the vehicle ahead, in each measurement by chance."""
 
     sensor: ClassVar[str] = "lead"
     name: ClassVar[str] = "dropout"
-    share: float = 1.0
+    share: float = 1.0  # Share of measurements that get lost, 0 … 1
 
 
 @dataclass(frozen=True, slots=True)
 class LeadBias:
-    """A radar that measures wrong.
-
-    Attributes
-    ----------
-    distance : float
-        What is added to the distance [m].
-    relative_speed : float
-        What is added to the relative speed [m/s].
-    """
+    """A radar that measures wrong."""
 
     sensor: ClassVar[str] = "lead"
     name: ClassVar[str] = "bias"
-    distance: float = 0.0
-    relative_speed: float = 0.0
+    distance: float = 0.0  # What is added to the distance [m]
+    relative_speed: float = 0.0  # What is added to the relative speed [m/s]
 
 
 @dataclass(frozen=True, slots=True)
 class LeadNoise:
-    """A radar that is noisier than it should be.
-
-    Attributes
-    ----------
-    factor : float
-        Its standard deviations over those that it should have [-].
-    """
+    """A radar that is noisier than it should be."""
 
     sensor: ClassVar[str] = "lead"
     name: ClassVar[str] = "noise"
-    factor: float = 10.0
+    factor: float = 10.0  # Its standard deviations over those that it should have [-]
 
 
 @dataclass(frozen=True, slots=True)
 class LeadNarrowView:
-    """A radar whose field of view is narrowed, as by snow on its cover.
-
-    Attributes
-    ----------
-    field_of_view : float
-        Full angle within which it measures [rad].
-    """
+    """A radar whose field of view is narrowed, as by snow on its cover."""
 
     sensor: ClassVar[str] = "lead"
     name: ClassVar[str] = "narrow_view"
-    field_of_view: float = math.radians(2.0)
+    field_of_view: float = math.radians(2.0)  # Full angle within which it measures [rad]
 
 
 @dataclass(frozen=True, slots=True)
 class PositionBias:
-    """A satellite position beside the true one, as reflections from walls make it.
-
-    Attributes
-    ----------
-    east, north : float
-        What is added in the world [m].
-    along, left : float
-        What is added in the direction of travel, and to its left [m].
-    """
+    """A satellite position beside the true one, as reflections from walls make it."""
 
     sensor: ClassVar[str] = "gps"
     name: ClassVar[str] = "position_bias"
+    # east, north: what is added in the world [m]
     east: float = 0.0
     north: float = 0.0
+    # along, left: what is added in the direction of travel, and to its left [m]
     along: float = 0.0
     left: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class HeadingBias:
-    """A wrong heading.
-
-    Attributes
-    ----------
-    angle : float
-        What is added, counterclockwise [rad].
-    """
+    """A wrong heading."""
 
     sensor: ClassVar[str] = "gps"
     name: ClassVar[str] = "heading_bias"
-    angle: float = 0.0
+    angle: float = 0.0  # What is added, counterclockwise [rad]
 
 
 @dataclass(frozen=True, slots=True)
@@ -271,40 +175,23 @@ class Where(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class SignsMissing:
-    """Signs that have gone.
-
-    Attributes
-    ----------
-    where : Where
-        From the world, or from the vehicle's map.
-    ids : tuple of str
-        Which; all if empty.
-    """
+    """Signs that have gone."""
 
     sensor: ClassVar[str] = "signs"
     name: ClassVar[str] = "missing"
-    where: Where = Where.WORLD
-    ids: tuple[str, ...] = ()
+    where: Where = Where.WORLD  # From the world, or from the vehicle's map
+    ids: tuple[str, ...] = ()  # Which; all if empty
 
 
 @dataclass(frozen=True, slots=True)
 class SignsMoved:
-    """Signs that are elsewhere.
-
-    Attributes
-    ----------
-    where : Where
-        In the world, or on the vehicle's map.
-    ids : tuple of str
-        Which; all if empty.
-    along, left, up : float
-        How far, seen by those they speak to [m].
-    """
+    """Signs that are elsewhere."""
 
     sensor: ClassVar[str] = "signs"
     name: ClassVar[str] = "moved"
-    where: Where = Where.WORLD
-    ids: tuple[str, ...] = ()
+    where: Where = Where.WORLD  # In the world, or on the vehicle's map
+    ids: tuple[str, ...] = ()  # Which; all if empty
+    # along, left, up: how far, seen by those they speak to [m]
     along: float = 0.0
     left: float = 0.0
     up: float = 0.0
@@ -312,16 +199,11 @@ class SignsMoved:
 
 @dataclass(frozen=True, slots=True)
 class Fouled:
-    """A scatterometer with dirt or water on its windows, or an insect in its beam.
-
-    Attributes
-    ----------
-    factor : float
-        What it tells over what it should [-]: below 1 by windows that let less light through, above by what scatters.
-    """
+    """A scatterometer with dirt or water on its windows, or an insect in its beam."""
 
     sensor: ClassVar[str] = "scatterometer"
     name: ClassVar[str] = "fouled"
+    # What it tells over what it should [-]: below 1 by windows that let less light through, above by what scatters
     factor: float = 0.5
 
 

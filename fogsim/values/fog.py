@@ -16,11 +16,6 @@ def airlight_share(ground_albedo: float = GROUND_ALBEDO) -> float:
     """Airlight seen level near the ground over that of a white horizontal diffuser, E / π: 0.34 + 0.66 ρ.
 
     That is its luminance in a layer of fog under an overcast sky, E being the illuminance of the ground.
-
-    Parameters
-    ----------
-    ground_albedo : float
-        Albedo ρ of the land around [-], 0 … 1.
     """
     return 0.34 + 0.66 * ground_albedo
 
@@ -58,13 +53,7 @@ class FogBank:
     extra_extinction: float
 
     def __post_init__(self) -> None:
-        """Refuse a bank that ends before it starts.
-
-        Raises
-        ------
-        InputError
-            If start, end and edge do not fit together.
-        """
+        """Refuse a bank that ends before it starts."""
         if not self.start < self.end:
             raise InputError(f"a fog bank must end beyond its start, got {self.start!r} to {self.end!r} m")
         if not 0 < self.edge <= (self.end - self.start) * (1 + 1e-9):
@@ -121,13 +110,7 @@ class FogPatches:
     offset: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        """Refuse patches without size or of impossible strength.
-
-        Raises
-        ------
-        InputError
-            If a number is out of range.
-        """
+        """Refuse patches without size or of impossible strength."""
         for name in ("correlation_length", "correlation_height"):
             if not 0 < getattr(self, name) < math.inf:
                 raise InputError(f"the {name} of fog patches must be a positive length, got {getattr(self, name)!r} m")
@@ -230,13 +213,7 @@ class FogField:
     reachable_densities: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse a field that cannot be.
-
-        Raises
-        ------
-        InputError
-            If a number is out of range, or the times are out of order.
-        """
+        """Refuse a field that cannot be."""
         if not 0 <= self.extinction < math.inf:
             raise InputError(f"an extinction coefficient must be finite and not negative, got {self.extinction!r} 1/m")
         if not all(0 <= light < math.inf for light in self.airlight):
@@ -275,15 +252,10 @@ class FogField:
 
 
 class SideLight(NamedTuple):
-    """Daylight of surfaces that are not level.
+    """Daylight of surfaces that are not level."""
 
-    Attributes
-    ----------
-    vertical, below : float
-        Illuminance of a vertical surface, on the mean of all sides, and of one that faces down, over that of a level
-        one [-].
-    """
-
+    # vertical, below: illuminance of a vertical surface, on the mean of all sides, and of one that faces down, over
+    # that of a level one [-]
     vertical: float
     below: float
 

@@ -51,66 +51,30 @@ ALL_LAMPS = Lamp(sum(Lamp))
 
 
 def lamp_names(lamps: Lamp) -> str:
-    """Lamps in words.
-
-    Parameters
-    ----------
-    lamps : Lamp
-        The lamps, such as "low_beam+front_fog"; nothing for none.
-    """
+    """Lamps in words."""
     return "+".join(str(lamp.name).lower() for lamp in Lamp if lamp and lamp in lamps)
 
 
 def dark_shift(across: float, is_stop_lamp: bool) -> int:
-    """Shift, as of `DARK_SHIFT`, for a lamp by its place.
-
-    Parameters
-    ----------
-    across : float
-        How far left of a vehicle's middle it is, as a share of the width [-].
-    is_stop_lamp : bool
-        Whether it is one.
-    """
+    """Shift, as of `DARK_SHIFT`, for a lamp by its place."""
     if abs(across) >= MIDDLE:
         return DARK_SHIFT[Side.LEFT if across > 0.0 else Side.RIGHT]
     return DARK_SHIFT[Side.MIDDLE] if is_stop_lamp else NEVER_APART
 
 
 def burning(lamps: int, side: Side) -> int:
-    """Kinds of lamps that burn on a side of a vehicle, bits of `Lamp`.
-
-    Parameters
-    ----------
-    lamps : int
-        Lit lamps as `TrafficState.lamps` has them.
-    side : Side
-        The side.
-    """
+    """Kinds of lamps that burn on a side of a vehicle, bits of `Lamp`."""
     kinds = MIDDLE_LAMPS if side is Side.MIDDLE else ALL_LAMPS
     return lamps & ~(lamps >> DARK_SHIFT[side]) & int(kinds)
 
 
 def dark_on(kinds: int, side: Side) -> int:
-    """Bits that say that lamps on a side are dark.
-
-    Parameters
-    ----------
-    kinds : int
-        Their kinds, bits of `Lamp`.
-    side : Side
-        The side.
-    """
+    """Bits that say that lamps on a side are dark."""
     return (kinds & int(MIDDLE_LAMPS if side is Side.MIDDLE else ALL_LAMPS)) << DARK_SHIFT[side]
 
 
 def settled(lamps: int) -> int:
-    """Lit lamps without the kinds that burn on no side.
-
-    Parameters
-    ----------
-    lamps : int
-        Lit lamps with sides that are dark, perhaps also of kinds that are not lit.
-    """
+    """Lit lamps without the kinds that burn on no side."""
     lit = {side: burning(lamps, side) for side in Side}
     kinds = lit[Side.LEFT] | lit[Side.RIGHT] | lit[Side.MIDDLE]
     return kinds | sum(dark_on(kinds & ~lit[side], side) for side in Side)
@@ -239,13 +203,7 @@ class LightSources:
 
 
 def joined_sources(parts: Sequence[LightSources]) -> LightSources:
-    """Lamps of several groups as one.
-
-    Parameters
-    ----------
-    parts : sequence of LightSources
-        The groups.
-    """
+    """Lamps of several groups as one."""
     parts = [part for part in parts if len(part.intensity)]
     if len(parts) == 1:
         return parts[0]
@@ -292,32 +250,15 @@ class StreetLighting:
 
 @dataclass(frozen=True, slots=True)
 class RoadBeams:
-    """Lit head lamps of other vehicles as what lights the road, beside the sky; those of a pair shine together.
+    """Lit head lamps of other vehicles as what lights the road, beside the sky; those of a pair shine together."""
 
-    Attributes
-    ----------
-    position : (n, 3) float64
-        Middle between the lamps of a pair [m].
-    heading : (n,) float64
-        Direction of their axes, counter-clockwise from x [rad].
-    height : (n,) float64
-        Height above the road [m].
-    kinds : tuple of Beam
-        Kinds of lamps.
-    kind : (n,) int64
-        Number of each pair's kind.
-    scale : (n,) float64
-        How many of the pair burn.
-    sky_illuminance : float
-        Horizontal illuminance of the sky in which the scene is drawn [lx]; where it is 0 the lamps light nothing.
-    """
-
-    position: NDArray[np.float64]
-    heading: NDArray[np.float64]
-    height: NDArray[np.float64]
-    kinds: tuple[Beam, ...]
-    kind: NDArray[np.int64]
-    scale: NDArray[np.float64]
+    position: NDArray[np.float64]  # (n, 3): Middle between the lamps of a pair [m]
+    heading: NDArray[np.float64]  # (n,): Direction of their axes, counter-clockwise from x [rad]
+    height: NDArray[np.float64]  # (n,): Height above the road [m]
+    kinds: tuple[Beam, ...]  # Kinds of lamps
+    kind: NDArray[np.int64]  # (n,) int64: Number of each pair's kind
+    scale: NDArray[np.float64]  # (n,): How many of the pair burn
+    # Horizontal illuminance of the sky in which the scene is drawn [lx]; where it is 0 the lamps light nothing
     sky_illuminance: float
 
 

@@ -67,20 +67,7 @@ SIGNAL_SHARES: Mapping[SignalLobe, tuple[tuple[float, ...], ...]] = {
 
 
 def checked_beam(beam: Beam, name: str = "beam") -> Beam:
-    """The beam itself, if it can be one.
-
-    Parameters
-    ----------
-    beam : Beam
-        Any.
-    name : str
-        What the message calls it.
-
-    Raises
-    ------
-    InputError
-        If shapes differ, directions do not ascend, or an intensity is missing, not finite or negative.
-    """
+    """The beam itself, if it can be one."""
     for axis in ("azimuth", "elevation"):
         values = np.asarray(getattr(beam, axis))
         if values.ndim != 1 or len(values) < 2 or not np.all(np.diff(values) > 0) or not np.all(np.isfinite(values)):
@@ -110,12 +97,7 @@ def luminous_intensity(beam: Beam, azimuth: ArrayLike, elevation: ArrayLike) -> 
 
     Beyond the table the intensity of its border falls by `FALL_OFF`.
 
-    Parameters
-    ----------
-    beam : Beam
-        The lamp.
-    azimuth, elevation : array_like
-        Directions to the right of the axis and above the horizontal through the lamp [rad]; they broadcast.
+    Takes `azimuth`, `elevation` [rad].
     """
     right, up = np.asarray(azimuth, dtype=np.float64), np.asarray(elevation, dtype=np.float64)
     table = np.log(np.maximum(beam.intensity, FLOOR))
@@ -139,12 +121,7 @@ def _place(
 def signal_share(lobe: SignalLobe, aside: float) -> float:
     """Intensity of a signal lamp as high as the eye over that along its axis [-], linear in the logarithm.
 
-    Parameters
-    ----------
-    lobe : SignalLobe
-        How it shines.
-    aside : float
-        Angle of the eye beside the axis, to either side [rad]; beyond the table its last entry counts.
+    Takes `aside` [rad].
     """
     angle, shares = abs(aside), SIGNAL_SHARES[lobe][0]
     for after, edge in enumerate(_AZIMUTHS):

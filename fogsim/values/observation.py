@@ -238,27 +238,14 @@ class Observation:
 
 
 def sign_kind_code(kind: str) -> int:
-    """Number of a kind of sign in pictures of the map, 1 … 255: the same for the same kind, always.
-
-    Parameters
-    ----------
-    kind : str
-        Sign code.
-    """
+    """Number of a kind of sign in pictures of the map, 1 … 255: the same for the same kind, always."""
     return 1 + zlib.crc32(f"sign kind {kind}".encode()) % 255
 
 
 def sign_map_values(kind: str, distance: float, diameter: float) -> tuple[int, int, int]:
     """Values of the channels of a sign's pixels in pictures of the map; see `Observation.sign_map`.
 
-    Parameters
-    ----------
-    kind : str
-        Sign code.
-    distance : float
-        Distance ahead of the front bumper [m].
-    diameter : float
-        Size of its face [m].
+    Takes `distance` [m], `diameter` [m].
     """
     nearness = min(max(round(SIGN_MAP_REACH - distance), 1), 255)
     return sign_kind_code(kind), nearness, min(round(255.0 * diameter / SIGN_MAP_SIZE), 255)
@@ -267,14 +254,7 @@ def sign_map_values(kind: str, distance: float, diameter: float) -> tuple[int, i
 def sign_coordinates(sign: SignSighting, camera: Camera, setback: float) -> tuple[float, float, float]:
     """Where the face of a sign is as the camera has it, before its roll: to the right, down, and in depth [m].
 
-    Parameters
-    ----------
-    sign : SignSighting
-        What the map says.
-    camera : Camera
-        The told camera.
-    setback : float
-        Its distance behind the front bumper [m].
+    Takes `setback` [m].
     """
     ahead, up = sign.distance + setback, sign.height - camera.mount_height
     cosine, sine = math.cos(camera.pitch), math.sin(camera.pitch)
@@ -284,19 +264,7 @@ def sign_coordinates(sign: SignSighting, camera: Camera, setback: float) -> tupl
 def sign_place(sign: SignSighting, camera: Camera, setback: float) -> tuple[float, float, float, float] | None:
     """Where a camera has the face of a sign, as an ellipse; None for one behind it.
 
-    Parameters
-    ----------
-    sign : SignSighting
-        What the map says.
-    camera : Camera
-        The told camera.
-    setback : float
-        Its distance behind the front bumper [m].
-
-    Returns
-    -------
-    tuple of float, or None
-        Column and row of its middle, half its width and half its height [px].
+    Returns column and row of its middle, half its width and half its height [px]. Takes `setback` [m].
     """
     right, down, depth = sign_coordinates(sign, camera, setback)
     if depth <= 0.0:

@@ -20,15 +20,7 @@ OWN_FRAME = CameraPose((0.0, 0.0, 0.0), 0.0)
 def camera_axes(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
     """Axes of a camera in the world.
 
-    Parameters
-    ----------
-    camera, pose
-        The camera, and where it is.
-
-    Returns
-    -------
-    (3, 3) float64
-        Rows: right, down and forward as unit vectors (east, north, up).
+    Returns rows: right, down and forward as unit vectors (east, north, up).
     """
     pitch = camera.pitch - pose.grade
     east, north = math.cos(pose.heading), math.sin(pose.heading)
@@ -48,15 +40,7 @@ def camera_axes(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
 def ray_from_pixel(camera: Camera, pose: CameraPose) -> NDArray[np.float64]:
     """Matrix from a pixel (u, v, 1) [px] to its viewing ray in the world.
 
-    Parameters
-    ----------
-    camera, pose
-        The camera, and where it is.
-
-    Returns
-    -------
-    (3, 3) float64
-        The ray is 1 long along the optical axis, so its length is distance along the ray over depth.
+    Returns the ray is 1 long along the optical axis, so its length is distance along the ray over depth (3, 3).
     """
     return np.asarray(matrix_product(camera_axes(camera, pose).T, _camera_ray_from_pixel(camera)))
 

@@ -88,27 +88,17 @@ NO_SIGNALS, NO_PERSONS = SignalState(), PersonState()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyPieces:
-    """Rigid pieces of bodies that bend, as arrays; those of one body are one after another, its front first.
+    """Rigid pieces of bodies that bend, as arrays; those of one body are one after another, its front first."""
 
-    Attributes
-    ----------
-    row : (m,) intp
-        The vehicle that each belongs to.
-    kind : tuple of str
-        What each is: "tractor", "trailer", "bus" or "carriage".
-    position : (m, 3) float64
-        Middles of their front ends on the road surface [m].
-    heading, grade : (m,) float64
-        As of `TrafficState` [rad].
-    length : (m,) float64
-        Lengths [m]; width and height are the vehicle's.
-    """
-
+    # (m,) int: The vehicle that each belongs to
     row: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))
-    kind: tuple[str, ...] = ()
+    kind: tuple[str, ...] = ()  # What each is: "tractor", "trailer", "bus" or "carriage"
+    # (m, 3): Middles of their front ends on the road surface [m]
     position: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
+    # heading, grade (m,): as of `TrafficState` [rad]
     heading: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     grade: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    # (m,): Lengths [m]; width and height are the vehicle's
     length: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
 
@@ -218,15 +208,7 @@ class TrafficState:
 
 
 def rear_of(state: TrafficState, row: int) -> tuple[NDArray[np.float64], float]:
-    """Middle of a vehicle's rear bumper on the road surface (3,) [m], and the heading there [rad].
-
-    Parameters
-    ----------
-    state : TrafficState
-        The traffic.
-    row : int
-        The vehicle.
-    """
+    """Middle of a vehicle's rear bumper on the road surface (3,) [m], and the heading there [rad]."""
     pieces = np.flatnonzero(state.pieces.row == row)
     if len(pieces):
         last = int(pieces[-1])
@@ -244,13 +226,7 @@ _PERSON_LENGTH, _PERSON_WIDTH, _PERSON_HEIGHT = 0.4, 0.6, 1.7  # [m]
 
 
 def with_persons(state: TrafficState) -> TrafficState:
-    """Traffic with persons on foot as further rows, behind the vehicles'; nan for what they do not have.
-
-    Parameters
-    ----------
-    state : TrafficState
-        The traffic; without persons it is given back as it is.
-    """
+    """Traffic with persons on foot as further rows, behind the vehicles'; nan for what they do not have."""
     persons, count = state.persons, len(state.persons.ids)
     if not count:
         return state
@@ -281,12 +257,7 @@ def with_persons(state: TrafficState) -> TrafficState:
 def advised_speeds(ids: Sequence[str], heard: Mapping[str, float]) -> NDArray[np.float64]:
     """Advice to vehicles as `TrafficState.advised_speed` has it (n,) [m/s]; empty where nobody has heard any.
 
-    Parameters
-    ----------
-    ids : (n,) sequence of str
-        The vehicles.
-    heard : mapping from vehicle id to float
-        What those who have heard any were advised [m/s].
+    Takes `heard` [m/s].
     """
     return np.array([heard.get(vehicle, np.inf) for vehicle in ids]) if heard else np.zeros(0)
 
@@ -424,13 +395,6 @@ def with_pieces(state: TrafficState, skip: int | None) -> tuple[TrafficState, ND
 
     The first piece of a vehicle has its row, further ones have rows behind all vehicles. Lamps burn at the front of the
     first and at the rear of the last piece.
-
-    Parameters
-    ----------
-    state : TrafficState
-        The traffic; without pieces it is given back as it is.
-    skip : int or None
-        A vehicle of which only its first piece is a row, since it is not drawn.
     """
     pieces, count = state.pieces, len(state.ids)
     if not pieces.kind:

@@ -20,25 +20,13 @@ _SAME_SPEED = 1e-6
 
 
 def level_of(speed: float) -> int:
-    """Level that shows a speed, or the next lower one.
-
-    Parameters
-    ----------
-    speed : float
-        The speed [m/s]; ``inf`` for none. Below the lowest level it is that level.
-    """
+    """Level that shows a speed, or the next lower one (`speed` [m/s])."""
     below = [level for level, shown in enumerate(SHOWN_SPEEDS[:DARK]) if shown <= speed + _SAME_SPEED]
     return DARK if math.isinf(speed) else max(below, default=0)
 
 
 class SignPolicy:
-    """A policy of one sign that remembers nothing.
-
-    Parameters
-    ----------
-    choose : callable
-        Level by what the environment tells the sign beside its observation.
-    """
+    """A policy of one sign that remembers nothing."""
 
     def __init__(self, choose: Callable[[Mapping[str, Any]], int]) -> None:
         self._choose = choose
@@ -52,13 +40,7 @@ class SignPolicy:
 
 
 class RandomSign:
-    """Any level, as likely as any other.
-
-    Parameters
-    ----------
-    action_space : gymnasium.spaces.Discrete
-        The sign's.
-    """
+    """Any level, as likely as any other."""
 
     def __init__(self, action_space: spaces.Discrete) -> None:
         self._levels = int(action_space.n)

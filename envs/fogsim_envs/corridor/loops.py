@@ -13,32 +13,14 @@ SECONDS_PER_HOUR = 3600.0
 
 
 class LoopReading(NamedTuple):
-    """What a loop across all lanes has counted.
+    """What a loop across all lanes has counted."""
 
-    Attributes
-    ----------
-    flow : float
-        Vehicles per hour [1/h].
-    speed : float or None
-        Mean speed of those who passed [m/s]; None if nobody did.
-    """
-
-    flow: float
-    speed: float | None
+    flow: float  # Vehicles per hour [1/h]
+    speed: float | None  # Mean speed of those who passed [m/s]; None if nobody did
 
 
 class InductionLoops:
-    """Loops at some places along a road.
-
-    Parameters
-    ----------
-    places : sequence of float
-        Positions along the road [m].
-    route : (n, 3) float64
-        Polyline along it [m].
-    edges : sequence of str
-        Edges of the network that are this road in this direction.
-    """
+    """Loops at some places along a road (`places` [m], `route` (n, 3) [m])."""
 
     def __init__(self, places: Sequence[float], route: NDArray[np.float64], edges: Sequence[str]) -> None:
         self._places = np.array(places, dtype=float)
@@ -48,15 +30,7 @@ class InductionLoops:
         self._time = 0.0
 
     def count(self, traffic: TrafficState, elapsed: float) -> None:
-        """Take in everybody's places after some time.
-
-        Parameters
-        ----------
-        traffic : TrafficState
-            Every vehicle.
-        elapsed : float
-            Time since the last call [s].
-        """
+        """Take in everybody's places after some time (`elapsed` [s])."""
         here = [row for row, lane in enumerate(traffic.lane) if lane.rpartition("_")[0] in self._edges]
         station, ids = project(traffic.position[here, :2], self._route), [traffic.ids[row] for row in here]
         # Who was not there before has not come over a loop: vehicles enter where there is none.

@@ -51,72 +51,33 @@ def corridor_space() -> spaces.Box:
 
 @dataclass(frozen=True, slots=True)
 class RoadKnowledge:
-    """What is known along the road at one instant.
+    """What is known along the road at one instant."""
 
-    Attributes
-    ----------
-    loops : (n + 1,) tuple of LoopReading
-        Loops before the first sign, between two each, and behind the last.
-    visibilities : (n,) sequence of float
-        What the visibility meters at the signs tell [m].
-    shown : (n,) sequence of float
-        Speeds that the signs have shown till now [m/s]; ``inf`` for none.
-    lanes : int
-        Number of lanes.
-    time_left : float
-        Share of the episode that is left [-].
-    """
-
-    loops: tuple[LoopReading, ...]
-    visibilities: Sequence[float]
-    shown: Sequence[float]
-    lanes: int
-    time_left: float
+    loops: tuple[LoopReading, ...]  # Loops before the first sign, between two each, and behind the last
+    visibilities: Sequence[float]  # What the visibility meters at the signs tell [m]
+    shown: Sequence[float]  # Speeds that the signs have shown till now [m/s]; ``inf`` for none
+    lanes: int  # Number of lanes
+    time_left: float  # Share of the episode that is left [-]
 
 
 def loop_places(starts: Sequence[float], length: float) -> tuple[float, ...]:
     """Places of loops: before the first sign, between two each, and behind the last (n + 1,) [m].
 
-    Parameters
-    ----------
-    starts : (n,) sequence of float
-        Places of the signs [m].
-    length : float
-        Length of the road [m].
+    Takes `starts` [m], `length` [m].
     """
     ends = (0.0, *starts, length)
     return tuple(0.5 * (before + behind) for before, behind in itertools.pairwise(ends))
 
 
 def measured_visibilities(sections: Sequence[RoadSection], rng: np.random.Generator) -> list[float]:
-    """What the meters at the signs tell [m].
-
-    Parameters
-    ----------
-    sections : (n,) sequence of RoadSection
-        What is true there.
-    rng : numpy.random.Generator
-        Random numbers of the meters' errors.
-    """
+    """What the meters at the signs tell [m]."""
     errors = rng.normal(0.0, METER_DEVIATION, len(sections)).tolist()
     true = (visibility_from_extinction(section.extinction) for section in sections)
     return [min(visibility * math.exp(error), METER_RANGE) for visibility, error in zip(true, errors, strict=True)]
 
 
 def sign_observation(sign: int, known: RoadKnowledge, section: RoadSection, length: float) -> NDArray[np.float32]:
-    """Entries of `CORRIDOR_FEATURES` for a sign, 0 … 1.
-
-    Parameters
-    ----------
-    sign : int
-        Its number in the direction of travel.
-    known : RoadKnowledge
-        What is known along the road.
-    section : RoadSection
-        The section that begins at it.
-    length : float
-        Length of the road [m].
-    """
+    """Entries of `CORRIDOR_FEATURES` for a sign, 0 … 1 (`length` [m])."""
     shown = (math.inf, *known.shown, math.inf)
     values = (
         *_loop(known.loops[sign], known.lanes),

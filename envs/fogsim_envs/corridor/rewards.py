@@ -42,30 +42,14 @@ class CorridorWeights:
 
 
 class CorridorReward:
-    """Gathers the terms of the reward over the steps of a decision period.
-
-    Parameters
-    ----------
-    weights : CorridorWeights
-        The weights.
-    standard : SafetyStandard
-        Reaction time and deceleration of the stopping sight distance, and the time to collision that is a conflict.
-    """
+    """Gathers the terms of the reward over the steps of a decision period."""
 
     def __init__(self, weights: CorridorWeights, standard: SafetyStandard = DEFAULT_STANDARD) -> None:
         self._weights, self._standard = weights, standard
         self._amounts = dict.fromkeys(CorridorWeights.__dataclass_fields__, 0.0)
 
     def add(self, step: TrafficStep, elapsed: float) -> None:
-        """Take in a step.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            The next step.
-        elapsed : float
-            Time since the one before [s].
-        """
+        """Take in a step (`elapsed` [s])."""
         found = {
             "delay": elapsed * lost_share(step) / _MINUTE,
             "overdriving": elapsed * overdriven(step, self._standard) / _KILOMETRE,
@@ -80,13 +64,7 @@ class CorridorReward:
 
 
 def lost_share(step: TrafficStep) -> float:
-    """How many vehicles' time is lost [-]: 1 for each who stands or waits to come onto the road, 0 for who goes freely.
-
-    Parameters
-    ----------
-    step : TrafficStep
-        The instant.
-    """
+    """Vehicles whose time is lost [-]: 1 for each that stands or waits to enter the road, 0 for one that is free."""
     traffic = step.traffic
     if not len(traffic.speed):
         return float(step.waiting)
@@ -94,15 +72,7 @@ def lost_share(step: TrafficStep) -> float:
 
 
 def overdriven(step: TrafficStep, standard: SafetyStandard) -> float:
-    """Speeds of all vehicles [m/s], each times the share of its stopping sight distance beyond its sight.
-
-    Parameters
-    ----------
-    step : TrafficStep
-        The instant.
-    standard : SafetyStandard
-        Reaction time and deceleration.
-    """
+    """Speeds of all vehicles [m/s], each times the share of its stopping sight distance beyond its sight."""
     speed, extinction = step.traffic.speed, step.truth.vehicle_extinctions
     if extinction is None or not len(speed):
         return 0.0
@@ -114,12 +84,7 @@ def overdriven(step: TrafficStep, standard: SafetyStandard) -> float:
 def conflict(step: TrafficStep, threshold: float) -> float:
     """How far everybody's time to collision is below a threshold: the sum of 0 … 1 for each vehicle.
 
-    Parameters
-    ----------
-    step : TrafficStep
-        The instant.
-    threshold : float
-        Time to collision below which there is a conflict [s].
+    Takes `threshold` [s].
     """
     found = find_following(step.traffic)
     remaining = time_to_collision(found.gap, found.speed, found.leader_speed)

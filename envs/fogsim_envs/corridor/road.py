@@ -14,39 +14,16 @@ from fogsim.values.road import LaneKind
 
 
 class SignedRoad(NamedTuple):
-    """A road with message signs.
+    """A road with message signs."""
 
-    Attributes
-    ----------
-    starts : (n,) tuple of float
-        Places of the signs along the road [m].
-    axis : (m, 3) float64
-        Polyline along it [m].
-    length : float
-        Its length [m].
-    lanes : int
-        Lanes for vehicles where it begins.
-    """
-
-    starts: tuple[float, ...]
-    axis: NDArray[np.float64]
-    length: float
-    lanes: int
+    starts: tuple[float, ...]  # Places of the signs along the road [m]
+    axis: NDArray[np.float64]  # (m, 3): Polyline along it [m]
+    length: float  # Its length [m]
+    lanes: int  # Lanes for vehicles where it begins
 
 
 def signed_road(scenario: Scenario) -> SignedRoad:
-    """The road along which a scenario without an ego has its signs.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-
-    Raises
-    ------
-    InputError
-        If it has an ego, or no signs.
-    """
+    """The road along which a scenario without an ego has its signs."""
     if scenario.traffic.has_ego or scenario.drivers.advised != "signs":
         raise InputError(
             "FogCorridor: expected a scenario with traffic.ego: none and drivers.advised: signs, got "

@@ -68,18 +68,7 @@ class Episode:
 
 
 def check_driver(driver: str) -> None:
-    """Refuse a driver of the ego that is not known.
-
-    Parameters
-    ----------
-    driver : str
-        How fast it goes in fog without advice.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such driver.
-    """
+    """Refuse a driver of the ego that is not known."""
     if driver not in SPEED_CHOICES:
         raise UnknownNameError("driver", driver, SPEED_CHOICES)
 
@@ -286,13 +275,7 @@ class ScenarioDistribution:
 
 
 def fog_setting(fog: Mapping[str, Any]) -> str:
-    """Override that puts a block ``fog`` in place of a scenario's.
-
-    Parameters
-    ----------
-    fog : mapping
-        The block.
-    """
+    """Override that puts a block ``fog`` in place of a scenario's."""
     return f"fog={json.dumps(dict(fog))}"
 
 

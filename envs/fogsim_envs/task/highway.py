@@ -47,13 +47,7 @@ class HighwayDistribution(ScenarioDistribution):
     """
 
     def draw(self, rng: np.random.Generator) -> Episode:
-        """An episode but for its fog; see `ScenarioDistribution.draw`.
-
-        Parameters
-        ----------
-        rng : numpy.random.Generator
-            Random numbers; as many are drawn whatever comes out.
-        """
+        """An episode but for its fog; see `ScenarioDistribution.draw`."""
         drawn = super().draw(rng)
         settings = tuple(one for one in drawn.settings if one.startswith(_DRAWN))
         begin, deceleration, hold = rng.uniform(3.0, 25.0), rng.uniform(3.0, 6.0), rng.uniform(5.0, 20.0)
@@ -144,18 +138,7 @@ class FogHighwayV1Env(FogAdvisoryV1Env):
 
     @checked_parameters
     def reset(self, *, seed: Seed | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode; see `FogAdvisoryV1Env.reset`, but for ``scenario``, which there is none to choose from.
-
-        Parameters
-        ----------
-        seed, options
-            As of `FogAdvisoryV1Env.reset`.
-
-        Raises
-        ------
-        InputError
-            If an option is unknown or does not fit.
-        """
+        """Begin an episode; see `FogAdvisoryV1Env.reset`, but for ``scenario``, which there is none to choose from."""
         if options and "scenario" in options:
             given = options["scenario"]
             raise InputError(f"options['scenario']: roads and traffic are highway-env's own here; got {given!r}")

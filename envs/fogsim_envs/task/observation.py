@@ -54,20 +54,7 @@ LIGHT_RANGE = (-1.0, 5.0)
 
 
 def task_space(mode: str, camera: Camera | None) -> spaces.Space[Any]:
-    """Space of observations.
-
-    Parameters
-    ----------
-    mode : str
-        One of `OBSERVATIONS`.
-    camera : Camera or None
-        Calibration of the ego's camera; None if there is none, for "state".
-
-    Raises
-    ------
-    UnknownNameError
-        If the mode is none of them.
-    """
+    """Space of observations."""
     if mode not in OBSERVATIONS:
         raise UnknownNameError("observation", mode, OBSERVATIONS)
     state = spaces.Box(-1.0, 1.0, (len(STATE_FEATURES),), np.float32)
@@ -88,21 +75,7 @@ def task_space(mode: str, camera: Camera | None) -> spaces.Space[Any]:
 
 
 def task_observation(step: Step, mode: str, own: Command, duration: float, way_end: float) -> Any:
-    """Observation of a step. Every array is the caller's own.
-
-    Parameters
-    ----------
-    step : Step
-        The finished step.
-    mode : str
-        One of `OBSERVATIONS`.
-    own : Command
-        What the agent asked for last, whatever the driver makes of it.
-    duration : float
-        Longest time of the episode [s].
-    way_end : float
-        Position along the route at which the ego arrives [m].
-    """
+    """Observation of a step. Every array is the caller's own (`duration` [s], `way_end` [m])."""
     if mode == "camera":
         return step.observation.image.copy()
     if mode == "camera+sign_map":
@@ -117,19 +90,7 @@ def task_observation(step: Step, mode: str, own: Command, duration: float, way_e
 
 
 def task_state(step: Step, own: Command, time_left: float, to_go: float) -> NDArray[np.float32]:
-    """Entries of ``state`` (`STATE_FEATURES`), float32 in −1 … 1.
-
-    Parameters
-    ----------
-    step : Step
-        The finished step.
-    own : Command
-        What the agent asked for last.
-    time_left : float
-        Time to the end of the episode [s].
-    to_go : float
-        Distance to the arrival [m].
-    """
+    """Entries of ``state`` (`STATE_FEATURES`), float32 in −1 … 1 (`time_left` [s], `to_go` [m])."""
     lead, belief, advice = step.observation.lead, step.belief, own.advice.speed
     lane, lanes = _lane(step)
     values = (
@@ -171,13 +132,7 @@ def _ambient_light(step: Step) -> float:
 
 
 def scaled_visibility(visibility: float) -> float:
-    """Visibility on a logarithmic scale: −1 for 10 m or less, 0 for 100 m, 1 for 1 km or more.
-
-    Parameters
-    ----------
-    visibility : float
-        Visibility [m]; it may be infinite.
-    """
+    """Visibility on a logarithmic scale: −1 for 10 m or less, 0 for 100 m, 1 for 1 km or more (`visibility` [m])."""
     return min(max(math.log10(max(visibility, 1e-9) / VISIBILITY), -1.0), 1.0) if math.isfinite(visibility) else 1.0
 
 

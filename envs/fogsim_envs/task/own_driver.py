@@ -9,27 +9,13 @@ from fogsim.values import Command, SpeedAdvice, Step
 
 
 class OwnDriver:
-    """A driver who goes by the advice, or by an own choice of speed where that is lower.
-
-    Parameters
-    ----------
-    choice : str
-        One of `fogsim.traffic.SPEED_CHOICES`.
-    """
+    """A driver who goes by the advice, or by an own choice of speed where that is lower."""
 
     def __init__(self, choice: str) -> None:
         self._choice = SPEED_CHOICES[choice]
 
     def follow(self, command: Command, step: Step) -> Command:
-        """Command that the vehicle gets.
-
-        Parameters
-        ----------
-        command : Command
-            What is advised.
-        step : Step
-            What was finished last; the driver sees the fog itself.
-        """
+        """Command that the vehicle gets."""
         if command.control is not None:
             return command
         visibility = step.truth.visibility_ahead

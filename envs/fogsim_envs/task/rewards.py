@@ -61,21 +61,11 @@ class TaskWeights:
 
 @dataclass(frozen=True, slots=True)
 class Way:
-    """The way of an episode, against which time and distance are counted.
+    """The way of an episode, against which time and distance are counted."""
 
-    Attributes
-    ----------
-    length : float
-        From the start to the arrival [m].
-    limit : float
-        Speed limit at the start [m/s].
-    duration : float
-        Longest time [s].
-    """
-
-    length: float
-    limit: float
-    duration: float
+    length: float  # From the start to the arrival [m]
+    limit: float  # Speed limit at the start [m/s]
+    duration: float  # Longest time [s]
 
     @property
     def time_at_limit(self) -> float:
@@ -88,21 +78,7 @@ def task_terms(
 ) -> dict[str, float]:
     """Weighted terms of the reward for one decision period; the reward is their sum.
 
-    Parameters
-    ----------
-    before, after : Step
-        First and last step of the period.
-    way : Way
-        The way.
-    weights : TaskWeights
-        The weights.
-    standard : SafetyStandard
-        Reaction time and deceleration of the stopping sight distance, and the time to collision that is a conflict.
-
-    Returns
-    -------
-    dict of str to float
-        Terms by the names of `TaskWeights`.
+    Returns terms by the names of `TaskWeights`.
     """
     duration = after.time - before.time
     driven = max(after.route_position - before.route_position, 0.0)
@@ -126,28 +102,14 @@ def task_terms(
 
 
 def unseen_share(step: Step, standard: SafetyStandard) -> float:
-    """Share of the stopping sight distance that lies beyond what can be seen ahead [-].
-
-    Parameters
-    ----------
-    step : Step
-        The instant.
-    standard : SafetyStandard
-        Reaction time and deceleration.
-    """
+    """Share of the stopping sight distance that lies beyond what can be seen ahead [-]."""
     speed = float(step.traffic.speed[step.ego])
     needed = stopping_sight_distance(speed, standard.reaction_time, standard.deceleration)
     return max(0.0, 1.0 - step.truth.visibility_ahead / needed) if needed > 0.0 else 0.0
 
 
 def time_to_collision(step: Step) -> float:
-    """Time in which the ego would strike its leader if both kept their speeds [s]; ``inf`` if it would not.
-
-    Parameters
-    ----------
-    step : Step
-        The instant.
-    """
+    """Time in which the ego would strike its leader if both kept their speeds [s]; ``inf`` if it would not."""
     speed = float(step.traffic.speed[step.ego])
     if step.leader is None or speed <= step.leader.speed:
         return math.inf
@@ -155,26 +117,12 @@ def time_to_collision(step: Step) -> float:
 
 
 def conflict(step: Step, threshold: float) -> float:
-    """How far the time to collision is below a threshold, 0 … 1.
-
-    Parameters
-    ----------
-    step : Step
-        The instant.
-    threshold : float
-        Time to collision below which there is a conflict [s].
-    """
+    """How far the time to collision is below a threshold, 0 … 1 (`threshold` [s])."""
     return max(0.0, 1.0 - time_to_collision(step) / threshold)
 
 
 def fault(step: Step) -> str:
-    """Who is at fault in the ego's collision: "ego" if it strikes somebody, "other" if it is struck; "" without one.
-
-    Parameters
-    ----------
-    step : Step
-        The instant.
-    """
+    """Who is at fault in the ego's collision: "ego" if it strikes somebody, "other" if it is struck; "" without one."""
     if strikes(step):
         return "ego"
     ego = step.traffic.ids[step.ego]
@@ -182,13 +130,7 @@ def fault(step: Step) -> str:
 
 
 def strikes(step: Step) -> bool:
-    """Whether the ego strikes somebody.
-
-    Parameters
-    ----------
-    step : Step
-        The instant.
-    """
+    """Whether the ego strikes somebody."""
     ego = step.traffic.ids[step.ego]
     return any(ego == one.collider for one in step.collisions)
 

@@ -28,32 +28,13 @@ _KEPT_SCENARIOS = 8
 
 @dataclass(frozen=True, slots=True)
 class EpisodeChoice:
-    """What of an episode is not to be drawn: the options of ``reset``.
+    """What of an episode is not to be drawn: the options of ``reset``."""
 
-    Attributes
-    ----------
-    scenario : name, file, Scenario or None
-        The scenario.
-    visibility : float or None
-        Visibility where the fog is densest [m].
-    overrides : iterable of str
-        ``key.path=value`` each, after all others.
-    driver : str or None
-        The ego's own driver.
-    episode : Episode or mapping or None
-        All that is drawn, or its `Episode.as_info`.
-
-    Raises
-    ------
-    InputError
-        If the driver is unknown or the episode is none.
-    """
-
-    scenario: AnyScenario | None = None
-    visibility: Annotated[float, Range(1.0, math.inf, "m")] | None = None
-    overrides: Iterable[str] = ()
-    driver: str | None = None
-    episode: Episode | Mapping[str, Any] | None = None
+    scenario: AnyScenario | None = None  # The scenario
+    visibility: Annotated[float, Range(1.0, math.inf, "m")] | None = None  # Visibility where the fog is densest [m]
+    overrides: Iterable[str] = ()  # ``key.path=value`` each, after all others
+    driver: str | None = None  # The ego's own driver
+    episode: Episode | Mapping[str, Any] | None = None  # All that is drawn, or its `Episode.as_info`
 
     def __post_init__(self) -> None:
         """Refuse a driver or an episode that cannot be."""
@@ -84,39 +65,12 @@ class Drawn(NamedTuple):
 def is_own_motorway(
     scenario: AnyScenario | None, distribution: ScenarioDistribution | Sequence[AnyScenario] | None
 ) -> bool:
-    """Whether episodes are drawn on the task's own motorway, whose fog is drawn too unless told otherwise.
-
-    Parameters
-    ----------
-    scenario : scenario or None
-        The one that was asked for.
-    distribution : ScenarioDistribution, sequence of scenarios or None
-        What of it is drawn, or of which scenarios one is taken.
-    """
+    """Whether episodes are drawn on the task's own motorway, whose fog is drawn too unless told otherwise."""
     return scenario is None and (distribution is None or isinstance(distribution, ScenarioDistribution))
 
 
 class EpisodeSource:
-    """What the episodes of an environment are drawn from.
-
-    Parameters
-    ----------
-    scenario : name, file, Scenario, callable or None
-        The scenario, or what makes it with overrides; None for the default task's motorway.
-    distribution : ScenarioDistribution, sequence of scenarios or None
-        What of it is drawn, or which one.
-    fog : FogDistribution or None
-        Which fog is drawn.
-    overrides : tuple of str
-        ``key.path=value`` each, after what is drawn.
-    split : str
-        One of `SPLITS`.
-
-    Raises
-    ------
-    InputError
-        If an argument does not fit, or a scenario cannot be loaded.
-    """
+    """What the episodes of an environment are drawn from."""
 
     def __init__(
         self,
@@ -150,22 +104,7 @@ class EpisodeSource:
         return isinstance(self._drawn, ScenarioDistribution) and self._drawn.darkest < DAY_ILLUMINANCE
 
     def draw(self, rng: np.random.Generator, choice: EpisodeChoice) -> tuple[int, Drawn]:
-        """Draw an episode; as many random numbers are used whatever is fixed.
-
-        Parameters
-        ----------
-        rng : numpy.random.Generator
-            Random numbers of the environment.
-        choice : EpisodeChoice
-            What is not to be drawn.
-
-        Returns
-        -------
-        int
-            Seed of the run.
-        Drawn
-            The episode.
-        """
+        """Draw an episode; as many random numbers are used whatever is fixed."""
         number = int(rng.integers(2**30))
         # The seeds of one split are even, of the other odd, and so are what all else is drawn by.
         seed = 2 * number + self._split

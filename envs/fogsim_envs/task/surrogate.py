@@ -32,67 +32,33 @@ Table = NDArray[np.float64]
 
 
 def light_class(illuminance: float) -> int:
-    """Place in `LIGHTS` of an illuminance of the sky.
-
-    Parameters
-    ----------
-    illuminance : float
-        Illuminance [lx].
-    """
+    """Place in `LIGHTS` of an illuminance of the sky (`illuminance` [lx])."""
     return 0 if illuminance >= _DAY else 1 if illuminance >= _DUSK else 2
 
 
 @checked_parameters
 @dataclass(frozen=True, slots=True)
 class SurrogateTable:
-    """How an estimator was measured to err, by light (rows) and visibility ahead (columns).
+    """How an estimator was measured to err, by light (rows) and visibility ahead (columns)."""
 
-    Attributes
-    ----------
-    method : str
-        Name of the estimator.
-    edges : (bins + 1,) float64
-        Visibilities that part the columns [m], rising.
-    stays_valid, becomes_valid : (lights, bins) float64
-        Shares of valid estimates after a valid and after an invalid one.
-    none_seen : (lights, bins) float64
-        Share of valid estimates that say "no fog seen".
-    error : (lights, bins, quantiles) float64
-        Quantiles of ln(estimated / true k), at even shares from 0 to 1.
-    deviation : (lights, bins, quantiles) float64
-        Quantiles of ln(standard deviation / k) of those estimates, likewise.
-    none_deviation : (lights, bins, quantiles) float64
-        Quantiles of ln(standard deviation · 1 m) of estimates that say "no fog seen".
-    episode_share, persistence : float
-        Share of an error's variance that stays for an episode, and correlation of the rest from one estimate to the
-        next.
-    """
-
-    method: str
-    edges: Table
+    method: str  # Name of the estimator
+    edges: Table  # (bins + 1,): Visibilities that part the columns [m], rising
+    # stays_valid, becomes_valid (lights, bins): shares of valid estimates after a valid and after an invalid one
     stays_valid: Table
     becomes_valid: Table
-    none_seen: Table
-    error: Table
-    deviation: Table
+    none_seen: Table  # (lights, bins): Share of valid estimates that say "no fog seen"
+    error: Table  # (lights, bins, quantiles): Quantiles of ln(estimated / true k), at even shares from 0 to 1
+    deviation: Table  # (lights, bins, quantiles): Quantiles of ln(standard deviation / k) of those estimates, likewise
+    # (lights, bins, quantiles): Quantiles of ln(standard deviation · 1 m) of estimates that say "no fog seen"
     none_deviation: Table
+    # episode_share, persistence: share of an error's variance that stays for an episode, and correlation of the rest
+    # from one estimate to the next
     episode_share: float
     persistence: float
 
     @classmethod
     def load(cls, path: Path = MEASURED) -> "SurrogateTable":
-        """Read a table.
-
-        Parameters
-        ----------
-        path : Path
-            File from `as_json`.
-
-        Raises
-        ------
-        InputError
-            If it is no such file.
-        """
+        """Read a table."""
         written = read_json(path)
         if not isinstance(written, dict):
             raise InputError(f"{path}: expected an object, got {shown(written)}")
@@ -125,13 +91,7 @@ def _rounded(value: Any) -> Any:
 
 
 class EstimatorSurrogate:
-    """Draws estimates in place of an estimator.
-
-    Parameters
-    ----------
-    table : SurrogateTable
-        How the estimator errs.
-    """
+    """Draws estimates in place of an estimator."""
 
     def __init__(self, table: SurrogateTable) -> None:
         self._table = table
@@ -141,27 +101,13 @@ class EstimatorSurrogate:
         self.reset(np.random.default_rng(0))
 
     def reset(self, rng: np.random.Generator) -> None:
-        """Begin an episode.
-
-        Parameters
-        ----------
-        rng : numpy.random.Generator
-            Random numbers of the episode.
-        """
+        """Begin an episode."""
         self._rng = rng
         self._common, self._error, self._width = rng.standard_normal(3).tolist()
         self._was_valid = True
 
     def estimate(self, extinction: float, illuminance: float) -> Estimate:
-        """Draw the next estimate.
-
-        Parameters
-        ----------
-        extinction : float
-            True extinction coefficient ahead [1/m].
-        illuminance : float
-            Illuminance of the sky [lx].
-        """
+        """Draw the next estimate (`extinction` [1/m], `illuminance` [lx])."""
         table, light = self._table, light_class(illuminance)
         column = bisect.bisect_left(self._inner_edges, visibility_from_extinction(extinction))
         new, width = self._rng.standard_normal(2).tolist()
@@ -186,13 +132,7 @@ _CLEAR = 3e-5
 
 
 def relative_extinction(estimated: float, extinction: float) -> float:
-    """Error of an estimate as the table has it, ln(estimated / true k).
-
-    Parameters
-    ----------
-    estimated, extinction : float
-        Extinction coefficients [1/m]; the estimated one positive.
-    """
+    """Error of an estimate as the table has it, ln(estimated / true k) (`estimated`, `extinction` [1/m])."""
     return math.log(estimated / max(extinction, _CLEAR))
 
 

@@ -50,22 +50,13 @@ def airlight_from_illuminance(illuminance: float, share: float = AIRLIGHT_SHARE)
 def airlight_source(field: FogField, grid: FrustumGrid) -> NDArray[np.float32] | None:
     """What fog scatters towards the eye beyond the field's even airlight.
 
-    A layer that absorbs nothing, over dark ground, lets the share 1 / (1 + σ τ↑) of diffuse light through, with
-    σ = ¾ (1 − g) in Eddington's two-stream approximation (Meador and Weaver 1980, J. Atmos. Sci. 37, 630). Here the
-    airlight of each place goes by that law, relative to the ground outside banks, where it is the field's; τ↑ is that
-    of the vertical column that is as dense as the place itself.
+    A layer that absorbs nothing, over dark ground, lets the share 1 / (1 + σ τ↑) of diffuse light through, with σ = ¾
+    (1 − g) in Eddington's two-stream approximation (Meador and Weaver 1980, J. Atmos. Sci. 37, 630). Here the airlight
+    of each place goes by that law, relative to the ground outside banks, where it is the field's; τ↑ is that of the
+    vertical column that is as dense as the place itself.
 
-    Parameters
-    ----------
-    field : FogField
-        The fog, at one time.
-    grid : FrustumGrid
-        Its optical depths.
-
-    Returns
-    -------
-    (r, c, n, 3) float32 or None
-        Luminance scattered in between the eye and each node, beyond L∞ (1 − T) [cd/m²]; None if there is no shading.
+    Returns luminance scattered in between the eye and each node, beyond L∞ (1 − T) [cd/m²]; None if there is no
+    shading.
     """
     shading = field.airlight_shading
     if shading == 0 or (field.extinction == 0 and not field.banks):

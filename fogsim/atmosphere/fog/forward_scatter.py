@@ -33,18 +33,7 @@ def add_forward_scatter(
     airlight stays so, and fog beside something dark is darker. Forward lobes of fog droplets are 1° to 2° wide; weight
     and width are assumptions, not measurements.
 
-    Parameters
-    ----------
-    luminance : (rows, cols, 3) float32
-        Luminance at the camera [cd/m²]; added to in place.
-    airlight : tuple of float
-        L∞ per channel [cd/m²].
-    transmittance : (rows, cols) float32
-        T.
-    weight : float
-        w, 0 … 0.3.
-    width : float
-        Standard deviation of the blur [px].
+    Takes `luminance` (rows, cols, 3) [cd/m²], `airlight` [cd/m²], `transmittance` (rows, cols), `width` [px].
     """
     block = max(1, int(width / _COARSEST))
     difference = luminance - np.array(airlight, np.float32)
@@ -71,12 +60,7 @@ def _block_means(image: NDArray[np.float32], block: int) -> NDArray[np.float32]:
 def pixel_width(angle: float, focal_length: float) -> float:
     """Width of a blur on the image [px]: at least half a pixel, so that it can be drawn.
 
-    Parameters
-    ----------
-    angle : float
-        Its width in directions [rad].
-    focal_length : float
-        Focal length [px].
+    Takes `angle` [rad], `focal_length` [px].
     """
     return max(focal_length * math.tan(angle), 0.5)
 
@@ -85,12 +69,7 @@ def pixel_width(angle: float, focal_length: float) -> float:
 def blur_rows(image: NDArray[np.float32], weights: NDArray[np.float32], out: NDArray[np.float32]) -> None:
     """Convolve each row of an image; what the weights miss at the edges is shared among the rest.
 
-    Parameters
-    ----------
-    image, out : (rows, cols, 3) float32
-        Before and after; `out` is written to.
-    weights : (2 n + 1,) float32
-        Of the pixels to either side.
+    Takes `image`, `out` (rows, cols, 3), `weights` (2 n + 1,).
     """
     columns, reach = image.shape[1], weights.shape[0] // 2
     for u in range(columns):
@@ -117,18 +96,8 @@ def exchange(
 ) -> None:
     """Exchange a share w (1 − T) of a difference for its blur.
 
-    Parameters
-    ----------
-    luminance, difference : (rows, cols, 3) float32
-        Luminance, changed in place, and the difference [cd/m²].
-    transmittance : (rows, cols) float32
-        T.
-    blurred : (block rows, block cols, 3) float32
-        Blurred difference of each block [cd/m²].
-    block : int
-        Side of a block [px].
-    weight : float32
-        w.
+    Takes `luminance`, `difference` (rows, cols, 3) [cd/m²], `transmittance` (rows, cols), `blurred` (block rows, block
+    cols, 3) [cd/m²], `block` [px].
     """
     rows, columns = blurred.shape[0], blurred.shape[1]
     part = np.float32(1.0) / np.float32(block)

@@ -34,18 +34,7 @@ def extinctions_on_rays(
 ) -> None:
     """Extinction coefficients at distances along rays.
 
-    Parameters
-    ----------
-    eye : (3,) float64
-        Where the rays begin [m].
-    directions : (m, 3) float64
-        Unit vectors.
-    at : (n,) float64
-        Ascending distances [m].
-    medium : Medium
-        The fog.
-    values : (m, n) float64
-        Extinction coefficients [1/m]; written to.
+    Takes `eye` (3,) [m], `directions` (m, 3), `at` (n,) [m], `values` (m, n) [1/m].
     """
     for m in range(directions.shape[0]):
         extinctions_on_ray(eye, directions[m], at, medium, values[m])
@@ -91,18 +80,7 @@ def grid_depths(
 ) -> None:
     """Extinction and optical depth at the nodes of each ray, by Simpson's rule between nodes.
 
-    Parameters
-    ----------
-    eye : (3,) float64
-        Where the rays begin [m].
-    directions : (m, 3) float64
-        Unit vectors.
-    distances : (n,) float64
-        Of the nodes, ascending from 0 [m]; the last stands for the end of the ray, wherever that is.
-    medium : Medium
-        The fog.
-    extinction, depth : (m, n) float32
-        Extinction coefficient [1/m] and optical depth [-]; written to.
+    Takes `eye` (3,) [m], `directions` (m, 3), `distances` (n,) [m], `extinction`, `depth` (m, n) [1/m].
     """
     last = distances.shape[0] - 1
     at, values, pieces = np.empty(2 * last - 1), np.empty(2 * last - 1), np.zeros(last + 1)
@@ -138,35 +116,18 @@ def grid_depths(
 
 
 class PixelGrid(NamedTuple):
-    """What lies on a grid's rays, and where the pixels of an image are between them.
+    """What lies on a grid's rays, and where the pixels of an image are between them."""
 
-    Attributes
-    ----------
-    rows : (grid rows,) float32
-        Image rows of the grid [px].
-    left : (cols,) int64
-        Number of the grid's column before each of the image's.
-    right_share : (cols,) float32
-        How far each column of the image is on to the next of the grid's, 0 … 1.
-    distances : (nodes,) float32
-        Distances of the nodes along every ray [m].
-    interval : (bins + 1,) int64
-        The node before a distance d, for d / (d + fold) in even steps over 0 … 1.
-    fold : float32
-        See `interval` [m].
-    depth : (grid rows, grid cols · nodes) float32
-        Optical depth from the eye to the nodes [-].
-    source : (grid rows, grid cols · nodes · 3) float32
-        Luminance scattered in up to the nodes beyond the airlight [cd/m²]; of no columns where there is none.
-    """
-
-    rows: NDArray[np.float32]
-    left: NDArray[np.int64]
-    right_share: NDArray[np.float32]
-    distances: NDArray[np.float32]
+    rows: NDArray[np.float32]  # (grid rows,): Image rows of the grid [px]
+    left: NDArray[np.int64]  # (cols,) int64: Number of the grid's column before each of the image's
+    right_share: NDArray[np.float32]  # (cols,): How far each column of the image is on to the next of the grid's, 0 … 1
+    distances: NDArray[np.float32]  # (nodes,): Distances of the nodes along every ray [m]
+    # (bins + 1,) int64: The node before a distance d, for d / (d + fold) in even steps over 0 … 1
     interval: NDArray[np.int64]
-    fold: np.float32
-    depth: NDArray[np.float32]
+    fold: np.float32  # See `interval` [m]
+    depth: NDArray[np.float32]  # (grid rows, grid cols · nodes): Optical depth from the eye to the nodes [-]
+    # (grid rows, grid cols · nodes · 3): Luminance scattered in up to the nodes beyond the airlight [cd/m²]; of no
+    # columns where there is none
     source: NDArray[np.float32]
 
 
@@ -182,16 +143,7 @@ def fog_rows_by_grid(
 
     L = L0 T + L∞ (1 − T) + S, τ and S interpolated linearly between four rays and two nodes.
 
-    Parameters
-    ----------
-    luminance, out : (rows, cols · 3) float32
-        Luminance per channel without fog and with it [cd/m²]; `out` is written to.
-    distance : (rows, cols) float32
-        Distance along the ray [m].
-    grid : PixelGrid
-        Optical depths and scattered light.
-    airlight : (3,) float32
-        L∞ per channel [cd/m²].
+    Takes `luminance`, `out` (rows, cols · 3) [cd/m²], `distance` (rows, cols) [m], `airlight` (3,) [cd/m²].
     """
     rows, left, right_share, distances = grid.rows, grid.left, grid.right_share, grid.distances
     interval, fold, depth, source = grid.interval, grid.fold, grid.depth, grid.source

@@ -26,21 +26,7 @@ def daytime_luminance(
 ) -> NDArray[np.float32]:
     """Luminance at a camera, L = L0 T + L∞ (1 − T), with the field's forward scattering.
 
-    Parameters
-    ----------
-    view : View
-        The scene without air.
-    field : FogField
-        The fog, at one time (see `field_at`).
-    camera, pose
-        The camera.
-    droplets : str
-        A member of `Droplets`; the airlight goes by it where the field has an albedo of the ground.
-
-    Returns
-    -------
-    (rows, cols, 3) float32
-        Linear luminance per channel [cd/m²].
+    Returns linear luminance per channel [cd/m²] (rows, cols, 3).
     """
     if field.ground_albedo is not None:
         return fogged_radiance(view, field, pose.position, ray_from_pixel(camera, pose), droplets)
@@ -55,19 +41,7 @@ def daytime_luminance(
 def transmittance(view: View, field: FogField, camera: Camera, pose: CameraPose) -> NDArray[np.float32]:
     """Transmittance T = e^(−τ) up to what each pixel shows; for the sky, of the whole path to the fog's end.
 
-    Parameters
-    ----------
-    view : View
-        Distances are taken from it.
-    field : FogField
-        The fog, at one time.
-    camera, pose
-        The camera.
-
-    Returns
-    -------
-    (rows, cols) float32
-        0 … 1.
+    Returns 0 … 1.
     """
     # A white scene in fog that adds no light of its own is seen as its transmittance.
     white = dataclasses.replace(view, radiance=np.ones_like(view.radiance), lamp_response=None)

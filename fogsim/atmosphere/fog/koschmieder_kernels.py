@@ -27,21 +27,7 @@ _NEXT = np.uint32(1)
 
 @kernel
 def transmittances(depth: NDArray[np.float32], power: NDArray[np.int32], out: NDArray[np.float32]) -> None:
-    """e^(−τ) for a row of optical depths, to 2·10⁻⁷; exactly 1 for 0.
-
-    Parameters
-    ----------
-    depth : (n,) float32
-        Optical depths [-]; used up.
-    power : (n,) int32
-        Scratch.
-    out : (n,) float32
-        Written to.
-
-    Notes
-    -----
-    2^y is split at the whole number i above y: the power 2^i is written straight into a float's exponent.
-    """
+    """e^(−τ) for a row of optical depths, to 2·10⁻⁷; exactly 1 for 0 (`depth` (n,), `power` (n,) int32, `out` (n,))."""
     as_float = power.view(np.float32)
     for u in range(depth.shape[0]):
         y = max(-depth[u] * _LOG2_E, _LEAST)
@@ -55,15 +41,7 @@ def transmittances(depth: NDArray[np.float32], power: NDArray[np.int32], out: ND
 
 @kernel
 def repeat_channels(values: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-    """Each value of a row for each of three interleaved channels.
-
-    Parameters
-    ----------
-    values : (n,) float32
-        Any.
-    out : (3 · n,) float32
-        Written to.
-    """
+    """Each value of a row for each of three interleaved channels (`values` (n,), `out` (3 · n,))."""
     for u in range(values.shape[0]):
         out[3 * u] = values[u]
         out[3 * u + 1] = values[u]
@@ -72,15 +50,7 @@ def repeat_channels(values: NDArray[np.float32], out: NDArray[np.float32]) -> No
 
 @kernel
 def fill_channels(colour: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-    """A colour in each of a row's pixels of three interleaved channels.
-
-    Parameters
-    ----------
-    colour : (3,) float32
-        Any.
-    out : (3 · n,) float32
-        Written to.
-    """
+    """A colour in each of a row's pixels of three interleaved channels (`colour` (3,), `out` (3 · n,))."""
     for j in range(out.shape[0]):
         out[j] = colour[j % 3]
 
@@ -89,30 +59,14 @@ def fill_channels(colour: NDArray[np.float32], out: NDArray[np.float32]) -> None
 def interpolate_rows(
     low: NDArray[np.float32], high: NDArray[np.float32], share: np.float32, out: NDArray[np.float32]
 ) -> None:
-    """A row that lies between two rows of a coarser grid.
-
-    Parameters
-    ----------
-    low, high, out : (n,) float32
-        The two rows, and the one between them; `out` is written to.
-    share : float32
-        How far it is on the way from `low` to `high`, 0 … 1.
-    """
+    """A row that lies between two rows of a coarser grid (`low`, `high`, `out` (n,))."""
     for j in range(out.shape[0]):
         out[j] = low[j] + (high[j] - low[j]) * share
 
 
 @kernel
 def bilinear(table: NDArray[np.float32], row: np.float32, column: np.float32) -> np.float32:
-    """Value of a table at a place within it.
-
-    Parameters
-    ----------
-    table : (rows, cols) float32
-        Any.
-    row, column : float32
-        The place, before the last row and column.
-    """
+    """Value of a table at a place within it (`table` (rows, cols))."""
     a, b = np.uint32(row), np.uint32(column)
     down, aside = row - np.float32(a), column - np.float32(b)
     low = table[a, b] + (table[a, b + _NEXT] - table[a, b]) * aside
@@ -130,10 +84,7 @@ def add_airlight(
 ) -> None:
     """L = L0 T + L∞ (1 − T) over a row: L0 exactly where T is 1.
 
-    Parameters
-    ----------
-    luminance, transmittance, airlight, out : (3 · n,) float32
-        L0 [cd/m²], T [-], L∞ and L [cd/m²] of interleaved channels; `out` is written to.
+    Takes `luminance`, `transmittance`, `airlight`, `out` (3 · n,) [cd/m²].
     """
     for j in range(out.shape[0]):
         out[j] = luminance[j] * transmittance[j] + airlight[j] * (_ONE - transmittance[j])
@@ -175,24 +126,13 @@ def _add_bank(
 
 
 class BankedFog(NamedTuple):
-    """Fog whose optical depth has a closed form, as it lies about an eye.
+    """Fog whose optical depth has a closed form, as it lies about an eye."""
 
-    Attributes
-    ----------
-    headroom : float32
-        Height of the fog's top above the eye [m].
-    extinction : float32
-        Extinction coefficient outside the banks [1/m].
-    banks : (n, 6) float32
-        Axis (x, y), how far the eye is beyond start and end, edge [m], extra extinction [1/m].
-    airlight : (3,) float32
-        L∞ per channel [cd/m²].
-    """
-
-    headroom: np.float32
-    extinction: np.float32
+    headroom: np.float32  # Height of the fog's top above the eye [m]
+    extinction: np.float32  # Extinction coefficient outside the banks [1/m]
+    # (n, 6): Axis (x, y), how far the eye is beyond start and end, edge [m], extra extinction [1/m]
     banks: NDArray[np.float32]
-    airlight: NDArray[np.float32]
+    airlight: NDArray[np.float32]  # (3,): L∞ per channel [cd/m²]
 
 
 @kernel
@@ -207,18 +147,7 @@ def fog_rows(
 ) -> None:
     """Fog rows of an image, with τ exact through banks and up to a top.
 
-    Parameters
-    ----------
-    luminance, out : (rows, cols · 3) float32
-        Luminance per channel without fog and with it [cd/m²]; `out` is written to.
-    distance : (rows, cols) float32
-        Distance along the ray [m].
-    ray_map : (3, 3) float32
-        Takes (u, v, 1) to a ray in the world, not normalised.
-    fog : BankedFog
-        The fog.
-    top, bottom : int
-        The first row, and the one after the last.
+    Takes `luminance`, `out` (rows, cols · 3) [cd/m²], `distance` (rows, cols) [m], `ray_map` (3, 3).
     """
     headroom, extinction, banks = fog.headroom, fog.extinction, fog.banks
     columns = distance.shape[1]

@@ -25,44 +25,26 @@ _PIECES = 4
 
 @dataclass(frozen=True, slots=True)
 class LayerTable:
-    """Source functions in layers, over E / π.
+    """Source functions in layers, over E / π."""
 
-    Attributes
-    ----------
-    thickness : (n,) float64
-        Optical thickness of the layer, ascending [-].
-    place : (m,) float64
-        Optical height above the ground over the thickness, from 0 to 1 [-].
-    elevation : (k,) float64
-        Of the line of sight, from −π/2 to π/2 [rad].
-    black, per_albedo : (n, m, k) float64
-        Over black ground, and what an albedo of 1 adds [-].
-    reflectance, transmittance : (n,) float64
-        Of the layer, for the light of the ground and for that of an overcast sky [-].
-    vertical_black, vertical_per_albedo : (n,) float64
-        Light of a vertical surface near the ground over E, as `black` and `per_albedo` [-].
-    """
-
-    thickness: NDArray[np.float64]
-    place: NDArray[np.float64]
-    elevation: NDArray[np.float64]
+    thickness: NDArray[np.float64]  # (n,): Optical thickness of the layer, ascending [-]
+    place: NDArray[np.float64]  # (m,): Optical height above the ground over the thickness, from 0 to 1 [-]
+    elevation: NDArray[np.float64]  # (k,): Of the line of sight, from −π/2 to π/2 [rad]
+    # black, per_albedo (n, m, k): over black ground, and what an albedo of 1 adds [-]
     black: NDArray[np.float64]
     per_albedo: NDArray[np.float64]
+    # reflectance, transmittance (n,): of the layer, for the light of the ground and for that of an overcast sky [-]
     reflectance: NDArray[np.float64]
     transmittance: NDArray[np.float64]
+    # vertical_black, vertical_per_albedo (n,): light of a vertical surface near the ground over E, as `black` and
+    # `per_albedo` [-]
     vertical_black: NDArray[np.float64]
     vertical_per_albedo: NDArray[np.float64]
 
 
 @cache
 def layer_table(droplets: str) -> LayerTable:
-    """The table that FogSim carries.
-
-    Parameters
-    ----------
-    droplets : str
-        A member of `Droplets`.
-    """
+    """The table that FogSim carries."""
     with (files("fogsim.atmosphere") / "data" / "airlight.npz").open("rb") as file, np.load(file) as found:
         return LayerTable(
             thickness=found["thickness"],
@@ -100,18 +82,12 @@ def side_light(field: FogField, droplets: str) -> SideLight:
 
 @dataclass(frozen=True, slots=True)
 class SlantAirlight:
-    """What the fog adds between an eye and places around it.
+    """What the fog adds between an eye and places around it."""
 
-    Attributes
-    ----------
-    share : (`ELEVATIONS`, `PATHS`) float32
-        Airlight over the field's: mean source function on a path, by the bent sine of its elevation and by what it
-        takes from the light, 1 − T (see `layer_airlight_kernels`).
-    sky : float
-        Luminance of the sky above the fog over that of a sky which gives the ground the same illuminance without fog.
-    """
-
+    # Airlight over the field's: mean source function on a path, by the bent sine of its elevation and by what it takes
+    # from the light, 1 − T (see `layer_airlight_kernels`)
     share: NDArray[np.float32]
+    # Luminance of the sky above the fog over that of a sky which gives the ground the same illuminance without fog
     sky: float
 
 
@@ -220,21 +196,8 @@ def _slant_airlight(thickness: float, depth: float, albedo: float, droplets: str
 def path_means(table: LayerTable, source: NDArray[np.float64], thickness: float, depth: float) -> NDArray[np.float64]:
     """What paths from an eye scatter in, over what they take from the light.
 
-    Parameters
-    ----------
-    table : LayerTable
-        Whose places and elevations count.
-    source : (m, k) float64
-        Source function at the table's places and elevations [-].
-    thickness : float
-        Optical thickness of the layer [-].
-    depth : float
-        Optical height of the eye above the ground [-].
-
-    Returns
-    -------
-    (`ELEVATIONS`, `PATHS`) float64
-        By the elevations of `sines` and by 1 − T, of paths that go on beyond ground and top as if in what is there [-].
+    Returns by the elevations of `sines` and by 1 − T, of paths that go on beyond ground and top as if in what is there
+    [-]. Takes `source` (m, k).
     """
     slopes = sines()
     looks = np.arcsin(slopes)

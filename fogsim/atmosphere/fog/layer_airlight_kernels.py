@@ -26,27 +26,13 @@ _PER_LOST = np.float32(PATHS - 1)
 
 
 class LayeredFog(NamedTuple):
-    """A plane layer of even fog, as it lies about an eye.
+    """A plane layer of even fog, as it lies about an eye."""
 
-    Attributes
-    ----------
-    headroom : float32
-        Height of the fog's top above the eye [m].
-    extinction : float32
-        Extinction coefficient [1/m].
-    airlight : (3,) float32
-        Its level per channel [cd/m²].
-    share : (`ELEVATIONS`, `PATHS`) float32
-        Airlight over that level by elevation and path.
-    sky : float32
-        Factor of the luminance of the sky.
-    """
-
-    headroom: np.float32
-    extinction: np.float32
-    airlight: NDArray[np.float32]
-    share: NDArray[np.float32]
-    sky: np.float32
+    headroom: np.float32  # Height of the fog's top above the eye [m]
+    extinction: np.float32  # Extinction coefficient [1/m]
+    airlight: NDArray[np.float32]  # (3,): Its level per channel [cd/m²]
+    share: NDArray[np.float32]  # Airlight over that level by elevation and path
+    sky: np.float32  # Factor of the luminance of the sky
 
 
 @kernel
@@ -61,18 +47,7 @@ def layered_fog_rows(
 ) -> None:
     """Fog rows of an image, L = L0 T + A (1 − T), A by elevation and path.
 
-    Parameters
-    ----------
-    luminance, out : (rows, cols · 3) float32
-        Luminance per channel without fog and with it [cd/m²]; `out` is written to.
-    distance : (rows, cols) float32
-        Distance along the ray [m].
-    ray_map : (3, 3) float32
-        Takes (u, v, 1) to a ray in the world, not normalised.
-    fog : LayeredFog
-        The fog.
-    top, bottom : int
-        The first row, and the one after the last.
+    Takes `luminance`, `out` (rows, cols · 3) [cd/m²], `distance` (rows, cols) [m], `ray_map` (3, 3).
     """
     columns = distance.shape[1]
     look, depth = np.empty(columns, np.float32), np.empty(columns, np.float32)

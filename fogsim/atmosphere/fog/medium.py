@@ -31,29 +31,19 @@ PATCH_SHAPE = (32, 128, 128)
 
 
 class Medium(NamedTuple):
-    """A field without time.
+    """A field without time."""
 
-    Attributes
-    ----------
-    layer : (7,) float64
-        Extinction outside the banks [1/m], height of base, thickness of its edge, height of top, thickness of its edge,
-        ground [m] and 1 / scale height [1/m].
-    banks : (n, 8) float64
-        Origin (x, y), axis (x, y), start, end, edge [m], extra extinction [1/m].
-    frame : (6,) float64
-        From places to cells of the patches: cells per metre horizontally and vertically, cosine and sine of the grid's
-        turn, drift (x, y) [m].
-    factors : (z, y, x) float32
-        Factors of the patches on their periodic grid; one cell where there are none.
-    shelters : (n, 9) float64
-        Origin (x, y), axis (x, y), where fog is half gone beyond the first portal and before the last, the length of
-        these edges, where it is half back to the sides, and the length of those edges [m].
-    """
-
+    # (7,): Extinction outside the banks [1/m], height of base, thickness of its edge, height of top, thickness of its
+    # edge, ground [m] and 1 / scale height [1/m]
     layer: NDArray[np.float64]
-    banks: NDArray[np.float64]
+    banks: NDArray[np.float64]  # (n, 8): Origin (x, y), axis (x, y), start, end, edge [m], extra extinction [1/m]
+    # (6,): From places to cells of the patches: cells per metre horizontally and vertically, cosine and sine of the
+    # grid's turn, drift (x, y) [m]
     frame: NDArray[np.float64]
+    # (z, y, x): Factors of the patches on their periodic grid; one cell where there are none
     factors: NDArray[np.float32]
+    # (n, 9): Origin (x, y), axis (x, y), where fog is half gone beyond the first portal and before the last, the length
+    # of these edges, where it is half back to the sides, and the length of those edges [m]
     shelters: NDArray[np.float64]
 
 
@@ -148,17 +138,7 @@ def patch_factors(strength: float, seed: int) -> NDArray[np.float32]:
     Their logarithm is white noise through a Gaussian filter, so that it is Gaussian with the correlation
     e^(−(Δ/`PATCH_CELLS`)²) over Δ cells.
 
-    Parameters
-    ----------
-    strength : float
-        Standard deviation of the logarithm [-].
-    seed : int
-        Seed of the noise.
-
-    Returns
-    -------
-    (32, 128, 128) float32
-        Positive factors over (z, y, x); read-only.
+    Returns positive factors over (z, y, x); read-only.
     """
     white = np.random.default_rng(seed).standard_normal(PATCH_SHAPE, dtype=np.float32)
     squares = [np.square(2.0 * np.pi * np.fft.fftfreq(n)) for n in PATCH_SHAPE[:2]]
@@ -175,13 +155,7 @@ def patch_factors(strength: float, seed: int) -> NDArray[np.float32]:
 
 @lru_cache(maxsize=8)
 def medium_of(field: FogField) -> Medium:
-    """Arrays of a field that does not change with time (see `field_at`).
-
-    Parameters
-    ----------
-    field : FogField
-        The field.
-    """
+    """Arrays of a field that does not change with time (see `field_at`)."""
     frame, factors = np.zeros(6), np.ones((1, 1, 1), dtype=np.float32)
     patches = field.patches
     if patches is not None and patches.strength > 0:
@@ -214,13 +188,7 @@ def _shelter_row(shelter: FogShelter) -> tuple[float, ...]:
 
 
 def has_closed_form(field: FogField) -> bool:
-    """Tell whether nothing but banks and a sharp top makes a field uneven, so that τ has a closed form.
-
-    Parameters
-    ----------
-    field : FogField
-        The fog.
-    """
+    """Tell whether nothing but banks and a sharp top makes a field uneven, so that τ has a closed form."""
     return (
         not field.shelters
         and (field.patches is None or field.patches.strength == 0)
@@ -232,13 +200,5 @@ def has_closed_form(field: FogField) -> bool:
 
 
 def is_uniform_below(field: FogField, height: float) -> bool:
-    """Tell whether fog is the same everywhere below a height.
-
-    Parameters
-    ----------
-    field : FogField
-        The fog.
-    height : float
-        The height [m].
-    """
+    """Tell whether fog is the same everywhere below a height (`height` [m])."""
     return has_closed_form(field) and not field.banks and height <= field.top

@@ -106,23 +106,7 @@ def extinctions_on_ray(
 ) -> None:
     """Extinction coefficient at distances along a ray.
 
-    Parameters
-    ----------
-    start : (3,) float64
-        Where the line begins [m].
-    towards : (3,) float64
-        Unit vector along it.
-    at : (n,) float64
-        Ascending distances [m].
-    medium : Medium
-        The fog.
-    values : (n,) float64
-        Extinction coefficients [1/m]; written to.
-
-    Notes
-    -----
-    One pass over the places for each part of the field: handing arrays to a function for every single place would take
-    longer than what is computed there. None for a part that is the same at both ends of the ray, and so between.
+    Takes `start` (3,) [m], `towards` (3,), `at` (n,) [m], `values` (n,) [1/m].
     """
     layer, banks = medium.layer, medium.banks
     x, y, z = start[0], start[1], start[2]
@@ -361,27 +345,8 @@ def depths_along(
 ) -> int:
     """Optical depth from a point to places along one direction.
 
-    Parameters
-    ----------
-    start : (3,) float64
-        Where the line begins [m].
-    towards : (3,) float64
-        Unit vector along it.
-    distances : (n,) float64
-        Ascending [m].
-    medium : Medium
-        The fog.
-    depths : (n,) float64
-        Optical depths [-]; written to.
-    scratch : (2, 4 MOST_PIECES) float64
-        Scratch.
-    enough : float
-        Optical depth from which on no place is looked at [-].
-
-    Returns
-    -------
-    int
-        How many places have been looked at.
+    Returns how many places have been looked at. Takes `start` (3,) [m], `towards` (3,), `distances` (n,) [m], `depths`
+    (n,).
     """
     cuts = np.empty(8 + 4 * medium.banks.shape[0] + 8 * medium.shelters.shape[0])
     total, here, next_cut = 0.0, 0.0, 0
@@ -415,15 +380,7 @@ def depths_between(
     depths: NDArray[np.float64],
     scratch: NDArray[np.float64],
 ) -> None:
-    """Optical depth of each of many straight lines.
-
-    Parameters
-    ----------
-    starts, ends : (n, 3) float64
-        Their ends [m].
-    medium, depths, scratch
-        As for `depths_along`.
-    """
+    """Optical depth of each of many straight lines (`starts`, `ends` (n, 3) [m])."""
     distance, towards = np.empty(1), np.empty(3)
     for i in range(starts.shape[0]):
         towards[:] = ends[i] - starts[i]
@@ -440,17 +397,7 @@ def depths_between(
 
 @kernel
 def extinctions(points: NDArray[np.float64], medium: Medium, values: NDArray[np.float64]) -> None:
-    """Extinction coefficient at each of many places.
-
-    Parameters
-    ----------
-    points : (n, 3) float64
-        The places [m].
-    medium : Medium
-        The fog.
-    values : (n,) float64
-        Extinction coefficients [1/m]; written to.
-    """
+    """Extinction coefficient at each of many places (`points` (n, 3) [m], `values` (n,) [1/m])."""
     nowhere, here = np.zeros(3), np.zeros(1)
     for i in range(points.shape[0]):
         extinctions_on_ray(points[i], nowhere, here, medium, values[i : i + 1])

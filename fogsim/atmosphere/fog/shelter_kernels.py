@@ -19,15 +19,7 @@ _Picture = NDArray[np.float32]
 
 @kernel
 def ray(rays: _Array, u: int, v: int) -> tuple[float, float, float]:
-    """Unit vector along a pixel's viewing ray.
-
-    Parameters
-    ----------
-    rays : (3, 3) float64
-        Takes a pixel (u, v, 1) to its viewing ray, of any length.
-    u, v : int
-        Column and row [px].
-    """
+    """Unit vector along a pixel's viewing ray (`rays` (3, 3), `u`, `v` [px])."""
     a = rays[0, 0] * u + rays[0, 1] * v + rays[0, 2]
     b = rays[1, 0] * u + rays[1, 1] * v + rays[1, 2]
     c = rays[2, 0] * u + rays[2, 1] * v + rays[2, 2]
@@ -41,15 +33,7 @@ def find_pixels_within(
 ) -> None:
     """Find the pixels whose rays pass through a tunnel's portal before they end.
 
-    Parameters
-    ----------
-    distance, rays, eye
-        Distance along the ray of each pixel (rows, cols) [m], the matrix (3, 3) that takes a pixel (u, v, 1) to its
-        viewing ray, and where the camera is (3,) [m].
-    portals : (n, 7) float64
-        Middle on the road (x, y, z), direction of the road in plan (x, y), half the width, and the height [m].
-    within : (rows, cols) bool
-        Made true where they do.
+    Takes `distance`, `rays`, `eye` [m], `portals` (n, 7) [m], `within` (rows, cols) bool.
     """
     for number in range(len(portals)):
         x, y, z = portals[number, 0] - eye[0], portals[number, 1] - eye[1], portals[number, 2] - eye[2]

@@ -13,15 +13,7 @@ from fogsim.values.pinhole import ray_from_pixel
 
 
 def is_sheltered(shelters: tuple[FogShelter, ...], place: tuple[float, float, float]) -> bool:
-    """Whether a place is in a tunnel.
-
-    Parameters
-    ----------
-    shelters : tuple of FogShelter
-        The tunnels.
-    place : tuple of float
-        (x, y, z) [m].
-    """
+    """Whether a place is in a tunnel (`place` [m])."""
     above = (place[0], place[1], place[2] + 0.01)
     return bool(Obstructions(_boxes(shelters)).way_through([place], [above])[0] > 0.0)
 
@@ -29,17 +21,7 @@ def is_sheltered(shelters: tuple[FogShelter, ...], place: tuple[float, float, fl
 def sheltered_pixels(
     shelters: tuple[FogShelter, ...], view: View, camera: Camera, pose: CameraPose
 ) -> NDArray[np.bool_]:
-    """Pixels whose rays pass through a tunnel before they end (rows, cols).
-
-    Parameters
-    ----------
-    shelters : tuple of FogShelter
-        The tunnels.
-    view : View
-        What is drawn.
-    camera, pose : Camera, CameraPose
-        The camera.
-    """
+    """Pixels whose rays pass through a tunnel before they end (rows, cols)."""
     distance, rays = np.ascontiguousarray(view.distance, np.float32), ray_from_pixel(camera, pose)
     within = np.zeros(distance.shape, np.bool_)
     find_pixels_within(distance, rays, np.array(pose.position, np.float64), _portals(shelters), within)

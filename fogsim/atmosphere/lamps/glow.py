@@ -51,18 +51,7 @@ def scattered_once(
 
     The line of sight is walked by the angle at which it is seen from the source, which makes the integrand flat.
 
-    Parameters
-    ----------
-    depth : array_like
-        Optical depth τ = k R to the source [-], positive; broadcasts with `angle`.
-    angle : array_like
-        Angle γ of the line of sight from the direction of the source [rad], in 0 … π without its ends.
-    phase : PhaseFunction
-        Of the droplets.
-    loss : float
-        Part of the extinction that light suffers on its way [-].
-    steps : int
-        Steps of the integral.
+    Takes `angle` [rad].
     """
     sight = _lines_of_sight(depth, angle, steps)
     return _scattered(sight, phase(sight.scattering), loss)
@@ -70,24 +59,13 @@ def scattered_once(
 
 @dataclass(frozen=True, slots=True)
 class _LinesOfSight:
-    """Steps along lines of sight, in the last axis; see `scattered_once`.
+    """Steps along lines of sight, in the last axis; see `scattered_once`."""
 
-    Attributes
-    ----------
-    scattering : (…, angles, steps) float64
-        Scattering angle, which the depth of the source does not change [rad].
-    way : (…, steps) float64
-        Optical depth from the source to the step and from there to the eye [-].
-    weight : (steps,) float64
-        Of the steps [-].
-    scale : (…) float64
-        What the mean over steps is multiplied with [rad].
-    """
-
+    # (…, angles, steps): Scattering angle, which the depth of the source does not change [rad]
     scattering: NDArray[np.float64]
-    way: NDArray[np.float64]
-    weight: NDArray[np.float64]
-    scale: NDArray[np.float64]
+    way: NDArray[np.float64]  # (…, steps): Optical depth from the source to the step and from there to the eye [-]
+    weight: NDArray[np.float64]  # (steps,): Of the steps [-]
+    scale: NDArray[np.float64]  # (…): What the mean over steps is multiplied with [rad]
 
 
 def _lines_of_sight(depth: ArrayLike, angle: ArrayLike, steps: int) -> _LinesOfSight:
@@ -108,17 +86,7 @@ def _scattered(sight: _LinesOfSight, phase: NDArray[np.float64], loss: float) ->
 
 
 def glow(depth: ArrayLike, angle: ArrayLike, droplets: Droplets) -> NDArray[np.float64]:
-    """P: luminance scattered about a lamp, times R² over its intensity [-]; see the module.
-
-    Parameters
-    ----------
-    depth : array_like
-        Optical depth τ = k R to the lamp [-], positive; broadcasts with `angle`.
-    angle : array_like
-        Angle of the line of sight from the lamp's direction [rad], in 0 … π without its ends.
-    droplets : Droplets
-        What the fog is made of.
-    """
+    """P: luminance scattered about a lamp, times R² over its intensity [-]; see the module (`angle` [rad])."""
     phase = phase_function(droplets)
     first = 1.0 - forward_share(phase)
     sight = _lines_of_sight(depth, angle, _STEPS)
@@ -138,27 +106,13 @@ def _blurred_phases(droplets: Droplets) -> tuple[PhaseFunction, ...]:
 
 
 def mean_cosine(phase: PhaseFunction) -> float:
-    """Mean cosine g of the scattering angle.
-
-    Parameters
-    ----------
-    phase : PhaseFunction
-        Of the droplets.
-    """
+    """Mean cosine g of the scattering angle."""
     theta = np.linspace(0.0, math.pi, 20001)
     return float(2.0 * math.pi * np.trapezoid(phase(theta) * np.sin(theta) * np.cos(theta), theta))
 
 
 def forward_share(phase: PhaseFunction, angle: float = FORWARD) -> float:
-    """Share of light that droplets scatter by less than an angle.
-
-    Parameters
-    ----------
-    phase : PhaseFunction
-        Of the droplets.
-    angle : float
-        The angle [rad].
-    """
+    """Share of light that droplets scatter by less than an angle (`angle` [rad])."""
     theta = np.linspace(0.0, angle, 400)
     return float(2.0 * math.pi * np.trapezoid(phase(theta) * np.sin(theta), theta))
 
@@ -168,21 +122,7 @@ def narasimhan_nayar(depth: float, angle: ArrayLike, asymmetry: float = 0.9, ter
 
     For comparison: FogSim does not draw with it. It knows no single scattering and diverges for τ ≤ 1.
 
-    Parameters
-    ----------
-    depth : float
-        Optical depth τ to the source [-], more than 1.
-    angle : array_like
-        Angle of the line of sight from the source's direction [rad].
-    asymmetry : float
-        Henyey & Greenstein's parameter q of the droplets, 0.85 … 0.9 in fog.
-    terms : int
-        Terms of the series.
-
-    Raises
-    ------
-    ValueError
-        If the optical depth is not above 1.
+    Takes `angle` [rad].
     """
     if not depth > 1.0:
         raise ValueError(f"the series of Narasimhan and Nayar converges for optical depths above 1, got {depth!r}")
@@ -194,29 +134,16 @@ def narasimhan_nayar(depth: float, angle: ArrayLike, asymmetry: float = 0.9, ter
 
 @dataclass(frozen=True, slots=True)
 class GlowTable:
-    """Glow over optical depth and angle.
+    """Glow over optical depth and angle."""
 
-    Attributes
-    ----------
-    log_depth : (t,) float64
-        ln τ of the rows, evenly spaced.
-    log_glow : (t, c) float64
-        ln(P c / τ), over chords c = 2 sin(γ/2) that lie evenly over c / (c + FOLD_CHORD).
-    """
-
-    log_depth: NDArray[np.float64]
+    log_depth: NDArray[np.float64]  # (t,): ln τ of the rows, evenly spaced
+    # (t, c): ln(P c / τ), over chords c = 2 sin(γ/2) that lie evenly over c / (c + FOLD_CHORD)
     log_glow: NDArray[np.float64]
 
 
 @cache
 def glow_table(droplets: Droplets) -> GlowTable:
-    """Table of the glow in fog; computing it takes a fraction of a second.
-
-    Parameters
-    ----------
-    droplets : Droplets
-        What the fog is made of.
-    """
+    """Table of the glow in fog; computing it takes a fraction of a second."""
     folded = (np.arange(_CHORDS) / (_CHORDS - 1)) * (1.98 / (1.98 + FOLD_CHORD))
     chord = np.maximum(FOLD_CHORD * folded / (1.0 - folded), 1e-4)
     values = glow(_DEPTHS[:, None], 2.0 * np.arcsin(chord / 2.0), droplets)

@@ -53,26 +53,7 @@ def add_wide_glows(
 ) -> None:
     """Sum wide glows on the coarsest image.
 
-    Parameters
-    ----------
-    directions : (3, m) float32
-        Unit vectors of its pixels in the camera's axes.
-    up : (3,) float64
-        What is above, in the camera's axes.
-    lamps : (n, COLUMNS) float64
-        Table of lamps.
-    light : (n, angles · SIDES) float32
-        Light of their glows [lx].
-    table : (depths, WIDE_SIZE) float32
-        Profiles of light of 1 lx.
-    log_depth : (depths,) float64
-        ln τ of the profiles.
-    angles : Angles
-        Of the profiles' entries.
-    faintest : float
-        Glows that are nowhere brighter are left out [cd/m²].
-    out : (4, m) float32
-        Luminance of three channels [cd/m²], and luminance times 1 / R; added to.
+    Takes `directions` (3, m), `up` (3,), `light` [lx], `log_depth` (depths,), `faintest` [cd/m²], `out` (4, m) [cd/m²].
     """
     red, green, blue, near = out[0], out[1], out[2], out[3]
     count = red.shape[0]
@@ -133,10 +114,7 @@ def _place_about(
 def upsample_grid(coarsest: NDArray[np.float32], out: NDArray[np.float32]) -> None:
     """The coarsest image stretched to the coarse one, linearly between its corners.
 
-    Parameters
-    ----------
-    coarsest, out : (4, rows, cols) float32
-        The two images; `out` is written to.
+    Takes `coarsest`, `out` (4, rows, cols).
     """
     rows, columns = out.shape[1], out.shape[2]
     for v in range(rows):
@@ -168,18 +146,7 @@ def add_middle_glows(
 ) -> None:
     """Add to the coarse image what the coarsest lacks near the lamps.
 
-    Parameters
-    ----------
-    directions, lamps, table, log_depth, faintest
-        As for `add_wide_glows`, with the directions of the coarse image.
-    cell : (3,) float64
-        Width and height of a cell [px], and `reach` on the axis in cells.
-    reach : float
-        Angle from a lamp within which something is lacking [rad].
-    light : (n, CORE_SIZE) float32
-        Light of the glows at the profiles' entries [lx].
-    out : (4, rows, cols) float32
-        The coarse image; added to.
+    Takes `cell` (3,) [px], `reach` [rad], `light` [lx], `out` (4, rows, cols).
     """
     rows, columns = out.shape[1], out.shape[2]
     profile, scale = np.empty(CORE_SIZE, np.float32), np.float32((CORE_SIZE - 1.0) / reach)
@@ -210,13 +177,7 @@ def add_middle_glows(
 
 @kernel
 def divide_by_luminance(coarse: NDArray[np.float32]) -> None:
-    """Make of luminance over range in the last channel of a coarse image the mean 1 / R [1/m].
-
-    Parameters
-    ----------
-    coarse : (4, m) float32
-        The image; changed in place.
-    """
+    """Make of luminance over range in the last channel of a coarse image the mean 1 / R [1/m] (`coarse` (4, m))."""
     for p in range(coarse.shape[1]):
         coarse[3, p] /= max(_RED * coarse[0, p] + _GREEN * coarse[1, p] + _BLUE * coarse[2, p], _LEAST)
 
@@ -255,16 +216,7 @@ def add_upsampled(
     Light is scattered into a line of sight about evenly up to its lamp, so of the glow of a lamp at R what is seen
     before a surface at d is the share min(1, d / R).
 
-    Parameters
-    ----------
-    coarse : (4, m) float32
-        Luminance of three channels [cd/m²], and mean 1 / R [1/m].
-    coarse_columns : int
-        Columns of the coarse image.
-    distance : (rows, cols) float32
-        What the pixels see [m].
-    out : (rows, cols · 3) float32
-        Luminance [cd/m²]; added to.
+    Takes `coarse` (4, m) [cd/m²], [1/m], `distance` (rows, cols) [m], `out` (rows, cols · 3) [cd/m²].
     """
     rows, columns = distance.shape
     coarse_rows, ready = coarse.shape[1] // coarse_columns, -1
@@ -297,18 +249,7 @@ def add_glow_cores(
 ) -> None:
     """Add to an image the cores of glows.
 
-    Parameters
-    ----------
-    lamps : (n, COLUMNS) float64
-        Table of lamps.
-    bright, profiles : (n,) bool and (n, CORE_SIZE) float32
-        From `core_profiles`.
-    reach : float
-        Distance from the lamps up to which there are cores [px].
-    distance : (rows, cols) float32
-        What the pixels see [m].
-    out : (rows, cols · 3) float32
-        Luminance [cd/m²]; added to.
+    Takes `bright`, `profiles` (n,) bool, `reach` [px], `distance` (rows, cols) [m], `out` (rows, cols · 3) [cd/m²].
     """
     rows, columns = distance.shape
     scale, last = np.float32((CORE_SIZE - 1.001) / reach), np.float32(CORE_SIZE - 1.001)
@@ -365,18 +306,7 @@ def add_direct_light(
     neighbours, is not added again. Of a lamp behind something the part that is hidden is left out. The light goes to
     the four pixels about the place.
 
-    Parameters
-    ----------
-    lamps : (n, COLUMNS) float64
-        Table of lamps.
-    focal : float
-        Focal length [px].
-    largest : float
-        Lamps that cover as many pixels or more are complete [px²].
-    faintest : float
-        Lamps whose light on all pixels together is less are left out [cd/m²].
-    luminance, out : (rows, cols · 3) float32
-        As drawn, without fog, and the image with it [cd/m²]; `out` is added to.
+    Takes `focal` [px], `largest` [px²], `faintest` [cd/m²], `luminance`, `out` (rows, cols · 3) [cd/m²].
     """
     rows, columns = out.shape[0], out.shape[1] // 3
     for i in range(lamps.shape[0]):
@@ -408,12 +338,7 @@ def add_direct_light(
 def mean_luminance(image: NDArray[np.float32], step: int) -> float:
     """Mean of an image's green channel, near enough to that of its luminance [cd/m²].
 
-    Parameters
-    ----------
-    image : (rows, cols · 3) float32
-        Luminance per channel [cd/m²].
-    step : int
-        Rows and columns between two pixels that are read.
+    Takes `image` (rows, cols · 3) [cd/m²].
     """
     total, count = 0.0, 0
     for v in range(step // 2, image.shape[0], step):

@@ -44,39 +44,19 @@ _SAME_RANGE = 0.15  # share by which ranges of lamps may differ that are drawn a
 
 
 class LampLight(NamedTuple):
-    """Light of lamps.
+    """Light of lamps."""
 
-    Attributes
-    ----------
-    intensity : (n,) float64
-        Luminous intensity toward the camera [cd].
-    colour : (n, 3) float64
-        Linear colours of luminance 1.
-    area : (n,) float64
-        Luminous area as the camera sees it [m²].
-    """
-
-    intensity: NDArray[np.float64]
-    colour: NDArray[np.float64]
-    area: NDArray[np.float64]
+    intensity: NDArray[np.float64]  # (n,): Luminous intensity toward the camera [cd]
+    colour: NDArray[np.float64]  # (n, 3): Linear colours of luminance 1
+    area: NDArray[np.float64]  # (n,): Luminous area as the camera sees it [m²]
 
 
 class GlowLines(NamedTuple):
-    """Glow of a lamp of unit strength, over optical depth and chord.
+    """Glow of a lamp of unit strength, over optical depth and chord."""
 
-    Attributes
-    ----------
-    values : (depths, chords) float64
-        Glow times chord, over chords that lie evenly over c / (c + fold).
-    log_depth : (depths,) float64
-        ln τ of the rows, evenly spaced.
-    fold : float
-        Chord that is placed half-way.
-    """
-
-    values: NDArray[np.float64]
-    log_depth: NDArray[np.float64]
-    fold: float
+    values: NDArray[np.float64]  # (depths, chords): Glow times chord, over chords that lie evenly over c / (c + fold)
+    log_depth: NDArray[np.float64]  # (depths,): ln τ of the rows, evenly spaced
+    fold: float  # Chord that is placed half-way
 
 
 @kernel
@@ -91,22 +71,8 @@ def project_lamps(
 ) -> int:
     """Set place, range and direction of lamps before a camera; their count.
 
-    Parameters
-    ----------
-    position : (n, 3) float64
-        Places [m].
-    intensity : (n,) float64
-        Those without any are left out [cd].
-    eye : (3,) float64
-        Optical centre [m].
-    axes : (3, 3) float64
-        The camera's axes (right, down, forward) in the world.
-    lens : (3,) float64
-        Focal length and principal point [px].
-    lamps : (n, COLUMNS) float64
-        Table of lamps; written to.
-    chosen : (n,) int64
-        Numbers of the lamps in the table; written to.
+    Takes `position` (n, 3) [m], `intensity` (n,) [cd], `eye` (3,) [m], `axes` (3, 3), `lens` (3,) [px], `chosen` (n,)
+    int64.
     """
     count = 0
     for i in range(position.shape[0]):
@@ -162,22 +128,7 @@ def select_lamps(
 ) -> int:
     """Set the other columns of projected lamps, and keep those that are not lost in fog; their count.
 
-    Parameters
-    ----------
-    light : LampLight
-        Of all lamps.
-    chosen : (n,) int64
-        Numbers of the projected ones among them; those of the kept ones come first afterwards.
-    depth : (n,) float64
-        Optical depths to those [-].
-    farthest : float
-        Optical depth at which a lamp has faded from sight [-].
-    focal : float
-        Focal length [px].
-    distance : (rows, cols) float32
-        What the pixels see [m].
-    lamps : (n, COLUMNS) float64
-        Table of lamps; changed in place.
+    Takes `chosen` (n,) int64, `depth` (n,), `focal` [px], `distance` (rows, cols) [m].
     """
     intensity, colour, area = light.intensity, light.colour, light.area
     count = 0
@@ -215,14 +166,7 @@ def merge_lamps(
 
     What is left for them is the sum of their light, at its middle.
 
-    Parameters
-    ----------
-    lamps, fused : (n, COLUMNS) float64
-        Table of lamps before and after; `fused` is written to.
-    light, fused_light : (n, entries) float32
-        Light of their glows [lx]; `fused_light` is written to.
-    apart : float
-        Distance on the image from which lamps are drawn separately [px].
+    Takes `light`, `fused_light` (n, entries) [lx], `apart` [px].
     """
     count = 0
     for i in range(lamps.shape[0]):
@@ -264,16 +208,7 @@ def profile_tables(
 ) -> None:
     """Glow of unit strength at each depth of a table: `wide` with its middle softened, `middle` what is missing there.
 
-    Parameters
-    ----------
-    glow : GlowLines
-        The glow.
-    soft, softer : float
-        Radii within which the glow is flat on the coarse and the coarsest image [rad].
-    reach : float
-        Radius at which `middle` goes to 0 [rad].
-    wide, middle : (depths, WIDE_SIZE) and (depths, CORE_SIZE) float32
-        Written to.
+    Takes `soft`, `softer` [rad], `reach` [rad].
     """
     lines, fold = glow.values, glow.fold
     for i in range(lines.shape[0]):
@@ -308,18 +243,7 @@ def lamp_profile(
 ) -> None:
     """Profile of a lamp's glow beyond its core, were its light 1 lx [cd/m²].
 
-    Parameters
-    ----------
-    table : (depths, entries) float32
-        Profiles of unit strength.
-    lamp : (COLUMNS,) float64
-        The lamp.
-    left : float
-        Share of the glow that is left of a hidden lamp.
-    log_depth : (depths,) float64
-        ln τ of the table's rows.
-    out : (entries,) float32
-        Written to.
+    Takes `table` (depths, entries), `log_depth` (depths,), `out` (entries,).
     """
     row, share, factor = _row_of(lamp[DEPTH], log_depth)
     gain = np.float32(factor * (left + (1.0 - left) * lamp[SHOWN]))
@@ -342,26 +266,8 @@ def core_profiles(
 ) -> None:
     """Luminance of each glow that coarse images lack, evenly over the distance on the image.
 
-    Parameters
-    ----------
-    lamps : (n, COLUMNS) float64
-        Table of lamps.
-    light : (n, CORE_SIZE) float32
-        Light of their glows at the entries [lx].
-    glow : GlowLines
-        The glow.
-    soft : float
-        Radius within which the glow is flat on the coarse image [rad].
-    reach : float
-        Distance up to which there are cores [px].
-    pixel : float
-        Angle of a pixel on the axis [rad].
-    faintest : float
-        Cores that are nowhere brighter are not `bright` [cd/m²].
-    core : (n, CORE_SIZE) float32
-        Luminance [cd/m²]; written to.
-    bright : (n,) bool
-        Written to.
+    Takes `light` [lx], `soft` [rad], `reach` [px], `pixel` [rad], `faintest` [cd/m²], `core` [cd/m²], `bright` (n,)
+    bool.
     """
     lines, log_depth, fold = glow.values, glow.log_depth, glow.fold
     line = np.empty(lines.shape[1])

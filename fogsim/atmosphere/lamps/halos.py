@@ -64,46 +64,30 @@ _DEPTHS = 96
 
 @dataclass(frozen=True, slots=True)
 class _Plan:
-    """What the halos in a camera's images have in common.
+    """What the halos in a camera's images have in common."""
 
-    Attributes
-    ----------
-    cell : (3,) float64
-        Width and height of a cell of the coarse image [px], and the reach of what the coarsest lacks, in cells.
-    shape, half_shape : tuple of int
-        Rows and columns of the coarse and the coarsest image.
-    directions, half_directions : (3, m) float32
-        Their directions in the camera's axes.
-    soft, reach : float
-        Radius within which glow is flat on the coarse image, and that of what the coarsest lacks [rad].
-    wide, middle : (depths, entries) float32
-        Profiles on the coarsest image, and of what is missing there.
-    wide_angles, middle_angles, core_angles : Angles
-        Of the entries of these profiles, and of the cores.
-    """
-
+    # (3,): Width and height of a cell of the coarse image [px], and the reach of what the coarsest lacks, in cells
     cell: NDArray[np.float64]
+    # shape, half_shape: rows and columns of the coarse and the coarsest image
     shape: tuple[int, int]
     half_shape: tuple[int, int]
+    # directions, half_directions (3, m): their directions in the camera's axes
     directions: NDArray[np.float32]
     half_directions: NDArray[np.float32]
+    # soft, reach: radius within which glow is flat on the coarse image, and that of what the coarsest lacks [rad]
     soft: float
     reach: float
+    # wide, middle (depths, entries): profiles on the coarsest image, and of what is missing there
     wide: NDArray[np.float32]
     middle: NDArray[np.float32]
+    # wide_angles, middle_angles, core_angles: of the entries of these profiles, and of the cores
     wide_angles: Angles
     middle_angles: Angles
     core_angles: Angles
 
 
 class Halos:
-    """Draws lamps of other vehicles and of streets in fog.
-
-    Parameters
-    ----------
-    droplets : Droplets
-        What the fog is made of: sets the shape of the glow.
-    """
+    """Draws lamps of other vehicles and of streets in fog."""
 
     def __init__(self, droplets: Droplets = Droplets.MODERATE_RADIATION) -> None:
         self._droplets = Droplets(droplets)
@@ -114,13 +98,7 @@ class Halos:
         return LobeMemory(self._droplets)
 
     def prepare(self, camera: Camera) -> None:
-        """Compute beforehand what depends on camera and droplets alone.
-
-        Parameters
-        ----------
-        camera : Camera
-            The camera.
-        """
+        """Compute beforehand what depends on camera and droplets alone."""
         self._plan(camera)
 
     def add(
@@ -132,21 +110,7 @@ class Halos:
         fog: FogField,
         sources: LightSources,
     ) -> None:
-        """Add glow and lost direct light of lamps to an image.
-
-        Parameters
-        ----------
-        luminance : (rows, cols, 3) float32
-            Luminance at the camera [cd/m²]; added to in place, C-contiguous.
-        view : View
-            What is seen; lamps that it shows are complete already.
-        camera, pose : Camera, CameraPose
-            The camera.
-        fog : FogField
-            The fog at one time.
-        sources : LightSources
-            The lamps.
-        """
+        """Add glow and lost direct light of lamps to an image (`luminance` (rows, cols, 3) [cd/m²])."""
         distance = np.ascontiguousarray(view.distance, dtype=np.float32)
         lamps, chosen = _lamps_in_view(camera, pose, fog, sources, distance)
         if not len(lamps):

@@ -39,20 +39,7 @@ def lamp_table(beam: Beam) -> NDArray[np.float32]:
 
     The latest are remembered, since the same lamps are in every scene.
 
-    Parameters
-    ----------
-    beam : Beam
-        The lamp.
-
-    Returns
-    -------
-    (BLURS, SIZE, SIZE) float32
-        Intensity [cd]; rows from below to above, columns from left to right.
-
-    Raises
-    ------
-    InputError
-        If the beam has holes, negative values or directions that do not ascend.
+    Returns Intensity [cd]; rows from below to above, columns from left to right.
     """
     checked_beam(beam)
     folded = np.clip(np.linspace(-1.0, 1.0, SIZE), -0.999, 0.999)
@@ -83,11 +70,5 @@ def _bilinear(table: NDArray[np.float64], row: NDArray[np.float64], column: NDAr
 
 
 def phase_table(phase: PhaseFunction) -> NDArray[np.float32]:
-    """Phase function over cos(θ/2) in even steps from 0, straight back, to 1, straight on [1/sr].
-
-    Parameters
-    ----------
-    phase : PhaseFunction
-        The phase function.
-    """
+    """Phase function over cos(θ/2) in even steps from 0, straight back, to 1, straight on [1/sr]."""
     return phase(2.0 * np.arccos(np.linspace(0.0, 1.0, PHASE_SIZE))).astype(np.float32)

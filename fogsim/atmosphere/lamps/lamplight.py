@@ -37,28 +37,14 @@ class _Group:
 
 
 class OwnLamplight:
-    """Draws the light of the lamps of the camera's own vehicle.
-
-    Parameters
-    ----------
-    droplets : Droplets
-        What the fog is made of: sets the phase function.
-    """
+    """Draws the light of the lamps of the camera's own vehicle."""
 
     def __init__(self, droplets: Droplets = Droplets.MODERATE_RADIATION) -> None:
         self._droplets = Droplets(droplets)
         self._veils: dict[tuple[int, float], tuple[_Group, NDArray[np.float32]]] = {}
 
     def prepare(self, camera: Camera, lamps: tuple[HeadLamp, ...]) -> None:
-        """Compute beforehand what depends on camera, lamps and droplets alone.
-
-        Parameters
-        ----------
-        camera : Camera
-            The camera.
-        lamps : tuple of HeadLamp
-            Lamps that may be lit together.
-        """
+        """Compute beforehand what depends on camera, lamps and droplets alone."""
         self._groups(camera, lamps)
 
     def add(
@@ -72,23 +58,7 @@ class OwnLamplight:
     ) -> None:
         """Add the lamps' light on surfaces, R E e^(−τ), and their veil to an image.
 
-        Parameters
-        ----------
-        luminance : (rows, cols, 3) float32
-            Luminance at the camera [cd/m²]; added to in place, C-contiguous.
-        view : View
-            What is seen, with its response to the lamps' light.
-        camera, pose : Camera, CameraPose
-            The camera.
-        fog : FogField
-            The fog at one time.
-        lamps : tuple of HeadLamp
-            Lit lamps.
-
-        Raises
-        ------
-        InputError
-            If a beam has holes.
+        Takes `luminance` (rows, cols, 3) [cd/m²].
         """
         rows, columns = view.distance.shape
         response = np.zeros((0, columns, 3), np.float32) if view.lamp_response is None else view.lamp_response

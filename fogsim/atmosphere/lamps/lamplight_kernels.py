@@ -31,44 +31,22 @@ _LightRows = tuple[_Floats, _Floats, _Floats, _Floats, _Floats, _Floats]
 
 
 class LampGroup(NamedTuple):
-    """Lamps of one colour.
+    """Lamps of one colour."""
 
-    Attributes
-    ----------
-    places : (n, 3) float32
-        Where they are from the eye in the vehicle's axes (forward, right, up) [m].
-    tables : (n, SIZE, SIZE) float32
-        Their beams, sharp [cd].
-    colour : (3,) float32
-        Linear colour of luminance 1.
-    """
-
-    places: NDArray[np.float32]
-    tables: NDArray[np.float32]
-    colour: NDArray[np.float32]
+    places: NDArray[np.float32]  # (n, 3): Where they are from the eye in the vehicle's axes (forward, right, up) [m]
+    tables: NDArray[np.float32]  # Their beams, sharp [cd]
+    colour: NDArray[np.float32]  # (3,): Linear colour of luminance 1
 
 
 class VeilGrid(NamedTuple):
-    """The veil on a grid of rays, and what fog there is on them.
+    """The veil on a grid of rays, and what fog there is on them."""
 
-    Attributes
-    ----------
-    columns : int
-        Columns of the grid.
-    nodes : uint32
-        Nodes of a ray, which lie evenly over r / (r + fold).
-    fold : float32
-        See `nodes` [m].
-    veil : (rows, columns · nodes) float32
-        Veil from the eye to each node [cd/m²]; without rows in clear air.
-    attenuation : (rows, columns · nodes) or (1, 1) float32
-        Mean extinction coefficient to each node; one entry where fog is even [1/m].
-    """
-
-    columns: int
-    nodes: np.uint32
-    fold: np.float32
+    columns: int  # Columns of the grid
+    nodes: np.uint32  # Nodes of a ray, which lie evenly over r / (r + fold)
+    fold: np.float32  # See `nodes` [m]
+    # (rows, columns · nodes): Veil from the eye to each node [cd/m²]; without rows in clear air
     veil: NDArray[np.float32]
+    # (rows, columns · nodes): Mean extinction coefficient to each node; one entry where fog is even [1/m]
     attenuation: NDArray[np.float32]
 
 
@@ -260,22 +238,8 @@ def add_own_light(
 ) -> None:
     """Add to an image what own lamps of one colour make of it.
 
-    Parameters
-    ----------
-    distance : (rows, cols) float32
-        What the pixels see [m].
-    response : (rows, cols · 3) float32
-        Its response to lamplight [cd/m² per lx]; may have no rows.
-    ray_map : (3, 3) float32
-        Takes (u, v, 1) to a ray in the vehicle's axes (forward, right, up).
-    step : int
-        On plane surfaces light is computed at each so many pixels.
-    lamps : LampGroup
-        The lamps.
-    grid : VeilGrid
-        Their veil.
-    out : (rows, cols · 3) float32
-        Luminance [cd/m²]; added to.
+    Takes `distance` (rows, cols) [m], `response` (rows, cols · 3) [cd/m² per lx], `ray_map` (3, 3), `out` (rows, cols ·
+    3) [cd/m²].
     """
     nodes, fold, veil, attenuation = grid.nodes, grid.fold, grid.veil, grid.attenuation
     columns = distance.shape[1]

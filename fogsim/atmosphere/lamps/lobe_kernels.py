@@ -11,40 +11,24 @@ from fogsim.jit import kernel
 
 
 class LobeTables(NamedTuple):
-    """Mean intensities that kinds of lamps send into their glow.
+    """Mean intensities that kinds of lamps send into their glow."""
 
-    Attributes
-    ----------
-    values : (kinds, azimuths, elevations, depths, angles · sides) float32
-        From `fogsim.atmosphere.lamps.lobes.mean_intensity`, where it is known [cd].
-    azimuth_fold, elevation_fold : float
-        Angles that lie half-way in a table [rad].
-    log_depth : (depths,) float64
-        ln τ.
-    """
-
+    # (kinds, azimuths, elevations, depths, angles · sides): intensities of
+    # `fogsim.atmosphere.lamps.lobes.mean_intensity`, where they are known [cd]
     values: NDArray[np.float32]
+    # azimuth_fold, elevation_fold: angles that lie half-way in a table [rad]
     azimuth_fold: float
     elevation_fold: float
-    log_depth: NDArray[np.float64]
+    log_depth: NDArray[np.float64]  # (depths,): ln τ
 
 
 class LampShapes(NamedTuple):
-    """How lamps shine.
+    """How lamps shine."""
 
-    Attributes
-    ----------
-    kind : (n,) int64
-        Number of each lamp's kind among the tables, −1 for one that shines alike in all directions.
-    scale : (n,) float64
-        Its intensity over that of its kind.
-    forward : (n, 3) float64
-        Unit vectors along the lamps' axes.
-    """
-
+    # (n,) int64: Number of each lamp's kind among the tables, −1 for one that shines alike in all directions
     kind: NDArray[np.int64]
-    scale: NDArray[np.float64]
-    forward: NDArray[np.float64]
+    scale: NDArray[np.float64]  # (n,): Its intensity over that of its kind
+    forward: NDArray[np.float64]  # (n, 3): Unit vectors along the lamps' axes
 
 
 @kernel
@@ -87,12 +71,7 @@ def find_unknown(
 ) -> int:
     """Find the directions to the eye of which tables are asked and do not tell; their count.
 
-    Parameters
-    ----------
-    lamps, chosen, eye, position, shapes, tables
-        As for `set_glow_light`.
-    known, unknown : (kinds, azimuths, elevations) bool
-        What tables tell, and what they are asked for besides; `unknown` is set.
+    Takes `known`, `unknown` (kinds, azimuths, elevations) bool.
     """
     count = 0
     for i in range(lamps.shape[0]):
@@ -125,22 +104,7 @@ def set_glow_light(
 ) -> None:
     """Light of each lamp that its glow is made of, as the illuminance that a lamp alike in all directions would give.
 
-    Parameters
-    ----------
-    lamps : (n, COLUMNS) float64
-        Table of lamps.
-    chosen : (n,) int64
-        Their numbers among all.
-    eye : (3,) float64
-        Where the eye is [m].
-    position, intensity : (all, 3) and (all,) float64
-        Places of all lamps [m], and luminous intensities toward the eye [cd].
-    shapes : LampShapes
-        Of all.
-    tables : LobeTables
-        Of the kinds.
-    out : (n, angles · sides) float32
-        Illuminance at the eye were the air clear [lx]; written to.
+    Takes `chosen` (n,) int64, `eye` (3,) [m], `position`, `intensity` (all,) [m], [cd], `out` (n, angles · sides) [lx].
     """
     values, log_depth = tables.values, tables.log_depth
     entries, depths = out.shape[1], values.shape[3]
@@ -169,18 +133,10 @@ def set_glow_light(
 
 
 class Angles(NamedTuple):
-    """Where the entries of a profile lie among the angles for which the light of glows is told.
+    """Where the entries of a profile lie among the angles for which the light of glows is told."""
 
-    Attributes
-    ----------
-    entry : (entries,) int64
-        The angle before each.
-    share : (entries,) float32
-        Share of the next one.
-    """
-
-    entry: NDArray[np.int64]
-    share: NDArray[np.float32]
+    entry: NDArray[np.int64]  # (entries,) int64: The angle before each
+    share: NDArray[np.float32]  # (entries,): Share of the next one
 
 
 @kernel
@@ -189,16 +145,7 @@ def side_profiles(
 ) -> None:
     """Profiles of a glow on each side of its lamp.
 
-    Parameters
-    ----------
-    unit : (entries,) float32
-        Profile, were the light 1 lx [cd/m²].
-    light : (angles · sides,) float32
-        Light of the glow [lx].
-    angles : Angles
-        Of the profile's entries.
-    out : (entries, sides + 1) float32
-        Luminance [cd/m²], that of the first side once more at the end; written to.
+    Takes `unit` (entries,) [cd/m²], `light` (angles · sides,) [lx], `out` (entries, sides + 1) [cd/m²].
     """
     sides = out.shape[1] - 1
     for n in range(unit.shape[0]):
@@ -213,16 +160,7 @@ def side_profiles(
 def mean_light(light: NDArray[np.float32], sides: int, angles: Angles, out: NDArray[np.float32]) -> None:
     """Light of glows at the entries of a profile, the mean of all sides.
 
-    Parameters
-    ----------
-    light : (n, angles · sides) float32
-        Light of the glows [lx].
-    sides : int
-        Number of sides.
-    angles : Angles
-        Of the profile's entries.
-    out : (n, entries) float32
-        Light [lx]; written to.
+    Takes `light` (n, angles · sides) [lx], `out` (n, entries) [lx].
     """
     count = light.shape[1] // sides
     mean = np.empty(count, np.float32)

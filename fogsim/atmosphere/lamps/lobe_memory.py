@@ -22,11 +22,6 @@ class LobeMemory:
     """Light that the glows of lamps are made of.
 
     It remembers mean intensities, some hundred microseconds' work for each kind of lamp and direction to the eye.
-
-    Parameters
-    ----------
-    droplets : Droplets
-        What the fog is made of.
     """
 
     def __init__(self, droplets: Droplets) -> None:
@@ -42,21 +37,7 @@ class LobeMemory:
     ) -> NDArray[np.float32]:
         """Light of each lamp's glow, by angle and side: the illuminance of a lamp alike in all directions [lx].
 
-        Parameters
-        ----------
-        lamps : (n, COLUMNS) float64
-            Table of lamps.
-        chosen : (n,) int64
-            Their numbers among the sources.
-        eye : (3,) float64
-            Where the eye is [m].
-        sources : LightSources
-            All lamps.
-
-        Returns
-        -------
-        (n, angles · SIDES) float32
-            Over the angles of `light_origins`.
+        Returns over the angles of `light_origins`. Takes `chosen` (n,) int64, `eye` (3,) [m].
         """
         shapes = self._shapes(sources, chosen)
         position = np.ascontiguousarray(sources.position)

@@ -34,42 +34,25 @@ _HALVES = 2  # directions in each bin of emitted angles
 
 @dataclass(frozen=True, slots=True)
 class Origins:
-    """Where scattered light had left the lamp about which it is seen.
+    """Where scattered light had left the lamp about which it is seen."""
 
-    Attributes
-    ----------
-    log_depth : (t,) float64
-        ln τ of the lamp.
-    angle : (g,) float64
-        Angles of lines of sight off the lamp [rad].
-    emitted : (e + 1,) float64
-        Edges of the bins of angles between the way to the eye and where the light left [rad].
-    turned : (m,) float64
-        Middles of the bins of turns of where it left from the side on which the line of sight passes, about the way to
-        the eye [rad].
-    share : (t, g, e, m) float64
-        Of the light, what left in each bin; adds up to 1 for each depth and angle.
-    excess : (t, g) float64
-        Luminance about a lamp that shines alike in all directions, over that of `fogsim.atmosphere.lamps.glow` [-].
-    """
-
-    log_depth: NDArray[np.float64]
-    angle: NDArray[np.float64]
+    log_depth: NDArray[np.float64]  # (t,): ln τ of the lamp
+    angle: NDArray[np.float64]  # (g,): Angles of lines of sight off the lamp [rad]
+    # (e + 1,): Edges of the bins of angles between the way to the eye and where the light left [rad]
     emitted: NDArray[np.float64]
+    # (m,): Middles of the bins of turns of where it left from the side on which the line of sight passes, about the way
+    # to the eye [rad]
     turned: NDArray[np.float64]
+    # (t, g, e, m): Of the light, what left in each bin; adds up to 1 for each depth and angle
     share: NDArray[np.float64]
+    # (t, g): Luminance about a lamp that shines alike in all directions, over that of `fogsim.atmosphere.lamps.glow`
+    # [-]
     excess: NDArray[np.float64]
 
 
 @cache
 def light_origins(droplets: Droplets) -> Origins:
-    """Where light that fog scatters had left its lamp, by photons.
-
-    Parameters
-    ----------
-    droplets : Droplets
-        What the fog is made of.
-    """
+    """Where light that fog scatters had left its lamp, by photons."""
     lines = (files("fogsim.atmosphere") / "data" / "light_origins.csv").read_text(encoding="utf-8").splitlines()
     seen, emitted, turned = (_edges(lines, name) for name in ("seen", "emitted", "turned"))
     rows = [line.split(",", 1)[1] for line in lines if line.startswith(f"{Droplets(droplets)},")]
@@ -108,20 +91,8 @@ def mean_intensity(
 
     It is what the closed glow is to be multiplied by, and so also holds what photons give over that, 0.7 … 1.2.
 
-    Parameters
-    ----------
-    lobe : Beam
-        The lamp.
-    azimuth, elevation : (n,) float64
-        Directions to the eye, to the right of the lamp's axis and above the horizontal through it [rad].
-    droplets : Droplets
-        What the fog is made of.
-
-    Returns
-    -------
-    (n, t, g, SIDES) float64
-        Intensity [cd], over depths and angles of `light_origins` and the side of the lamp on which the line of sight
-        passes, as the lamp sees it: right, right above, above …
+    Returns Intensity [cd], over depths and angles of `light_origins` and the side of the lamp on which the line of
+    sight passes, as the lamp sees it: right, right above, above …. Takes `azimuth`, `elevation` (n,) [rad].
     """
     origins = light_origins(droplets)
     edges, bins = origins.emitted, len(origins.emitted) - 1
@@ -160,23 +131,8 @@ def lobe_glow(
 ) -> NDArray[np.float64]:
     """Luminance scattered about a lamp, times R² [cd].
 
-    Parameters
-    ----------
-    depth : float
-        Optical depth τ = k R to the lamp [-], positive.
-    angle : (n,) array_like
-        Angles of lines of sight from the lamp's direction [rad], in 0 … π without its ends.
-    lobe : Beam
-        The lamp.
-    eye : tuple of float
-        Direction to the eye, to the right of the lamp's axis and above the horizontal [rad].
-    droplets : Droplets
-        What the fog is made of.
-
-    Returns
-    -------
-    (n, SIDES) float64
-        By the side of the lamp on which the line of sight passes, as of `mean_intensity`.
+    Returns by the side of the lamp on which the line of sight passes, as of `mean_intensity`. Takes `angle` (n,) [rad],
+    `eye` [rad].
     """
     origins, gamma = light_origins(droplets), np.asarray(angle, dtype=np.float64)
     mean = mean_intensity(lobe, np.array([eye[0]]), np.array([eye[1]]), droplets)[0]

@@ -21,18 +21,10 @@ class Droplets(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class PhaseFunction:
-    """Share of scattered light per solid angle, over the scattering angle; its integral over the sphere is 1.
+    """Share of scattered light per solid angle, over the scattering angle; its integral over the sphere is 1."""
 
-    Attributes
-    ----------
-    angle : (n,) float64
-        Ascending scattering angles from 0, straight on, to π, straight back [rad].
-    value : (n,) float64
-        Phase function [1/sr].
-    """
-
-    angle: NDArray[np.float64]
-    value: NDArray[np.float64]
+    angle: NDArray[np.float64]  # (n,): Ascending scattering angles from 0, straight on, to π, straight back [rad]
+    value: NDArray[np.float64]  # (n,): Phase function [1/sr]
 
     def __call__(self, angle: ArrayLike) -> NDArray[np.float64]:
         """Phase function at scattering angles [rad], interpolated in its logarithm [1/sr]."""
@@ -44,11 +36,6 @@ def phase_function(droplets: Droplets) -> PhaseFunction:
     """Phase function of fog by its droplets, at 0.55 µm (Mie theory; `benchmarks/mie_phase.py` made the table).
 
     Extinction and phase functions of droplets that are larger than the wavelength hardly depend on colour.
-
-    Parameters
-    ----------
-    droplets : Droplets
-        The distribution of droplet sizes.
     """
     path = files("fogsim.atmosphere") / "data" / "phase_functions.csv"
     lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
@@ -60,12 +47,7 @@ def phase_function(droplets: Droplets) -> PhaseFunction:
 def henyey_greenstein(angle: ArrayLike, asymmetry: float) -> NDArray[np.float64]:
     """Phase function of Henyey & Greenstein (1941), p = (1 − g²) / (4π (1 + g² − 2 g cos θ)^(3/2)) [1/sr].
 
-    Parameters
-    ----------
-    angle : array_like
-        Scattering angle θ [rad].
-    asymmetry : float
-        Mean cosine g of the scattering angle, −1 … 1.
+    Takes `angle` [rad].
     """
     cosine = np.cos(np.asarray(angle, dtype=np.float64))
     square = asymmetry * asymmetry
@@ -75,12 +57,7 @@ def henyey_greenstein(angle: ArrayLike, asymmetry: float) -> NDArray[np.float64]
 def blurred(phase: PhaseFunction, width: float) -> PhaseFunction:
     """Phase function after light's direction has been spread, as by earlier scattering at small angles.
 
-    Parameters
-    ----------
-    phase : PhaseFunction
-        Before.
-    width : float
-        Standard deviation of the spread in each of two directions across the light [rad], not large.
+    Takes `width` [rad].
     """
     angle = np.linspace(0.0, math.pi, 361)
     # A ring at distance ε about direction θ lies at angles acos(cos θ cos ε − sin θ sin ε cos ψ) from the axis.

@@ -13,13 +13,7 @@ _STEEPEST = np.float32(0.2)  # relative change of 1 / distance over a piece abov
 
 
 def piece_length(focal_length: float) -> int:
-    """Pixels of a piece: 0.6°, over which beams and light change by little.
-
-    Parameters
-    ----------
-    focal_length : float
-        Focal length of the camera [px].
-    """
+    """Pixels of a piece: 0.6°, over which beams and light change by little (`focal_length` [px])."""
     return min(max(int(math.radians(0.6) * focal_length), 1), 8)
 
 
@@ -38,23 +32,8 @@ def choose_pixels(
 
     Over a plane 1 / distance is linear.
 
-    Parameters
-    ----------
-    length : (cols,) float32
-        What the row sees [m].
-    step : int
-        Pixels of a piece.
-    inverse, bent : (cols,) float32 and uint8
-        Scratch.
-    pixel, chosen : (cols,) float32
-        Columns and distances of the chosen pixels; written to.
-    first, even : (cols,) uint64 and bool
-        For each piece the number of its first pixel among the chosen, and whether it is plane; written to.
-
-    Returns
-    -------
-    uint64
-        How many were chosen.
+    Returns how many were chosen. Takes `length` (cols,) [m], `inverse`, `bent` (cols,), `pixel`, `chosen` (cols,),
+    `first`, `even` (cols,) uint64.
     """
     # Unsigned, because indices that may be negative cost a comparison each.
     columns, size = np.uint64(length.shape[0]), np.uint64(step)
@@ -99,18 +78,7 @@ def row_points(
 ) -> None:
     """Where the things are that chosen pixels of a row see.
 
-    Parameters
-    ----------
-    count : uint64
-        Chosen pixels.
-    ray_map : (3, 3) float32
-        Takes (u, v, 1) to a ray.
-    v : int
-        The row.
-    pixel, length : (cols,) float32
-        Columns of the pixels, and what they see [m].
-    points : (3, cols) float32
-        Places in the axes of the rays [m]; written to.
+    Takes `ray_map` (3, 3), `pixel`, `length` (cols,) [m], `points` (3, cols) [m].
     """
     first_x = ray_map[0, 1] * np.float32(v) + ray_map[0, 2]
     first_y = ray_map[1, 1] * np.float32(v) + ray_map[1, 2]
@@ -132,17 +100,7 @@ def spread_over_row(
     even: NDArray[np.bool_],
     out: NDArray[np.float32],
 ) -> None:
-    """Values of the chosen pixels, for every pixel of a row.
-
-    Parameters
-    ----------
-    values : (cols,) float32
-        Of the chosen pixels.
-    step, first, even
-        As for `choose_pixels`.
-    out : (cols,) float32
-        Written to.
-    """
+    """Values of the chosen pixels, for every pixel of a row (`values` (cols,), `out` (cols,))."""
     if step == 1:
         for u in range(values.shape[0]):
             out[u] = values[u]

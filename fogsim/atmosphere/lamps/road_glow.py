@@ -53,17 +53,7 @@ class RoadGlow:
         self._known: _Patches | None = None
 
     def sources(self, lamps: tuple[HeadLamp, ...], camera: Camera, pose: CameraPose, fog: FogField) -> LightSources:
-        """Lit pieces of the road as sources of light.
-
-        Parameters
-        ----------
-        lamps : tuple of HeadLamp
-            Lit lamps of the camera's vehicle.
-        camera, pose : Camera, CameraPose
-            The camera.
-        fog : FogField
-            The fog at one time; its extinction stands for that between the lamps and the road.
-        """
+        """Lit pieces of the road as sources of light."""
         patches = self._patches(lamps, camera.mount_height)
         reached = patches.flux * np.exp(-LOSS_OF_SPREAD_LIGHT * fog.extinction * patches.range_)
         cosine, sine = math.cos(pose.heading), math.sin(pose.heading)
@@ -92,17 +82,7 @@ class RoadGlow:
 
 
 def glow_of_beams(beams: RoadBeams, pose: CameraPose, fog: FogField) -> LightSources:
-    """The lit road before other vehicles as sources of light, one a pair of lamps.
-
-    Parameters
-    ----------
-    beams : RoadBeams
-        Their lamps, at least one pair.
-    pose : CameraPose
-        The camera.
-    fog : FogField
-        The fog at one time; its extinction stands for that between the lamps and the road.
-    """
+    """The lit road before other vehicles as sources of light, one a pair of lamps."""
     eye = np.asarray(pose.position, dtype=np.float64)
     chosen = np.argsort(((beams.position - eye) ** 2).sum(axis=1), kind="stable")[:MOST]
     roads = [_lit_road(beams.kinds[beams.kind[i]], round(float(beams.height[i]), 2)) for i in chosen.tolist()]

@@ -56,13 +56,7 @@ def node_distances() -> NDArray[np.float64]:
 
 
 def veil_rays(camera: Camera) -> VeilRays:
-    """Rays on which a camera's veil is computed.
-
-    Parameters
-    ----------
-    camera : Camera
-        The camera, which looks along the vehicle's axis but for its pitch and roll.
-    """
+    """Rays on which a camera's veil is computed."""
     rows = max(2, math.ceil(CELLS * camera.height / camera.width)) + 1
     u0, v0 = camera.principal_point
     right = (np.linspace(0, camera.width - 1, CELLS + 1) - u0) / camera.focal_length
@@ -84,17 +78,7 @@ def ray_pieces() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def lit_air(
     rays: VeilRays, lamps: list[tuple[tuple[float, float, float], NDArray[np.float32]]], droplets: Droplets
 ) -> LitAir:
-    """Light of lamps on rays, by geometry and droplets alone.
-
-    Parameters
-    ----------
-    rays : VeilRays
-        The rays.
-    lamps : list of (offset, table)
-        Lamps of one colour: their places in the vehicle's axes from the eye [m], and beams from `lamp_table`.
-    droplets : Droplets
-        Sets the phase function.
-    """
+    """Light of lamps on rays, by geometry and droplets alone (`lamps` (offset, table) [m])."""
     shape = (len(rays.directions), len(rays.at))
     straight, turned, path = (np.zeros(shape, np.float32) for _ in range(3))
     air = LitAir(straight, turned, path)
@@ -114,12 +98,7 @@ def _scattering_phase(droplets: Droplets) -> ScatteringPhase:
 def veil_along(air: LitAir, extinction: NDArray[np.float32], mean: NDArray[np.float32]) -> NDArray[np.float32]:
     """Veil between the eye and each node of the rays [cd/m²], (rays, nodes).
 
-    Parameters
-    ----------
-    air : LitAir
-        Light on the rays.
-    extinction, mean : (rays, intervals) or (1, 1) float32
-        Extinction coefficient in each interval between nodes, and its mean from the eye to there [1/m].
+    Takes `extinction`, `mean` (rays, intervals) [1/m].
     """
     veil = np.empty((len(air.path), INTERVALS + 1), np.float32)
     integrate_veil(air, extinction, mean, np.float32(LOSS_OF_SPREAD_LIGHT), veil)

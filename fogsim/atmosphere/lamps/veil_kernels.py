@@ -25,53 +25,32 @@ _HALF = 0.5 * (SIZE - 1)
 
 
 class VeilRays(NamedTuple):
-    """Rays of a camera's view, in the vehicle's axes (forward, left, up).
+    """Rays of a camera's view, in the vehicle's axes (forward, left, up)."""
 
-    Attributes
-    ----------
-    shape : tuple of int
-        Rows and columns of the grid, whose corners are the middles of the image's corner pixels.
-    directions : (n, 3) float32
-        Unit vectors, row by row.
-    at, length : (pieces,) float64
-        Middles and lengths of the pieces of each ray [m].
-    """
-
-    shape: tuple[int, int]
-    directions: NDArray[np.float32]
+    shape: tuple[int, int]  # Rows and columns of the grid, whose corners are the middles of the image's corner pixels
+    directions: NDArray[np.float32]  # (n, 3): Unit vectors, row by row
+    # at, length (pieces,): middles and lengths of the pieces of each ray [m]
     at: NDArray[np.float64]
     length: NDArray[np.float64]
 
 
 class ScatteringPhase(NamedTuple):
-    """Where light is scattered to, as it is and after it has been spread.
+    """Where light is scattered to, as it is and after it has been spread."""
 
-    Attributes
-    ----------
-    straight, spread : (PHASE_SIZE,) float32
-        Tables of the phase functions of straight and of spread light [1/sr].
-    width : float
-        Standard deviation of the directions of spread light [rad].
-    """
-
+    # straight, spread: tables of the phase functions of straight and of spread light [1/sr]
     straight: NDArray[np.float32]
     spread: NDArray[np.float32]
-    width: float
+    width: float  # Standard deviation of the directions of spread light [rad]
 
 
 class LitAir(NamedTuple):
-    """What lamps would send to the eye from each piece of the rays, were the air clear on the way.
+    """What lamps would send to the eye from each piece of the rays, were the air clear on the way."""
 
-    Attributes
-    ----------
-    straight, turned : (rays, pieces) float32
-        From the beam as it is and as scattering spreads it [cd/m² per extinction].
-    path : (rays, pieces) float32
-        Way from lamp to piece to eye [m]; while lamps are added, that from lamp to piece weighted by its light.
-    """
-
+    # straight, turned (rays, pieces): from the beam as it is and as scattering spreads it [cd/m² per extinction]
     straight: NDArray[np.float32]
     turned: NDArray[np.float32]
+    # (rays, pieces): Way from lamp to piece to eye [m]; while lamps are added, that from lamp to piece weighted by its
+    # light
     path: NDArray[np.float32]
 
 
@@ -103,18 +82,7 @@ def add_scattered_light(
 ) -> None:
     """Add a lamp's light on pieces of rays that is scattered to the eye: Σ p(Θ) I / s² Δr [cd/m² per extinction].
 
-    Parameters
-    ----------
-    rays : VeilRays
-        The rays.
-    offset : (3,) float64
-        Place of the lamp from the eye in the vehicle's axes (forward, left, up) [m].
-    table : (BLURS, SIZE, SIZE) float32
-        Its beam; see `lamp_table`.
-    phases : ScatteringPhase
-        Where light is scattered to.
-    air : LitAir
-        Light on the pieces; added to.
+    Takes `offset` (3,) [m].
     """
     directions, at, length = rays.directions, rays.at, rays.length
     phase, spread_phase, spread = phases.straight, phases.spread, phases.width
@@ -151,16 +119,7 @@ def average_extinctions(
 ) -> None:
     """Mean extinction coefficients along rays.
 
-    Parameters
-    ----------
-    distances : (nodes,) float32
-        Of the nodes, ascending from 0 [m].
-    depth : (m, nodes) float32
-        Optical depths from the eye to them [-].
-    local : (m, nodes - 1) float32
-        Means between nodes [1/m]; written to.
-    mean : (m, nodes) float32
-        At the eye, and from then on means from the eye to each node [1/m]; all but the first are written to.
+    Takes `distances` (nodes,) [m], `depth` (m, nodes), `local` (m, nodes - 1) [1/m], `mean` (m, nodes) [1/m].
     """
     for m in range(depth.shape[0]):
         for n in range(distances.shape[0] - 1):
@@ -179,16 +138,7 @@ def integrate_veil(
 ) -> None:
     """Light that comes back to the eye from the ray up to each node.
 
-    Parameters
-    ----------
-    air : LitAir
-        Light on m rays.
-    extinction, mean : (m or 1, intervals or 1) float32
-        Extinction coefficient in each interval between nodes, and its mean from the eye to there [1/m].
-    loss : float32
-        Part of the extinction that spread light suffers; straight light suffers twice that.
-    veil : (m, nodes) float32
-        Luminance, cumulated [cd/m²]; written to.
+    Takes `extinction`, `mean` (m or 1, intervals or 1) [1/m], `veil` (m, nodes) [cd/m²].
     """
     straight, turned, path = air.straight, air.turned, air.path
     pieces, intervals = path.shape[1], veil.shape[1] - 1

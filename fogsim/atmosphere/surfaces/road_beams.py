@@ -46,21 +46,7 @@ class TrafficLight:
     def on(self, view: View, camera: Camera, pose: CameraPose, fog: FogField, beams: RoadBeams) -> View:
         """A drawn scene with the beams' light.
 
-        Parameters
-        ----------
-        view : View
-            The scene as drawn in the sky's light; it is not changed.
-        camera, pose : Camera, CameraPose
-            The camera.
-        fog : FogField
-            The fog at one time.
-        beams : RoadBeams
-            The beams and the sky's light.
-
-        Returns
-        -------
-        View
-            Its image is valid until the next call.
+        Returns Its image is valid until the next call.
         """
         if not len(beams.kind) or beams.sky_illuminance <= 0.0:
             return view

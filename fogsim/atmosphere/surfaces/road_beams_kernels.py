@@ -11,44 +11,20 @@ from fogsim.jit import kernel
 
 
 class BeamsAlike(NamedTuple):
-    """Beams of one kind from one height.
+    """Beams of one kind from one height."""
 
-    Attributes
-    ----------
-    places : (n, 3) float64
-        Where the lamps are [m].
-    headings : (n,) float64
-        Directions of their axes, counter-clockwise from x [rad].
-    scales : (n,) float64
-        How many lamps shine together at each place.
-    extinction : (n,) float64
-        Of the fog before each [1/m].
-    height : float
-        Of the lamps above the road [m].
-    """
-
-    places: NDArray[np.float64]
-    headings: NDArray[np.float64]
-    scales: NDArray[np.float64]
-    extinction: NDArray[np.float64]
-    height: float
+    places: NDArray[np.float64]  # (n, 3): Where the lamps are [m]
+    headings: NDArray[np.float64]  # (n,): Directions of their axes, counter-clockwise from x [rad]
+    scales: NDArray[np.float64]  # (n,): How many lamps shine together at each place
+    extinction: NDArray[np.float64]  # (n,): Of the fog before each [1/m]
+    height: float  # Of the lamps above the road [m]
 
 
 @kernel
 def add_beam_illuminance(beams: BeamsAlike, pattern: NDArray[np.float64], step: float, ground: GroundLight) -> None:
     """Add beams to a map of illuminance, and set how high up what stands there is lit: as high as the lamps.
 
-    Parameters
-    ----------
-    beams : BeamsAlike
-        The beams.
-    pattern : (m, 2 l + 1) float64
-        Horizontal illuminance of one lamp without fog [lx]: by steps ahead, the first at the lamp, and to the right,
-        the middle one straight ahead.
-    step : float
-        Of the pattern [m].
-    ground : GroundLight
-        The map; added to.
+    Takes `pattern` (m, 2 l + 1) [lx], `step` [m].
     """
     origin, cell, illuminance, tops = ground.origin, ground.cell, ground.illuminance, ground.tops
     rows, columns = illuminance.shape

@@ -36,24 +36,12 @@ _COSINES = np.linspace(0.0, 1.0, 129)
 
 @dataclass(frozen=True, slots=True)
 class _Map:
-    """Light on the ground about a place.
+    """Light on the ground about a place."""
 
-    Attributes
-    ----------
-    lamps : StreetLighting
-        What lights it.
-    middle : (2,) float64
-        Where its middle is [m].
-    extinction : (n,) float64
-        That at each lamp [1/m].
-    light : GroundLight
-        The map itself.
-    """
-
-    lamps: StreetLighting
-    middle: NDArray[np.float64]
-    extinction: NDArray[np.float64]
-    light: GroundLight
+    lamps: StreetLighting  # What lights it
+    middle: NDArray[np.float64]  # (2,): Where its middle is [m]
+    extinction: NDArray[np.float64]  # (n,): That at each lamp [1/m]
+    light: GroundLight  # The map itself
 
 
 class StreetLight:
@@ -71,21 +59,7 @@ class StreetLight:
     def on(self, view: View, camera: Camera, pose: CameraPose, fog: FogField, lamps: StreetLighting) -> View:
         """A drawn scene with the lamps' light.
 
-        Parameters
-        ----------
-        view : View
-            The scene as drawn in the sky's light; it is not changed.
-        camera, pose : Camera, CameraPose
-            The camera.
-        fog : FogField
-            The fog at one time.
-        lamps : StreetLighting
-            The lamps and the sky's light.
-
-        Returns
-        -------
-        View
-            Its image is valid until the next call.
+        Returns Its image is valid until the next call.
         """
         if not len(lamps.position) or lamps.sky_illuminance <= 0:
             return view

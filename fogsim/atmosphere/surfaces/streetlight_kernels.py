@@ -15,56 +15,31 @@ _FARTHEST = np.float32(500.0)  # half the diagonal of a map, and more
 
 
 class GroundLight(NamedTuple):
-    """A map of the light on the ground.
+    """A map of the light on the ground."""
 
-    Attributes
-    ----------
-    origin : (2,) float64
-        Where the middle of the map's first corner is (x, y) [m].
-    cell : float
-        Side of its cells [m].
-    illuminance, tops : (rows, cols) float32
-        Horizontal illuminance [lx] and height of the nearest lamp [m], rows to the north, columns to the east.
-    """
-
-    origin: NDArray[np.float64]
-    cell: float
+    origin: NDArray[np.float64]  # (2,): Where the middle of the map's first corner is (x, y) [m]
+    cell: float  # Side of its cells [m]
+    # illuminance, tops (rows, cols): horizontal illuminance [lx] and height of the nearest lamp [m], rows to the north,
+    # columns to the east
     illuminance: NDArray[np.float32]
     tops: NDArray[np.float32]
 
 
 class EyeOnMap(NamedTuple):
-    """Where the eye is on a map.
+    """Where the eye is on a map."""
 
-    Attributes
-    ----------
-    column, row : float32
-        Place on the map [cells].
-    cells_per_metre : float32
-        [1/m]
-    height : float32
-        Of the eye [m].
-    """
-
+    # column, row: place on the map [cells]
     column: np.float32
     row: np.float32
-    cells_per_metre: np.float32
-    height: np.float32
+    cells_per_metre: np.float32  # [1/m]
+    height: np.float32  # Of the eye [m]
 
 
 class Reflection(NamedTuple):
-    """How surfaces return the lamps' light: as they do the sky's.
+    """How surfaces return the lamps' light: as they do the sky's."""
 
-    Attributes
-    ----------
-    factor : (3,) float32
-        The lamps' colour per illuminance of the sky [1/lx].
-    most : float32
-        What is brighter shines by itself, and returns no more than that [cd/m²].
-    """
-
-    factor: NDArray[np.float32]
-    most: np.float32
+    factor: NDArray[np.float32]  # (3,): The lamps' colour per illuminance of the sky [1/lx]
+    most: np.float32  # What is brighter shines by itself, and returns no more than that [cd/m²]
 
 
 @kernel
@@ -78,20 +53,7 @@ def add_lamp_illuminance(
 ) -> None:
     """Add lamps to a map of illuminance, and set how high the nearest lamp hangs.
 
-    Parameters
-    ----------
-    lamps : (n, 3) float64
-        Places [m].
-    extinction : (n,) float64
-        What the light of each loses on its way [1/m].
-    height : float
-        Height of the lamps above the road [m].
-    intensity : (m,) float64
-        Over the cosine of the angle from straight down, in even steps from 0 to 1 [cd].
-    farthest : float
-        Distance along the ground beyond which a lamp lights nothing [m].
-    ground : GroundLight
-        The map; added to.
+    Takes `lamps` (n, 3) [m], `extinction` (n,) [1/m], `height` [m], `intensity` (m,) [cd], `farthest` [m].
     """
     origin, cell, illuminance, tops = ground.origin, ground.cell, ground.illuminance, ground.tops
     rows, columns = illuminance.shape
@@ -177,22 +139,7 @@ def add_street_light(
 ) -> None:
     """Luminance of an image by the sky's light and that of street lamps.
 
-    Parameters
-    ----------
-    luminance, out : (rows, cols · 3) float32
-        By the sky's light, and by both [cd/m²]; `out` is written to.
-    distance : (rows, cols) float32
-        What the pixels see [m].
-    ray_map : (3, 3) float32
-        Takes (u, v, 1) to a ray in the world.
-    step : int
-        On plane surfaces light is read at each so many pixels.
-    eye : EyeOnMap
-        Where the camera is on the map.
-    ground : GroundLight
-        The map.
-    reflection : Reflection
-        How surfaces return the lamps' light.
+    Takes `luminance`, `out` (rows, cols · 3) [cd/m²], `distance` (rows, cols) [m], `ray_map` (3, 3).
     """
     columns = distance.shape[1]
     points, light, few = (

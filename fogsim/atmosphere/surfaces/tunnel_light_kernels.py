@@ -26,41 +26,21 @@ _UNDER_CEILING = 0.25
 
 
 class TunnelSpace(NamedTuple):
-    """A tunnel, as kernels read it.
+    """A tunnel, as kernels read it."""
 
-    Attributes
-    ----------
-    boxes : (m, 10) float64
-        Its space, in order along it.
-    stations : (m,) float64
-        Where along it each box begins [m].
-    length : float
-        Length from portal to portal [m].
-    daylight : (n,) float64
-        Share of the sky's light each `STEP` along it, from `BEFORE` before it to as far beyond it [-].
-    """
-
-    boxes: NDArray[np.float64]
-    stations: NDArray[np.float64]
-    length: float
+    boxes: NDArray[np.float64]  # (m, 10): Its space, in order along it
+    stations: NDArray[np.float64]  # (m,): Where along it each box begins [m]
+    length: float  # Length from portal to portal [m]
+    # (n,): Share of the sky's light each `STEP` along it, from `BEFORE` before it to as far beyond it [-]
     daylight: NDArray[np.float64]
 
 
 class Luminaires(NamedTuple):
-    """Lamps in a row under the ceiling.
+    """Lamps in a row under the ceiling."""
 
-    Attributes
-    ----------
-    illuminance : float
-        What they give the road, over what the sky gives it outside [-].
-    luminance : float
-        Of each of them [cd/m²].
-    spacing, size, half_width : float
-        From one to the next, how long each is, and half its width [m].
-    """
-
-    illuminance: float
-    luminance: float
+    illuminance: float  # What they give the road, over what the sky gives it outside [-]
+    luminance: float  # Of each of them [cd/m²]
+    # spacing, size, half_width: from one to the next, how long each is, and half its width [m]
     spacing: float
     size: float
     half_width: float
@@ -70,15 +50,10 @@ class Luminaires(NamedTuple):
 def sky_share(distance: float, half_width: float, height: float) -> float:
     """Share of an even sky's light that comes through a portal to the road before or behind it [-].
 
-    The configuration factor from a small level surface to an upright rectangle that stands on its plane, centred
-    before it, in its closed form.
+    The configuration factor from a small level surface to an upright rectangle that stands on its plane, centred before
+    it, in its closed form.
 
-    Parameters
-    ----------
-    distance : float
-        From the portal [m], not negative; half of the sky is seen right at it.
-    half_width, height : float
-        Half the portal's width, and its height [m].
+    Takes `distance` [m], `half_width`, `height` [m].
     """
     if distance <= 0.0:
         return 0.5
@@ -90,14 +65,7 @@ def sky_share(distance: float, half_width: float, height: float) -> float:
 def daylight_share(station: float, length: float, half_width: float, height: float) -> float:
     """Share of the sky's light on a road in a tunnel, or before it [-].
 
-    Parameters
-    ----------
-    station : float
-        Place along the tunnel from its first portal, negative before it [m].
-    length : float
-        From portal to portal [m].
-    half_width, height : float
-        Half its width, and its height [m].
+    Takes `station` [m], `length` [m], `half_width`, `height` [m].
     """
     if station < 0.0:
         return 1.0 - sky_share(-station, half_width, height)
@@ -134,22 +102,8 @@ def light_pixels(
 ) -> None:
     """Light what is seen of a tunnel and of the road before its portals, in place.
 
-    Parameters
-    ----------
-    radiance : (rows, cols, 3) float32
-        The scene in the light of the whole sky [cd/m²]; written to.
-    own : (rows, cols, 3) float32
-        What surfaces shine by themselves, without the sky [cd/m²].
-    distance : (rows, cols) float32
-        Distance along the ray [m].
-    rays : (3, 3) float64
-        Takes a pixel (u, v, 1) to its viewing ray.
-    eye : (3,) float64
-        Where the camera is [m].
-    space : TunnelSpace
-        The tunnel.
-    lamps : Luminaires
-        Its lamps.
+    Takes `radiance` (rows, cols, 3) [cd/m²], `own` (rows, cols, 3) [cd/m²], `distance` (rows, cols) [m], `rays` (3, 3),
+    `eye` (3,) [m].
     """
     for v in range(distance.shape[0]):
         for u in range(distance.shape[1]):

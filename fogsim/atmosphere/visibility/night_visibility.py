@@ -76,17 +76,7 @@ _PAVEMENT, _OBSERVER = Pavement(), Observer()
 def high_beam_veil(visibility: float, kind: FogKind) -> float:
     """Luminance of the veil of own high beams, L_v = 1 / (a V_met + b) [cd/m²] (gallen2014 eq. 9); 0 in clear air.
 
-    Parameters
-    ----------
-    visibility : float
-        Meteorological visibility [m], positive; ``inf`` is clear air.
-    kind : FogKind
-        Radiation or advection fog.
-
-    Raises
-    ------
-    InputError
-        If the visibility is not positive.
+    Takes `visibility` [m].
     """
     if not visibility > 0:
         raise InputError(f"meteorological visibility must be positive [m], got {visibility!r}")
@@ -106,20 +96,7 @@ def target_visibility_level(
 ) -> NDArray[np.float64]:
     """Visibility level of the target lit by a pair of own lamps (gallen2014 eqs. 3–8).
 
-    Parameters
-    ----------
-    beam : Beam
-        One lamp of the pair.
-    distance : (n,) float64
-        Of the target [m].
-    visibility : float
-        Meteorological visibility [m]; ``inf`` is clear air.
-    veil : float
-        Luminance that the lit fog adds to target and road [cd/m²].
-    pavement, observer : Pavement, Observer
-        What is looked at, and by whom.
-    glare : float
-        Veil inside the eye, added to target and road alike [cd/m²]; see `veiling_luminance`.
+    Takes `distance` (n,) [m], `visibility` [m], `veil` [cd/m²], `glare` [cd/m²].
     """
     at_target = _pair_intensity(beam, distance, 0.5 * pavement.target_size, observer)
     at_foot = _pair_intensity(beam, distance, 0.0, observer)

@@ -25,13 +25,7 @@ LEAST_FOR_POLARITY = 0.004
 
 
 def angular_size(size: ArrayLike, distance: ArrayLike) -> NDArray[np.float64]:
-    """Angle that a target subtends [rad], 2 atan(size / (2 distance)).
-
-    Parameters
-    ----------
-    size, distance : array_like
-        Of the target [m], positive.
-    """
+    """Angle that a target subtends [rad], 2 atan(size / (2 distance)) (`size`, `distance` [m])."""
     return np.asarray(2.0 * np.arctan(np.asarray(size) / (2.0 * np.asarray(distance))))
 
 
@@ -46,25 +40,7 @@ def threshold(
 ) -> NDArray[np.float64]:
     """Luminance difference that is just detected, ΔL_th [cd/m²] (Adrian 1989).
 
-    Parameters
-    ----------
-    background : array_like
-        Luminance to which the eye is adapted, veils included [cd/m²], not negative.
-    angle : array_like
-        Angular size of the target [rad], positive.
-    darker : array_like of bool
-        Whether the target is darker than its background (negative contrast).
-    exposure_time : float
-        Time of observation [s], positive; 2 s and more count as 2 s.
-    age : float
-        Age of the observer [years], below 75; 23 and less count as 23.
-    probability_factor : float
-        k of the formula, positive.
-
-    Raises
-    ------
-    InputError
-        If an argument is out of its range or not finite.
+    Takes `background` [cd/m²], `angle` [rad], `exposure_time` [s], `age` [years].
     """
     luminance, minutes = _checked(background, angle, exposure_time, age, probability_factor)
     positive = probability_factor * _threshold_root(luminance, minutes) ** 2
@@ -120,12 +96,7 @@ def _threshold_root(luminance: NDArray[np.float64], minutes: NDArray[np.float64]
 def polarity_factor(luminance: ArrayLike, minutes: ArrayLike) -> NDArray[np.float64]:
     """F_cp ≤ 1: dark targets are seen at a smaller difference than bright ones.
 
-    Parameters
-    ----------
-    luminance : array_like
-        Adaptation luminance [cd/m²]; below `LEAST_FOR_POLARITY` the factor there.
-    minutes : array_like
-        Angular size of the target [minutes of arc].
+    Takes `luminance` [cd/m²], `minutes` [minutes of arc].
     """
     log = np.log10(np.maximum(luminance, LEAST_FOR_POLARITY))
     curvature = np.where(log >= -1.0, 0.125, 0.075)
@@ -139,14 +110,7 @@ def polarity_factor(luminance: ArrayLike, minutes: ArrayLike) -> NDArray[np.floa
 def exposure_factor(luminance: ArrayLike, minutes: ArrayLike, exposure_time: float) -> NDArray[np.float64]:
     """F_t = (a + t)/t: a short glance asks for more (fitted to targets below 60 minutes of arc).
 
-    Parameters
-    ----------
-    luminance : array_like
-        Adaptation luminance [cd/m²].
-    minutes : array_like
-        Angular size of the target [minutes of arc]; above 60 as at 60.
-    exposure_time : float
-        Time of observation [s].
+    Takes `luminance` [cd/m²], `minutes` [minutes of arc], `exposure_time` [s].
     """
     if exposure_time >= 2.0:
         return np.ones(np.broadcast_shapes(np.shape(luminance), np.shape(minutes)))
@@ -159,13 +123,7 @@ def exposure_factor(luminance: ArrayLike, minutes: ArrayLike, exposure_time: flo
 
 
 def age_factor(age: float) -> float:
-    """F_age: what older eyes need more; it jumps from 1.93 to 1.90 at 64 years, as published.
-
-    Parameters
-    ----------
-    age : float
-        Age of the observer [years], below 75; 23 and less count as 23.
-    """
+    """F_age: what older eyes need more; it jumps from 1.93 to 1.90 at 64 years, as published (`age` [years])."""
     if age <= 64.0:
         return (max(age, 23.0) - 19.0) ** 2 / 2160.0 + 0.99
     return (age - 56.6) ** 2 / 116.3 + 1.43

@@ -86,13 +86,7 @@ def _tell(out: Path, wish: "RestorationWish", told: "Counter[str]", last: "Resto
 
 
 def _tell_lacking(lacking: "list[Restored]", files: bool) -> None:
-    """Say which images were not restored; frames of a video have stayed as they were.
-
-    Raises
-    ------
-    typer.Exit
-        If image files were left out.
-    """
+    """Say which images were not restored; frames of a video have stayed as they were."""
     if not lacking:
         return
     if not files:

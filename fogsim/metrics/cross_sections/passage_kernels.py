@@ -30,23 +30,8 @@ def count_passages(
 ) -> int:
     """Count how often vehicles pass sections of a road in its direction.
 
-    Parameters
-    ----------
-    position : (n, 2) float64
-        Fronts in the order of their steps [m].
-    step, vehicle : (n,) intp
-        Numbers of step and vehicle.
-    last : (m, 4) float64
-        Of each vehicle its last position [m] and step, `NOT_YET` if there is none, and a distance from there within
-        which no section lies [m]; brought up to date.
-    sections : (s, 4) float64
-        Middles of the sections [m], and the unit vector along the road.
-    read : (k, s) bool
-        Which sections count at each step, from the first one on.
-    first : int
-        Number of the first step.
-    half_width : float
-        How far to either side a section reaches [m].
+    Takes `position` (n, 2) [m], `step`, `vehicle` (n,) int, `last` (m, 4) [m], `sections` (s, 4) [m], `read` (k, s)
+    bool, `half_width` [m].
     """
     count = 0
     for i in range(len(position)):

@@ -16,47 +16,26 @@ _CORNERS = np.array([(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)])
 
 
 class Encroachments(NamedTuple):
-    """Pairs of vehicles that have driven over the same area one after the other.
+    """Pairs of vehicles that have driven over the same area one after the other."""
 
-    Attributes
-    ----------
-    first, second : (k,) intp
-        Vehicles, in the order of their fronts.
-    junction : (k,) intp
-        Where.
-    time : (k,) float64
-        Post-encroachment time [s]; 0 where the second came before the first had left.
-    """
-
+    # first, second (k,) int: vehicles, in the order of their fronts
     first: Numbers
     second: Numbers
-    junction: Numbers
-    time: Floats
+    junction: Numbers  # (k,) int: Where
+    time: Floats  # (k,): Post-encroachment time [s]; 0 where the second came before the first had left
 
 
 def find_encroachments(tracks: Tracks) -> Encroachments:
     """Post-encroachment times of all pairs whose ways cross, at each place where they do.
 
-    Bodies of widths w₁, w₂ on straight ways that cross at the angle θ both sweep a parallelogram, whose corners lie
-    at ± w₂ / (2 sin θ) along the first way and ± w₁ / (2 sin θ) along the second one. At each of its points
+    Bodies of widths w₁, w₂ on straight ways that cross at the angle θ both sweep a parallelogram, whose corners lie at
+    ± w₂ / (2 sin θ) along the first way and ± w₁ / (2 sin θ) along the second one. At each of its points
 
         PET = (time at which the second one's front comes) − (time at which the first one's rear has left),
 
     and the least of these is at a corner: that is said, and 0 where it is negative [1, 2]. Times are interpolated from
     where the fronts were at the steps; a rear passes where its front has driven the vehicle's length beyond, and is
     gone with its vehicle. Ways that come from the same lane or lead to the same one do not cross.
-
-    Parameters
-    ----------
-    tracks : Tracks
-        The ways.
-
-    References
-    ----------
-    .. [1] B. L. Allen, B. T. Shin, P. J. Cooper: Analysis of traffic conflicts and collisions. Transportation Research
-       Record 667 (1978), 67-74.
-    .. [2] D. Gettman, L. Pu, T. Sayed, S. Shelby: Surrogate safety assessment model and validation. FHWA-HRT-08-051
-       (2008): PET from when the first vehicle last occupied a position to when the second one arrived at it.
     """
     piece = np.flatnonzero(tracks.junction >= 0)
     piece = piece[np.argsort(tracks.junction[piece], kind="stable")]

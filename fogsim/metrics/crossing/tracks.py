@@ -25,26 +25,18 @@ _JUMP = 5.0
 
 
 class Fronts(NamedTuple):
-    """Where fronts of vehicles were; row i is one vehicle at one step.
+    """Where fronts of vehicles were; row i is one vehicle at one step."""
 
-    Attributes
-    ----------
-    vehicle, lane : (n,) intp
-        Numbers of vehicle and lane.
-    time, elapsed : (n,) float64
-        Time, and that since the step before [s].
-    x, y : (n,) float64
-        Middle of the front bumper [m].
-    speed, length, width : (n,) float64
-        Speed [m/s]; size of the body [m].
-    """
-
+    # vehicle, lane (n,) int: numbers of vehicle and lane
     vehicle: Numbers
     lane: Numbers
+    # time, elapsed (n,): time, and that since the step before [s]
     time: Floats
     elapsed: Floats
+    # x, y (n,): middle of the front bumper [m]
     x: Floats
     y: Floats
+    # speed, length, width (n,): speed [m/s]; size of the body [m]
     speed: Floats
     length: Floats
     width: Floats
@@ -98,33 +90,20 @@ class Junctions:
 
 
 class Tracks(NamedTuple):
-    """Ways through junctions, one vehicle's after another's.
+    """Ways through junctions, one vehicle's after another's."""
 
-    Attributes
-    ----------
-    fronts : Fronts
-        Rows in the order of vehicle and time; of each way from the row before the junction on, until the rear has left.
-    source : (n,) intp
-        Rows that these were.
-    track : (n,) intp
-        Number of the way that a row belongs to.
-    start, end : (m,) intp
-        First and last row of each way.
-    travelled : (n,) float64
-        Way of the front along all of them [m].
-    junction : (n,) intp
-        Junction in which the way from the row before to this one lies; `UNKNOWN` where there is none, or no way.
-    origin, target : (n,) intp
-        Lanes from which and to which the vehicle goes through it, `UNKNOWN` where that was not seen.
-    """
-
+    # Rows in the order of vehicle and time; of each way from the row before the junction on, until the rear has left
     fronts: Fronts
-    source: Numbers
-    track: Numbers
+    source: Numbers  # (n,) int: Rows that these were
+    track: Numbers  # (n,) int: Number of the way that a row belongs to
+    # start, end (m,) int: first and last row of each way
     start: Numbers
     end: Numbers
-    travelled: Floats
+    travelled: Floats  # (n,): Way of the front along all of them [m]
+    # (n,) int: Junction in which the way from the row before to this one lies; `UNKNOWN` where there is none, or no way
     junction: Numbers
+    # origin, target (n,) int: lanes from which and to which the vehicle goes through it, `UNKNOWN` where that was not
+    # seen
     origin: Numbers
     target: Numbers
 

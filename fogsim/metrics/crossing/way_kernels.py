@@ -15,19 +15,8 @@ _ROUNDING = 1e-9
 def crossing_pieces(begin: Floats, way: Floats, junction: Numbers, vehicle: Numbers, least_sine: float) -> Floats:
     """Pairs of pieces of different vehicles in the same junction that cross.
 
-    Parameters
-    ----------
-    begin, way : (n, 2) float64
-        Where each piece begins, and the way from there to its end [m].
-    junction, vehicle : (n,) intp
-        Whose it is; pieces of a junction follow one another.
-    least_sine : float
-        Sine of the least angle between two that cross [-].
-
-    Returns
-    -------
-    (k, 4) float64
-        Numbers of the two pieces, and at which part of either, 0 … 1, the other crosses it.
+    Returns numbers of the two pieces, and at which part of either, 0 … 1, the other crosses it (k, 4). Takes `begin`,
+    `way` (n, 2) [m], `junction`, `vehicle` (n,) int.
     """
     found, count = np.empty((64, 4)), 0
     length = np.sqrt(way[:, 0] ** 2 + way[:, 1] ** 2)

@@ -84,11 +84,6 @@ def has_reason(step: Step) -> bool:
 
     That is: here or up to `REASON_WITHIN` ahead, one cannot stop within sight at the present speed, or the extinction
     is at least `MUCH_DENSER` times that at the camera, in fog of less than 1000 m.
-
-    Parameters
-    ----------
-    step : Step
-        The step.
     """
     truth, speed = step.truth, float(step.traffic.speed[step.ego])
     most = visibility_from_extinction(stopping_sight_distance(speed, REACTION_TIME, DECELERATION))

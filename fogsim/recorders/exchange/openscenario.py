@@ -44,13 +44,6 @@ class OpenScenarioRecorder:
 
     Each vehicle follows its trajectory, with the time of each camera period; visibility at the camera is
     ``visualRange``, again whenever it has changed by a hundredth. Roads are not written.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    title : str
-        Name of the scenario.
     """
 
     def __init__(self, path: Path, title: str) -> None:
@@ -63,15 +56,7 @@ class OpenScenarioRecorder:
         self._open = True
 
     def record(self, step: TrafficStep, _derived: Derived | None = None) -> None:
-        """Take in who is where.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            The finished step.
-        _derived : mapping from str to float or None
-            Not needed.
-        """
+        """Take in who is where."""
         if self._visibility and step.time <= self._end:
             return
         traffic, self._end = step.traffic, step.time
@@ -90,13 +75,7 @@ class OpenScenarioRecorder:
             self._ego = traffic.ids[step.ego]
 
     def close(self, complete: bool) -> None:
-        """Write the file.
-
-        Parameters
-        ----------
-        complete : bool
-            False if the run was cut short, which its description then says.
-        """
+        """Write the file."""
         if self._open:
             write_text(self._path, "\n".join(self._lines(complete)) + "\n")
             self._open = False

@@ -52,16 +52,6 @@ class OsiRecorder:
     Moving objects are vehicles and persons, their base in the middle of their bounding boxes; traffic lights have one
     object for each lit lens. Fog is the class of the visibility at the camera, which OSI has no number for. Ids are
     numbers by the order of first appearance; an object's ``source_reference`` has the name that it has in SUMO.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Raises
-    ------
-    MissingDependencyError
-        If the package osi-python is not installed.
     """
 
     def __init__(self, path: Path) -> None:
@@ -72,15 +62,7 @@ class OsiRecorder:
         self._closed = False
 
     def record(self, step: TrafficStep, _derived: Derived | None = None) -> None:
-        """Write one step.
-
-        Parameters
-        ----------
-        step : TrafficStep
-            The finished step.
-        _derived : mapping from str to float or None
-            Not needed.
-        """
+        """Write one step."""
         if self._closed:
             return
         if self._file is None:
@@ -90,13 +72,7 @@ class OsiRecorder:
         self._file.write(struct.pack("<L", len(message)) + message)
 
     def close(self, complete: bool) -> None:  # noqa: ARG002 - a trace that was cut short is one all the same
-        """Finish the file; closing twice does nothing.
-
-        Parameters
-        ----------
-        complete : bool
-            Not needed: every message is whole.
-        """
+        """Finish the file; closing twice does nothing."""
         if self._file is not None:
             self._file.close()
         self._closed = True
@@ -208,13 +184,7 @@ class OsiRecorder:
 
 
 def fog_class(visibility: float) -> str:
-    """OSI's name of a class of visibility, without ``FOG_``.
-
-    Parameters
-    ----------
-    visibility : float
-        Meteorological visibility [m].
-    """
+    """OSI's name of a class of visibility, without ``FOG_`` (`visibility` [m])."""
     return next((name for end, name in FOG_CLASSES if visibility < end), "EXCELLENT_VISIBILITY")
 
 

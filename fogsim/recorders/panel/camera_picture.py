@@ -21,13 +21,7 @@ _ROWS: dict[str, tuple[str, Colour]] = {
 
 
 def draw_camera_picture(step: Step) -> Image.Image:
-    """Draw the camera's image into 640 × 480 pixels, its aspect kept, with marks at rows and signs that were found.
-
-    Parameters
-    ----------
-    step : Step
-        The finished step.
-    """
+    """Draw the camera's image into 640 × 480 pixels, its aspect kept, with marks at rows and signs that were found."""
     pixels = shown_image(step.observation)
     picture = Image.new("RGB", (WIDTH, HEIGHT), GROUND)
     scaled = scale_image(pixels, WIDTH, HEIGHT)
@@ -45,27 +39,13 @@ def draw_camera_picture(step: Step) -> Image.Image:
 
 
 def shown_image(observation: Observation) -> NDArray[np.uint8]:
-    """(rows, cols[, 3]) uint8: the image in 8 bits, whatever the camera has.
-
-    Parameters
-    ----------
-    observation : Observation
-        With the image.
-    """
+    """(rows, cols[, 3]) uint8: the image in 8 bits, whatever the camera has."""
     frame = observation.frame
     return eight_bit(frame.image, frame.camera.bits) if isinstance(frame, Frame) else eight_bit(frame, 8)
 
 
 def scale_image(pixels: NDArray[np.uint8], width: int, height: int) -> Image.Image:
-    """Scale an image into a box, its aspect kept.
-
-    Parameters
-    ----------
-    pixels : (rows, cols[, 3]) uint8
-        The image.
-    width, height : int
-        The box [px].
-    """
+    """Scale an image into a box, its aspect kept (`width`, `height` [px])."""
     image = Image.fromarray(pixels).convert("RGB")
     factor = min(width / image.width, height / image.height)
     if factor == 1:
@@ -85,15 +65,7 @@ def _first_row(estimates: Sequence[Estimate], key: str) -> float | None:
 
 
 def found_row(estimate: Estimate, key: str) -> float | None:
-    """Row in the diagnostics of an estimate; None if there is none.
-
-    Parameters
-    ----------
-    estimate : Estimate
-        The estimate.
-    key : str
-        Name of the row: "horizon_row".
-    """
+    """Row in the diagnostics of an estimate; None if there is none."""
     row = estimate.diagnostics.get(key)
     return float(row) if isinstance(row, int | float) and math.isfinite(row) else None
 

@@ -68,13 +68,7 @@ _SPEED_AXIS = Axis(0.0, 160.0, (50.0, 100.0))
 
 
 class FramePanel:
-    """Draws frames one after another; it remembers the last minute for its charts, and the last collision.
-
-    Parameters
-    ----------
-    draw_picture : callable
-        Draws what stands beside the panel, of `PICTURE_SIZE`; the camera's image if not given.
-    """
+    """Draws frames one after another; it remembers the last minute for its charts, and the last collision."""
 
     def __init__(self, draw_picture: Callable[[Step], Image.Image] = draw_camera_picture) -> None:
         self._draw_picture = draw_picture
@@ -95,17 +89,7 @@ class FramePanel:
     def draw(self, step: Step, derived: Derived) -> NDArray[np.uint8]:
         """Draw the frame of a step.
 
-        Parameters
-        ----------
-        step : Step
-            The step.
-        derived : mapping from str to float or None
-            What was derived from it.
-
-        Returns
-        -------
-        (480, 1024, 3) uint8 array
-            The frame, red first.
+        Returns the frame, red first (480, 1024, 3) uint8.
         """
         frame = self._background.copy()
         picture = self._draw_picture(step)

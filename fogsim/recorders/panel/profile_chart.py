@@ -30,18 +30,7 @@ def draw_profile(
 ) -> Image.Image:
     """Draw the visibility at places along the road, the vehicle's own a fine line.
 
-    Parameters
-    ----------
-    size : tuple of int
-        Width and height [px].
-    axis : Axis
-        Vertical axis, of visibilities [m].
-    believed : FogProfile
-        What is believed: its median and its 90 % interval.
-    true : FogProfile or None
-        What is true, if that is known.
-    reported : sequence of (float, float)
-        Distance ahead and visibility that others have told of lately [m, m].
+    Takes `size` [px], `axis` [m], `reported` (float, float).
     """
     width, height = size[0] * _OVERSAMPLING, (size[1] - _FOOT) * _OVERSAMPLING
     image = Image.new("RGB", (width, height), WELL)

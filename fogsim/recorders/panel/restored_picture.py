@@ -20,11 +20,6 @@ def draw_restored_picture(step: Step) -> Image.Image:
     """Draw the camera's image, and over its right half what contrast restoration by the belief makes of it.
 
     Where no fog is believed, by night, and of frames without a calibration it is the camera's image alone.
-
-    Parameters
-    ----------
-    step : Step
-        The finished step.
     """
     picture, frame = draw_camera_picture(step), step.observation.frame
     light = step.observation.light

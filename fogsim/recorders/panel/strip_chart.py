@@ -24,31 +24,16 @@ _OVERSAMPLING = 2
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """The vertical axis of a chart.
+    """The vertical axis of a chart."""
 
-    Attributes
-    ----------
-    low, high : float
-        Its ends; values beyond are drawn at them.
-    ticks : sequence of float
-        Values with a line and a number.
-    logarithmic : bool
-        True for equal ratios at equal distances.
-    """
-
+    # low, high: its ends; values beyond are drawn at them
     low: float
     high: float
-    ticks: Sequence[float]
-    logarithmic: bool = False
+    ticks: Sequence[float]  # Values with a line and a number
+    logarithmic: bool = False  # True for equal ratios at equal distances
 
     def height(self, value: float) -> float:
-        """Place of a value between the ends, 0 … 1.
-
-        Parameters
-        ----------
-        value : float
-            In the unit of the ends.
-        """
+        """Place of a value between the ends, 0 … 1."""
         value = min(max(value, self.low), self.high)
         if self.logarithmic:
             return math.log(value / self.low) / math.log(self.high / self.low)
@@ -57,37 +42,16 @@ class Axis:
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """One curve of a chart.
+    """One curve of a chart."""
 
-    Attributes
-    ----------
-    colour : tuple of int
-        Its colour.
-    columns : tuple of int
-        One column of the chart's rows for a line, two (low, high) for a filled band.
-    dashed : bool
-        True for a line that lets another show through.
-    """
-
-    colour: Colour
+    colour: Colour  # Its colour
+    # One column of the chart's rows for a line, two (low, high) for a filled band
     columns: tuple[int] | tuple[int, int]
-    dashed: bool = False
+    dashed: bool = False  # True for a line that lets another show through
 
 
 class StripChart:
-    """Curves over the last minute; now is at the right edge.
-
-    Parameters
-    ----------
-    size : tuple of int
-        Width and height [px].
-    axis : Axis
-        Vertical axis.
-    curves : sequence of Curve
-        What is drawn, the first one behind.
-    title : str
-        What it shows.
-    """
+    """Curves over the last minute; now is at the right edge (`size` [px])."""
 
     def __init__(self, size: tuple[int, int], axis: Axis, curves: Sequence[Curve], title: str) -> None:
         self._axis = axis
@@ -113,15 +77,7 @@ class StripChart:
         return image
 
     def add(self, time: float, values: tuple[float | None, ...]) -> None:
-        """Add a row of values at an instant [s]; None leaves a gap.
-
-        Parameters
-        ----------
-        time : float
-            The instant [s].
-        values : tuple of float or None
-            One for each column; None leaves a gap.
-        """
+        """Add a row of values at an instant [s]; None leaves a gap (`time` [s])."""
         self._latest = (time, values)
         if not self._rows or time - self._rows[-1][0] >= _SPACING - 1e-9:
             self._rows.append(self._latest)

@@ -23,19 +23,7 @@ def gather_copies(
 ) -> tuple[int, int]:
     """Gather as many copies as there is memory for, but none that lies between pixels or is hidden by what is drawn.
 
-    Parameters
-    ----------
-    triangles, drawn, pinhole, picture, work
-        See `rasterise`.
-    begin : int
-        The first copy to look at.
-    size : tuple of int
-        First row, the one after the last, and columns.
-
-    Returns
-    -------
-    tuple of int
-        Number of copies gathered, and the first copy that has not been looked at.
+    Returns number of copies gathered, and the first copy that has not been looked at.
     """
     mesh, record, axes, lens, near = drawn.mesh, drawn.record, pinhole.axes, pinhole.lens, pinhole.near
     first_vertex, first_face, copies = triangles.first_vertex, triangles.first_face, work.copy
@@ -71,15 +59,7 @@ def gather_copies(
 
 @kernel
 def depth_key(inverse_depth: float | np.float32, triangle_id: int) -> Any:
-    """What a pixel sees as one number: the greater, the nearer.
-
-    Parameters
-    ----------
-    inverse_depth : float
-        1/z [1/m].
-    triangle_id : int
-        What is seen.
-    """
+    """What a pixel sees as one number: the greater, the nearer (`inverse_depth` [1/m])."""
     return np.int64(np.float32(inverse_depth).view(np.int32)) << 32 | np.int64(triangle_id)
 
 

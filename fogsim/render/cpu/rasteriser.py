@@ -17,13 +17,7 @@ _TOGETHER = 2048  # most triangles that are worked on at a time, if no mesh has 
 
 
 class CPURasteriser:
-    """Finds what pixels see to the bit the same every time, large pictures by two threads (see `Rasteriser`).
-
-    Parameters
-    ----------
-    table : MeshTable
-        All meshes.
-    """
+    """Finds what pixels see to the bit the same every time, large pictures by two threads (see `Rasteriser`)."""
 
     def __init__(self, table: MeshTable) -> None:
         counts = np.diff(table.first_vertex)
@@ -48,13 +42,7 @@ class CPURasteriser:
         self._picture = np.empty((0, 0), np.int64)
 
     def triangle_ids(self, drawing: Drawing, camera: Camera, pose: CameraPose) -> NDArray[np.int32]:
-        """Find the nearest triangle of each pixel (see `Rasteriser.triangle_ids`).
-
-        Parameters
-        ----------
-        drawing, camera, pose
-            See `Rasteriser.triangle_ids`.
-        """
+        """Find the nearest triangle of each pixel (see `Rasteriser.triangle_ids`)."""
         # Behind each row lies what vectors reach over its end, and so much that rows lie apart in the cache.
         size = (camera.height, camera.width // 16 * 16 + 24)
         if self._picture.shape != size:

@@ -46,23 +46,7 @@ def rasterise(
 ) -> None:
     """Find the nearest triangle of each pixel of some rows.
 
-    Parameters
-    ----------
-    triangles : Triangles
-        All meshes.
-    drawn : Drawn
-        The copies.
-    pinhole : Pinhole
-        The camera.
-    picture : (rows, columns + at least 7) int64
-        Is set to what is seen: in the lower half its id, −1 for nothing, in the upper half the bits of its 1/z as a
-        32-bit float, which sort like the float. Of two surfaces the greater number is the nearer one.
-    columns : int
-        Width of the picture [px]; what lies behind it is not set.
-    top, bottom : int
-        First row, and the one after the last.
-    work : Work
-        Memory to work in, with room for the largest mesh.
+    Takes `picture` (rows, columns + at least 7) int64, `columns` [px].
     """
     picture[top:bottom] = _EMPTY
     # Handing an array to a function costs as much as drawing a triangle, so the functions below take many copies each.

@@ -16,90 +16,45 @@ Index = NDArray[np.int64]
 
 
 class Triangles(NamedTuple):
-    """All meshes, as rasterising wants them.
+    """All meshes, as rasterising wants them."""
 
-    Attributes
-    ----------
-    positions : (3, n) float32
-        x, y and z of all vertices [m].
-    faces : (m, 3) uint32
-        Vertices of each triangle, numbered within its mesh.
-    first_vertex, first_face : (k + 1,) int64
-        Where those of each mesh begin.
-    in_solid : (m,) bool
-        As in `MeshTable`.
-    centre, half_extent : (k, 3) float64
-        Middle and half the extents of the bounding box of each mesh [m].
-    """
-
-    positions: Array
-    faces: NDArray[np.uint32]
+    positions: Array  # (3, n): x, y and z of all vertices [m]
+    faces: NDArray[np.uint32]  # (m, 3) uint32: Vertices of each triangle, numbered within its mesh
+    # first_vertex, first_face (k + 1,) int64: where those of each mesh begin
     first_vertex: Index
     first_face: Index
-    in_solid: NDArray[np.bool_]
+    in_solid: NDArray[np.bool_]  # (m,) bool: As in `MeshTable`
+    # centre, half_extent (k, 3): middle and half the extents of the bounding box of each mesh [m]
     centre: Wide
     half_extent: Wide
 
 
 class Work(NamedTuple):
-    """Memory for some copies at a time, so few that it stays near the processor.
+    """Memory for some copies at a time, so few that it stays near the processor."""
 
-    Attributes
-    ----------
-    corners : (5, n) float32
-        Vertices: x, y, z in camera axes [m], then column and row [px], NaN before the near plane.
-    points : (m, 9) float32
-        Of each triangle that may cover a pixel, the corners in camera axes [m].
-    box : (m, 4) int32
-        Its first and last row and column.
-    vertex : (m, 3) uint32
-        Where its vertices are among the corners.
-    triangle_id : (m,) int32
-        Its id.
-    copy : (c,) int64
-        The copies that are worked on.
-    """
-
-    corners: Array
-    points: Array
-    box: NDArray[np.int32]
-    vertex: NDArray[np.uint32]
-    triangle_id: NDArray[np.int32]
-    copy: Index
+    corners: Array  # (5, n): Vertices: x, y, z in camera axes [m], then column and row [px], NaN before the near plane
+    points: Array  # (m, 9): Of each triangle that may cover a pixel, the corners in camera axes [m]
+    box: NDArray[np.int32]  # (m, 4) int32: Its first and last row and column
+    vertex: NDArray[np.uint32]  # (m, 3) uint32: Where its vertices are among the corners
+    triangle_id: NDArray[np.int32]  # (m,) int32: Its id
+    copy: Index  # (c,) int64: The copies that are worked on
 
 
 class Drawn(NamedTuple):
-    """A `Drawing` as plain numbers.
+    """A `Drawing` as plain numbers."""
 
-    Attributes
-    ----------
-    mesh, first
-        As in `Drawing`.
-    record : (c, 17) float32
-        The records; the first twelve numbers of each are the transform.
-    """
-
+    # mesh, first: as in `Drawing`
     mesh: Index
-    record: Array
+    record: Array  # (c, 17): The records; the first twelve numbers of each are the transform
     first: Index
 
 
 class Pinhole(NamedTuple):
-    """Where a camera looks.
+    """Where a camera looks."""
 
-    Attributes
-    ----------
-    axes : (3, 3) float64
-        Axes of the camera in the world as rows.
-    lens : (3,) float64
-        Focal length and principal point [px].
-    near : float
-        Depth before which nothing is seen [m].
-    """
-
-    axes: Wide
-    lens: Wide
-    near: float
+    axes: Wide  # (3, 3): Axes of the camera in the world as rows
+    lens: Wide  # (3,): Focal length and principal point [px]
+    near: float  # Depth before which nothing is seen [m]
 
 
 @kernel
@@ -108,14 +63,7 @@ def project(triangles: Triangles, drawn: Drawn, copies: Index, pinhole: Pinhole,
 
     One loop for each number, since each alone runs in vector registers.
 
-    Parameters
-    ----------
-    triangles, drawn, pinhole
-        See `rasterise`.
-    copies : (n,) int64
-        The copies.
-    corners : (5, n) float32
-        See `Work`; is filled.
+    Takes `copies` (n,) int64, `corners` (5, n).
     """
     mesh, record, axes, lens, near = drawn.mesh, drawn.record, pinhole.axes, pinhole.lens, pinhole.near
     positions, first_vertex = triangles.positions, triangles.first_vertex
@@ -149,21 +97,7 @@ def cull_triangles(triangles: Triangles, drawn: Drawn, copies: Index, size: tupl
     Every triangle is written down, and by the next one again unless it is kept: which are is hard to foresee, and so
     costs a processor that guesses more than to write.
 
-    Parameters
-    ----------
-    triangles, drawn
-        See `rasterise`.
-    copies : (n,) int64
-        The copies.
-    size : tuple of int
-        First row, the one after the last, and columns.
-    work : Work
-        Has the corners and gets the triangles.
-
-    Returns
-    -------
-    int
-        Number of triangles kept.
+    Returns number of triangles kept. Takes `copies` (n,) int64.
     """
     mesh, first = drawn.mesh, drawn.first
     faces, first_vertex, first_face = triangles.faces, triangles.first_vertex, triangles.first_face
@@ -209,17 +143,7 @@ def _greatest(a: np.float32, b: np.float32, c: np.float32) -> np.float32:
 def set_up_boxes(kept: int, pinhole: Pinhole, size: tuple[int, int, int], work: Work) -> int:
     """Set boxes and corners of kept triangles, and leave out those before the near plane.
 
-    Parameters
-    ----------
-    kept : int
-        Number of triangles that `cull_triangles` kept.
-    pinhole, size, work
-        See `rasterise` and `cull_triangles`.
-
-    Returns
-    -------
-    int
-        Number of triangles left.
+    Returns number of triangles left.
     """
     lens, near = pinhole.lens, pinhole.near
     corners, points, box, vertex, triangle_id = work.corners, work.points, work.box, work.vertex, work.triangle_id

@@ -31,27 +31,13 @@ class Platform(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """An OpenGL context and the process it belongs to.
+    """An OpenGL context and the process it belongs to."""
 
-    Attributes
-    ----------
-    platform : Platform
-        Holder of the context.
-    process : int
-        Id of the process that made it.
-    version : tuple of int
-        Major and minor version of OpenGL.
-    software : bool
-        True if the processor draws, for want of a graphics card.
-    description : str
-        Way, version and renderer, for reports.
-    """
-
-    platform: Platform
-    process: int
-    version: tuple[int, int]
-    software: bool
-    description: str
+    platform: Platform  # Holder of the context
+    process: int  # Id of the process that made it
+    version: tuple[int, int]  # Major and minor version of OpenGL
+    software: bool  # True if the processor draws, for want of a graphics card
+    description: str  # Way, version and renderer, for reports
 
     @property
     def is_of_this_process(self) -> bool:
@@ -59,13 +45,7 @@ class Context:
         return os.getpid() == self.process
 
     def activate(self) -> None:
-        """Make the context the current one of this thread.
-
-        Raises
-        ------
-        RenderError
-            If another process made it: a context does not survive a fork.
-        """
+        """Make the context the current one of this thread."""
         if not self.is_of_this_process:
             raise RenderError(
                 f"process {os.getpid()} was forked from process {self.process} after that had drawn; an OpenGL context "
@@ -86,15 +66,7 @@ class Context:
 
 
 def context() -> Context:
-    """Make the process's context at the first call, and make it current at every call.
-
-    Raises
-    ------
-    MissingDependencyError
-        If OpenGL, or EGL and OSMesa both, are missing, too old or do not work; the message names the packages.
-    RenderError
-        If this process was forked from one that had drawn.
-    """
+    """Make the process's context at the first call, and make it current at every call."""
     only = _only_context()
     only.activate()
     return only

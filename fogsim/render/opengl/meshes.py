@@ -27,15 +27,7 @@ _COPY_LAYOUT = ((2, 4, False, 0), (3, 4, False, 16), (4, 4, False, 32), (5, 1, T
 
 
 class MeshStore:
-    """All meshes of a scene in one vertex array, drawn in any number of copies.
-
-    Parameters
-    ----------
-    corners : (n,) `CORNER`
-        Corners of the triangles of all meshes.
-    version : tuple of int
-        Version of the context.
-    """
+    """All meshes of a scene in one vertex array, drawn in any number of copies."""
 
     def __init__(self, corners: NDArray[np.void], version: tuple[int, int]) -> None:
         self._at_once = version >= INDIRECT
@@ -52,15 +44,7 @@ class MeshStore:
         GL.glBindVertexArray(0)
 
     def draw(self, copies: NDArray[np.void], commands: NDArray[np.void]) -> None:
-        """Draw copies with the program in use.
-
-        Parameters
-        ----------
-        copies : (c,) `COPY`
-            The copies, those of a mesh together.
-        commands : (k,) `COMMAND`
-            One for each mesh that has copies.
-        """
+        """Draw copies with the program in use."""
         if not len(commands):
             return
         GL.glBindVertexArray(self._array)

@@ -12,15 +12,7 @@ _RGBA, _UNSIGNED_BYTE = 0x1908, 0x1401
 
 
 class OSMesaPlatform:
-    """An off-screen context that draws with the processor.
-
-    Raises
-    ------
-    ImportError
-        If the library is not there.
-    RuntimeError
-        If it gives no context.
-    """
+    """An off-screen context that draws with the processor."""
 
     def __init__(self) -> None:
         self._library = OpenGL.platform.PLATFORM.OSMesa
@@ -36,12 +28,6 @@ class OSMesaPlatform:
         self._pixel = (ctypes.c_ubyte * 4)()  # pictures are drawn to framebuffers; the window is one pixel
 
     def make_current(self) -> None:
-        """Make the context the current one of this thread.
-
-        Raises
-        ------
-        RuntimeError
-            If the library refuses.
-        """
+        """Make the context the current one of this thread."""
         if not self._library.OSMesaMakeCurrent(self._context, self._pixel, _UNSIGNED_BYTE, 1, 1):
             raise RuntimeError("OSMesa does not make its context current")

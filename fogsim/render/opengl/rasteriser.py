@@ -17,20 +17,7 @@ if TYPE_CHECKING:
 
 
 class GLRasteriser:
-    """Finds visible triangles with a graphics card, or with a library that stands in for one.
-
-    Parameters
-    ----------
-    table : MeshTable
-        All meshes of the scene.
-
-    Raises
-    ------
-    MissingDependencyError
-        If OpenGL is missing or does not work.
-    RenderError
-        If this process was forked from one that had drawn.
-    """
+    """Finds visible triangles with a graphics card, or with a library that stands in for one."""
 
     def __init__(self, table: MeshTable) -> None:
         self._context = context()
@@ -49,13 +36,7 @@ class GLRasteriser:
         self._closed = False
 
     def triangle_ids(self, drawing: Drawing, camera: Camera, pose: CameraPose) -> NDArray[np.int32]:
-        """Find the triangle that each pixel sees (see `Rasteriser.triangle_ids`).
-
-        Parameters
-        ----------
-        drawing, camera, pose
-            See `Rasteriser.triangle_ids`.
-        """
+        """Find the triangle that each pixel sees (see `Rasteriser.triangle_ids`)."""
         if self._closed:
             raise RenderError("this renderer is closed; make a new one")
         self._context.activate()

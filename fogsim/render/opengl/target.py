@@ -14,18 +14,7 @@ _BACKGROUND = np.array([NOTHING, 0, 0, 0], np.int32)
 
 
 class Target:
-    """Framebuffer of triangle ids for one size of picture, one sample a pixel.
-
-    Parameters
-    ----------
-    width, height : int
-        Size [px].
-
-    Raises
-    ------
-    RenderError
-        If the graphics system cannot draw to such a framebuffer.
-    """
+    """Framebuffer of triangle ids for one size of picture, one sample a pixel (`width`, `height` [px])."""
 
     def __init__(self, width: int, height: int) -> None:
         self.size = (width, height)

@@ -18,25 +18,8 @@ def next_coplanar_spans(
 ) -> tuple[int, int]:
     """Find the next spans of a kind that lie in a row and a plane, and set their depths, distances and instance ids.
 
-    Parameters
-    ----------
-    kind : int
-        `ROAD` or `TERRAIN`.
-    spans : Spans
-        The spans and their surfaces.
-    begin, count : int
-        The first span to look at, and the number of all.
-    lens : (3,) float64
-        See `Lens`.
-    work : Row
-        Gets the spans as its members, and their depths.
-    picture : Picture
-        Is filled where these spans are.
-
-    Returns
-    -------
-    tuple of int
-        Number of members, 0 if there are none any more, and the first span that has not been looked at.
+    Returns number of members, 0 if there are none any more, and the first span that has not been looked at. Takes
+    `lens` (3,).
     """
     span, kinds, surface, member, depth = spans.span, spans.kind, spans.surface, work.member, work.depth
     distance, instance = picture.distance, picture.instance

@@ -27,31 +27,16 @@ COLUMNS = 40
 
 
 class Light(NamedTuple):
-    """Light and what shines.
+    """Light and what shines."""
 
-    Attributes
-    ----------
-    white : float
-        Radiance of a level white surface [cd/m²].
-    vertical, below : float
-        What reaches a vertical surface, and one that faces down, over what reaches a level one [-].
-    zenith : (3,) float64
-        Radiance of the zenith [cd/m²].
-    terrain : (4,) float64
-        Height of the terrain [m], infinite below if there is none, and its reflectance.
-    lamp_masks : (surfaces,) int32
-        Lamps any of which lights a surface, −1 if it is always lit.
-    lamp_radiance : (surfaces, 3) float64
-        Radiance that it then adds [cd/m²].
-    """
-
-    white: float
+    white: float  # Radiance of a level white surface [cd/m²]
+    # vertical, below: what reaches a vertical surface, and one that faces down, over what reaches a level one [-]
     vertical: float
     below: float
-    zenith: Wide
-    terrain: Wide
-    lamp_masks: Numbers
-    lamp_radiance: Wide
+    zenith: Wide  # (3,): Radiance of the zenith [cd/m²]
+    terrain: Wide  # (4,): Height of the terrain [m], infinite below if there is none, and its reflectance
+    lamp_masks: Numbers  # (surfaces,) int32: Lamps any of which lights a surface, −1 if it is always lit
+    lamp_radiance: Wide  # (surfaces, 3): Radiance that it then adds [cd/m²]
 
 
 class Meshes(NamedTuple):
@@ -77,28 +62,16 @@ class Copies(NamedTuple):
 
 
 class Spans(NamedTuple):
-    """Neighbouring pixels of a row that see the same.
+    """Neighbouring pixels of a row that see the same."""
 
-    Attributes
-    ----------
-    span : (n, 4) int32
-        Row, first column, last column and surface.
-    surface_of_triangle : (triangle_ids,) int32
-        Number of the surface of each triangle id, or −2 − its copy as long as it has none.
-    triangle_id, copy : (n,) int32
-        Of each surface, from number 2 on; number 0 is the sky and 1 the terrain.
-    kind : (n,) int32
-        Kind of each.
-    surface : (n, COLUMNS) float64
-        What else there is to say of each.
-    """
-
-    span: Numbers
+    span: Numbers  # (n, 4) int32: Row, first column, last column and surface
+    # (triangle_ids,) int32: Number of the surface of each triangle id, or −2 − its copy as long as it has none
     surface_of_triangle: Numbers
+    # triangle_id, copy (n,) int32: of each surface, from number 2 on; number 0 is the sky and 1 the terrain
     triangle_id: Numbers
     copy: Numbers
-    kind: Numbers
-    surface: Wide
+    kind: Numbers  # (n,) int32: Kind of each
+    surface: Wide  # What else there is to say of each
 
 
 class Picture(NamedTuple):

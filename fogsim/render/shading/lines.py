@@ -15,17 +15,7 @@ DASH, PERIOD = 6.0, 18.0
 
 @kernel
 def columns_near(away: float, change: float, reach: float, size: int) -> tuple[int, int]:
-    """First of the pixels of a span that lie within reach of a line, and the one after the last.
-
-    Parameters
-    ----------
-    away, change : float
-        How far to the left of the line the first pixel is, and by how much each further one is more so.
-    reach : float
-        How far from the line a pixel may be.
-    size : int
-        Number of pixels.
-    """
+    """First of the pixels of a span that lie within reach of a line, and the one after the last."""
     if abs(change) * size <= 1e-9 * reach:  # the row spans along the line
         return 0, size if abs(away) < reach else 0
     per_change = 1.0 / change
@@ -39,12 +29,7 @@ def columns_near(away: float, change: float, reach: float, size: int) -> tuple[i
 def dashed_share(along: float, length: float) -> float:
     """Share of a footprint that dashes cover, from the place of its middle along the line and its length [m].
 
-    Parameters
-    ----------
-    along : float
-        Where its middle is [m].
-    length : float
-        Its length [m].
+    Takes `along` [m], `length` [m].
     """
     length = max(length, 1e-4)
     start = along - 0.5 * length

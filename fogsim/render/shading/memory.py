@@ -20,15 +20,7 @@ class Memory:
         self._arrays: dict[tuple[int, ...], list[NDArray[np.int32]]] = {}
 
     def empty(self, shape: tuple[int, ...], kind: type[np.float32] | type[np.int32]) -> NDArray[Any]:
-        """Give an array with any contents.
-
-        Parameters
-        ----------
-        shape : tuple of int
-            Its shape.
-        kind : type
-            `numpy.float32` or `numpy.int32`.
-        """
+        """Give an array with any contents."""
         arrays = self._arrays.get(shape)
         if arrays is None:
             # What is kept is for pictures of one size.

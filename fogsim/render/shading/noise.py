@@ -17,18 +17,10 @@ PER_CELL = 8
 
 
 class Noise(NamedTuple):
-    """Tiles; the squares of a tile lie row after row.
+    """Tiles; the squares of a tile lie row after row."""
 
-    Attributes
-    ----------
-    grain : (GRAIN²,) float32
-        Independent numbers.
-    smooth : (SMOOTH²,) float32
-        Value noise.
-    """
-
-    grain: NDArray[np.float32]
-    smooth: NDArray[np.float32]
+    grain: NDArray[np.float32]  # Independent numbers
+    smooth: NDArray[np.float32]  # Value noise
 
 
 @functools.cache

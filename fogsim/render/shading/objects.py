@@ -14,19 +14,7 @@ OBJECT = layout.OBJECT
 
 @kernel
 def shade_objects(spans: Spans, count: int, lens: Wide, picture: Picture) -> None:
-    """Shade the spans of triangles without texture, and set their distances and instance ids.
-
-    Parameters
-    ----------
-    spans : Spans
-        The spans and their surfaces.
-    count : int
-        Number of spans.
-    lens : (3,) float64
-        See `Lens`.
-    picture : Picture
-        Is filled where these spans are.
-    """
+    """Shade the spans of triangles without texture, and set their distances and instance ids (`lens` (3,))."""
     span, kinds, surface = spans.span, spans.kind, spans.surface
     radiance, distance, instance, response = picture.radiance, picture.distance, picture.instance, picture.response
     lamplight, depths = len(response) > 0, np.empty(distance.shape[1], np.float32)
@@ -93,17 +81,7 @@ def _numbers(surface: Wide, number: int, first: int) -> tuple[np.float32, np.flo
 
 @kernel
 def shade_sky(spans: Spans, count: int, rays: Wide, light: Light, picture: Picture) -> None:
-    """Shade the spans of sky: the CIE standard overcast sky, L(θ) = L_z (1 + 2 sin θ) / 3.
-
-    Parameters
-    ----------
-    spans, count, picture
-        See `shade_objects`.
-    rays : (3, 3) float64
-        See `Lens`.
-    light : Light
-        Has the radiance of the zenith.
-    """
+    """Shade the spans of sky: the CIE standard overcast sky, L(θ) = L_z (1 + 2 sin θ) / 3 (`rays` (3, 3))."""
     span = spans.span
     radiance, distance, instance, response = picture.radiance, picture.distance, picture.instance, picture.response
     shares = np.empty(distance.shape[1], np.float32)

@@ -17,33 +17,20 @@ _SHORTEST, _LONGEST = 5.0, 150.0  # of those stretches, even in the logarithm [m
 
 
 class Asphalt(NamedTuple):
-    """A `Pavement` as numbers.
+    """A `Pavement` as numbers."""
 
-    Attributes
-    ----------
-    by_sine : (n,) float64
-        Reflectance over that of dry asphalt seen from above, at even steps from 0 to 1 of the root of the sine of the
-        eye's elevation.
-    tracks, repairs : float
-        See `Pavement`.
-    stretches : (PERIOD + 1,) float64
-        Integral of the stretches' brightness, of mean 0 and deviation 1, over each whole metre along the road [m].
-    """
-
+    # (n,): Reflectance over that of dry asphalt seen from above, at even steps from 0 to 1 of the root of the sine of
+    # the eye's elevation
     by_sine: Wide
+    # tracks, repairs: see `Pavement`
     tracks: float
     repairs: float
+    # Integral of the stretches' brightness, of mean 0 and deviation 1, over each whole metre along the road [m]
     stretches: Wide
 
 
 def asphalt(pavement: Pavement) -> Asphalt:
-    """Numbers of a pavement.
-
-    Parameters
-    ----------
-    pavement : Pavement
-        The pavement.
-    """
+    """Numbers of a pavement."""
     by_sine = reflectance_by_sine(pavement.surface)
     return Asphalt(by_sine, float(pavement.wheel_tracks), float(pavement.repairs), _stretches())
 
@@ -52,15 +39,7 @@ def asphalt(pavement: Pavement) -> Asphalt:
 def reflectance_by_sine(surface: RoadSurface) -> Wide:
     """Reflectance of a surface by the root of the sine of the eye's elevation (`tools/make_road_reflectance.py`).
 
-    Parameters
-    ----------
-    surface : RoadSurface
-        The surface.
-
-    Returns
-    -------
-    (n,) float64
-        Over that of dry asphalt seen from above; at even steps from 0 to 1.
+    Returns over that of dry asphalt seen from above; at even steps from 0 to 1 (n,).
     """
     path = files("fogsim.render") / "data" / "road_reflectance.csv"
     lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
@@ -87,15 +66,7 @@ def _stretches() -> Wide:
 
 @kernel
 def reflectance_at(by_sine: Wide, sine: float) -> float:
-    """Reflectance to an eye at an elevation, over that of dry asphalt seen from above.
-
-    Parameters
-    ----------
-    by_sine : (n,) float64
-        See `reflectance_by_sine`.
-    sine : float
-        Sine of the elevation.
-    """
+    """Reflectance to an eye at an elevation, over that of dry asphalt seen from above (`by_sine` (n,))."""
     place = np.sqrt(min(1.0, max(0.0, sine))) * (len(by_sine) - 1)
     low = min(int(place), len(by_sine) - 2)
     return float(by_sine[low] + (place - low) * (by_sine[low + 1] - by_sine[low]))
@@ -103,17 +74,7 @@ def reflectance_at(by_sine: Wide, sine: float) -> float:
 
 @kernel
 def mean_of_stretches(integral: Wide, along: float, extent: float) -> float:
-    """Mean brightness of the stretches over an extent along the road.
-
-    Parameters
-    ----------
-    integral : (PERIOD + 1,) float64
-        See `Asphalt`.
-    along : float
-        The extent's middle [m].
-    extent : float
-        Its length [m]; less than 0.1 is taken for 0.1, and more than the period for the period.
-    """
+    """Mean brightness of the stretches over an extent along the road (`along` [m], `extent` [m])."""
     extent = min(max(extent, 0.1), float(PERIOD))
     start = (along - 0.5 * extent) % PERIOD
     # The integral over a whole period is 0, so that it goes on behind the table's end as it begins.

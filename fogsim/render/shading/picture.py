@@ -27,21 +27,7 @@ from fogsim.values.scene import Pavement, Surface
 
 
 class Shading:
-    """Shades pictures of one scene in one light.
-
-    Parameters
-    ----------
-    table : MeshTable
-        All meshes.
-    illuminance : float
-        Horizontal illuminance E of the overcast sky [lx].
-    height : float
-        Height of the terrain's plane [m], −inf where there is no terrain.
-    reflectance : (3,) float64
-        Reflectance of the terrain.
-    pavement : Pavement
-        What roads are like.
-    """
+    """Shades pictures of one scene in one light (`illuminance` [lx], `height` [m], `reflectance` (3,))."""
 
     def __init__(
         self,
@@ -76,15 +62,7 @@ class Shading:
         self._rows, self._spans = [memory_for_row(0), memory_for_row(0)], [_room(0, 0), _room(0, 0)]
 
     def set_daylight(self, illuminance: float, sides: SideLight = EVEN_LIGHT) -> None:
-        """Shade by another daylight from now on.
-
-        Parameters
-        ----------
-        illuminance : float
-            Horizontal illuminance of the sky [lx].
-        sides : SideLight
-            What of it reaches surfaces that are not level.
-        """
+        """Shade by another daylight from now on (`illuminance` [lx])."""
         white, zenith = _white_and_zenith(illuminance)
         light = self._scene.light._replace(white=white, zenith=zenith, vertical=sides.vertical, below=sides.below)
         self._scene = self._scene._replace(light=light)
@@ -92,17 +70,7 @@ class Shading:
     def view(
         self, triangle_ids: NDArray[np.int32], drawing: Drawing, camera: Camera, pose: CameraPose, lamplight: bool
     ) -> View:
-        """Shade what each pixel sees.
-
-        Parameters
-        ----------
-        triangle_ids : (rows, cols) int32
-            What a `Rasteriser` found.
-        drawing, camera, pose
-            What it was given.
-        lamplight : bool
-            Whether the answer to lamplight is wanted.
-        """
+        """Shade what each pixel sees (`triangle_ids` (rows, cols) int32)."""
         rows, columns = triangle_ids.shape
         copies = Copies(
             drawing.mesh,
@@ -143,24 +111,12 @@ def _white_and_zenith(illuminance: float) -> tuple[float, NDArray[np.float64]]:
 
 
 class ShadedScene(NamedTuple):
-    """What stays the same from picture to picture.
+    """What stays the same from picture to picture."""
 
-    Attributes
-    ----------
-    meshes : Meshes
-        All meshes.
-    light : Light
-        Daylight and lamps.
-    noise : Noise
-        Texture.
-    asphalt : Asphalt
-        What roads are like.
-    """
-
-    meshes: Meshes
-    light: Light
-    noise: Noise
-    asphalt: Asphalt
+    meshes: Meshes  # All meshes
+    light: Light  # Daylight and lamps
+    noise: Noise  # Texture
+    asphalt: Asphalt  # What roads are like
 
 
 @kernel
@@ -174,25 +130,7 @@ def shade_rows(
     work: Row,
     picture: Picture,
 ) -> None:
-    """Shade some rows of a picture.
-
-    Parameters
-    ----------
-    triangle_ids : (rows, cols) int32
-        What each pixel sees.
-    rows : tuple of int
-        The first row, and the one after the last.
-    scene : ShadedScene
-        Meshes, light and texture.
-    copies : Copies
-        What is drawn.
-    lens : Lens
-        Where the camera is.
-    spans, work : Spans, Row
-        Memory.
-    picture : Picture
-        Is filled in these rows.
-    """
+    """Shade some rows of a picture (`triangle_ids` (rows, cols) int32)."""
     meshes, light, noise = scene.meshes, scene.light, scene.noise
     top, bottom = rows
     height = light.terrain[0]

@@ -14,25 +14,7 @@ def find_spans(
 ) -> tuple[int, int]:
     """Find the spans of some rows.
 
-    Parameters
-    ----------
-    triangle_ids : (rows, cols) int32
-        What each pixel sees.
-    top, bottom : int
-        First row, and the one after the last.
-    copies : Copies
-        What is drawn.
-    rays : (3, 3) float64
-        See `Lens`.
-    terrain : bool
-        Whether there is terrain below the horizon; else there is sky.
-    spans : Spans
-        Is filled, but for the numbers of the surfaces.
-
-    Returns
-    -------
-    tuple of int
-        Numbers of spans and of surfaces.
+    Returns numbers of spans and of surfaces. Takes `triangle_ids` (rows, cols) int32, `rays` (3, 3).
     """
     span, surface_of_triangle, triangle_of, copy_of = (
         spans.span,

@@ -36,25 +36,7 @@ LINE_RESPONSE = 0.15
 def shade_road(
     spans: Spans, count: int, lens: Lens, noise: Noise, asphalt: Asphalt, work: Row, picture: Picture
 ) -> None:
-    """Shade the spans of road, and set their distances and instance ids.
-
-    Parameters
-    ----------
-    spans : Spans
-        The spans and their surfaces.
-    count : int
-        Number of spans.
-    lens : Lens
-        Where the camera is.
-    noise : Noise
-        Texture.
-    asphalt : Asphalt
-        What the road is like.
-    work : Row
-        Memory.
-    picture : Picture
-        Is filled where these spans are.
-    """
+    """Shade the spans of road, and set their distances and instance ids."""
     span, surface, member = spans.span, spans.surface, work.member
     members, number = next_coplanar_spans(ROAD, spans, 0, count, lens.lens, work, picture)
     while members > 0:

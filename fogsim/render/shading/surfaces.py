@@ -37,13 +37,6 @@ def light_share(
     """What reaches a surface with that unit normal of the overcast sky's light and, from below, of the ground's.
 
     A little more comes from one side so that shapes read. A level surface gets 1.
-
-    Parameters
-    ----------
-    x, y, z : float
-        The normal: east, north, up.
-    vertical, below : float
-        What vertical surfaces get on the mean of all sides, and those that face down [-].
     """
     by_height = vertical + (0.5 * (1.0 - below) + (0.5 * (1.0 + below) - vertical) * z) * z
     return by_height + 0.07 * (0.5 * x - 0.86 * y)
@@ -56,10 +49,7 @@ def retroreflection(distance: float) -> float:
     That of EN 12899-1 class RA2 at an entrance angle of 5°: 250, 180 and 5 at 12′, 20′ and 2° between lamp and eye,
     interpolated between the logarithms [M: from memory], for an eye 0.75 m above the lamp [M].
 
-    Parameters
-    ----------
-    distance : float
-        From the camera [m].
+    Takes `distance` [m].
     """
     angle = math.log(min(max(math.degrees(0.75 / distance), 0.2), 2.0))
     middle = math.log(1.0 / 3.0)
@@ -71,17 +61,7 @@ def retroreflection(distance: float) -> float:
 
 @kernel
 def set_background_surfaces(lens: Lens, light: Light, spans: Spans) -> None:
-    """Set the numbers of sky and terrain.
-
-    Parameters
-    ----------
-    lens : Lens
-        Where the camera is.
-    light : Light
-        Daylight and terrain.
-    spans : Spans
-        Gets surfaces 0 and 1.
-    """
+    """Set the numbers of sky and terrain."""
     kind, surface, height = spans.kind, spans.surface, lens.eye[2] - light.terrain[0]
     kind[0], surface[0, INSTANCE] = layout.SKY, 0
     kind[1], surface[1, INSTANCE], surface[1, WHITE] = TERRAIN, 1, light.white
@@ -95,19 +75,7 @@ def set_background_surfaces(lens: Lens, light: Light, spans: Spans) -> None:
 def set_surfaces(
     meshes: Meshes, copies: Copies, lens: Lens, light: Light, lamplight: bool, spans: Spans, count: int
 ) -> None:
-    """Set the numbers of the surfaces from number 2 to `count`.
-
-    Parameters
-    ----------
-    meshes, copies, lens, light
-        See `shade_rows`.
-    lamplight : bool
-        Whether the response to lamplight is wanted.
-    spans : Spans
-        Has the triangles and gets their surfaces.
-    count : int
-        Number of surfaces.
-    """
+    """Set the numbers of the surfaces from number 2 to `count`."""
     surface_of, faces, first_face, vertex_instance = meshes.surface, meshes.faces, meshes.first_face, meshes.instance
     positions, normals, colours = meshes.positions, meshes.normals, meshes.reflectance
     integers, record, mesh, first = copies.integers, copies.record, copies.mesh, copies.first

@@ -18,13 +18,7 @@ _DRY = (1.5, 0.4, -0.3)  # how much more of each channel the large patches of dr
 
 @kernel
 def shade_terrain(spans: Spans, count: int, lens: Lens, noise: Noise, work: Row, picture: Picture) -> None:
-    """Shade the spans of terrain, and set their distances and instance ids.
-
-    Parameters
-    ----------
-    spans, count, lens, noise, work, picture
-        See `shade_road`.
-    """
+    """Shade the spans of terrain, and set their distances and instance ids."""
     span, surface, rays, member = spans.span, spans.surface, lens.rays, work.member
     texture, tint, radiance, response = work.texture, work.tint, picture.radiance, picture.response
     dry, drier, driest = np.float32(_DRY[0]), np.float32(_DRY[1]), np.float32(_DRY[2])

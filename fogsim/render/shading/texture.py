@@ -26,33 +26,19 @@ Four = tuple[float, float, float, float]
 
 
 class Row(NamedTuple):
-    """Memory for one row of pixels.
+    """Memory for one row of pixels."""
 
-    Attributes
-    ----------
-    depth, texture, tint : (columns,) float32
-        Depths [m], factors of reflectance, and the share of them that the largest patches have.
-    place : (columns,) uint32
-        Places in a tile of noise.
-    member : (columns,) int32
-        Spans that are textured together.
-    """
-
+    # depth, texture, tint (columns,): depths [m], factors of reflectance, and the share of them that the largest
+    # patches have
     depth: Array
     texture: Array
     tint: Array
-    place: NDArray[np.uint32]
-    member: Numbers
+    place: NDArray[np.uint32]  # (columns,) uint32: Places in a tile of noise
+    member: Numbers  # (columns,) int32: Spans that are textured together
 
 
 def memory_for_row(columns: int) -> Row:
-    """Make memory for a row of so many pixels.
-
-    Parameters
-    ----------
-    columns : int
-        Number of pixels.
-    """
+    """Make memory for a row of so many pixels."""
     depth, texture, tint = np.zeros((3, columns), np.float32)
     return Row(depth, texture, tint, np.zeros(columns, np.uint32), np.zeros(columns, np.int32))
 
@@ -68,25 +54,7 @@ def set_texture(
     noise: Noise,
     work: Row,
 ) -> None:
-    """Set texture and tint from column `begin` to the one before `end`.
-
-    Parameters
-    ----------
-    material : tuple
-        `ASPHALT` or `GRASS`.
-    plane : tuple of float
-        1/z of the ground as a plane over column, row and 1 [1/m].
-    row : float
-        The row.
-    begin, end : int
-        Columns between which the depths are surface.
-    lens : Lens
-        Where the camera is.
-    noise : Noise
-        Tiles of texture.
-    work : Row
-        Has the depths and gets the texture.
-    """
+    """Set texture and tint from column `begin` to the one before `end` (`plane` [1/m])."""
     slope, drop, rest = plane
     rays, eye = lens.rays, lens.eye
     texture, place = work.texture, work.place

@@ -8,44 +8,20 @@ from fogsim.units import clock_time
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Periods:
-    """The clocks as whole numbers.
+    """The clocks as whole numbers."""
 
-    Attributes
-    ----------
-    camera_period : float
-        Time between frames [s].
-    traffic_steps : int
-        Traffic steps in one camera period.
-    decision_frames : int
-        Camera periods in one decision period.
-    frames : int
-        Most camera periods that a run may last.
-    """
-
-    camera_period: float
-    traffic_steps: int
-    decision_frames: int
-    frames: int
+    camera_period: float  # Time between frames [s]
+    traffic_steps: int  # Traffic steps in one camera period
+    decision_frames: int  # Camera periods in one decision period
+    frames: int  # Most camera periods that a run may last
 
     def time(self, index: int) -> float:
-        """Time of a camera period since the run began [s].
-
-        Parameters
-        ----------
-        index : int
-            Number of the camera period, from 0.
-        """
+        """Time of a camera period since the run began [s]."""
         return clock_time(index * self.camera_period)
 
 
 def periods(scenario: Scenario) -> Periods:
-    """Clocks of a scenario.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """Clocks of a scenario."""
     clocks = scenario.clocks
     return Periods(
         camera_period=clocks.camera_period_s,

@@ -16,23 +16,7 @@ from fogsim.values import FogField, Structure
 
 
 def fog_field(scenario: Scenario, route: NDArray[np.float64], structures: Sequence[Structure] = ()) -> FogField:
-    """Fog of a scenario, laid along the ego's route; `fog_of_run` draws its patches.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    route : (n, 3) float64
-        Polyline along the route [m].
-    structures : sequence of Structure
-        What stands beside the roads and over them; tunnels keep fog out.
-
-    Raises
-    ------
-    InputError
-        If the airlight is to be that of photons, and there is no such layer, it is denser than is known, or the road
-        leads out of it.
-    """
+    """Fog of a scenario, laid along the ego's route; `fog_of_run` draws its patches (`route` (n, 3) [m])."""
     airlight = airlight_from_illuminance(scenario.light.illuminance_lx, scenario.fog.airlight_share)
     fog = scripted_fog(scenario.timeline, fog_along(scenario.fog, airlight, route, tunnels_of(structures)))
     if fog.ground_albedo is not None:
@@ -41,17 +25,7 @@ def fog_field(scenario: Scenario, route: NDArray[np.float64], structures: Sequen
 
 
 def fog_of_run(scenario: Scenario, fog: FogField, patch_seed: int) -> FogField:
-    """Fog of a scenario with the patches of one run, unless the scenario gives their seed.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    fog : FogField
-        From `fog_field`.
-    patch_seed : int
-        From `Streams`.
-    """
+    """Fog of a scenario with the patches of one run, unless the scenario gives their seed."""
     written = scenario.fog.patches
     if fog.patches is None or written is None or written.seed is not None:
         return fog

@@ -23,20 +23,7 @@ T = TypeVar("T")
 
 
 def check_ego(scenario: Scenario, who: str) -> None:
-    """Refuse a scenario without an ego.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    who : str
-        Who needs it, for the message.
-
-    Raises
-    ------
-    InputError
-        If its ego is none.
-    """
+    """Refuse a scenario without an ego."""
     if not scenario.traffic.has_ego:
         raise InputError(
             f"{who} needs an ego vehicle, and traffic.ego is none; name one, or run traffic alone with fogsim "
@@ -45,35 +32,14 @@ def check_ego(scenario: Scenario, who: str) -> None:
 
 
 def check_frames(scenario: Scenario, who: str) -> None:
-    """Refuse a scenario that draws no frames.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    who : str
-        Who needs them, for the message.
-
-    Raises
-    ------
-    InputError
-        If its renderer is "none", or its ego is.
-    """
+    """Refuse a scenario that draws no frames."""
     check_ego(scenario, who)
     if scenario.renderer == NO_RENDERER:
         raise InputError(f"{who} needs frames, and renderer: none draws none; choose auto, opengl, cpu or reference")
 
 
 def estimators(scenario: Scenario, assumed: Camera) -> tuple[Estimator, ...]:
-    """Estimators of a scenario, with the calibration that the vehicle assumes.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    assumed : Camera
-        The assumed calibration.
-    """
+    """Estimators of a scenario, with the calibration that the vehicle assumes."""
     made = tuple(_made(ESTIMATORS, one, scenario, assumed) for one in scenario.estimators)
     for estimator in made:
         supply(estimator)
@@ -87,40 +53,17 @@ def supply(estimator: Estimator) -> None:
 
 
 def fusion(scenario: Scenario) -> Fusion | LocatedFusion:
-    """Fusion of a scenario.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """Fusion of a scenario."""
     return _made(FUSIONS, scenario.fusion, scenario)
 
 
 def adviser(scenario: Scenario) -> Adviser | VehicleAdviser:
-    """Speed adviser of a scenario.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """Speed adviser of a scenario."""
     return _made(ADVISERS, scenario.advice, scenario)
 
 
 def road_adviser(scenario: Scenario) -> Adviser:
-    """Speed adviser of a scenario, who advises roads.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-
-    Raises
-    ------
-    InputError
-        If it needs the sensors of a vehicle.
-    """
+    """Speed adviser of a scenario, who advises roads."""
     advising = adviser(scenario)
     if isinstance(advising, VehicleAdviser):
         raise InputError(
@@ -131,13 +74,7 @@ def road_adviser(scenario: Scenario) -> Adviser:
 
 
 def own_methods(scenario: Scenario) -> dict[str, str]:
-    """Versions of the methods of a scenario that are not FogSim's, by their names.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """Versions of the methods of a scenario that are not FogSim's, by their names."""
     folder, roadside = scenario.directory, scenario.sensors.reports.roadside
     beside_road = () if roadside is None or roadside.camera is None else (roadside.camera.estimator,)
     found = {
@@ -150,13 +87,7 @@ def own_methods(scenario: Scenario) -> dict[str, str]:
 
 
 def safety_standard(scenario: Scenario) -> SafetyStandard:
-    """What a run is judged by: the reaction time and deceleration that its advice counts with, where it has them.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """What a run is judged by: the reaction time and deceleration that its advice counts with, where it has them."""
     advising, usual = adviser(scenario), SafetyStandard()
     return dataclasses.replace(
         usual,
@@ -166,13 +97,7 @@ def safety_standard(scenario: Scenario) -> SafetyStandard:
 
 
 def lighting_policy(scenario: Scenario) -> LightingPolicy | VehicleLightingPolicy:
-    """Lighting policy of a scenario.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """Lighting policy of a scenario."""
     return _made(LIGHTING_POLICIES, scenario.lighting, scenario)
 
 

@@ -5,12 +5,6 @@ from fogsim.values import Pavement
 
 
 def pavement(scenario: Scenario) -> Pavement:
-    """What roads are like.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """What roads are like."""
     given = scenario.pavement
     return Pavement(given.surface, given.wheel_tracks, given.repairs)

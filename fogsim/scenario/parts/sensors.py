@@ -22,15 +22,7 @@ METERED_PERCENT = {Metering.HIGHLIGHTS: 65.0, Metering.LOG_AVERAGE: 18.0}
 
 
 def camera_mount(scenario: Scenario, body: str = CAR) -> CameraMount:
-    """Where on the ego its camera is.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    body : str
-        Body kind of the ego, which settles what the scenario leaves open; see `TrafficState.types`.
-    """
+    """Where on the ego its camera is."""
     section, usual = scenario.camera, USUAL_MOUNTS[body]
     return CameraMount(
         height=usual.height if section.mount_height_m is None else section.mount_height_m,
@@ -39,15 +31,7 @@ def camera_mount(scenario: Scenario, body: str = CAR) -> CameraMount:
 
 
 def camera(scenario: Scenario, body: str = CAR) -> Camera:
-    """Calibration of the ego's camera.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    body : str
-        Body kind of the ego; see `camera_mount`.
-    """
+    """Calibration of the ego's camera."""
     section = scenario.camera
     by_view = 0.5 * section.width / math.tan(0.5 * math.radians(section.field_of_view_deg))
     return Camera(
@@ -65,15 +49,7 @@ def camera(scenario: Scenario, body: str = CAR) -> Camera:
 
 
 def assumed_camera(scenario: Scenario, body: str = CAR) -> Camera:
-    """Calibration that the ego's estimators assume, with the scenario's errors in it.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    body : str
-        Body kind of the ego; see `camera_mount`.
-    """
+    """Calibration that the ego's estimators assume, with the scenario's errors in it."""
     true, told = camera(scenario, body), scenario.camera.told
     return dataclasses.replace(
         true,
@@ -85,13 +61,7 @@ def assumed_camera(scenario: Scenario, body: str = CAR) -> Camera:
 
 
 def camera_sensor(scenario: Scenario) -> CameraSensor:
-    """What takes the pictures of the ego's camera.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """What takes the pictures of the ego's camera."""
     section = scenario.camera
     auto = auto_exposure(scenario) if section.automatic else None
     period = scenario.clocks.camera_period_s
@@ -99,13 +69,7 @@ def camera_sensor(scenario: Scenario) -> CameraSensor:
 
 
 def sensor(scenario: Scenario) -> Sensor:
-    """Image sensor of the ego's camera, at the exposure that it has if it is fixed.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """Image sensor of the ego's camera, at the exposure that it has if it is fixed."""
     section = scenario.camera
     airlight = max(airlight_from_illuminance(scenario.light.illuminance_lx, scenario.fog.airlight_share))
     return Sensor(
@@ -119,13 +83,7 @@ def sensor(scenario: Scenario) -> Sensor:
 
 
 def auto_exposure(scenario: Scenario) -> AutoExposure:
-    """How the ego's camera sets its own exposure.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """How the ego's camera sets its own exposure."""
     section = scenario.camera.exposure
     percent = METERED_PERCENT[section.metering] if section.target_percent is None else section.target_percent
     return AutoExposure(
@@ -139,13 +97,7 @@ def auto_exposure(scenario: Scenario) -> AutoExposure:
 
 
 def body_pitch(scenario: Scenario) -> BodyPitch:
-    """How the ego's body pitches when it brakes.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """How the ego's body pitches when it brakes."""
     body = scenario.camera.body
     suspension = Suspension(math.radians(body.pitch_deg_per_mps2), body.time_constant_s)
     return BodyPitch(suspension, scenario.clocks.camera_period_s)
@@ -162,38 +114,20 @@ def roadside_scenario(scenario: Scenario, section: RoadsideCamera) -> Scenario:
 
 
 def lead_sensor(scenario: Scenario) -> LeadSensor:
-    """Radar of the ego.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """Radar of the ego."""
     lead = scenario.sensors.lead
     view = math.radians(lead.field_of_view_deg)
     return LeadSensor(lead.reach_m, lead.distance_deviation_m, lead.speed_deviation_mps, view)
 
 
 def gps(scenario: Scenario) -> Gps:
-    """Satellite positioning of the ego.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """Satellite positioning of the ego."""
     section = scenario.sensors.gps
     return Gps(section.position_deviation_m, math.radians(section.heading_deviation_deg))
 
 
 def scatterometer(scenario: Scenario) -> Scatterometer | None:
-    """The ego's forward-scatter visibility sensor, if it has one.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """The ego's forward-scatter visibility sensor, if it has one."""
     section = scenario.sensors.scatterometer
     if section is None:
         return None

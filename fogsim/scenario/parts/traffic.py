@@ -16,13 +16,7 @@ _CONDITIONS = ("at_position_m", "at_time_s", "at_gap_to_ego_m")
 
 
 def traffic_setup(scenario: Scenario) -> TrafficSetup:
-    """What the traffic stage needs to know.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """What the traffic stage needs to know."""
     traffic, folder, files = scenario.traffic, scenario.directory, traffic_files(scenario)
     return TrafficSetup(
         net=files.net,

@@ -24,18 +24,7 @@ _NUMBERS = {"right": 0, "left": -1}
 
 
 def entering_vehicles(scenario: Scenario) -> Entries:
-    """Vehicles that a timeline brings onto the road with a way of their own.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-
-    Raises
-    ------
-    PlacementError
-        If one cannot be where it is to be.
-    """
+    """Vehicles that a timeline brings onto the road with a way of their own."""
     doings = [pair for entry in scenario.timeline for pair in doings_of(entry)]
     wanted = {
         (vehicle, doing.depart): None

@@ -42,38 +42,16 @@ _SECONDS_PER_HOUR = 3600.0
 
 @dataclass(frozen=True, slots=True)
 class TrafficFiles:
-    """SUMO's files of a scenario.
+    """SUMO's files of a scenario."""
 
-    Attributes
-    ----------
-    net : Path or None
-        Its network; None where a configuration names it.
-    routes, additional : tuple of Path
-        Its route and additional files, but those that a configuration names.
-    """
-
-    net: Path | None
+    net: Path | None  # Its network; None where a configuration names it
+    # routes, additional: its route and additional files, but those that a configuration names
     routes: tuple[Path, ...]
     additional: tuple[Path, ...]
 
 
 def traffic_files(scenario: Scenario) -> TrafficFiles:
-    """Files of a scenario; those of a road by template are written where they are not there yet.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-
-    Raises
-    ------
-    PlacementError
-        If an actor cannot be where it is to be.
-    DemandError
-        If there is traffic on a way that the road does not have.
-    InputError
-        If nothing can be written into the cache directory.
-    """
+    """Files of a scenario; those of a road by template are written where they are not there yet."""
     traffic, folder = scenario.traffic, scenario.directory
     net = None if traffic.net is None else folder / traffic.net
     routes = tuple(folder / path for path in traffic.routes)
@@ -97,18 +75,7 @@ def traffic_files(scenario: Scenario) -> TrafficFiles:
 
 
 def road_layout(scenario: Scenario) -> tuple[Layout, tuple[Placed, ...]]:
-    """Road of a scenario and where its actors are.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        A scenario that has a road by template.
-
-    Raises
-    ------
-    PlacementError
-        If an actor cannot be where it is to be.
-    """
+    """Road of a scenario and where its actors are."""
     if scenario.road is None:
         raise ValueError("expected a scenario with a road by template, got one without")
     template = _template(scenario.road)
@@ -121,18 +88,7 @@ def road_layout(scenario: Scenario) -> tuple[Layout, tuple[Placed, ...]]:
 
 
 def with_way(scenario: Scenario) -> Scenario:
-    """A scenario of traffic alone on a road by template, with the whole way as that along which places count.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Any scenario; where it is another one, or names the way, it stays as it is.
-
-    Raises
-    ------
-    PlacementError
-        If an actor cannot be where it is to be.
-    """
+    """A scenario of traffic alone on a road by template, with the whole way as that along which places count."""
     traffic = scenario.traffic
     if scenario.road is None or traffic.has_ego or traffic.along:
         return scenario
@@ -180,15 +136,7 @@ def _first(name: str, sections: Mapping[str, ActorSection], says_so: Callable[[A
 
 
 class DemandError(InputError):
-    """Traffic on a way that a road does not have.
-
-    Parameters
-    ----------
-    key : str
-        Key of the demand.
-    told : str
-        What is wrong.
-    """
+    """Traffic on a way that a road does not have."""
 
     def __init__(self, key: str, told: str) -> None:
         super().__init__(f"demand.{key}: {told}")
@@ -204,26 +152,14 @@ def _check_ways(layout: Layout, section: DemandSection) -> None:
 
 
 def actors_of(scenario: Scenario) -> dict[str, ActorSection]:
-    """Actors of a scenario by their ids; on a road by template the ego is one of them, also where it is not written.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """Actors of a scenario by their ids; on a road by template the ego is one of them, also where it is not written."""
     if scenario.road is None or not scenario.traffic.has_ego:
         return dict(scenario.actors)
     return {scenario.traffic.ego: ActorSection(), **scenario.actors}
 
 
 def vehicles_of(scenario: Scenario) -> dict[str, ActorSection]:
-    """Actors of a scenario that are vehicles, by their ids.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    """
+    """Actors of a scenario that are vehicles, by their ids."""
     return {name: section for name, section in actors_of(scenario).items() if not section.is_person}
 
 

@@ -170,13 +170,7 @@ _SI = {"m": 1.0, "kmh": 1.0 / 3.6, "deg": math.pi / 180.0}
 
 
 def measure_of(key: str) -> tuple[str, float]:
-    """Name of a template's measure by its key in a file, and its SI unit's worth in the file's.
-
-    Parameters
-    ----------
-    key : str
-        The key, perhaps with a unit at the end.
-    """
+    """Name of a template's measure by its key in a file, and its SI unit's worth in the file's."""
     stem, _, suffix = key.rpartition("_")
     return (stem, _SI[suffix]) if suffix in _SI else (key, 1.0)
 
@@ -363,18 +357,7 @@ Actors = dict[NewId, ActorSection]
 
 
 def check_roads(written: Any) -> None:
-    """Refuse blocks of a scenario that do not go together.
-
-    Parameters
-    ----------
-    written : Scenario
-        The scenario.
-
-    Raises
-    ------
-    ValueError
-        If there is a road and a network, or demand or actors without a road.
-    """
+    """Refuse blocks of a scenario that do not go together."""
     traffic = written.traffic
     if written.road is not None:
         for key in ("net", "config"):

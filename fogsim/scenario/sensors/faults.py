@@ -427,11 +427,5 @@ AnyFault = Annotated[
 
 
 def fault_of(written: AnyFault) -> Fault:
-    """A fault of a scenario file in SI units.
-
-    Parameters
-    ----------
-    written : AnyFault
-        What the file has.
-    """
+    """A fault of a scenario file in SI units."""
     return Fault(written.in_si(), written.at_s, math.inf if written.for_s is None else written.for_s)

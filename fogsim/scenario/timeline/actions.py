@@ -73,19 +73,8 @@ class Situation(Protocol):
 def actions_of(entry: TimelineEntry, now: Situation, reference: float) -> Actions | None:
     """What an entry begins.
 
-    Parameters
-    ----------
-    entry : TimelineEntry
-        The entry.
-    now : Situation
-        Where everybody is.
-    reference : float
-        Extinction coefficient to which densities refer, from `fog_reference` [1/m].
-
-    Returns
-    -------
-    Actions or None
-        None while somebody of whom it tells is not on the road, or not at a place that it needs.
+    Returns None while somebody of whom it tells is not on the road, or not at a place that it needs. Takes `reference`
+    [1/m].
     """
     traffic: list[TrafficAction] = []
     fog: list[ChangeFog] = []
@@ -112,38 +101,18 @@ def actions_of(entry: TimelineEntry, now: Situation, reference: float) -> Action
 
 
 def doings_of(entry: TimelineEntry) -> Iterator[tuple[str, Doing]]:
-    """Subjects of an entry, each with one thing that it does; those of several several times.
-
-    Parameters
-    ----------
-    entry : TimelineEntry
-        The entry.
-    """
+    """Subjects of an entry, each with one thing that it does; those of several several times."""
     for subject, written in entry.do.items():
         yield from ((subject, doing) for doing in (written if isinstance(written, tuple) else (written,)))
 
 
 def entry_name(entry: TimelineEntry, number: int) -> str:
-    """What an entry is called in conditions and messages.
-
-    Parameters
-    ----------
-    entry : TimelineEntry
-        The entry.
-    number : int
-        Its place in the timeline, from 0.
-    """
+    """What an entry is called in conditions and messages."""
     return entry.name or f"timeline.{number}"
 
 
 def told(entry: TimelineEntry) -> str:
-    """What an entry does in a few words: ``slow: brake; fog: visibility_m``.
-
-    Parameters
-    ----------
-    entry : TimelineEntry
-        The entry.
-    """
+    """What an entry does in a few words: ``slow: brake; fog: visibility_m``."""
     words = []
     for subject, doing in doings_of(entry):
         given = [key for key in type(doing).model_fields if key in doing.model_fields_set]
@@ -153,13 +122,7 @@ def told(entry: TimelineEntry) -> str:
 
 
 def vehicles_of(entry: TimelineEntry) -> tuple[str, ...]:
-    """Vehicles that an entry makes do something, or follow, as it names them; each once.
-
-    Parameters
-    ----------
-    entry : TimelineEntry
-        The entry.
-    """
+    """Vehicles that an entry makes do something, or follow, as it names them; each once."""
     named = []
     for subject, doing in doings_of(entry):
         if isinstance(doing, VehicleActions):
@@ -231,13 +194,7 @@ def _departure(vehicle: str, action: DepartAction, now: Situation) -> list[Traff
 
 
 def departing_vehicles(entries: Sequence[TimelineEntry]) -> frozenset[str]:
-    """Vehicles that a timeline brings onto the road.
-
-    Parameters
-    ----------
-    entries : sequence of TimelineEntry
-        The timeline.
-    """
+    """Vehicles that a timeline brings onto the road."""
     doings = [pair for entry in entries for pair in doings_of(entry)]
     return frozenset(subject for subject, doing in doings if isinstance(doing, VehicleActions) and doing.depart)
 
@@ -326,12 +283,7 @@ def _density(action: FogActions, reference: float) -> float:
 def fog_reference(entries: Sequence[TimelineEntry], extinction: float) -> float:
     """Extinction coefficient to which densities refer: the scenario's own, or the densest of the timeline's [1/m].
 
-    Parameters
-    ----------
-    entries : sequence of TimelineEntry
-        The timeline.
-    extinction : float
-        Extinction coefficient of the scenario, outside banks [1/m]; 0 in clear air, where fog may come to be.
+    Takes `extinction` [1/m].
     """
     wanted = [
         extinction_from_visibility(doing.visibility_m)
@@ -343,15 +295,7 @@ def fog_reference(entries: Sequence[TimelineEntry], extinction: float) -> float:
 
 
 def light_range(entries: Sequence[TimelineEntry], illuminance: float) -> tuple[float, float]:
-    """Lowest and highest horizontal illuminance that there may be in a run [lx].
-
-    Parameters
-    ----------
-    entries : sequence of TimelineEntry
-        The timeline.
-    illuminance : float
-        Illuminance with which it begins [lx].
-    """
+    """Lowest and highest horizontal illuminance that there may be in a run [lx] (`illuminance` [lx])."""
     doings = [doing for entry in entries for _, doing in doings_of(entry)]
     levels = [illuminance, *(doing.illuminance_lx for doing in doings if isinstance(doing, LightActions))]
     return min(levels), max(levels)
@@ -360,17 +304,7 @@ def light_range(entries: Sequence[TimelineEntry], illuminance: float) -> tuple[f
 def scripted_fog(entries: Sequence[TimelineEntry], fog: FogField) -> FogField:
     """A fog that can become what a timeline makes of it.
 
-    Parameters
-    ----------
-    entries : sequence of TimelineEntry
-        The timeline.
-    fog : FogField
-        The fog without it.
-
-    Returns
-    -------
-    FogField
-        With the densities that it may come to; where the air is clear, fog of density 0 in its place.
+    Returns with the densities that it may come to; where the air is clear, fog of density 0 in its place.
     """
     reference = fog_reference(entries, fog.extinction)
     changes = [doing for entry in entries for _, doing in doings_of(entry) if isinstance(doing, FogActions)]

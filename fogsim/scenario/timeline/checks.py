@@ -33,18 +33,7 @@ DAYLIGHT_RENDERER = "reference"
 
 
 def check_timeline(scenario: "Scenario") -> None:
-    """Refuse a timeline that a run of its scenario could not play.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-
-    Raises
-    ------
-    ValidationError
-        If there is anything that it could not.
-    """
+    """Refuse a timeline that a run of its scenario could not play."""
     refuse((("timeline", *place), told) for place, told in _mistakes(scenario))
     if scenario.end_when is not None:
         told = condition_mistakes(scenario.end_when, run_content(scenario))
@@ -57,14 +46,7 @@ def pointless_triggers(document: Document, scenario: "Scenario", limits: Limits)
     Triggers of OpenSCENARIO files may: what was not played is reported at the end of the run. So may those that come
     after a run's end that was moved by ``--set``.
 
-    Parameters
-    ----------
-    document : Document
-        Where keys stand.
-    scenario : Scenario
-        Its scenario.
-    limits : mapping from str to (float, float)
-        Ranges of signals in the run, as for `pointless_parts`; ``time`` among them.
+    Takes `limits` (float, float).
     """
     if document.is_overridden(("duration_s",)):
         limits = {key: ends for key, ends in limits.items() if key != "time"}
@@ -165,13 +147,7 @@ def _fog_mistake(doing: FogActions, scenario: "Scenario") -> str | None:
 
 
 def named_vehicles(timeline: Sequence[TimelineEntry]) -> Iterator[tuple[KeyPath, str]]:
-    """Vehicles that a timeline names, and where; the ego aside, and those that it brings itself.
-
-    Parameters
-    ----------
-    timeline : sequence of TimelineEntry
-        The timeline.
-    """
+    """Vehicles that a timeline names, and where; the ego aside, and those that it brings itself."""
     others = departing_vehicles(timeline) | {EGO}
     for number, entry in enumerate(timeline):
         for vehicle in vehicles_of(entry):

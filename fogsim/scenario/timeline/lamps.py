@@ -108,15 +108,7 @@ class LampActions(Section):
 
 
 def lamp_mistake(kind: str, written: LampActions) -> str | None:
-    """What a block of lamps wants of a vehicle that has no such lamp.
-
-    Parameters
-    ----------
-    kind : str
-        Type of the vehicle, as actors have it.
-    written : LampActions
-        What the file says.
-    """
+    """What a block of lamps wants of a vehicle that has no such lamp."""
     apart = written.kinds_by_side()
     if kind == "motorcycle" and apart:
         return f"lamps: {' and '.join(apart)} of a motorcycle are single; write one word for each"
@@ -126,15 +118,7 @@ def lamp_mistake(kind: str, written: LampActions) -> str | None:
 
 
 def lamp_switches(vehicle: str, written: LampActions) -> Iterator[SetLamps]:
-    """Switches of lamps, which files name as `Lamp` does in small letters: of whole kinds, then side by side.
-
-    Parameters
-    ----------
-    vehicle : str
-        Id of the vehicle.
-    written : LampActions
-        What the file says.
-    """
+    """Switches of lamps, which files name as `Lamp` does in small letters: of whole kinds, then side by side."""
     states = {lamp: getattr(written, (lamp.name or "").lower()) or written.all for lamp in Lamp}
     yield _switch(vehicle, {lamp: state for lamp, state in states.items() if isinstance(state, str)}, None)
     for side in Side:

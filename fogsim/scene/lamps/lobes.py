@@ -53,13 +53,7 @@ def signal_shares() -> NDArray[np.float64]:
 
 @lru_cache(maxsize=64)
 def sum_of_beams(beams: tuple[Beam, ...]) -> Beam:
-    """What lamps in one housing shine together.
-
-    Parameters
-    ----------
-    beams : tuple of Beam
-        One or more.
-    """
+    """What lamps in one housing shine together."""
     if len(beams) == 1:
         return beams[0]
     azimuth, elevation = (

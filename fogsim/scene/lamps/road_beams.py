@@ -31,18 +31,7 @@ def road_beams(
 ) -> RoadBeams | None:
     """Lit head lamps and front fog lamps near a camera, whichever way they shine; None if there are none.
 
-    Parameters
-    ----------
-    state : TrafficState
-        All vehicles and their lit lamps.
-    skip : int or None
-        Row that is left out, as a rule the vehicle that carries the camera.
-    eye : (3,) float64
-        Where the camera is [m].
-    beams : mapping of Lamp to Beam
-        Beam of one lamp of each kind; one that is not there lights nothing.
-    sky_illuminance : float
-        Horizontal illuminance of the sky in which the scene is drawn [lx].
+    Takes `eye` (3,) [m], `sky_illuminance` [lx].
     """
     state, _ = with_pieces(state, skip)
     shining = int(sum(beams))

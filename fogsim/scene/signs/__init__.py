@@ -22,13 +22,7 @@ _POST = "sign_post"
 
 
 def sign_shapes(signs: Sequence[Sign]) -> dict[str, Mesh]:
-    """Shapes of the faces of signs, of diameter 1, and of a post 1 m high; what is too small to see is blended.
-
-    Parameters
-    ----------
-    signs : sequence of Sign
-        The signs.
-    """
+    """Shapes of the faces of signs, of diameter 1, and of a post 1 m high; what is too small to see is blended."""
     shapes = {_POST: tube(0.0, 1.0, 0.038, 0.038, _BACK)} if signs else {}
     for name, sign in {shape_name(sign): sign for sign in signs}.items():
         face = face_of(sign)
@@ -39,17 +33,7 @@ def sign_shapes(signs: Sequence[Sign]) -> dict[str, Mesh]:
 
 
 def sign_batches(signs: Sequence[Sign], hanging: Sequence[Sign], terrain: Terrain) -> list[Batch]:
-    """Every sign where the map says, and posts under those that do not hang from a gantry.
-
-    Parameters
-    ----------
-    signs : sequence of Sign
-        All signs.
-    hanging : sequence of Sign
-        Those of them that hang from gantries.
-    terrain : Terrain
-        The land.
-    """
+    """Every sign where the map says, and posts under those that do not hang from a gantry."""
     batches = [_face(sign) for sign in signs]
     held = {sign.sign_id for sign in hanging}
     standing = [sign for sign in signs if sign.sign_id not in held]

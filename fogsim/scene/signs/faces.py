@@ -17,30 +17,14 @@ _LAYER = 0.013  # what is printed lies this far before what it is printed on, so
 
 @dataclass(frozen=True, slots=True)
 class Face:
-    """A plate and what is printed on it.
+    """A plate and what is printed on it."""
 
-    Attributes
-    ----------
-    outline : tuple of (x, y)
-        Convex outline of the plate, counterclockwise.
-    border : Material
-        Its rim.
-    frame : Material
-        What lies inside the rim.
-    field : Material
-        What lies inside the frame, and what symbols are printed on.
-    widths : tuple of float
-        Sizes of frame and field in units of the outline's.
-    symbol : Mesh
-        What is printed on the field.
-    """
-
-    outline: tuple[tuple[float, float], ...]
-    border: Material
-    frame: Material
-    field: Material
-    widths: tuple[float, float]
-    symbol: Mesh
+    outline: tuple[tuple[float, float], ...]  # (x, y): Convex outline of the plate, counterclockwise
+    border: Material  # Its rim
+    frame: Material  # What lies inside the rim
+    field: Material  # What lies inside the frame, and what symbols are printed on
+    widths: tuple[float, float]  # Sizes of frame and field in units of the outline's
+    symbol: Mesh  # What is printed on the field
 
     @property
     def coarse(self) -> tuple[tuple[float, float], ...]:
@@ -100,29 +84,13 @@ def _blended(field: Mesh, symbol: Mesh) -> Mesh:
 
 
 def regular(sides: int, turn: float, radius: float = 0.5) -> tuple[tuple[float, float], ...]:
-    """Corners of a regular polygon.
-
-    Parameters
-    ----------
-    sides : int
-        Number of corners.
-    turn : float
-        Angle of the first from the x-axis [rad].
-    radius : float
-        Their distance from the middle.
-    """
+    """Corners of a regular polygon (`turn` [rad])."""
     angle = turn + 2 * math.pi * np.arange(sides) / sides
     return tuple(zip((radius * np.cos(angle)).tolist(), (radius * np.sin(angle)).tolist(), strict=True))
 
 
 def triangle(direction: float) -> tuple[tuple[float, float], ...]:
-    """Triangle with cut corners, 1 wide, its middle between tip and base.
-
-    Parameters
-    ----------
-    direction : float
-        1 with its tip up, −1 with its tip down.
-    """
+    """Triangle with cut corners, 1 wide, its middle between tip and base."""
     height, cut = 0.5 * math.sqrt(3), 0.045
     tip, left, right = np.array([0.0, height / 2]), np.array([-0.5, -height / 2]), np.array([0.5, -height / 2])
     corners = []
@@ -133,56 +101,24 @@ def triangle(direction: float) -> tuple[tuple[float, float], ...]:
 
 
 def disc_face(symbol: Mesh, *, frame: Material = RED, field: Material = FIELD, ring: float = 0.78) -> Face:
-    """Round sign: white rim, coloured ring, field.
-
-    Parameters
-    ----------
-    symbol : Mesh
-        What is printed on it.
-    frame, field : Material
-        Of its ring and of what lies within.
-    ring : float
-        Diameter of the field.
-    """
+    """Round sign: white rim, coloured ring, field."""
     return Face(regular(_ROUND, 0.0), FIELD, frame, field, (0.965, ring), symbol)
 
 
 def warning_face(symbol: Mesh) -> Face:
-    """Triangle that warns, with its symbol a little below the middle of its height.
-
-    Parameters
-    ----------
-    symbol : Mesh
-        What is printed on it.
-    """
+    """Triangle that warns, with its symbol a little below the middle of its height."""
     low = replace(symbol, positions=symbol.positions + np.array([0.0, -0.13, 0.0], np.float32))
     return Face(triangle(1.0), FIELD, RED, FIELD, (0.965, 0.72), low)
 
 
 def plate_face(symbol: Mesh, *, field: Material = FIELD, border: Material = BLACK) -> Face:
-    """Square plate with a thin border.
-
-    Parameters
-    ----------
-    symbol : Mesh
-        What is printed on it.
-    field, border : Material
-        Of the plate and of its border.
-    """
+    """Square plate with a thin border."""
     corners = ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))
     return Face(corners, border, border, field, (0.99, 0.92), symbol)
 
 
 def back(outline: Corners, material: Material) -> Mesh:
-    """The plate seen from behind.
-
-    Parameters
-    ----------
-    outline : sequence of (x, y)
-        Its outline.
-    material : Material
-        Its material.
-    """
+    """The plate seen from behind (`outline` (x, y))."""
     mirror = flat(outline, material)
     return replace(
         mirror,

@@ -21,30 +21,15 @@ _SAME = 3.0  # signs nearer to one another along the road hang from one gantry [
 
 @dataclass(frozen=True, slots=True)
 class Gantry:
-    """A bridge of steel over a carriageway.
+    """A bridge of steel over a carriageway."""
 
-    Attributes
-    ----------
-    signs : tuple of Sign
-        What hangs from it.
-    reach : tuple of float
-        How far to the right and to the left of its first sign its legs stand [m], to the left positive.
-    """
-
-    signs: tuple[Sign, ...]
+    signs: tuple[Sign, ...]  # What hangs from it
+    # How far to the right and to the left of its first sign its legs stand [m], to the left positive
     reach: tuple[float, float]
 
 
 def gantries(signs: Sequence[Sign], lanes: Sequence[Lane]) -> list[Gantry]:
-    """Gantries for those signs whose middle lies over a lane.
-
-    Parameters
-    ----------
-    signs : sequence of Sign
-        All signs.
-    lanes : sequence of Lane
-        All lanes with at least two points.
-    """
+    """Gantries for those signs whose middle lies over a lane."""
     found: list[Gantry] = []
     if not signs:
         return found
@@ -110,15 +95,7 @@ class _Pieces:
 
 
 def gantry_mesh(gantry: Gantry, terrain: Terrain) -> Mesh:
-    """Two legs and a beam of two tubes with struts, behind the signs.
-
-    Parameters
-    ----------
-    gantry : Gantry
-        The gantry.
-    terrain : Terrain
-        The land that its legs stand on.
-    """
+    """Two legs and a beam of two tubes with struts, behind the signs."""
     first = gantry.signs[0]
     right, left = gantry.reach
     ahead = np.array([np.cos(first.heading), np.sin(first.heading), 0.0])

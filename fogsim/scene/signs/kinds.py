@@ -33,21 +33,11 @@ from fogsim.values.scene import Instance, Mesh
 
 @dataclass(frozen=True, slots=True)
 class SignKind:
-    """A kind of sign.
+    """A kind of sign."""
 
-    Attributes
-    ----------
-    meaning : str
-        What it says.
-    code : str
-        Its number in the German catalogue (VzKat), by which OpenDRIVE files commonly name it.
-    face : callable
-        Its face by its value [SI].
-    """
-
-    meaning: str
-    code: str
-    face: Callable[[float], Face]
+    meaning: str  # What it says
+    code: str  # Its number in the German catalogue (VzKat), by which OpenDRIVE files commonly name it
+    face: Callable[[float], Face]  # Its face by its value [SI]
 
 
 def _number(speed: float) -> str:
@@ -131,13 +121,7 @@ _BY_CODE = {kind.code: kind for kind in SIGN_KINDS.values()}
 
 
 def face_of(sign: Sign) -> Face:
-    """Face of a sign; that of an unknown kind is a plate with its code.
-
-    Parameters
-    ----------
-    sign : Sign
-        The sign.
-    """
+    """Face of a sign; that of an unknown kind is a plate with its code."""
     code = sign.kind.removeprefix("xodr.")
     kind = SIGN_KINDS.get(code) or _BY_CODE.get(code)
     speechless = kind in _LIMITS and sign.value <= 0
@@ -145,11 +129,5 @@ def face_of(sign: Sign) -> Face:
 
 
 def shape_name(sign: Sign) -> str:
-    """Name of the shape of a sign's face; signs that look alike share it.
-
-    Parameters
-    ----------
-    sign : Sign
-        The sign.
-    """
+    """Name of the shape of a sign's face; signs that look alike share it."""
     return f"sign {sign.kind} {_number(sign.value)}"

@@ -30,49 +30,19 @@ _X, _Y, _Z = np.eye(3)
 
 
 def flat(corners: Corners, material: Material) -> Mesh:
-    """Convex polygon.
-
-    Parameters
-    ----------
-    corners : sequence of (x, y)
-        Its corners, in order around it.
-    material : Material
-        Its material.
-    """
+    """Convex polygon (`corners` (x, y))."""
     return polygon([(x, y, 0.0) for x, y in corners], material, _Z, Instance.SIGN)
 
 
 def line(points: Corners, width: float, material: Material) -> Mesh:
-    """Line through points.
-
-    Parameters
-    ----------
-    points : sequence of (x, y)
-        The points.
-    width : float
-        Its width.
-    material : Material
-        Its material.
-    """
+    """Line through points (`points` (x, y))."""
     middle = cleaned(np.column_stack((np.array(points), np.zeros(len(points)))), 1e-4)
     edges = np.stack((parallel(middle, width / 2), parallel(middle, -width / 2)), axis=1)
     return grid(edges, material, _Z, instance=Instance.SIGN)
 
 
 def text(words: str, height: float, material: Material, *, widest: float = 10.0) -> Mesh:
-    """Text of a height, narrowed where it would be too wide.
-
-    Parameters
-    ----------
-    words : str
-        See `lettering`.
-    height : float
-        Its height.
-    material : Material
-        Its material.
-    widest : float
-        Greatest width.
-    """
+    """Text of a height, narrowed where it would be too wide."""
     plain = lettering(words, material)
     if not len(plain.faces):
         return plain
@@ -145,18 +115,7 @@ _CHARACTERS: dict[str, list[_Stroke]] = {
 def lettering(words: str, material: Material) -> Mesh:
     """Lay out a word or a number in the plane z = 0.
 
-    Parameters
-    ----------
-    words : str
-        Letters, all drawn as capitals, digits and ``- _ . : / ?``; anything else is drawn as a question mark, spaces
-        are left blank.
-    material : Material
-        Its material.
-
-    Returns
-    -------
-    Mesh
-        The text in units of its height, centred on the origin, reading along x with y up.
+    Returns the text in units of its height, centred on the origin, reading along x with y up.
     """
     parts = []
     for place, character in enumerate(words.upper()):
@@ -199,13 +158,7 @@ def skidding_car() -> Mesh:
 
 
 def bend(side: int) -> Mesh:
-    """Arrow of a bend.
-
-    Parameters
-    ----------
-    side : int
-        1 to the left, −1 to the right.
-    """
+    """Arrow of a bend."""
     shaft = line([(side * 0.07, -0.19), (side * 0.07, -0.02), (-side * 0.03, 0.08), (-side * 0.03, 0.12)], 0.05, BLACK)
     tip = flat([(-side * 0.03 - 0.06, 0.11), (-side * 0.03 + 0.06, 0.11), (-side * 0.03, 0.22)], BLACK)
     return merge((shaft, tip))

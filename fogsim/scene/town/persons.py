@@ -36,13 +36,7 @@ def person_shapes() -> dict[str, Mesh]:
 
 
 def person_batches(persons: PersonState) -> tuple[Batch, ...]:
-    """Build one batch for each shape that is there.
-
-    Parameters
-    ----------
-    persons : PersonState
-        The persons; how they put their feet follows from where they are.
-    """
+    """Build one batch for each shape that is there."""
     if not persons.ids:
         return ()
     looks = np.array([_look(person) for person in persons.ids])

@@ -12,16 +12,7 @@ from fogsim.values.scene import Mesh
 def rod(points: Sequence[Vector], radii: Sequence[tuple[float, float]], sides: int, material: Material) -> Mesh:
     """Closed tube of oval rings about some points, smooth around; rings are level, or upright along a level tube.
 
-    Parameters
-    ----------
-    points : sequence of (3,)
-        Middles of the rings, at least two [m].
-    radii : sequence of tuple of float
-        Radii of each ring: along x and along y of a rising tube; up and level of a level one [m].
-    sides : int
-        Corners of a ring.
-    material : Material
-        Its material.
+    Takes `points` (3,) [m], `radii` [m].
     """
     middle = np.array(points, np.float64)
     along = middle[-1] - middle[0]

@@ -123,13 +123,7 @@ def _arm(sides: int) -> Mesh:
 
 
 def signal_posts(heads: Sequence[SignalHead]) -> list[Batch]:
-    """Posts of all heads, with arms where heads are above the road.
-
-    Parameters
-    ----------
-    heads : sequence of SignalHead
-        The heads.
-    """
+    """Posts of all heads, with arms where heads are above the road."""
     by_post: dict[tuple[float, float, float], list[SignalHead]] = {}
     for head in heads:
         by_post.setdefault(head.post, []).append(head)
@@ -155,15 +149,7 @@ def signal_posts(heads: Sequence[SignalHead]) -> list[Batch]:
 
 
 def signal_batches(signals: SignalState, time: float) -> tuple[Batch, ...]:
-    """Heads of traffic lights with their lit lenses.
-
-    Parameters
-    ----------
-    signals : SignalState
-        What they show.
-    time : float
-        Now, for what blinks [s].
-    """
+    """Heads of traffic lights with their lit lenses (`time` [s])."""
     if not signals.ids:
         return ()
     size, lit = np.repeat(signals.diameter[:, None], 3, axis=1), _lit(signals, time)
@@ -189,17 +175,7 @@ def _lit(signals: SignalState, time: float) -> NDArray[np.int32]:
 
 
 def signal_light_sources(signals: SignalState, eye: NDArray[np.float64], time: float) -> LightSources:
-    """Lit lenses that shine toward an eye.
-
-    Parameters
-    ----------
-    signals : SignalState
-        What they show.
-    eye : (3,) float64
-        Where the eye is [m].
-    time : float
-        Now, for what blinks [s].
-    """
+    """Lit lenses that shine toward an eye (`eye` (3,) [m], `time` [s])."""
     lights = _lit(signals, time)
     ahead = np.column_stack((np.cos(signals.heading), np.sin(signals.heading), np.zeros(len(signals.ids))))
     parts = []
@@ -237,13 +213,10 @@ def _lens() -> Beam:
 def directed_share(aside: NDArray[np.float64], below: NDArray[np.float64]) -> NDArray[np.float64]:
     """Share of its full intensity that a lens shines in directions, for eyes in front of it [-].
 
-    As ITE asks at least (VTCSH LED Circular Signal Supplement 2005, 4.1.1: horizontal and vertical factor), in full
-    to eyes that are higher than 2.5° below the lens, as those of drivers far away are.
+    As ITE asks at least (VTCSH LED Circular Signal Supplement 2005, 4.1.1: horizontal and vertical factor), in full to
+    eyes that are higher than 2.5° below the lens, as those of drivers far away are.
 
-    Parameters
-    ----------
-    aside, below : (n,) float64
-        Angles beside and below the lens's axis [rad].
+    Takes `aside`, `below` (n,) [rad].
     """
     beside, down = np.degrees(aside), np.degrees(below)
     horizontal = 0.05 + 0.95 * np.exp(-0.5 * (beside / 11.0) ** 2)

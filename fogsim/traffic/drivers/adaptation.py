@@ -44,15 +44,7 @@ _LOG_LUMINANCE_ROOTS = np.log10(luminance_root(10.0**_LOG_LUMINANCES))
 
 
 def airlight_luminance(illuminance: float, share: float = AIRLIGHT_SHARE) -> float:
-    """Luminance of fog under an overcast sky [cd/m²].
-
-    Parameters
-    ----------
-    illuminance : float
-        Horizontal illuminance [lx].
-    share : float
-        The airlight over that of a white horizontal surface [-].
-    """
+    """Luminance of fog under an overcast sky [cd/m²] (`illuminance` [lx])."""
     return share * illuminance / math.pi
 
 
@@ -69,24 +61,14 @@ _BRIGHT_FLUX_ROOT, _ = _roots(BRIGHT_LUMINANCE)
 
 
 class Adaptation(NamedTuple):
-    """Eyes that are adapted; made by `adaptation`.
+    """Eyes that are adapted; made by `adaptation`."""
 
-    Attributes
-    ----------
-    airlight : float
-        Luminance of the fog in the sky's light [cd/m²].
-    luminance : float
-        What the eye sees behind a vehicle and is adapted to [cd/m²]: the airlight, what the own head lamps light, and
-        the veil of glare.
-    eye_threshold : float
-        Illuminance at the eye at which a lamp is noticed [lx].
-    flux_root, luminance_root : float
-        √φ and √L of Adrian's formula.
-    """
-
-    airlight: float
+    airlight: float  # Luminance of the fog in the sky's light [cd/m²]
+    # What the eye sees behind a vehicle and is adapted to [cd/m²]: the airlight, what the own head lamps light, and the
+    # veil of glare
     luminance: float
-    eye_threshold: float
+    eye_threshold: float  # Illuminance at the eye at which a lamp is noticed [lx]
+    # flux_root, luminance_root: √φ and √L of Adrian's formula
     flux_root: float
     luminance_root: float
 
@@ -95,12 +77,7 @@ class Adaptation(NamedTuple):
 def contrast_ratio(eyes: Adaptation, distance: float) -> float:
     """Smallest contrast at which a vehicle is noticed over that by day [-]: from 1 on, more in the dark.
 
-    Parameters
-    ----------
-    eyes : Adaptation
-        Whose.
-    distance : float
-        Distance of the vehicle, which makes it small [m].
+    Takes `distance` [m].
     """
     # By day Koschmieder's law knows one threshold, for small and large, in dim light and in bright.
     if eyes.luminance >= _DAY_LUMINANCE:
@@ -115,14 +92,7 @@ def contrast_ratio(eyes: Adaptation, distance: float) -> float:
 def adaptation(illuminance: float, glare: float = 0.0, share: float = AIRLIGHT_SHARE) -> Adaptation:
     """Eyes adapted to the light of the sky, of the own head lamps, and to glare.
 
-    Parameters
-    ----------
-    illuminance : float
-        Horizontal illuminance of the scene [lx].
-    glare : float
-        Veil inside the eye from others' head lamps [cd/m²]; see `fogsim.values.eye.veiling_luminance`.
-    share : float
-        See `airlight_luminance`.
+    Takes `illuminance` [lx], `glare` [cd/m²].
     """
     airlight = airlight_luminance(illuminance, share)
     luminance = airlight + HEAD_LAMP_LUMINANCE + glare

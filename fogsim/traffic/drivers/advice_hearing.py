@@ -18,40 +18,13 @@ class VehiclePlaces(Protocol):
     """Where the vehicles of a simulation are."""
 
     def on_stretch(self, stretch: Stretch, among: Collection[str] | None = None) -> Mapping[str, float]:
-        """Vehicles on a stretch, and how far past its beginning their front bumpers are [m].
-
-        Parameters
-        ----------
-        stretch : Stretch
-            The stretch.
-        among : collection of str or None
-            Vehicles that are asked about; None for all.
-
-        Raises
-        ------
-        InputError
-            If the network has no such stretch.
-        """
+        """Vehicles on a stretch, and how far past its beginning their front bumpers are [m]."""
 
     def near_ego(self, distance: float, among: Collection[str] | None = None) -> Collection[str]:
-        """Vehicles near the ego; nobody while the ego is not on the road.
-
-        Parameters
-        ----------
-        distance : float
-            From front bumper to front bumper, at most [m].
-        among : collection of str or None
-            Vehicles that are asked about; None for all.
-        """
+        """Vehicles near the ego; nobody while the ego is not on the road (`distance` [m])."""
 
     def speed(self, vehicle: str) -> float:
-        """Speed of a vehicle [m/s].
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        """
+        """Speed of a vehicle [m/s]."""
 
 
 class AdviceHearing:
@@ -59,11 +32,6 @@ class AdviceHearing:
 
     A message sign is read in passing, and what it said then is kept to the end of its stretch, whatever it says to
     those who come later. All other advice is heard as long as it is in force and the driver is where it is given.
-
-    Parameters
-    ----------
-    places : VehiclePlaces
-        Where the vehicles are.
     """
 
     def __init__(self, places: VehiclePlaces) -> None:
@@ -72,15 +40,7 @@ class AdviceHearing:
         self._last_on: dict[Stretch, Collection[str]] = {}
 
     def enter(self, command: Command, entering: Collection[str]) -> Heard:
-        """Advice in force where vehicles enter the road [m/s]: they have come past the signs of their stretch upstream.
-
-        Parameters
-        ----------
-        command : Command
-            What is in force.
-        entering : collection of str
-            Vehicles that have entered the road in the last step.
-        """
+        """Advice in force where vehicles enter the road [m/s]: they have passed the signs of their stretch upstream."""
         by_name = advised_by_name(command).get(Display.IN_CAR, {})
         heard: Heard = {Display.IN_CAR: {v: by_name[v] for v in entering if v in by_name}}
         if command.advice_reach > 0.0:
@@ -94,15 +54,7 @@ class AdviceHearing:
         return _spoken(heard)
 
     def listen(self, command: Command, elapsed: float) -> Heard:
-        """Advice that each driver now goes by, as far as there is any [m/s].
-
-        Parameters
-        ----------
-        command : Command
-            What is in force.
-        elapsed : float
-            Time since the last call [s]; signs that show something new are read by those who passed them meanwhile.
-        """
+        """Advice that each driver now goes by, as far as there is any [m/s] (`elapsed` [s])."""
         heard = advised_by_name(command)
         if command.advice_reach > 0.0:
             near = self._places.near_ego(command.advice_reach)
@@ -135,28 +87,12 @@ class AdviceHearing:
 
 
 def advised_by_name(command: Command) -> Heard:
-    """Advice to single drivers by name, which is heard in the car.
-
-    Parameters
-    ----------
-    command : Command
-        What is in force.
-    """
+    """Advice to single drivers by name, which is heard in the car."""
     return _spoken({Display.IN_CAR: {v: speed for v, speed in command.advised_speeds.items() if speed < math.inf}})
 
 
 def heard_since(heard: Heard, before: Heard, time: float) -> Heard:
-    """Instants since which drivers have heard any advice, by where [s].
-
-    Parameters
-    ----------
-    heard : Heard
-        What they hear now.
-    before : Heard
-        The instants as they were at the last call.
-    time : float
-        Instant [s].
-    """
+    """Instants since which drivers have heard any advice, by where [s] (`time` [s])."""
     return {
         display: {vehicle: before.get(display, {}).get(vehicle, time) for vehicle in speeds}
         for display, speeds in heard.items()
@@ -175,40 +111,14 @@ def _add_lower(heard: Heard, display: Display, vehicles: Iterable[str], speed: f
 
 
 def check_edges(stretch: Stretch, known: Collection[str]) -> None:
-    """Check that a network has the edges of a stretch.
-
-    Parameters
-    ----------
-    stretch : Stretch
-        The stretch.
-    known : collection of str
-        Edges of the network.
-
-    Raises
-    ------
-    InputError
-        If it lacks one.
-    """
+    """Check that a network has the edges of a stretch."""
     for edge in stretch.edges:
         if edge not in known:
             raise InputError(f"an advised stretch: the network has no edge {edge!r}; {suggest(edge, known)}")
 
 
 def check_start(stretch: Stretch, length: float) -> None:
-    """Check that a stretch begins on its road.
-
-    Parameters
-    ----------
-    stretch : Stretch
-        The stretch.
-    length : float
-        Length of its edges, or of the ego's route [m].
-
-    Raises
-    ------
-    InputError
-        If it begins behind their end.
-    """
+    """Check that a stretch begins on its road (`length` [m])."""
     if stretch.start >= length:
         road = f"edges, {', '.join(stretch.edges)}, are" if stretch.edges else "ego's route is"
         raise InputError(f"an advised stretch begins at {stretch.start:g} m, but the {road} {length:.0f} m long")

@@ -11,31 +11,17 @@ from fogsim.registry import Registry
 
 @dataclass(frozen=True, slots=True)
 class Compliance:
-    """Who follows an advised speed, and how far.
+    """Who follows an advised speed, and how far."""
 
-    Attributes
-    ----------
-    reached_share : float
-        Share of drivers whom the advice reaches (a sign that they pass, a device on board), 0 … 1.
-    rate : float
-        Share of those who follow it, 0 … 1.
-    strength : float
-        How far they go from their own speed down to the advised one, 0 … 1.
-    delay : float
-        Time before they do [s].
-    trust : float
-        How far those who by themselves drive slower in fog go up to the advised speed, for they take it to be safe,
-        0 … 1; never beyond what they drive in clear air.
-    foreseen : float
-        Share of `strength` and `trust` that is left where they see no fog yet, 0 … 1.
-    """
-
+    # Share of drivers whom the advice reaches (a sign that they pass, a device on board), 0 … 1
     reached_share: float = 1.0
-    rate: float = 1.0
-    strength: float = 1.0
-    delay: float = 2.0
+    rate: float = 1.0  # Share of those who follow it, 0 … 1
+    strength: float = 1.0  # How far they go from their own speed down to the advised one, 0 … 1
+    delay: float = 2.0  # Time before they do [s]
+    # How far those who by themselves drive slower in fog go up to the advised speed, for they take it to be safe, 0 …
+    # 1; never beyond what they drive in clear air
     trust: float = 0.0
-    foreseen: float = 1.0
+    foreseen: float = 1.0  # Share of `strength` and `trust` that is left where they see no fog yet, 0 … 1
 
 
 FULL = Compliance()
@@ -81,15 +67,5 @@ COMPLIANCES: Registry[Compliance] = Registry(
 
 
 def complied_speed(own: float, advised: float, strength: float, trust: float = 0.0) -> float:
-    """Speed of a driver who goes some way from the own speed to an advised one [m/s].
-
-    Parameters
-    ----------
-    own, advised : float
-        Speeds [m/s].
-    strength : float
-        How far down, 0 (not at all) … 1 (all the way).
-    trust : float
-        How far up, 0 … 1.
-    """
+    """Speed of a driver who goes some way from the own speed to an advised one [m/s] (`own`, `advised` [m/s])."""
     return own + strength * min(0.0, advised - own) + trust * max(0.0, advised - own)

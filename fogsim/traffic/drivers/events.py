@@ -16,21 +16,9 @@ Order = tuple[float, float]
 def signed_gap(ahead: float | None, behind: float | None, length: float, ego_length: float) -> float | None:
     """Gap of a vehicle to the ego, from the ways between their front bumpers.
 
-    Parameters
-    ----------
-    ahead : float or None
-        Way along the road from the ego's front bumper to the vehicle's, at least 0 [m]; None if there is none.
-    behind : float or None
-        Way from the vehicle's front bumper to the ego's, likewise.
-    length, ego_length : float
-        Lengths of the two [m].
-
-    Returns
-    -------
-    float or None
-        Positive for a vehicle ahead of the ego: from the ego's front bumper to its rear bumper [m]. Negative for one
-        behind it: minus the gap from its front bumper to the ego's rear bumper. 0 while they are beside one another.
-        None if no way leads from one to the other.
+    Returns positive for a vehicle ahead of the ego: from the ego's front bumper to its rear bumper [m]. Negative for
+    one behind it: minus the gap from its front bumper to the ego's rear bumper. 0 while they are beside one another.
+    None if no way leads from one to the other. Takes `ahead` [m], `length`, `ego_length` [m].
     """
     # On a road that leads in a circle there are both ways: the shorter one counts.
     if ahead is not None and (behind is None or ahead <= behind):
@@ -40,39 +28,18 @@ def signed_gap(ahead: float | None, behind: float | None, length: float, ego_len
 
 @dataclass(frozen=True, slots=True)
 class Trigger:
-    """When an event begins: as soon as one of the conditions that are given holds.
+    """When an event begins: as soon as one of the conditions that are given holds."""
 
-    Attributes
-    ----------
-    at_position : float or None
-        Distance that the vehicle has driven since it departed [m].
-    at_time : float or None
-        Time since the ego appeared [s].
-    at_gap_to_ego : float or None
-        Gap to the ego along the road, from bumper to bumper [m]: positive for a vehicle ahead of the ego, negative for
-        one behind it, 0 for one beside it. It holds when the gap comes to this value or passes it, from either side,
-        and for a vehicle that is nearer on the same side already when both are first on the road.
-    name : str
-        What the event is called in messages.
-    """
-
-    at_position: float | None = None
-    at_time: float | None = None
+    at_position: float | None = None  # Distance that the vehicle has driven since it departed [m]
+    at_time: float | None = None  # Time since the ego appeared [s]
+    # Gap to the ego along the road, from bumper to bumper [m]: positive for a vehicle ahead of the ego, negative for
+    # one behind it, 0 for one beside it. It holds when the gap comes to this value or passes it, from either side, and
+    # for a vehicle that is nearer on the same side already when both are first on the road
     at_gap_to_ego: float | None = None
-    name: str = ""
+    name: str = ""  # What the event is called in messages
 
     def fires(self, time: float, driven: float, gap: float | None, earlier_gap: float | None) -> bool:
-        """Tell whether the event begins.
-
-        Parameters
-        ----------
-        time : float
-            Time since the ego appeared [s]; negative before.
-        driven : float
-            Distance that the vehicle has driven [m].
-        gap, earlier_gap : float or None
-            Its gap to the ego now and in the step before, as of `signed_gap` [m]; None where there was none.
-        """
+        """Tell whether the event begins (`time` [s], `driven` [m], `gap`, `earlier_gap` [m])."""
         return (
             (self.at_position is not None and driven >= self.at_position)
             or (self.at_time is not None and time >= self.at_time)
@@ -89,68 +56,32 @@ def _reaches(wanted: float, gap: float, earlier: float | None) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class BrakeEvent:
-    """A vehicle brakes, holds the lower speed, and drives on.
+    """A vehicle brakes, holds the lower speed, and drives on."""
 
-    Attributes
-    ----------
-    vehicle : str
-        Its id.
-    trigger : Trigger
-        When.
-    to_speed : float
-        Speed that it brakes to [m/s]; 0 is a standstill.
-    deceleration : float
-        Deceleration while braking [m/s²], positive; the vehicle's own limit applies too.
-    hold : float
-        Time from the beginning of the braking until it drives on [s]; ``inf`` for a breakdown.
-    """
-
-    vehicle: str
-    trigger: Trigger
-    to_speed: float = 0.0
-    deceleration: float = 4.0
-    hold: float = math.inf
+    vehicle: str  # Its id
+    trigger: Trigger  # When
+    to_speed: float = 0.0  # Speed that it brakes to [m/s]; 0 is a standstill
+    deceleration: float = 4.0  # Deceleration while braking [m/s²], positive; the vehicle's own limit applies too
+    hold: float = math.inf  # Time from the beginning of the braking until it drives on [s]; ``inf`` for a breakdown
 
 
 @dataclass(frozen=True, slots=True)
 class LaneChangeEvent:
-    """A vehicle changes lane, whoever is there: it cuts in.
+    """A vehicle changes lane, whoever is there: it cuts in."""
 
-    Attributes
-    ----------
-    vehicle : str
-        Its id.
-    trigger : Trigger
-        When.
-    lanes : int
-        How many lanes to the left; negative to the right.
-    stay : float
-        Time for which it stays there [s].
-    """
-
-    vehicle: str
-    trigger: Trigger
-    lanes: int
-    stay: float = 60.0
+    vehicle: str  # Its id
+    trigger: Trigger  # When
+    lanes: int  # How many lanes to the left; negative to the right
+    stay: float = 60.0  # Time for which it stays there [s]
 
 
 @dataclass(frozen=True, slots=True)
 class LampFailureEvent:
-    """Lamps of a vehicle go dark, or are switched by hand.
+    """Lamps of a vehicle go dark, or are switched by hand."""
 
-    Attributes
-    ----------
-    vehicle : str
-        Its id.
-    trigger : Trigger
-        When.
-    switches : tuple of SetLamps
-        Which, and how; all of them fail if there are none.
-    """
-
-    vehicle: str
-    trigger: Trigger
-    switches: tuple[SetLamps, ...] = ()
+    vehicle: str  # Its id
+    trigger: Trigger  # When
+    switches: tuple[SetLamps, ...] = ()  # Which, and how; all of them fail if there are none
 
 
 Event = BrakeEvent | LaneChangeEvent | LampFailureEvent
@@ -158,43 +89,23 @@ Event = BrakeEvent | LaneChangeEvent | LampFailureEvent
 
 @dataclass(frozen=True, slots=True)
 class Situation:
-    """What triggers look at.
+    """What triggers look at."""
 
-    Attributes
-    ----------
-    time : float
-        Time since the ego appeared [s].
-    present : set of str
-        Vehicles on the road.
-    driven : callable
-        Distance that a vehicle has driven [m].
-    gap_to_ego : callable
-        Gap of a vehicle to the ego along the road, as of `signed_gap` [m]; None if there is none.
-    has_lane : callable
-        Whether a vehicle could go so many lanes to the left, negative to the right, where it is.
-    """
-
-    time: float
-    present: set[str]
-    driven: Callable[[str], float]
+    time: float  # Time since the ego appeared [s]
+    present: set[str]  # Vehicles on the road
+    driven: Callable[[str], float]  # Distance that a vehicle has driven [m]
+    # Gap of a vehicle to the ego along the road, as of `signed_gap` [m]; None if there is none
     gap_to_ego: Callable[[str], float | None]
+    # Whether a vehicle could go so many lanes to the left, negative to the right, where it is
     has_lane: Callable[[str, int], bool]
 
 
 @dataclass(frozen=True, slots=True)
 class ScriptedActions:
-    """What the script asks for in this step.
+    """What the script asks for in this step."""
 
-    Attributes
-    ----------
-    orders : mapping from vehicle id to Order
-        Speeds to bring vehicles to.
-    lane_changes : tuple of ChangeLane
-        Lane changes that begin now.
-    """
-
-    orders: Mapping[str, Order]
-    lane_changes: tuple[ChangeLane, ...]
+    orders: Mapping[str, Order]  # Speeds to bring vehicles to
+    lane_changes: tuple[ChangeLane, ...]  # Lane changes that begin now
 
 
 class Script:
@@ -230,13 +141,7 @@ class Script:
         return not (self._waiting or self._braking)
 
     def play(self, situation: Situation) -> ScriptedActions:
-        """Begin what is due and go on with what has begun.
-
-        Parameters
-        ----------
-        situation : Situation
-            What triggers depend on.
-        """
+        """Begin what is due and go on with what has begun."""
         begun = self._begin(situation) if self._waiting else []
         return ScriptedActions(
             orders=self._orders(situation) if self._braking else {},
@@ -244,17 +149,7 @@ class Script:
         )
 
     def unplayed(self, seen: Collection[str], present: Collection[str], others: Iterable[str] = ()) -> Unplayed:
-        """Tell what has not been played so far.
-
-        Parameters
-        ----------
-        seen : collection of str
-            Vehicles that have been on the road, at any time.
-        present : collection of str
-            Those that are on it now.
-        others : iterable of str
-            Vehicles that are expected beside those of the events.
-        """
+        """Tell what has not been played so far."""
 
         def why(event: Event) -> Reason:
             if event in self._without_lane:

@@ -33,12 +33,6 @@ _OF_CLASSES = {
 
 
 def eye_height(vehicle_class: str, shape: str = "", length: float = 0.0) -> float:
-    """Height of a driver's eyes above the road [m].
-
-    Parameters
-    ----------
-    vehicle_class, shape, length
-        Of the vehicle; see `fogsim.traffic.appearance.body_kind`.
-    """
+    """Height of a driver's eyes above the road [m]."""
     known = _OF_CLASSES.get(vehicle_class)
     return EYE_HEIGHTS[body_kind(vehicle_class, shape, length)] if known is None else known

@@ -22,24 +22,12 @@ RECOMMENDED_HEADWAY = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """What a driver's wish of a headway depends on.
+    """What a driver's wish of a headway depends on."""
 
-    Attributes
-    ----------
-    visibility : float
-        Visibility that drivers go by [m].
-    reach : LeaderReach
-        How far away they see a vehicle ahead.
-    speed : float
-        Their speed [m/s].
-    minimum_gap : float
-        Gap that they keep at a standstill [m].
-    """
-
-    visibility: float
-    reach: LeaderReach
-    speed: float
-    minimum_gap: float
+    visibility: float  # Visibility that drivers go by [m]
+    reach: LeaderReach  # How far away they see a vehicle ahead
+    speed: float  # Their speed [m/s]
+    minimum_gap: float  # Gap that they keep at a standstill [m]
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,38 +36,19 @@ class FollowingModel:
 
     So do drivers on a time schedule (van der Hulst, Rothengatter & Meijman 1998), and on the whole the traffic on a
     Dutch motorway: following distances fell by no more than speeds did (Hogema & van der Horst 1994).
-
-    Attributes
-    ----------
-    keeps_up : bool
-        Whether they drive as fast as a leader whom they see, where by themselves they would be slower in fog.
-    kept_share : float
-        Gap that they do not exceed, as a share of how far away they see the leader [-]; ``inf`` if they do.
     """
 
+    # Whether they drive as fast as a leader whom they see, where by themselves they would be slower in fog
     keeps_up: bool = field(default=False, kw_only=True)
+    # Gap that they do not exceed, as a share of how far away they see the leader [-]; ``inf`` if they do
     kept_share: float = field(default=math.inf, kw_only=True)
 
     def headway(self, own: float, around: Surroundings) -> float:  # noqa: ARG002 - kinds of drivers look around
-        """Time headway that is wanted [s], over which the minimum gap comes.
-
-        Parameters
-        ----------
-        own : float
-            Time headway wanted in clear air [s].
-        around : Surroundings
-            What they see, and how fast they drive.
-        """
+        """Time headway that is wanted [s], over which the minimum gap comes (`own` [s])."""
         return own
 
     def top_speed(self, reach: LeaderReach) -> float:  # noqa: ARG002 - kinds of drivers look around
-        """Speed that they do not exceed so as not to come too near [m/s]; ``inf`` for none.
-
-        Parameters
-        ----------
-        reach : LeaderReach
-            How far away they see a vehicle ahead.
-        """
+        """Speed that they do not exceed so as not to come too near [m/s]; ``inf`` for none."""
         return math.inf
 
 
@@ -89,25 +58,14 @@ class InSight(FollowingModel):
 
     Closing in until the outline is well seen shortens the time to notice that the gap changes (Caro, Cavallo et al.
     2009), and spares the driver the search for the road (Saffarian, Happee & de Winter 2012).
-
-    Attributes
-    ----------
-    shortest : float
-        No headway is shorter for that [s]; so much is FogSim's own, and so is the share of sight.
     """
 
-    shortest: float = 0.5
+    shortest: float = 0.5  # No headway is shorter for that [s]; so much is FogSim's own, and so is the share of sight
     keeps_up: bool = field(default=True, kw_only=True)
     kept_share: float = field(default=0.7, kw_only=True)
 
     def headway(self, own: float, around: Surroundings) -> float:
-        """Headway at which the leader is in sight, at most the own one [s].
-
-        Parameters
-        ----------
-        own, around
-            As of `FollowingModel`.
-        """
+        """Headway at which the leader is in sight, at most the own one [s]."""
         farthest = self.kept_share * around.reach.farthest - around.minimum_gap
         if own * around.speed <= farthest:
             return own
@@ -120,29 +78,14 @@ class Careful(FollowingModel):
 
     Drivers without time pressure keep longer headways where they see less far ahead (van der Hulst, Rothengatter &
     Meijman 1998, 1999). By how much is FogSim's own: linear in visibility to the recommended one.
-
-    Attributes
-    ----------
-    recommended : float
-        Headway in dense fog, unless the own one is longer [s].
-    unaffected_above : float
-        Visibility from which the headway is that of clear air [m].
-    dense : float
-        Visibility up to which the headway is the recommended one [m].
     """
 
-    recommended: float = RECOMMENDED_HEADWAY
-    unaffected_above: float = 200.0
-    dense: float = 50.0
+    recommended: float = RECOMMENDED_HEADWAY  # Headway in dense fog, unless the own one is longer [s]
+    unaffected_above: float = 200.0  # Visibility from which the headway is that of clear air [m]
+    dense: float = 50.0  # Visibility up to which the headway is the recommended one [m]
 
     def headway(self, own: float, around: Surroundings) -> float:
-        """Headway that grows in fog [s].
-
-        Parameters
-        ----------
-        own, around
-            As of `FollowingModel`.
-        """
+        """Headway that grows in fog [s]."""
         density = (self.unaffected_above - around.visibility) / (self.unaffected_above - self.dense)
         return own + max(self.recommended - own, 0.0) * min(max(density, 0.0), 1.0)
 
@@ -156,13 +99,7 @@ class OutOfSight(Careful):
     """
 
     def top_speed(self, reach: LeaderReach) -> float:
-        """Speed at which the recommended headway is as long as they see [m/s].
-
-        Parameters
-        ----------
-        reach : LeaderReach
-            As of `FollowingModel`.
-        """
+        """Speed at which the recommended headway is as long as they see [m/s]."""
         return reach.farthest / self.recommended
 
 
@@ -183,14 +120,7 @@ def misjudged_headway(wanted: float, around: Surroundings, misjudgement: float) 
     shorter headways at a visibility of 30 m: Cavallo & Beaudoin; closing in until the outline shows: Caro, Cavallo et
     al. 2009).
 
-    Parameters
-    ----------
-    wanted : float
-        Time headway that they want [s].
-    around : Surroundings
-        What they see, and how fast they drive.
-    misjudgement : float
-        By which share distances are overestimated where only lamps are seen [-].
+    Takes `wanted` [s].
     """
     gap = wanted * around.speed + around.minimum_gap
     if misjudgement == 0.0 or gap <= around.reach.by_body or around.speed <= 0.0:

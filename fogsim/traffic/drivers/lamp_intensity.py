@@ -46,36 +46,18 @@ down has 0.52, 0.22, 0.05 at 5°, 10°, 20°, the mean of both sides."""
 
 @functools.lru_cache(maxsize=1024)
 def kinds_that_burn(lamps: int) -> int:
-    """Kinds of lamps of which that on the left or that on the right burns, bits of `Lamp`.
-
-    Parameters
-    ----------
-    lamps : int
-        Lit lamps as `TrafficState.lamps` has them; here and below there may be dark sides of kinds that are not lit.
-    """
+    """Kinds of lamps of which that on the left or that on the right burns, bits of `Lamp`."""
     return burning(lamps, Side.LEFT) | burning(lamps, Side.RIGHT)
 
 
 @functools.lru_cache(maxsize=1024)
 def head_lamps_that_burn(lamps: int) -> tuple[int, ...]:
-    """Beams, bits of `Lamp`, of each of a vehicle's two head lamps that burns.
-
-    Parameters
-    ----------
-    lamps : int
-        Its lit lamps.
-    """
+    """Beams, bits of `Lamp`, of each of a vehicle's two head lamps that burns."""
     return tuple(lit for side in (Side.LEFT, Side.RIGHT) if (lit := burning(lamps, side) & HEAD_LAMPS))
 
 
 def burning_head_lamps(lamps: int) -> float:
-    """Share of a vehicle's head lamps that burn [-].
-
-    Parameters
-    ----------
-    lamps : int
-        Its lit lamps.
-    """
+    """Share of a vehicle's head lamps that burn [-]."""
     return 0.5 * len(head_lamps_that_burn(lamps))
 
 
@@ -84,11 +66,6 @@ def rear_intensity(lamps: int) -> float:
     """Luminous intensity of the brightest rear lamp that is lit [cd].
 
     Of two alike each is seen by itself, so that one that fails changes nothing as long as the other one burns.
-
-    Parameters
-    ----------
-    lamps : int
-        Lit lamps.
     """
     kinds = kinds_that_burn(lamps)
     third = THIRD_STOP_LAMP if burning(lamps, Side.MIDDLE) else 0.0
@@ -96,17 +73,7 @@ def rear_intensity(lamps: int) -> float:
 
 
 def intensity_toward(lamps: int, length: float, ahead: float, aside: float) -> float:
-    """Luminous intensity of the brightest lamp of a vehicle toward an eye [cd].
-
-    Parameters
-    ----------
-    lamps : int
-        Its lit lamps.
-    length : float
-        Its length [m].
-    ahead, aside : float
-        Where the eye is, from the middle of the front bumper: ahead of it and to either side [m].
-    """
+    """Luminous intensity of the brightest lamp of a vehicle toward an eye [cd] (`length` [m], `ahead`, `aside` [m])."""
     kinds = kinds_that_burn(lamps)
     if not lamps:
         return 0.0
@@ -123,13 +90,7 @@ def intensity_toward(lamps: int, length: float, ahead: float, aside: float) -> f
 
 
 def head_lamp_share(bearing: float) -> float:
-    """Light of the own head lamps in a direction over that straight ahead [-].
-
-    Parameters
-    ----------
-    bearing : float
-        Angle from straight ahead, to either side [rad].
-    """
+    """Light of the own head lamps in a direction over that straight ahead [-] (`bearing` [rad])."""
     return math.exp(-abs(bearing) / BEAM_WIDTH)
 
 
@@ -140,15 +101,7 @@ def _front_intensity(lamps: int, angle: float) -> float:
 
 
 def beam_intensity(lamps: int, degrees: float) -> float:
-    """Luminous intensity of one head lamp toward an eye as high as it or a little higher [cd].
-
-    Parameters
-    ----------
-    lamps : int
-        Lit lamps, bits of `Lamp`; 0 without head lamps.
-    degrees : float
-        Angle of the eye from the lamp's axis [°], not negative.
-    """
+    """Luminous intensity of one head lamp toward an eye as high as it or a little higher [cd] (`degrees` [°])."""
     if lamps & int(Lamp.HIGH_BEAM):
         return 32585.0 * math.exp(-((degrees / 5.669) ** 1.202)) + 1674.0 * math.exp(-((degrees / 23.30) ** 1.5))
     if lamps & int(Lamp.LOW_BEAM):

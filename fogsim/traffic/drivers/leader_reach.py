@@ -21,18 +21,11 @@ _STEPS_PER_E_FOLD = 100
 
 @dataclass(frozen=True, slots=True)
 class LeaderReach:
-    """Distances up to which drivers see a typical vehicle ahead.
+    """Distances up to which drivers see a typical vehicle ahead."""
 
-    Attributes
-    ----------
-    by_body : float
-        Its body, against the airlight or in the own head lamps [m]; ``inf`` where fog hides nothing that matters.
-    farthest : float
-        Anything of it, with lit rear position lamps [m].
-    """
-
+    # Its body, against the airlight or in the own head lamps [m]; ``inf`` where fog hides nothing that matters
     by_body: float
-    farthest: float
+    farthest: float  # Anything of it, with lit rear position lamps [m]
 
 
 CLEAR = LeaderReach(math.inf, math.inf)
@@ -40,30 +33,17 @@ CLEAR = LeaderReach(math.inf, math.inf)
 
 
 def leader_reach(sight: DriverSight | None, visibility: float) -> LeaderReach:
-    """How far away drivers see a typical vehicle ahead in even fog, to half a percent.
-
-    Parameters
-    ----------
-    sight : DriverSight or None
-        Their eyes; None if they see through the fog.
-    visibility : float
-        Meteorological visibility [m]; ``inf`` in clear air.
-    """
+    """How far away drivers see a typical vehicle ahead in even fog, to half a percent (`visibility` [m])."""
     return CLEAR if sight is None or math.isinf(visibility) else _leader_reach(sight, _step(visibility))
 
 
 def drivers_visibility(sight: DriverSight | None, visibility: float) -> float:
     """Visibility that drivers go by [m]: the meteorological one by day, in darkness at most the range of a rear lamp.
 
-    White & Jeffery 1980: speeds by night follow those by day if visibility is the distance at which a rear light of
-    2 cd is seen.
+    White & Jeffery 1980: speeds by night follow those by day if visibility is the distance at which a rear light of 2
+    cd is seen.
 
-    Parameters
-    ----------
-    sight : DriverSight or None
-        Their eyes; None if they see through the fog.
-    visibility : float
-        Meteorological visibility [m]; ``inf`` in clear air.
+    Takes `visibility` [m].
     """
     if sight is None or sight.illuminance >= DAY_ILLUMINANCE or math.isinf(visibility):
         return visibility

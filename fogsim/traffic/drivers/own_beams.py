@@ -18,25 +18,13 @@ HALF_VEIL_EXTINCTION = 0.0325
 
 @functools.lru_cache(maxsize=1024)
 def head_lamp_light(lamps: int) -> float:
-    """Light of a vehicle's head lamps straight ahead over that of two low beams [-].
-
-    Parameters
-    ----------
-    lamps : int
-        Its lit lamps, as `TrafficState.lamps` has them.
-    """
+    """Light of a vehicle's head lamps straight ahead over that of two low beams [-]."""
     high = int(Lamp.HIGH_BEAM)
     return sum(0.5 * (HIGH_BEAM_LIGHT if lit & high else 1.0) for lit in head_lamps_that_burn(lamps))
 
 
 def uses_high_beam(lamps: int) -> bool:
-    """Whether a head lamp shines its high beam.
-
-    Parameters
-    ----------
-    lamps : int
-        Lit lamps, likewise.
-    """
+    """Whether a head lamp shines its high beam."""
     return head_lamp_light(lamps) > 1.0
 
 
@@ -44,12 +32,9 @@ def high_beam_veil(extinction: float) -> float:
     """What fog adds to the veil before a driver's eyes when high beams take the place of low beams [cd/m²].
 
     A fit to the veil of the pictures in moderate radiation fog (docs/explanation/night.md), from a car driver's eyes
-    toward the road 40 m ahead: within 10 % from V_met = 30 m to 1000 m. From higher up it is less: 0.6 of it from
-    1.5 m.
+    toward the road 40 m ahead: within 10 % from V_met = 30 m to 1000 m. From higher up it is less: 0.6 of it from 1.5
+    m.
 
-    Parameters
-    ----------
-    extinction : float
-        Extinction coefficient at the eyes [1/m].
+    Takes `extinction` [1/m].
     """
     return DENSEST_VEIL * extinction / (extinction + HALF_VEIL_EXTINCTION)

@@ -23,27 +23,15 @@ LEAST_ACCELERATION, MOST_ACCELERATION = -6.0, 2.5
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """What actions look at.
+    """What actions look at."""
 
-    Attributes
-    ----------
-    time : float
-        Time since the ego appeared [s].
-    step : float
-        Time to the next step [s].
-    present : collection of str
-        Vehicles on the road.
-    driven, speed : callable
-        Distance that a vehicle has driven [m], and its speed [m/s].
-    gap : callable
-        Gap from a vehicle to another that is ahead of it, bumper to bumper [m]; None if there is none.
-    """
-
-    time: float
-    step: float
-    present: Collection[str]
+    time: float  # Time since the ego appeared [s]
+    step: float  # Time to the next step [s]
+    present: Collection[str]  # Vehicles on the road
+    # driven, speed: distance that a vehicle has driven [m], and its speed [m/s]
     driven: Callable[[str], float]
     speed: Callable[[str], float]
+    # Gap from a vehicle to another that is ahead of it, bumper to bumper [m]; None if there is none
     gap: Callable[[str, str], float | None]
 
 
@@ -72,17 +60,7 @@ class _SpeedCourse:
 
 
 def speed_on_the_way(action: ChangeSpeed, first: float, passed: float) -> float:
-    """Speed at a time on the way from one speed to another [m/s].
-
-    Parameters
-    ----------
-    action : ChangeSpeed
-        The change.
-    first : float
-        Speed at its beginning [m/s].
-    passed : float
-        Time since then [s].
-    """
+    """Speed at a time on the way from one speed to another [m/s] (`first` [m/s], `passed` [s])."""
     if action.profile:
         times, speeds = zip(*action.profile, strict=True)
         return float(np.interp(passed, (0.0, *times), (first, *speeds)))
@@ -188,13 +166,7 @@ class Lamps:
         return frozenset(self._switches)
 
     def switch(self, action: SetLamps) -> None:
-        """Switch lamps.
-
-        Parameters
-        ----------
-        action : SetLamps
-            Which.
-        """
+        """Switch lamps."""
         sides = self._switches.setdefault(action.vehicle, {side: _Switches() for side in Side})
         for now in sides.values() if action.side is None else (sides[action.side],):
             now.failed |= action.failed
@@ -202,15 +174,7 @@ class Lamps:
             now.dark = now.dark & ~(action.lit | action.automatic) | action.dark
 
     def switched(self, vehicle: str, own: int) -> int:
-        """Lamps of a vehicle as they are switched, with the bits of every side that is dark.
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        own : int
-            Lamps that it would have lit by itself, bits of `Lamp`.
-        """
+        """Lamps of a vehicle as they are switched, with the bits of every side that is dark."""
         lamps = own
         for side, switches in self._switches.get(vehicle, {}).items():
             # A kind that is lit by hand on one side, and not by itself, is dark on the others.
@@ -222,25 +186,11 @@ class Lamps:
         return lamps
 
     def indicate(self, indicating: _Indicating) -> None:
-        """Let a vehicle indicate.
-
-        Parameters
-        ----------
-        indicating : _Indicating
-            Which, and until when.
-        """
+        """Let a vehicle indicate."""
         self._indicating[indicating.change.vehicle] = indicating
 
     def shown(self, state: TrafficState, time: float) -> TrafficState:
-        """A state with the lamps as they are.
-
-        Parameters
-        ----------
-        state : TrafficState
-            With the lamps that the vehicles would have lit by themselves.
-        time : float
-            Time since the ego appeared [s].
-        """
+        """A state with the lamps as they are (`time` [s])."""
         self._indicating = {v: one for v, one in self._indicating.items() if time < one.ends}
         touched = {v for v in (*self._switches, *self._indicating) if v in state.ids}
         if not touched:
@@ -261,13 +211,7 @@ USUAL_DURATION = 3.0
 
 
 class Playing:
-    """Plays what has begun.
-
-    Parameters
-    ----------
-    lamps : Lamps
-        Lamps that are not the vehicles' own.
-    """
+    """Plays what has begun."""
 
     def __init__(self, lamps: Lamps) -> None:
         self._lamps = lamps
@@ -285,15 +229,7 @@ class Playing:
         return frozenset(v for v, course in self._courses.items() if isinstance(course, _FollowCourse))
 
     def begin(self, action: TrafficAction, motion: Motion) -> None:
-        """Begin an action of a vehicle on the road; of several on a speed the last one counts.
-
-        Parameters
-        ----------
-        action : TrafficAction
-            What; traffic lights are not drivers' business, and left alone.
-        motion : Motion
-            How everybody moves.
-        """
+        """Begin an action of a vehicle on the road; of several on a speed the last one counts."""
         match action:
             case ChangeSpeed():
                 self._courses[action.vehicle] = _SpeedCourse(action, motion.time, motion.speed(action.vehicle))
@@ -315,13 +251,7 @@ class Playing:
                 self._lamps.switch(action)
 
     def speeds(self, motion: Motion) -> dict[str, float]:
-        """Speeds that vehicles are to have after the next step [m/s]; ``inf`` for a driver who is free.
-
-        Parameters
-        ----------
-        motion : Motion
-            How everybody moves.
-        """
+        """Speeds that vehicles are to have after the next step [m/s]; ``inf`` for a driver who is free."""
         speeds: dict[str, float] = {}
         for vehicle, course in list(self._courses.items()):
             speed = course.speed(motion) if vehicle in motion.present else None
@@ -332,13 +262,7 @@ class Playing:
         return speeds
 
     def changes(self, motion: Motion) -> tuple[ChangeLane, ...]:
-        """Changes of lane that are to be made now.
-
-        Parameters
-        ----------
-        motion : Motion
-            How everybody moves.
-        """
+        """Changes of lane that are to be made now."""
         due = [one for one in self._due_changes if one.begins <= motion.time + 1e-9]
         self._due_changes = [one for one in self._due_changes if one not in due]
         return tuple(one.change for one in due if one.change.vehicle in motion.present)

@@ -42,22 +42,10 @@ class FogAccess(Protocol):
         """An extinction coefficient that the fog reaches everywhere near the road [1/m]; 0 if there is none."""
 
     def extinction(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Extinction coefficient at points (..., 3) [1/m].
-
-        Parameters
-        ----------
-        points : (..., 3) array_like
-            Points [m].
-        """
+        """Extinction coefficient at points (..., 3) [1/m] (`points` (..., 3) [m])."""
 
     def optical_depth(self, start: ArrayLike, end: ArrayLike) -> NDArray[np.float64]:
-        """Optical depth between points (..., 3) [-].
-
-        Parameters
-        ----------
-        start, end : (..., 3) array_like
-            Points [m].
-        """
+        """Optical depth between points (..., 3) [-] (`start`, `end` (..., 3) [m])."""
 
 
 class ClearAir:
@@ -76,27 +64,16 @@ class ClearAir:
 
 @dataclass(frozen=True, slots=True)
 class DriverSight:
-    """Eyes and headlamps of a driver.
+    """Eyes and headlamps of a driver."""
 
-    Attributes
-    ----------
-    illuminance : float
-        Horizontal illuminance of the scene [lx].
-    headlamp_reach : float
-        Distance at which an unlit vehicle is seen in the own headlamps at night in clear air [m].
-    reaction_time : float
-        Time from the first sight of a leader that was not to be seen before to the first reaction [s]; for surprised
-        drivers 1 s and more.
-    contrast_threshold : float
-        Smallest contrast that is noticed by day [-].
-    airlight_share : float
-        The airlight over that of a white horizontal surface [-]: before darker fog, paint stands out less.
-    """
-
-    illuminance: float
+    illuminance: float  # Horizontal illuminance of the scene [lx]
+    # Distance at which an unlit vehicle is seen in the own headlamps at night in clear air [m]
     headlamp_reach: float = 55.0
+    # Time from the first sight of a leader that was not to be seen before to the first reaction [s]; for surprised
+    # drivers 1 s and more
     reaction_time: float = 1.0
-    contrast_threshold: float = CONTRAST_THRESHOLD
+    contrast_threshold: float = CONTRAST_THRESHOLD  # Smallest contrast that is noticed by day [-]
+    # The airlight over that of a white horizontal surface [-]: before darker fog, paint stands out less
     airlight_share: float = AIRLIGHT_SHARE
 
     def depth_limit(
@@ -109,23 +86,8 @@ class DriverSight:
     ) -> float:
         """Optical depth up to which a vehicle is seen, which falls with its distance [-].
 
-        Parameters
-        ----------
-        distance : float
-            Distance [m], positive.
-        inherent_contrast : float
-            Contrast of the body to the airlight without fog between, 0 … 1.
-        intensity : float
-            Luminous intensity of its brightest lamp toward the eye [cd].
-        head_lamps : float
-            Light of the own head lamps toward it over that of low beams straight ahead [-]; 0 while they are dark.
-        glare : float
-            Veil inside the eye from others' head lamps, and before it from own high beams in fog [cd/m²].
-
-        Returns
-        -------
-        float
-            Negative for a vehicle that is not even seen without fog, ``-inf`` where there is no light at all.
+        Returns negative for a vehicle that is not even seen without fog, ``-inf`` where there is no light at all. Takes
+        `distance` [m], `intensity` [cd], `glare` [cd/m²].
         """
         eyes, threshold, reach = self._eyes(glare)
         seen = float(inherent_contrast), float(intensity), float(head_lamps)
@@ -148,17 +110,7 @@ class DriverSight:
     ) -> float:
         """Distance up to which a vehicle is seen in even fog, up to 1 cm less [m].
 
-        Parameters
-        ----------
-        extinction : float
-            Extinction coefficient [1/m].
-        inherent_contrast, intensity, head_lamps, glare : float
-            See `depth_limit`.
-
-        Returns
-        -------
-        float
-            ``inf`` beyond `sight_kernels.FARTHEST`.
+        Returns ``inf`` beyond `sight_kernels.FARTHEST`. Takes `extinction` [1/m].
         """
         eyes, threshold, reach = self._eyes(glare)
         seen = float(inherent_contrast), float(intensity), float(head_lamps)
@@ -169,21 +121,7 @@ class DriverSight:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Whether leaders are seen, and for how long that is sure to stay so [s].
 
-        Parameters
-        ----------
-        facing : (10, n) float64
-            What is known of drivers and their leaders; rows of `sight_kernels`.
-        most_glare : float
-            Veil inside the eye that there may be at most [cd/m²].
-        horizon : float
-            Longest time of interest [s].
-
-        Returns
-        -------
-        (n,) float64
-            `sight_kernels.SEEN`, `HIDDEN` or, where it depends on the glare, `DAZZLED`.
-        (n,) float64
-            For how long [s].
+        Takes `facing` (10, n), `most_glare` [cd/m²], `horizon` [s].
         """
         judged = np.empty((2, facing.shape[1]))
         eyes, threshold, reach = self._eyes(0.0)
@@ -193,12 +131,7 @@ class DriverSight:
     def sure_distance(self, maximum_extinction: float, most_glare: float = 0.0) -> float:
         """Distance up to which every body is seen, without any lamps, where the fog is nowhere denser than given [m].
 
-        Parameters
-        ----------
-        maximum_extinction : float
-            Extinction coefficient [1/m].
-        most_glare : float
-            Veil inside the eye that there may be at most [cd/m²].
+        Takes `maximum_extinction` [1/m], `most_glare` [cd/m²].
         """
         least = inherent_contrast((1.0, 1.0, 1.0), self.airlight_share)
         return self.seen_distance(maximum_extinction, least, head_lamps=0.0, glare=most_glare)
@@ -206,12 +139,7 @@ class DriverSight:
     def hidden_distance(self, minimum_extinction: float, brightest: float = BRIGHTEST) -> float:
         """Distance from which nothing of a vehicle is seen where the fog is nowhere thinner than given [m].
 
-        Parameters
-        ----------
-        minimum_extinction : float
-            Extinction coefficient [1/m].
-        brightest : float
-            Luminous intensity of the brightest lamp that there may be [cd].
+        Takes `minimum_extinction` [1/m], `brightest` [cd].
         """
         # By day nobody sees by head lamps.
         own = HIGH_BEAM_LIGHT if self.illuminance < DAY_ILLUMINANCE else 1.0
@@ -222,13 +150,6 @@ def inherent_contrast(paint: tuple[float, float, float], airlight_share: float =
     """Contrast of a vehicle's rear to the airlight, 0 … 1.
 
     A third of the rear is dark glass, tyres and shadow; the rest is paint under half of the sky.
-
-    Parameters
-    ----------
-    paint : tuple of float
-        Linear reflectance, 0 … 1.
-    airlight_share : float
-        The airlight over that of a white horizontal surface [-].
     """
     reflectance = luminance_of(paint) * 2.0 / 3.0
     return max(0.0, 1.0 - VERTICAL_ILLUMINANCE * reflectance / airlight_share)

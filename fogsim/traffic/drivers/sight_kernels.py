@@ -40,24 +40,12 @@ the contrast of its body [-], and its driver's eyes above the road [m]."""
 
 
 class Closing(NamedTuple):
-    """Bounds on how fast gaps and what lies in them change.
+    """Bounds on how fast gaps and what lies in them change."""
 
-    Attributes
-    ----------
-    speed : float
-        By how much one vehicle's speed changes, on the average over the time that is looked ahead [m/s].
-    drift : float
-        How fast fog drifts and changes [m/s].
-    extinction : float
-        Extinction coefficient that is exceeded nowhere [1/m].
-    is_even : bool
-        Whether the fog is the same everywhere, so that nothing but the gap changes its optical depth.
-    """
-
-    speed: float
-    drift: float
-    extinction: float
-    is_even: bool
+    speed: float  # By how much one vehicle's speed changes, on the average over the time that is looked ahead [m/s]
+    drift: float  # How fast fog drifts and changes [m/s]
+    extinction: float  # Extinction coefficient that is exceeded nowhere [1/m]
+    is_even: bool  # Whether the fog is the same everywhere, so that nothing but the gap changes its optical depth
 
 
 @kernel
@@ -72,20 +60,7 @@ def face_leaders(
 ) -> None:
     """Put down where leaders are, how fast that changes, and the lines on which drivers look at them.
 
-    Parameters
-    ----------
-    vehicles : (m, 7) float64
-        Columns `X` to `EYE_HEIGHT`.
-    behind, ahead : (n,) int64
-        Rows of followers and leaders.
-    gaps : (n,) float64
-        SUMO's gaps between them [m], which leave out the followers' minimum gaps.
-    closing : Closing
-        Bounds on how fast that changes.
-    facing : (10, n) float64
-        Rows `DISTANCE`, `CLOSING`, `DEEPENING` and `CONTRAST` are written.
-    lines : (2, n, 3) float64
-        The drivers' eyes, and the leaders' rears at that height, at most in the middle of their bodies [m]; written to.
+    Takes `vehicles` (m, 7), `behind`, `ahead` (n,) int64, `gaps` (n,) [m], `facing` (10, n), `lines` (2, n, 3) [m].
     """
     for i in range(gaps.size):
         own, other = vehicles[behind[i]], vehicles[ahead[i]]
@@ -115,16 +90,7 @@ def depth_limit(
 ) -> float:
     """Optical depth up to which a vehicle is seen [-]; see `DriverSight.depth_limit`.
 
-    Parameters
-    ----------
-    eyes : Adaptation
-        Whose.
-    threshold : float
-        Smallest contrast that is noticed by day [-].
-    reach : float
-        Distance at which an unlit vehicle is seen in the own head lamps at night in clear air [m].
-    distance, contrast, intensity, head_lamps : float
-        Of the vehicle [m], [-], [cd], [-].
+    Takes `reach` [m], `distance`, `contrast`, `intensity`, `head_lamps` [m], [cd].
     """
     squared = distance * distance
     once = contrast * eyes.airlight / (eyes.luminance * (threshold * contrast_ratio(eyes, distance)))
@@ -146,18 +112,7 @@ def seen_distance(
 ) -> float:
     """Distance up to which a vehicle is seen in even fog [m]; see `DriverSight.seen_distance`.
 
-    Parameters
-    ----------
-    eyes : Adaptation
-        Whose.
-    threshold : float
-        Smallest contrast that is noticed by day [-].
-    reach : float
-        Distance at which an unlit vehicle is seen in the own head lamps at night in clear air [m].
-    extinction : float
-        Extinction coefficient [1/m].
-    contrast, intensity, head_lamps : float
-        Of the vehicle [-], [cd], [-].
+    Takes `reach` [m], `extinction` [1/m], `contrast`, `intensity`, `head_lamps` [cd].
     """
     near, far = 0.0, FARTHEST
     if depth_limit(eyes, threshold, reach, far, contrast, intensity, head_lamps) >= extinction * far:
@@ -183,18 +138,7 @@ def judge_leaders(
 ) -> None:
     """Whether leaders are seen, and for how long that is sure to stay so.
 
-    Parameters
-    ----------
-    eyes, dazzled : Adaptation
-        The drivers' without glare, and in the most that there may be.
-    threshold, reach : float
-        As of `depth_limit`.
-    facing : (10, n) float64
-        Rows `DISTANCE` to `OWN`.
-    horizon : float
-        Longest time of interest [s].
-    judged : (2, n) float64
-        `HIDDEN`, `SEEN` or `DAZZLED`; and for how long [s]. Written to.
+    Takes `facing` (10, n), `horizon` [s], `judged` (2, n) [s].
     """
     for i in range(facing.shape[1]):
         distance, depth, contrast = facing[DISTANCE, i], facing[DEPTH, i], facing[CONTRAST, i]

@@ -35,33 +35,16 @@ class RelativeChoice(Protocol):
     """A choice that also slows drivers relative to the speed that they would drive in clear air, on any road."""
 
     def __call__(self, visibility: float) -> float:
-        """Speed that a driver will not exceed [m/s].
-
-        Parameters
-        ----------
-        visibility : float
-            Meteorological visibility [m].
-        """
+        """Speed that a driver will not exceed [m/s] (`visibility` [m])."""
 
     def share(self, visibility: float) -> float:
-        """Share of the speed in clear air that a driver still wants [-].
-
-        Parameters
-        ----------
-        visibility : float
-            Meteorological visibility [m].
-        """
+        """Share of the speed in clear air that a driver still wants [-] (`visibility` [m])."""
 
 
 def speed_share(choice: Choice, visibility: float) -> float:
     """Share of the speed in clear air that drivers of a choice still want [-]; 1 if it is not relative.
 
-    Parameters
-    ----------
-    choice : Choice
-        How drivers choose.
-    visibility : float
-        Meteorological visibility [m].
+    Takes `visibility` [m].
     """
     # Asked thousands of times a second, where isinstance of a protocol takes 50 times as long.
     share: Callable[[float], float] | None = getattr(choice, "share", None)
@@ -115,54 +98,25 @@ class ObservedSpeed:
 
     How the share bends, and the ratio of 2.1, were calibrated to these sizes in motorway traffic (`fogsim reproduce
     drivers` with its calibration seeds): vehicles behind slower ones drive slower than they would by themselves.
-
-    Attributes
-    ----------
-    unaffected_above : float
-        Visibility from which drivers do not slow down [m].
-    slowest_share : float
-        Share of the speed in clear air that is still wanted in severe fog [-].
-    severe : float
-        Visibility up to which fog is severe [m].
-    overdriving : float
-        Speed over the safe one that drivers do not exceed [-].
-    overdriving_from : float
-        Visibility from which they drive so much faster than is safe [m].
-    safe_up_to : float
-        Visibility up to which they drive no faster than is safe [m].
-    curvature : float
-        Power of the density with which that share falls [-]; 1 is linear.
     """
 
-    unaffected_above: float = UNAFFECTED_ABOVE
-    slowest_share: float = 0.82
-    severe: float = 30.0
-    overdriving: float = 2.1
-    overdriving_from: float = 50.0
-    safe_up_to: float = 30.0
-    curvature: float = 1.5
+    unaffected_above: float = UNAFFECTED_ABOVE  # Visibility from which drivers do not slow down [m]
+    slowest_share: float = 0.82  # Share of the speed in clear air that is still wanted in severe fog [-]
+    severe: float = 30.0  # Visibility up to which fog is severe [m]
+    overdriving: float = 2.1  # Speed over the safe one that drivers do not exceed [-]
+    overdriving_from: float = 50.0  # Visibility from which they drive so much faster than is safe [m]
+    safe_up_to: float = 30.0  # Visibility up to which they drive no faster than is safe [m]
+    curvature: float = 1.5  # Power of the density with which that share falls [-]; 1 is linear
 
     def __call__(self, visibility: float) -> float:
-        """Speed that a driver will not exceed [m/s]; ``inf`` where fog does not matter.
-
-        Parameters
-        ----------
-        visibility : float
-            Meteorological visibility [m].
-        """
+        """Speed that a driver will not exceed [m/s]; ``inf`` where fog does not matter (`visibility` [m])."""
         if visibility >= self.unaffected_above:
             return math.inf
         rise = (visibility - self.safe_up_to) / (self.overdriving_from - self.safe_up_to)
         return (1.0 + (self.overdriving - 1.0) * _clipped(rise)) * within_sight(visibility)
 
     def share(self, visibility: float) -> float:
-        """Share of the speed in clear air that a driver still wants [-].
-
-        Parameters
-        ----------
-        visibility : float
-            Meteorological visibility [m].
-        """
+        """Share of the speed in clear air that a driver still wants [-] (`visibility` [m])."""
         density = _clipped((self.unaffected_above - visibility) / (self.unaffected_above - self.severe))
         return 1.0 - (1.0 - self.slowest_share) * math.pow(density, self.curvature)
 
@@ -182,41 +136,22 @@ SPEED_CHOICES: Registry[Choice] = Registry(
 
 @dataclass(frozen=True, slots=True)
 class DriverSetup:
-    """What drivers are like.
+    """What drivers are like."""
 
-    Attributes
-    ----------
-    speed_choice : str
-        Name in `SPEED_CHOICES`.
-    spread : float
-        Standard deviation of the logarithm of a driver's own factor on the chosen speed [-].
-    compliance : Compliance
-        How they follow advice.
-    misjudgement : float
-        By which share they take distances for longer than they are [-] where they see the lamps of a leader and not its
-        outline, and so follow closer: 0.3 … 0.6 (Cavallo, Colomb & Doré 2001).
-    following : mapping from str to float, or None
-        Shares of the kinds of drivers, by their names in `FOLLOWING_MODELS`, together 1. None stands for
-        `OBSERVED_MIXTURE` if speeds are `observed` ones, and for drivers who follow as in clear air otherwise.
-    compliance_by_display : mapping from Display to Compliance
-        How they follow advice where that depends on where they hear it; the rest as `compliance` has it.
-    """
-
-    speed_choice: str = "observed"
-    spread: float = 0.1
-    compliance: Compliance = FULL
+    speed_choice: str = "observed"  # Name in `SPEED_CHOICES`
+    spread: float = 0.1  # Standard deviation of the logarithm of a driver's own factor on the chosen speed [-]
+    compliance: Compliance = FULL  # How they follow advice
+    # By which share they take distances for longer than they are [-] where they see the lamps of a leader and not its
+    # outline, and so follow closer: 0.3 … 0.6 (Cavallo, Colomb & Doré 2001)
     misjudgement: float = 0.0
+    # Shares of the kinds of drivers, by their names in `FOLLOWING_MODELS`, together 1. None stands for
+    # `OBSERVED_MIXTURE` if speeds are `observed` ones, and for drivers who follow as in clear air otherwise
     following: Mapping[str, float] | None = None
+    # How they follow advice where that depends on where they hear it; the rest as `compliance` has it
     compliance_by_display: Mapping[Display, Compliance] = field(default_factory=dict)
 
     def compliance_with(self, display: Display) -> Compliance:
-        """How they follow advice that they hear in one way.
-
-        Parameters
-        ----------
-        display : Display
-            Where they hear it.
-        """
+        """How they follow advice that they hear in one way."""
         return self.compliance_by_display.get(display, self.compliance)
 
     @property
@@ -229,75 +164,34 @@ class DriverSetup:
 
 @dataclass(frozen=True, slots=True)
 class DriverTraits:
-    """What sets one driver apart.
+    """What sets one driver apart."""
 
-    Attributes
-    ----------
-    speed_factor : float
-        Factor on the speed that the setup's choice gives [-].
-    reached_from, moved_from : float
-        Share of drivers reached, and of those who follow, from which on this one is among them, 0 … 1: whoever follows
-        in the car when few do follows signs, too, that more do.
-    following : str
-        How they follow, a name in `FOLLOWING_MODELS`.
-    """
-
-    speed_factor: float
+    speed_factor: float  # Factor on the speed that the setup's choice gives [-]
+    # reached_from, moved_from: share of drivers reached, and of those who follow, from which on this one is among them,
+    # 0 … 1: whoever follows in the car when few do follows signs, too, that more do
     reached_from: float = 0.0
     moved_from: float = 0.0
-    following: str = "unaffected"
+    following: str = "unaffected"  # How they follow, a name in `FOLLOWING_MODELS`
 
     def follows(self, compliance: Compliance) -> bool:
-        """Whether advice reaches and moves them.
-
-        Parameters
-        ----------
-        compliance : Compliance
-            How drivers follow it.
-        """
+        """Whether advice reaches and moves them."""
         return self.hears(compliance) and self.moved_from < compliance.rate
 
     def hears(self, compliance: Compliance) -> bool:
-        """Whether advice reaches them.
-
-        Parameters
-        ----------
-        compliance : Compliance
-            Whom it reaches.
-        """
+        """Whether advice reaches them."""
         return self.reached_from < compliance.reached_share
 
 
 class HeardAdvice(NamedTuple):
-    """Advice that a driver has heard.
+    """Advice that a driver has heard."""
 
-    Attributes
-    ----------
-    display : Display
-        Where.
-    speed : float
-        Advised speed [m/s].
-    since : float
-        Time for which there has been advice there [s].
-    """
-
-    display: Display
-    speed: float
-    since: float
+    display: Display  # Where
+    speed: float  # Advised speed [m/s]
+    since: float  # Time for which there has been advice there [s]
 
 
 def driver_traits(setup: DriverSetup, vehicle: str, seed: int) -> DriverTraits:
-    """Traits of the driver of a vehicle; they depend on nothing but the seed and the vehicle's id.
-
-    Parameters
-    ----------
-    setup : DriverSetup
-        What drivers are like.
-    vehicle : str
-        Its id.
-    seed : int
-        Seed of the run, not negative.
-    """
+    """Traits of the driver of a vehicle; they depend on nothing but the seed and the vehicle's id."""
     rng = np.random.default_rng([seed, zlib.crc32(vehicle.encode())])
     speed_factor = math.exp(setup.spread * rng.standard_normal())
     reached, moved, kind = rng.random(3)
@@ -321,19 +215,7 @@ def _drawn_kind(shares: Mapping[str, float], draw: float) -> str:
 
 
 def chosen_speed(choice: Choice, factor: float, own: float, visibility: float) -> float:
-    """Speed that a driver chooses in fog [m/s].
-
-    Parameters
-    ----------
-    choice : Choice
-        How drivers choose.
-    factor : float
-        This one's factor on speeds that sight limits [-].
-    own : float
-        Speed that they would drive in clear air [m/s].
-    visibility : float
-        Visibility that they go by [m].
-    """
+    """Speed that a driver chooses in fog [m/s] (`own` [m/s], `visibility` [m])."""
     return min(factor * choice(visibility), speed_share(choice, visibility) * own)
 
 
@@ -348,22 +230,7 @@ def desired_speed(
 ) -> float:
     """Speed that a driver wants to drive [m/s], never more than the own one.
 
-    Parameters
-    ----------
-    setup : DriverSetup
-        What drivers are like.
-    driver : DriverTraits
-        What this one is like.
-    own : float
-        Speed that they would drive in clear air without advice [m/s].
-    visibility : float
-        Meteorological visibility where they are [m]; ``inf`` in clear air.
-    heard : sequence of HeardAdvice
-        Advice that there is for them; what makes them slowest counts.
-    room : float
-        Speed that they do not exceed so as not to come too near to a leader [m/s].
-    kept : float
-        Speed at which they keep up with a leader [m/s]; 0 if they do not.
+    Takes `own` [m/s], `visibility` [m], `room` [m/s], `kept` [m/s].
     """
     chosen = chosen_speed(SPEED_CHOICES[setup.speed_choice], driver.speed_factor, own, visibility)
     chosen = min(max(min(chosen, room), kept), own)
@@ -378,14 +245,7 @@ def desired_speed(
 def speed_by_compliance(compliance: Compliance, own: float, advised: float, visibility: float) -> float:
     """Speed of a driver who follows advice, as far as he believes it where he is [m/s].
 
-    Parameters
-    ----------
-    compliance : Compliance
-        How drivers follow it.
-    own, advised : float
-        Speed that is chosen without it, and the advised one [m/s].
-    visibility : float
-        Visibility that the driver goes by [m].
+    Takes `own`, `advised` [m/s], `visibility` [m].
     """
     belief = compliance.foreseen if visibility >= UNAFFECTED_ABOVE else 1.0
     return complied_speed(own, advised, belief * compliance.strength, belief * compliance.trust)

@@ -21,28 +21,7 @@ from fogsim.values.script import TrafficAction
 
 
 class DriverControl:
-    """Stands in for the method ``act`` of one road.
-
-    Parameters
-    ----------
-    fleet : Fleet
-        The vehicles.
-    setup : DriverSetup
-        How drivers choose their speed in fog and follow advice.
-    events : sequence of Event
-        What is scripted.
-    seed : int
-        Seed of the drivers' differences.
-    advice_deceleration : float
-        How hard vehicles slow down to a speed that they have chosen or are advised [m/s²].
-    sight : DriverSight or None
-        Eyes of the drivers; None if they see through the fog.
-
-    Raises
-    ------
-    InputError
-        If the script names a vehicle that is not there.
-    """
+    """Stands in for the method ``act`` of one road (`advice_deceleration` [m/s²])."""
 
     def __init__(
         self,
@@ -60,13 +39,7 @@ class DriverControl:
         self._manoeuvres = Manoeuvres(fleet, events)
 
     def enter_fog(self, fog: FogAccess) -> None:
-        """Let the drivers choose their speeds in a fog, and see only what it lets them see.
-
-        Parameters
-        ----------
-        fog : FogAccess
-            The fog.
-        """
+        """Let the drivers choose their speeds in a fog, and see only what it lets them see."""
         self._desired_speeds.fog = fog
         if self._sight is not None:
             limit_sight(fog, self._fleet, self._sight)
@@ -77,23 +50,11 @@ class DriverControl:
         return self._desired_speeds.heard if math.isinf(own) else {**self._desired_speeds.heard, ego: own}
 
     def begin(self, actions: Sequence[TrafficAction]) -> tuple[TrafficAction, ...]:
-        """Begin what a script asks for; see `Manoeuvres.begin`.
-
-        Parameters
-        ----------
-        actions : sequence of TrafficAction
-            What begins.
-        """
+        """Begin what a script asks for; see `Manoeuvres.begin`."""
         return self._manoeuvres.begin(actions)
 
     def unplayed(self, keep_lane: Sequence[str]) -> Unplayed:
-        """Tell what has not been played so far; see `Manoeuvres.unplayed`.
-
-        Parameters
-        ----------
-        keep_lane : sequence of str
-            Vehicles that are expected beside those of the script.
-        """
+        """Tell what has not been played so far; see `Manoeuvres.unplayed`."""
         return self._manoeuvres.unplayed(keep_lane)
 
     def __call__(self) -> None:
@@ -106,13 +67,7 @@ class DriverControl:
 
 
 def hold_at_standstill(fleet: Fleet) -> None:
-    """Let nobody who drives by IDM back away: its acceleration has no end at standstill.
-
-    Parameters
-    ----------
-    fleet : Fleet
-        The vehicles, whose drivers have decided for this step.
-    """
+    """Let nobody who drives by IDM back away: its acceleration has no end at standstill."""
     for vehicle in fleet.environment.road.vehicles:
         if isinstance(vehicle, IDMVehicle):
             stopping = -vehicle.speed / fleet.step_length

@@ -15,12 +15,7 @@ from fogsim.values import Collision
 def find_collisions(fleet: Fleet, period: float) -> Iterator[Collision]:
     """Collisions of the last simulation step by the library's own rule; they are found in later steps again.
 
-    Parameters
-    ----------
-    fleet : Fleet
-        The vehicles.
-    period : float
-        Length of a step [s]: the library counts as hit who would be in the next one, and so does this.
+    Takes `period` [s].
     """
     for one, other in _hits(fleet.environment.road, period):
         collider, victim = fleet.name(one), fleet.name(other)

@@ -31,18 +31,7 @@ from fogsim.values import Command
 class HighwayDesiredSpeeds:
     """Sets the target speeds of an environment's IDM drivers, and in dense fog their time headways.
 
-    Parameters
-    ----------
-    fleet : Fleet
-        The vehicles.
-    setup : DriverSetup
-        What drivers are like; the ego's follows its advice as it is.
-    seed : int
-        With a vehicle's id it gives its driver's traits.
-    advice_deceleration : float
-        How hard vehicles slow down to a lower target speed [m/s²].
-    sight : DriverSight or None
-        Eyes of the drivers; None if they see through the fog.
+    Takes `advice_deceleration` [m/s²].
     """
 
     def __init__(
@@ -69,13 +58,7 @@ class HighwayDesiredSpeeds:
         return self._heard
 
     def update(self, command: Command) -> None:
-        """Set the target speeds of this step, and restore those of drivers whom nothing slows down any more.
-
-        Parameters
-        ----------
-        command : Command
-            The advice to the ego and to others.
-        """
+        """Set the target speeds of this step, and restore those of drivers whom nothing slows down any more."""
         drivers = [v for v in self._fleet.environment.road.vehicles if _drives_itself(v)]
         if self._fleet.time >= self._next:
             self._next = self._fleet.time + CHOICE_PERIOD

@@ -96,25 +96,11 @@ class Fleet:
 
 
 def acceleration(vehicle: Any) -> float:
-    """Acceleration along the heading [m/s²].
-
-    Parameters
-    ----------
-    vehicle : highway_env.vehicle.kinematics.Vehicle
-        The vehicle.
-    """
+    """Acceleration along the heading [m/s²]."""
     return float(vehicle.action["acceleration"])
 
 
 def ahead(road: Any, vehicle: Any) -> Any:
-    """What is ahead of a vehicle in its lane, seen or not; None if there is nothing.
-
-    Parameters
-    ----------
-    road : highway_env.road.road.Road
-        Its road.
-    vehicle : highway_env.vehicle.kinematics.Vehicle
-        The vehicle.
-    """
+    """What is ahead of a vehicle in its lane, seen or not; None if there is nothing."""
     # The class's own way, as the instance's may be that of drivers in fog.
     return type(road).neighbour_vehicles(road, vehicle, vehicle.lane_index)[0]

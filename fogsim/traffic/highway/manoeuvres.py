@@ -17,20 +17,7 @@ from fogsim.values.script import ChangeLane, SetLamps, TrafficAction
 
 
 class Manoeuvres:
-    """Makes vehicles do what is scripted.
-
-    Parameters
-    ----------
-    fleet : Fleet
-        The vehicles.
-    events : sequence of Event
-        What is scripted.
-
-    Raises
-    ------
-    InputError
-        If it names a vehicle that is not there. That no vehicle is ahead of the ego is no mistake, only chance.
-    """
+    """Makes vehicles do what is scripted."""
 
     def __init__(self, fleet: Fleet, events: Sequence[Event]) -> None:
         there = list(dict.fromkeys([*fleet.present(), LEAD]))
@@ -48,20 +35,7 @@ class Manoeuvres:
     def begin(self, actions: Sequence[TrafficAction]) -> tuple[TrafficAction, ...]:
         """Begin what a script asks for: changes of lane as they are here, and lamps that fail all at once.
 
-        Parameters
-        ----------
-        actions : sequence of TrafficAction
-            What begins.
-
-        Returns
-        -------
-        tuple of TrafficAction
-            Those that could not begin: the vehicle has left, or there is no such lane.
-
-        Raises
-        ------
-        InputError
-            If highway-env's vehicles cannot do it.
+        Returns those that could not begin: the vehicle has left, or there is no such lane.
         """
         vehicles, refused = self._fleet.present(), list[TrafficAction]()
         situation = self._situation(vehicles)
@@ -84,10 +58,7 @@ class Manoeuvres:
     def plan(self) -> Mapping[str, Order]:
         """Begin what is due, before the drivers decide.
 
-        Returns
-        -------
-        mapping from vehicle id to Order
-            Speeds for this step, for `apply` once the drivers have decided.
+        Returns speeds for this step, for `apply` once the drivers have decided.
         """
         vehicles = self._fleet.present()
         self._end_lane_changes(vehicles)
@@ -100,13 +71,7 @@ class Manoeuvres:
         return actions.orders
 
     def apply(self, orders: Mapping[str, Order]) -> None:
-        """Slow vehicles down to the speeds of their orders, whatever their drivers have decided.
-
-        Parameters
-        ----------
-        orders : mapping from vehicle id to Order
-            From `plan`.
-        """
+        """Slow vehicles down to the speeds of their orders, whatever their drivers have decided."""
         vehicles = self._fleet.present() if orders else {}
         for name, (target, deceleration) in orders.items():
             vehicle = vehicles[name]
@@ -115,13 +80,7 @@ class Manoeuvres:
             )
 
     def unplayed(self, keep_lane: Sequence[str]) -> Unplayed:
-        """Tell what has not been played so far, and which vehicles of `keep_lane` are not there either.
-
-        Parameters
-        ----------
-        keep_lane : sequence of str
-            Vehicles that are expected beside those of the script.
-        """
+        """Tell what has not been played so far, and which vehicles of `keep_lane` are not there either."""
         present = self._fleet.present()
         return self._script.unplayed(self._fleet.known(), present, keep_lane)
 

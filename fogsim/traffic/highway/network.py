@@ -24,13 +24,7 @@ _MARKINGS = {
 
 
 def upright(points: ArrayLike) -> NDArray[np.float64]:
-    """Points (..., 2) of highway-env as (..., 3) with y up, on the level road [m].
-
-    Parameters
-    ----------
-    points : (..., 2) array_like
-        highway-env's positions [m].
-    """
+    """Points (..., 2) of highway-env as (..., 3) with y up, on the level road [m] (`points` (..., 2) [m])."""
     flat = np.asarray(points, dtype=np.float64)
     return np.stack((flat[..., 0], 0.0 - flat[..., 1], np.zeros(flat.shape[:-1])), axis=-1)
 
@@ -83,36 +77,18 @@ def _carriageway(edge_id: str, parallel: Sequence[Any]) -> Iterator[Lane]:
 
 
 def speed_limit(lane: Any) -> float:
-    """Speed limit of a lane [m/s]; where it has none, the highest speed of highway-env's vehicles.
-
-    Parameters
-    ----------
-    lane : highway_env.road.lane.AbstractLane
-        The lane.
-    """
+    """Speed limit of a lane [m/s]; where it has none, the highest speed of highway-env's vehicles."""
     return float(Vehicle.MAX_SPEED if lane.speed_limit is None else lane.speed_limit)
 
 
 def lane_id(index: tuple[str, str, int]) -> str:
-    """Id of a lane, as in the road network.
-
-    Parameters
-    ----------
-    index : tuple
-        Start node, end node and number.
-    """
+    """Id of a lane, as in the road network."""
     start, end, number = index
     return f"{edge_id(start, end)}_{number}"
 
 
 def edge_id(start: str, end: str) -> str:
-    """Id of an edge, as in the road network.
-
-    Parameters
-    ----------
-    start, end : str
-        Its nodes.
-    """
+    """Id of an edge, as in the road network."""
     return f"{start}>{end}"
 
 

@@ -21,17 +21,7 @@ from fogsim.traffic.highway.snapshot import front_bumper, rear_bumper
 
 
 def limit_sight(fog: FogAccess, fleet: Fleet, sight: DriverSight) -> None:
-    """Let the drivers of an environment see only what a fog lets them see, until its next reset.
-
-    Parameters
-    ----------
-    fog : FogAccess
-        The fog.
-    fleet : Fleet
-        The vehicles.
-    sight : DriverSight
-        The drivers' eyes.
-    """
+    """Let the drivers of an environment see only what a fog lets them see, until its next reset."""
     # On this one road, not in the library: other environments of the process go on in clear air.
     road = fleet.environment.road
     road.neighbour_vehicles = neighbours = VisibleNeighbours(fog, fleet, sight)
@@ -40,13 +30,7 @@ def limit_sight(fog: FogAccess, fleet: Fleet, sight: DriverSight) -> None:
 
 
 class VisibleNeighbours:
-    """Stands in for the methods ``neighbour_vehicles`` and ``respect_priorities`` of one road.
-
-    Parameters
-    ----------
-    fog, fleet, sight
-        As in `limit_sight`.
-    """
+    """Stands in for the methods ``neighbour_vehicles`` and ``respect_priorities`` of one road."""
 
     def __init__(self, fog: FogAccess, fleet: Fleet, sight: DriverSight) -> None:
         self._fog = fog
@@ -65,13 +49,7 @@ class VisibleNeighbours:
         )
 
     def who_gives_way(self, one: Any, other: Any) -> Any:
-        """Which of two vehicles whose ways cross gives way; None if its driver has not perceived the other.
-
-        Parameters
-        ----------
-        one, other : highway_env.vehicle.kinematics.Vehicle
-            The vehicles.
-        """
+        """Which of two vehicles whose ways cross gives way; None if its driver has not perceived the other."""
         giving = type(self._fleet.environment.road).respect_priorities(one, other)
         foe, eye = (other if giving is one else one), front_bumper(giving)
         near_end = min(front_bumper(foe), rear_bumper(foe), key=lambda end: math.dist(eye, end))

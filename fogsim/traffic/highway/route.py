@@ -22,26 +22,12 @@ _WIDEST_BEND = 2.0 * math.pi / 3.0
 
 
 def planned_route(vehicle: Any) -> Any:
-    """Lanes that a vehicle plans to drive; None if it has no plan, or is of a kind that makes none.
-
-    Parameters
-    ----------
-    vehicle : highway_env.vehicle.kinematics.Vehicle
-        The vehicle.
-    """
+    """Lanes that a vehicle plans to drive; None if it has no plan, or is of a kind that makes none."""
     return getattr(vehicle, "route", None)
 
 
 def lanes_ahead(network: Any, ego: Any) -> Iterator[tuple[str, str, int]]:
-    """Lanes one after the other, from the ego's own; a route in circles is ended, and one that would turn back.
-
-    Parameters
-    ----------
-    network : highway_env.road.road.RoadNetwork
-        The network.
-    ego : highway_env.vehicle.kinematics.Vehicle
-        The ego.
-    """
+    """Lanes one after the other, from the ego's own; a route in circles is ended, and one that would turn back."""
     # The library takes what has been driven off the list that it is given.
     here, plan, passed = ego.lane_index, list(planned_route(ego) or ()), set()
     while here not in passed:
@@ -61,13 +47,7 @@ def _leads_on(lane: Any, following: Any) -> bool:
 
 
 def reached_at(lane: Any, following: Any) -> float:
-    """Station of a lane abreast of another's end [m].
-
-    Parameters
-    ----------
-    lane, following : highway_env.road.lane.AbstractLane
-        The one that ends, and the one that is driven next.
-    """
+    """Station of a lane abreast of another's end [m]."""
     station, _ = following.local_coordinates(lane.position(lane.length, 0.0))
     return float(np.clip(station, 0.0, following.length))
 

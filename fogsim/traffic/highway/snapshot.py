@@ -22,24 +22,12 @@ LEADER_REACH = 300.0
 
 
 def front_bumper(vehicle: Any) -> NDArray[np.float64]:
-    """Middle of the front bumper on the road [m], (3,): east, north, up.
-
-    Parameters
-    ----------
-    vehicle : highway_env.vehicle.kinematics.Vehicle
-        The vehicle.
-    """
+    """Middle of the front bumper on the road [m], (3,): east, north, up."""
     return upright(vehicle.position + 0.5 * vehicle.LENGTH * vehicle.direction)
 
 
 def rear_bumper(vehicle: Any) -> NDArray[np.float64]:
-    """Middle of the rear bumper on the road [m], (3,): east, north, up.
-
-    Parameters
-    ----------
-    vehicle : highway_env.vehicle.kinematics.Vehicle
-        The vehicle.
-    """
+    """Middle of the rear bumper on the road [m], (3,): east, north, up."""
     return upright(vehicle.position - 0.5 * vehicle.LENGTH * vehicle.direction)
 
 

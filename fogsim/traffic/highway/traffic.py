@@ -43,29 +43,7 @@ class HighwayTraffic:
     The ego keeps its lane and follows its leader by IDM, as the others do. Of the environment, roads and vehicles are
     used, not its rewards, its endings or what it does once a policy step (intersections let new vehicles in there).
 
-    Parameters
-    ----------
-    environment : highway_env.envs.common.abstract.AbstractEnv
-        The environment without wrappers; it is the traffic's from now on.
-    sight : DriverSight or None
-        Eyes of the drivers; None if they see through the fog.
-    reading_radius : float
-        Vehicles farther from the ego than this are not read [m].
-    advice_deceleration : float
-        How hard vehicles slow down to a speed that they are advised or choose [m/s²].
-    drivers : DriverSetup
-        How drivers choose their speed in fog and follow advice; the ego's follows its advice as it is.
-    events : sequence of Event
-        What is scripted; vehicles are named as in `Fleet.name`, the one ahead of the ego at the beginning `LEAD`.
-    keep_lane : sequence of str
-        Vehicles that never change lane.
-    after_collision : AfterCollision
-        What becomes of vehicles that have collided; the ego stays in any case.
-
-    Raises
-    ------
-    InputError
-        If it is no environment of highway-env.
+    Takes `reading_radius` [m], `advice_deceleration` [m/s²].
     """
 
     def __init__(
@@ -103,23 +81,7 @@ class HighwayTraffic:
         return float(1.0 / self._environment.config["simulation_frequency"])
 
     def start(self, seed: int) -> None:
-        """Reset the environment.
-
-        Parameters
-        ----------
-        seed : int
-            Seed of the environment and of the drivers' differences.
-
-        Raises
-        ------
-        InputError
-            If the script names a vehicle that is not there.
-        OtherRoadsError
-            If the environment has built other roads than before, or the ego's route leads over others: begin anew with
-            another `HighwayTraffic`, and a loop that has not drawn any.
-        SimulationError
-            If the environment has no vehicle to control.
-        """
+        """Reset the environment."""
         self._environment.reset(seed=seed)
         if self._environment.vehicle is None:
             raise SimulationError(f"{type(self._environment).__name__} has no controlled vehicle to become the ego")
@@ -140,13 +102,7 @@ class HighwayTraffic:
             self._control.enter_fog(self._fog)
 
     def enter_fog(self, fog: FogAccess) -> None:
-        """Let drivers see only what this fog lets them see, from now on and in every later run.
-
-        Parameters
-        ----------
-        fog : FogAccess
-            The fog.
-        """
+        """Let drivers see only what this fog lets them see, from now on and in every later run."""
         self._fog = fog
         if self._control is not None:
             self._control.enter_fog(fog)
@@ -169,29 +125,12 @@ class HighwayTraffic:
         return self._network, SignMap()
 
     def begin(self, actions: Sequence[TrafficAction]) -> tuple[TrafficAction, ...]:
-        """Begin what a script asks for; see `Traffic.begin`.
-
-        Parameters
-        ----------
-        actions : sequence of TrafficAction
-            What begins.
-
-        Raises
-        ------
-        InputError
-            If highway-env's vehicles cannot do it.
-        """
+        """Begin what a script asks for; see `Traffic.begin`."""
         _, control = self._running()
         return control.begin(actions)
 
     def advance(self, command: Command) -> None:
-        """Move by one simulation step with a command in force.
-
-        Parameters
-        ----------
-        command : Command
-            Advised speeds and lamps.
-        """
+        """Move by one simulation step with a command in force."""
         fleet, control = self._running()
         fleet.ego_lamps, fleet.lamps_of = command.lamps, command.lamps_of
         control.command = command

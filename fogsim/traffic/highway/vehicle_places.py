@@ -12,13 +12,7 @@ from fogsim.values import Stretch
 
 
 class HighwayVehiclePlaces:
-    """Finds vehicles by their lanes; edges are named as in the road network. See `VehiclePlaces`.
-
-    Parameters
-    ----------
-    fleet : Fleet
-        The vehicles; the ego's route is the one that it has now.
-    """
+    """Finds vehicles by their lanes; edges are named as in the road network. See `VehiclePlaces`."""
 
     def __init__(self, fleet: Fleet) -> None:
         self._fleet = fleet
@@ -31,20 +25,7 @@ class HighwayVehiclePlaces:
         }
 
     def on_stretch(self, stretch: Stretch, among: Collection[str] | None = None) -> dict[str, float]:
-        """Vehicles on a stretch, and how far past its beginning they are [m]; see `VehiclePlaces.on_stretch`.
-
-        Parameters
-        ----------
-        stretch : Stretch
-            The stretch.
-        among : collection of str or None
-            Vehicles that are asked about; None for all.
-
-        Raises
-        ------
-        InputError
-            If the network has no such edge, or the stretch begins behind the end of its edges.
-        """
+        """Vehicles on a stretch, and how far past its beginning they are [m]; see `VehiclePlaces.on_stretch`."""
         starts = self._edge_starts(stretch)
         past: dict[str, float] = {}
         for name, vehicle in self._fleet.present().items():
@@ -68,15 +49,7 @@ class HighwayVehiclePlaces:
         return starts
 
     def near_ego(self, distance: float, among: Collection[str] | None = None) -> list[str]:
-        """Vehicles near the ego; see `VehiclePlaces.near_ego`.
-
-        Parameters
-        ----------
-        distance : float
-            From front bumper to front bumper, at most [m].
-        among : collection of str or None
-            Vehicles that are asked about; None for all.
-        """
+        """Vehicles near the ego; see `VehiclePlaces.near_ego` (`distance` [m])."""
         vehicles = self._fleet.present()
         if self._fleet.ego not in vehicles.values():
             return []
@@ -85,11 +58,5 @@ class HighwayVehiclePlaces:
         return [name for name in asked if math.dist(front_bumper(vehicles[name]), here) <= distance]
 
     def speed(self, vehicle: str) -> float:
-        """Speed of a vehicle [m/s]; see `VehiclePlaces.speed`.
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        """
+        """Speed of a vehicle [m/s]; see `VehiclePlaces.speed`."""
         return float(self._fleet.present()[vehicle].speed)

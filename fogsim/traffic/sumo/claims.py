@@ -28,51 +28,23 @@ Rule = Callable[[float, Collection[float]], float]
 
 
 def lowest(own: float, claims: Collection[float]) -> float:
-    """The lowest claim holds, unless the vehicle's own value is lower.
-
-    Parameters
-    ----------
-    own : float
-        The vehicle's own value.
-    claims : collection of float
-        Values that sessions claim.
-    """
+    """The lowest claim holds, unless the vehicle's own value is lower."""
     return min(own, *claims) if claims else own
 
 
 def farthest(own: float, claims: Collection[float]) -> float:
-    """The claim that is farthest from the vehicle's own value by ratio holds; the lower of two that are as far.
-
-    Parameters
-    ----------
-    own : float
-        The vehicle's own value.
-    claims : collection of float
-        Values that sessions claim.
-    """
+    """The claim that is farthest from the vehicle's own value by ratio holds; the lower of two that are as far."""
     return max(claims, key=lambda claim: (max(claim, own) / max(min(claim, own), _LEAST), -claim)) if claims else own
 
 
 @dataclass(frozen=True, slots=True)
 class Attribute:
-    """What of a vehicle is set.
+    """What of a vehicle is set."""
 
-    Attributes
-    ----------
-    name : str
-        Its name.
-    read : callable
-        From SUMO's domain of vehicles and a vehicle's id to the value.
-    write : callable
-        Sets a vehicle's value.
-    rule : callable
-        Which value is in force where sessions claim some.
-    """
-
-    name: str
-    read: Callable[[Api, str], float]
-    write: Callable[[Api, str, float], None]
-    rule: Rule = lowest
+    name: str  # Its name
+    read: Callable[[Api, str], float]  # From SUMO's domain of vehicles and a vehicle's id to the value
+    write: Callable[[Api, str, float], None]  # Sets a vehicle's value
+    rule: Rule = lowest  # Which value is in force where sessions claim some
 
 
 TOP_SPEED = Attribute("maxSpeed", lambda get, v: float(get.getMaxSpeed(v)), lambda set_, v, x: set_.setMaxSpeed(v, x))
@@ -134,28 +106,14 @@ OVERTAKE_RIGHT = _lane_change_parameter("lcOvertakeRight", sign=-1)
 
 
 def new_session(api: Api) -> str:
-    """Name of a new session of a simulation, which no other session of it has.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    """
+    """Name of a new session of a simulation, which no other session of it has."""
     number = int(api.simulation.getParameter("", _SESSIONS) or 0) + 1
     api.simulation.setParameter("", _SESSIONS, str(number))
     return str(number)
 
 
 class LoadMark:
-    """A mark of one session in a simulation, which SUMO forgets when another simulation is loaded in its place.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    session : str
-        Name of the session.
-    """
+    """A mark of one session in a simulation, which SUMO forgets when another simulation is loaded in its place."""
 
     def __init__(self, api: Api, session: str) -> None:
         self._read = getter(api, "simulation", "getParameter")
@@ -167,13 +125,7 @@ class LoadMark:
         return bool(self._read("", self._key) == self._value)
 
     def check(self) -> None:
-        """Refuse another simulation.
-
-        Raises
-        ------
-        SimulationError
-            If another simulation was loaded.
-        """
+        """Refuse another simulation."""
         if not self.is_there():
             raise SimulationError(
                 "the simulation was loaded again while FogSim was using it: attach to it, or start the run, again"
@@ -181,15 +133,7 @@ class LoadMark:
 
 
 class SessionValues(Generic[_Value]):
-    """Values that the sessions keep with vehicles under one key.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    name : str
-        What it is about.
-    """
+    """Values that the sessions keep with vehicles under one key."""
 
     def __init__(self, api: Api, name: str) -> None:
         self._vehicles = api.vehicle
@@ -199,13 +143,7 @@ class SessionValues(Generic[_Value]):
         self._written: dict[str, tuple[str, dict[str, _Value]]] = {}
 
     def read(self, vehicle: str) -> dict[str, _Value]:
-        """Values of a vehicle, by session.
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        """
+        """Values of a vehicle, by session."""
         text = self._read(vehicle, self._key)
         if not text:
             self._written.pop(vehicle, None)
@@ -214,15 +152,7 @@ class SessionValues(Generic[_Value]):
         return dict(values) if text == known else dict(json.loads(text))
 
     def write(self, vehicle: str, values: dict[str, _Value]) -> None:
-        """Replace the values of a vehicle.
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        values : dict
-            Value by session; an empty one removes the key.
-        """
+        """Replace the values of a vehicle."""
         text = json.dumps(values) if values else ""
         self._written[vehicle] = text, dict(values)
         self._vehicles.setParameter(vehicle, self._key, text)
@@ -233,15 +163,6 @@ class Claims:
 
     Which claim of all sessions holds is the attribute's rule: mostly the lowest, unless the vehicle's own value is
     lower. A value that somebody else has set meanwhile is the vehicle's own from then on.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    attribute : Attribute
-        What is claimed.
-    session : str
-        Name of the session.
     """
 
     def __init__(self, api: Api, attribute: Attribute, session: str) -> None:
@@ -251,13 +172,7 @@ class Claims:
         self._values = SessionValues[float](api, attribute.name)
 
     def own_value(self, vehicle: str) -> float:
-        """The value that a vehicle has without any claim.
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        """
+        """The value that a vehicle has without any claim."""
         return self._current(vehicle)[1][_OWN]
 
     def _current(self, vehicle: str) -> tuple[float, dict[str, float]]:
@@ -268,27 +183,13 @@ class Claims:
         return now, values
 
     def claim(self, vehicle: str, value: float) -> None:
-        """Claim a value of the attribute.
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        value : float
-            In the attribute's unit.
-        """
+        """Claim a value of the attribute."""
         now, values = self._current(vehicle)
         values[self._session] = value
         self._put_in_force(vehicle, now, values)
 
     def withdraw(self, vehicle: str) -> None:
-        """Withdraw the claim to a vehicle, if there is one: what others claim, or its own value, comes into force.
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        """
+        """Withdraw the claim to a vehicle, if there is one: what others claim, or its own value, comes into force."""
         # Before anything else is asked: mostly there is none.
         if self._session in self._values.read(vehicle):
             now, values = self._current(vehicle)

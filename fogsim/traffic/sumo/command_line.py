@@ -10,15 +10,7 @@ _LOG = "error-log"
 
 
 def command_line(setup: TrafficSetup, seed: int) -> list[str]:
-    """SUMO's command line, without the program's name, and without where outputs go.
-
-    Parameters
-    ----------
-    setup : TrafficSetup
-        The simulation.
-    seed : int
-        Its seed.
-    """
+    """SUMO's command line, without the program's name, and without where outputs go."""
     if setup.config is None:
         source = ["--net-file", str(setup.net)]
     else:
@@ -55,13 +47,7 @@ def has_error_log(setup: TrafficSetup) -> bool:
 
 
 def output_prefix(setup: TrafficSetup) -> str:
-    """What names of SUMO's outputs begin with: as the scenario has it, or its configuration.
-
-    Parameters
-    ----------
-    setup : TrafficSetup
-        The simulation.
-    """
+    """What names of SUMO's outputs begin with: as the scenario has it, or its configuration."""
     chosen = dict(setup.sumo_options).get(_PREFIX)
     configured = "" if setup.config is None else configured_prefix(setup.config)
     # A folder in it counts as little as those of the outputs themselves.

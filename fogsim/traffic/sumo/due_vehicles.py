@@ -8,33 +8,15 @@ from fogsim.traffic.sumo.update_schedule import UpdateSchedule
 
 
 class Due(NamedTuple):
-    """Vehicles of one step.
+    """Vehicles of one step."""
 
-    Attributes
-    ----------
-    vehicles : sequence of str
-        Those to be looked at; all are on the road.
-    new : sequence of str
-        Those that have entered the road since the last step, or come back to it, and are on it.
-    gone : sequence of str
-        Those that have left it, if they were due, and all new ones, whose ids others may have borne.
-    """
-
-    vehicles: Sequence[str]
-    new: Sequence[str]
-    gone: Sequence[str]
+    vehicles: Sequence[str]  # Those to be looked at; all are on the road
+    new: Sequence[str]  # Those that have entered the road since the last step, or come back to it, and are on it
+    gone: Sequence[str]  # Those that have left it, if they were due, and all new ones, whose ids others may have borne
 
 
 class DueVehicles:
-    """Schedules the vehicles of a roster; a new one is due at once.
-
-    Parameters
-    ----------
-    roster : Roster
-        Who is on the road.
-    step : float
-        Time between two steps [s].
-    """
+    """Schedules the vehicles of a roster; a new one is due at once (`step` [s])."""
 
     def __init__(self, roster: Roster, step: float) -> None:
         self._roster = roster
@@ -57,13 +39,5 @@ class DueVehicles:
         return Due(due, new, gone + entered)
 
     def schedule(self, vehicles: Sequence[str], pause: float) -> None:
-        """Schedule vehicles that have been taken out.
-
-        Parameters
-        ----------
-        vehicles : sequence of str
-            Their ids.
-        pause : float
-            When they are due again at the latest, at the earliest in the next step [s].
-        """
+        """Schedule vehicles that have been taken out (`pause` [s])."""
         self._schedule.add(vehicles, self._roster.time + pause)

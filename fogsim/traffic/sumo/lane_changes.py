@@ -39,17 +39,12 @@ class _Glide:
     """The way to a lane: the cubic Hermite polynomial from (offset, rate) to (0, 0).
 
     For who begins without sideways speed it is a smoothstep.
-
-    Attributes
-    ----------
-    begun, duration : float
-        When it began, and how long it takes [s].
-    offset, rate : float
-        What was left of the way then, to the left [m], and its rate of change [m/s].
     """
 
+    # begun, duration: when it began, and how long it takes [s]
     begun: float
     duration: float
+    # offset, rate: what was left of the way then, to the left [m], and its rate of change [m/s]
     offset: float
     rate: float
 
@@ -74,25 +69,11 @@ class LaneChangeSmoothing:
         self._wanted: dict[str, float] = {}
 
     def take_time(self, vehicle: str, duration: float) -> None:
-        """Let the next change of a vehicle take a time.
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        duration : float
-            The time [s]; 0 for a change at once.
-        """
+        """Let the next change of a vehicle take a time (`duration` [s])."""
         self._wanted[vehicle] = duration
 
     def smoothed(self, state: TrafficState) -> TrafficState:
-        """The state as it is to be seen; the states of one run are to be given in their order.
-
-        Parameters
-        ----------
-        state : TrafficState
-            The state as SUMO has it.
-        """
+        """The state as it is to be seen; the states of one run are to be given in their order."""
         last, self._last = self._last, state
         if last is not None:
             changed = _lane_changed(last, state)

@@ -10,19 +10,7 @@ _NO_LANE_CHANGES = 0
 
 
 class LaneKeeping:
-    """Keeps some vehicles in their lanes.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    vehicles : iterable of str
-        Which, as soon as they are on the road.
-    roster : Roster
-        Who is on the road.
-    session : str
-        Name of the session.
-    """
+    """Keeps some vehicles in their lanes."""
 
     def __init__(self, api: Api, vehicles: Iterable[str], roster: Roster, session: str) -> None:
         self._wanted = frozenset(vehicles)
@@ -40,13 +28,7 @@ class LaneKeeping:
             self._kept.add(vehicle)
 
     def release(self, present: Collection[str]) -> None:
-        """Let vehicles change lanes again as they did before.
-
-        Parameters
-        ----------
-        present : collection of str
-            Vehicles on the road.
-        """
+        """Let vehicles change lanes again as they did before."""
         for vehicle in self._kept.intersection(present):
             self._modes.withdraw(vehicle)
         self._kept.clear()

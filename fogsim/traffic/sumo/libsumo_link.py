@@ -15,13 +15,7 @@ from fogsim.traffic.sumo.output_folder import OutputFolder
 
 
 def load_libsumo() -> ModuleType:
-    """Import libsumo without the lines that it prints on the way.
-
-    Raises
-    ------
-    MissingDependencyError
-        If libsumo or a library of the system that it needs is missing.
-    """
+    """Import libsumo without the lines that it prints on the way."""
     try:
         # libsumo prints a remark about other packages' versions to stdout, which may carry JSON of ours.
         with contextlib.redirect_stdout(io.StringIO()):
@@ -36,13 +30,7 @@ def load_libsumo() -> ModuleType:
 
 
 class LibsumoLink:
-    """SUMO inside this process, through libsumo; one at a time.
-
-    Parameters
-    ----------
-    outputs : OutputFolder or None
-        Where what SUMO writes goes; None for where SUMO's own files say.
-    """
+    """SUMO inside this process, through libsumo; one at a time."""
 
     remote = False
     shared = False
@@ -52,27 +40,7 @@ class LibsumoLink:
         self._sumo: ModuleType | None = None
 
     def begin(self, arguments: Sequence[str]) -> Api:
-        """Start SUMO here, or load it anew; see `SumoLink.begin`.
-
-        Parameters
-        ----------
-        arguments : sequence of str
-            SUMO's command line without the program's name.
-
-        Raises
-        ------
-        SimulationRunningError
-            If another simulation runs in this process.
-        SimulationError
-            If SUMO refuses its input; the message holds SUMO's own words. If two outputs would be one file.
-        InputError
-            If there is no folder for what SUMO writes.
-
-        Warns
-        -----
-        UserWarning
-            If what SUMO writes is not kept.
-        """
+        """Start SUMO here, or load it anew; see `SumoLink.begin`."""
         sumo = load_libsumo()
         if sumo.isLoaded() and self._sumo is None:
             raise SimulationRunningError(

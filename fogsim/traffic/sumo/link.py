@@ -35,18 +35,7 @@ class SumoLink(Protocol):
         """See the class."""
 
     def begin(self, arguments: Sequence[str]) -> Api:
-        """Start SUMO with arguments of its command line, or load it anew if this link has begun it before.
-
-        Parameters
-        ----------
-        arguments : sequence of str
-            SUMO's command line without the program's name.
-
-        Raises
-        ------
-        SimulationError
-            If SUMO refuses, or cannot be reached.
-        """
+        """Start SUMO with arguments of its command line, or load it anew if this link has begun it before."""
 
     def step(self) -> None:
         """Move the simulation by one step."""
@@ -63,15 +52,7 @@ class SumoLink(Protocol):
 
 @contextlib.contextmanager
 def translated_errors(library: ModuleType, where: str) -> Iterator[None]:
-    """Block in which the errors of libsumo or traci become a `SimulationError`.
-
-    Parameters
-    ----------
-    library : module
-        libsumo or traci.
-    where : str
-        Where the simulation runs, for the message.
-    """
+    """Block in which the errors of libsumo or traci become a `SimulationError`."""
     try:
         yield
     except (library.FatalTraCIError, ConnectionError) as error:
@@ -94,15 +75,6 @@ def getter(api: Api, domain: str, name: str) -> Getter:
 
     libsumo's Python functions only pass their arguments on to compiled ones, which costs as much as the answer; where
     the compiled function is at hand it is taken itself. It names no leader as ``("", -1)`` instead of None.
-
-    Parameters
-    ----------
-    api : Api
-        libsumo or a connection of traci.
-    domain : str
-        ``vehicle``, ``simulation``, ``lane``, …
-    name : str
-        Name of the getter.
     """
     compiled = sys.modules.get(f"{getattr(api, '__name__', '')}._libsumo")
     found: Getter = getattr(compiled, f"{domain}_{name}", None) or getattr(getattr(api, domain), name)
@@ -110,15 +82,7 @@ def getter(api: Api, domain: str, name: str) -> Getter:
 
 
 def vehicle_getter(api: Api, name: str) -> Getter:
-    """Getter of the domain ``vehicle``; see `getter`.
-
-    Parameters
-    ----------
-    api : Api
-        libsumo or a connection of traci.
-    name : str
-        Name of the getter.
-    """
+    """Getter of the domain ``vehicle``; see `getter`."""
     return getter(api, "vehicle", name)
 
 
@@ -128,15 +92,7 @@ def is_off_lanes(api: Api, vehicle: str) -> bool:
 
 
 def subscribed(api: Api, names: Mapping[str, int]) -> tuple[Getter, ...]:
-    """Getters of the domain ``simulation`` whose answers SUMO sends with each step, so that asking sends no message.
-
-    Parameters
-    ----------
-    api : Api
-        A connection of traci.
-    names : mapping from str to int
-        Names of getters, and the numbers of their variables in SUMO's TraCI protocol.
-    """
+    """Getters of the domain ``simulation`` whose answers SUMO sends with each step, so that asking sends no message."""
     simulation = api.simulation
     simulation.subscribe(tuple(names.values()))
 

@@ -20,15 +20,7 @@ MOST_WARNINGS = 3
 
 
 def describe_seen(ego: str, seen: Collection[str]) -> str:
-    """Say which vehicles there were instead of an ego that was not, those with a similar id first.
-
-    Parameters
-    ----------
-    ego : str
-        Id of the ego.
-    seen : collection of str
-        Vehicles that have been on the road.
-    """
+    """Say which vehicles there were instead of an ego that was not, those with a similar id first."""
     if not seen:
         return "no vehicle at all did: are there vehicles in its route or additional files?"
     near = difflib.get_close_matches(ego, sorted(seen), n=3, cutoff=0.5)
@@ -58,20 +50,7 @@ def check_microscopic(api: Api) -> None:
 
 
 def check_step_length(api: Api, step_length: float) -> None:
-    """Hold a simulation to the step that FogSim counts with.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    step_length : float
-        The step [s].
-
-    Raises
-    ------
-    SimulationError
-        If its step is another.
-    """
+    """Hold a simulation to the step that FogSim counts with (`step_length` [s])."""
     found = api.simulation.getDeltaT()
     if abs(found - step_length) > 1e-3 * CLOCK_TICK:
         raise SimulationError(
@@ -81,18 +60,7 @@ def check_step_length(api: Api, step_length: float) -> None:
 
 
 def loaded_net(api: Api) -> Path:
-    """Network file that a running simulation has loaded.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-
-    Raises
-    ------
-    SimulationError
-        If there is no such file here, as SUMO may have been started in another folder or on another machine.
-    """
+    """Network file that a running simulation has loaded."""
     path = Path(api.simulation.getOption("net-file"))
     if not path.is_file():
         raise SimulationError(
@@ -103,12 +71,6 @@ def loaded_net(api: Api) -> Path:
 
 
 def loaded_additional(api: Api) -> tuple[Path, ...]:
-    """Additional files of a running simulation, as far as they are here to be read.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    """
+    """Additional files of a running simulation, as far as they are here to be read."""
     names = api.simulation.getOption("additional-files").split(",")
     return tuple(path for name in names if (path := Path(name.strip())).is_file())

@@ -19,15 +19,7 @@ MAX_WAIT = 1.0
 
 
 class AllVehicles:
-    """Finds everybody on the road.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    roster : Roster
-        Who is on the road.
-    """
+    """Finds everybody on the road."""
 
     def __init__(self, api: Api, roster: Roster) -> None:
         self._position = vehicle_getter(api, "getPosition3D")
@@ -51,16 +43,7 @@ class NearbyVehicles:
 
     Nor are distances of those near computed before one of them could be far.
 
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    ego : str
-        Id of the ego.
-    radius : float
-        Horizontal distance from the ego's front bumper up to which a vehicle is near [m].
-    roster : Roster or None
-        Who is on the road; None for one of its own.
+    Takes `radius` [m].
     """
 
     def __init__(self, api: Api, ego: str, radius: float, roster: Roster | None = None) -> None:

@@ -58,18 +58,10 @@ _EXPECTED: Mapping[str, tuple[str, tuple[type, ...]]] = {
 
 @dataclass(frozen=True, slots=True)
 class KnownOption:
-    """An option of the installed SUMO.
+    """An option of the installed SUMO."""
 
-    Attributes
-    ----------
-    name : str
-        Its first name; synonyms are known by theirs.
-    kind : str
-        What it takes, in SUMO's words: BOOL, INT, FLOAT, TIME, STR, FILE, …
-    """
-
-    name: str
-    kind: str
+    name: str  # Its first name; synonyms are known by theirs
+    kind: str  # What it takes, in SUMO's words: BOOL, INT, FLOAT, TIME, STR, FILE, …
 
 
 def option_mistakes(options: Mapping[str, OptionValue]) -> dict[str, str]:
@@ -77,11 +69,6 @@ def option_mistakes(options: Mapping[str, OptionValue]) -> dict[str, str]:
 
     Where SUMO is not installed, or runs in this process, so that it cannot be asked what it knows, only options of
     FogSim's own are told; SUMO itself refuses what it does not know when it starts.
-
-    Parameters
-    ----------
-    options : mapping from str to bool, int, float or str
-        Options, named without the two dashes.
     """
     known = known_options() if options else {}
     told = {name: _mistake(name, value, known) for name, value in options.items()}

@@ -56,13 +56,7 @@ class OutputFolder:
         self._told: set[str] = set()
 
     def open(self) -> list[str]:
-        """Make the folder, and give the arguments of SUMO's command line that lead there.
-
-        Raises
-        ------
-        InputError
-            If it cannot be made, or not be written.
-        """
+        """Make the folder, and give the arguments of SUMO's command line that lead there."""
         self.warnings = ()
         if self._own is None and (self._folder is None or not _can_be_named(self._folder)):
             self._own = Path(tempfile.mkdtemp(prefix="fogsim-"))
@@ -108,23 +102,11 @@ class OutputFolder:
         return sorted(Path(name).name for name, times in targets.items() if times > 1 and name.startswith(place))
 
     def shorten(self, message: str) -> str:
-        """A message of SUMO's with the names of files as they were asked for.
-
-        Parameters
-        ----------
-        message : str
-            The message.
-        """
+        """A message of SUMO's with the names of files as they were asked for."""
         return message.replace(self._way, self._prefix) if self._way else message
 
     def tell_lost(self) -> None:
-        """Warn of outputs that will not be kept, each once.
-
-        Warns
-        -----
-        UserWarning
-            If no folder was named and SUMO has begun to write.
-        """
+        """Warn of outputs that will not be kept, each once."""
         if self._folder is not None or self._own is None:
             return
         lost = [name for name in _names(self._own) if name not in self._told]
@@ -138,13 +120,7 @@ class OutputFolder:
             )
 
     def close(self) -> None:
-        """Remove what is not kept, and a folder in which nothing is; twice does nothing.
-
-        Warns
-        -----
-        UserWarning
-            If SUMO, which does not tell, could not write all of a file, or outputs were lost of which nobody knew.
-        """
+        """Remove what is not kept, and a folder in which nothing is; twice does nothing."""
         try:
             self._take_warnings()
             self.tell_lost()

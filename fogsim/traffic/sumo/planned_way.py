@@ -10,31 +10,15 @@ from fogsim.traffic.setup import TrafficSetup
 
 
 class PlannedWay(NamedTuple):
-    """Where the ego drives.
+    """Where the ego drives."""
 
-    Attributes
-    ----------
-    net : Path
-        Network.
-    additional : tuple of Path
-        Files with what stands beside the road.
-    edges : tuple of str
-        Ids of the edges that the ego drives on.
-    """
-
-    net: Path
-    additional: tuple[Path, ...]
-    edges: tuple[str, ...]
+    net: Path  # Network
+    additional: tuple[Path, ...]  # Files with what stands beside the road
+    edges: tuple[str, ...]  # Ids of the edges that the ego drives on
 
 
 def planned_way(setup: TrafficSetup) -> PlannedWay | None:
-    """Look for the ego's way in the files; None where it is not written out in them.
-
-    Parameters
-    ----------
-    setup : TrafficSetup
-        The simulation and its ego.
-    """
+    """Look for the ego's way in the files; None where it is not written out in them."""
     if setup.ego is None:
         return None
     if setup.config is None:

@@ -115,12 +115,6 @@ class Roster:
             self.present.difference_update(vehicles)
 
     def entered_since(self, since: int) -> tuple[list[str], int]:
-        """Vehicles that have entered since an earlier call, and the mark to give to the next call.
-
-        Parameters
-        ----------
-        since : int
-            Mark of the earlier call; 0 for all since the beginning.
-        """
+        """Vehicles that have entered since an earlier call, and the mark to give to the next call."""
         entered = self._entered
         return (entered[since:], len(entered)) if since < len(entered) else ([], since)

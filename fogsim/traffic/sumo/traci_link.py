@@ -20,13 +20,7 @@ LONGEST_TIMEOUT = 1e6
 
 
 def load_traci() -> ModuleType:
-    """Import traci.
-
-    Raises
-    ------
-    MissingDependencyError
-        If it is not installed.
-    """
+    """Import traci."""
     try:
         import traci  # noqa: PLC0415 - importing fogsim must not load SUMO's packages
     except ImportError as error:
@@ -40,23 +34,7 @@ class TraciLink:
 
     The simulation is taken as it is at the first `begin`, whatever its arguments; a later one loads the arguments.
 
-    Parameters
-    ----------
-    host : str
-        Where SUMO runs.
-    port : int
-        Its ``--remote-port``.
-    order : int or None
-        This client's place among several (SUMO's ``--num-clients``); each needs another one.
-    retries : int
-        How often to try again, every 0.25 s, while SUMO does not listen yet.
-    timeout : float
-        How long SUMO may leave one message unanswered [s], more than 0; ``inf`` for ever. A step waits for all clients.
-
-    Raises
-    ------
-    InputError
-        If the timeout is no such time.
+    Takes `timeout` [s].
     """
 
     remote = True
@@ -84,19 +62,7 @@ class TraciLink:
         return f"at {self._host}:{self._port}"
 
     def begin(self, arguments: Sequence[str]) -> Api:
-        """Connect, or load the simulation anew; see `SumoLink.begin`.
-
-        Parameters
-        ----------
-        arguments : sequence of str
-            SUMO's command line without the program's name.
-
-        Raises
-        ------
-        SimulationError
-            If SUMO cannot be reached, refuses or falls silent, or other clients would lose their simulation by loading
-            another.
-        """
+        """Connect, or load the simulation anew; see `SumoLink.begin`."""
         if self._connection is None:
             self._connection = self._connect()
         else:
@@ -165,14 +131,7 @@ class TraciLink:
 class _LimitedSocket:
     """A socket of traci's that tells a silent SUMO by an error of ours; traci takes silence for a closed connection.
 
-    Parameters
-    ----------
-    connected : socket.socket
-        The socket.
-    timeout : float
-        How long to wait [s].
-    where : str
-        Where the simulation runs, for the message.
+    Takes `timeout` [s].
     """
 
     def __init__(self, connected: socket.socket, timeout: float, where: str) -> None:

@@ -25,26 +25,13 @@ Speed = TypeVar("Speed", float, NDArray[np.float64])
 def closing_speed_bound(speed: Speed, leader_speed: Speed, horizon: float) -> Speed:
     """How fast the gap between two vehicles, or each of many gaps, changes at most [m/s].
 
-    Parameters
-    ----------
-    speed, leader_speed : float or (n,) float64
-        Their speeds now [m/s].
-    horizon : float
-        Time from now up to which the bound holds [s].
+    Takes `speed`, `leader_speed` (n,) [m/s], `horizon` [s].
     """
     return abs(leader_speed - speed) + 0.5 * MAX_RELATIVE_ACCELERATION * horizon
 
 
 class UpdateSchedule:
-    """Vehicles by the step in which each is due; only those due are ever touched.
-
-    Parameters
-    ----------
-    step : float
-        Time between two steps [s].
-    now : float
-        Simulated time [s].
-    """
+    """Vehicles by the step in which each is due; only those due are ever touched (`step` [s], `now` [s])."""
 
     def __init__(self, step: float, now: float) -> None:
         self._step = step
@@ -61,13 +48,7 @@ class UpdateSchedule:
         return number - number % self._batch if number - self._current >= self._batch else number
 
     def unscheduled(self, vehicles: Sequence[str]) -> list[str]:
-        """Those of some vehicles that wait for no step, each once.
-
-        Parameters
-        ----------
-        vehicles : sequence of str
-            Their ids.
-        """
+        """Those of some vehicles that wait for no step, each once."""
         # Seldom asked for any, so that keeping a set of all scheduled vehicles would cost more.
         if not vehicles:
             return []
@@ -75,28 +56,12 @@ class UpdateSchedule:
         return [v for v in dict.fromkeys(vehicles) if v not in scheduled]
 
     def add(self, vehicles: Sequence[str], time: float) -> None:
-        """Schedule vehicles that are not scheduled yet, at the earliest for the next step.
-
-        Parameters
-        ----------
-        vehicles : sequence of str
-            Their ids.
-        time : float
-            When they are due at the latest [s].
-        """
+        """Schedule vehicles that are not scheduled yet, at the earliest for the next step (`time` [s])."""
         if vehicles:
             self._due.setdefault(self._step_at(time), []).extend(vehicles)
 
     def add_each(self, vehicles: Sequence[str], times: Sequence[float]) -> None:
-        """Schedule vehicles as `add` does, each for a time of its own.
-
-        Parameters
-        ----------
-        vehicles : sequence of str
-            Their ids.
-        times : sequence of float
-            When they are due at the latest [s].
-        """
+        """Schedule vehicles as `add` does, each for a time of its own (`times` [s])."""
         due, step_at, last, number = self._due, self._step_at, math.nan, 0
         for vehicle, time in zip(vehicles, times, strict=True):
             # Mostly many wait as long as they may, and so for the same time.
@@ -105,13 +70,7 @@ class UpdateSchedule:
             due.setdefault(number, []).append(vehicle)
 
     def bring_forward(self, vehicle: str) -> None:
-        """Make a vehicle that waits due in the next step; one that waits for nothing stays so.
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        """
+        """Make a vehicle that waits due in the next step; one that waits for nothing stays so."""
         # Seldom asked for, so that keeping where each vehicle waits would cost more.
         for waiting in self._due.values():
             if vehicle in waiting:
@@ -120,13 +79,7 @@ class UpdateSchedule:
                 return
 
     def pop_due(self, now: float) -> list[str]:
-        """Take out the vehicles that are due.
-
-        Parameters
-        ----------
-        now : float
-            Simulated time [s].
-        """
+        """Take out the vehicles that are due (`now` [s])."""
         number, last = self._number(now), self._current
         self._current = number
         if number - last == 1:

@@ -22,19 +22,7 @@ _VARIABLES = {
 def vehicle_getters(
     api: Api, remote: bool, names: Sequence[str], arguments: Mapping[str, tuple[str, Any]] | None = None
 ) -> tuple[Getter, ...]:
-    """Getters of the domain ``vehicle``, by subscription where every call is a message to another process.
-
-    Parameters
-    ----------
-    api : Api
-        libsumo or a connection of traci.
-    remote : bool
-        True for a connection.
-    names : sequence of str
-        Names of the getters.
-    arguments : mapping from str to (str, Any) or None
-        For getters that take an argument, its type in the protocol and the only value that is asked for.
-    """
+    """Getters of the domain ``vehicle``, by subscription where every call is a message to another process."""
     if not remote:
         return tuple(vehicle_getter(api, name) for name in names)
     numbers = {name: _VARIABLES[name] for name in names}

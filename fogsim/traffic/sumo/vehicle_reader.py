@@ -53,33 +53,17 @@ class DynamicState(NamedTuple):
     """What changes about vehicles, in SUMO's units; entry i of each belongs to ``ids[i]``.
 
     A named tuple is made in a third of the time of a frozen dataclass, which is noticeable in each step.
-
-    Attributes
-    ----------
-    ids : tuple of str
-        Vehicle ids.
-    position : (n, 3) float64
-        Middle of the front bumper [m].
-    angle : (n,) float64
-        Heading, clockwise from north [°].
-    speed, acceleration : (n,) float64
-        Speed [m/s] and acceleration [m/s²].
-    lane : tuple of str
-        Lane ids; empty off the lanes.
-    signals : sequence of int
-        SUMO's signal bits.
-    slope : (n,) float64
-        From the rear to the front bumper, positive uphill [°].
     """
 
-    ids: tuple[str, ...]
-    position: NDArray[np.float64]
-    angle: NDArray[np.float64]
+    ids: tuple[str, ...]  # Vehicle ids
+    position: NDArray[np.float64]  # (n, 3): Middle of the front bumper [m]
+    angle: NDArray[np.float64]  # (n,): Heading, clockwise from north [°]
+    # speed, acceleration (n,): speed [m/s] and acceleration [m/s²]
     speed: NDArray[np.float64]
     acceleration: NDArray[np.float64]
-    lane: tuple[str, ...]
-    signals: Sequence[int]
-    slope: NDArray[np.float64]
+    lane: tuple[str, ...]  # Lane ids; empty off the lanes
+    signals: Sequence[int]  # SUMO's signal bits
+    slope: NDArray[np.float64]  # (n,): From the rear to the front bumper, positive uphill [°]
 
 
 class _Constants(NamedTuple):
@@ -97,13 +81,7 @@ class _Constants(NamedTuple):
 
 
 class VehicleBodies:
-    """Kinds, sizes, paints and wishes of vehicles as a table that grows with every vehicle.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    """
+    """Kinds, sizes, paints and wishes of vehicles as a table that grows with every vehicle."""
 
     def __init__(self, api: Api) -> None:
         self._api = api
@@ -118,11 +96,6 @@ class VehicleBodies:
 
         These are length, width, height [m], linear reflectances red, green, blue of the paint, the driver's own speed
         over the limit [-] and the vehicle's own top speed [m/s].
-
-        Parameters
-        ----------
-        ids : (n,) sequence of str
-            Vehicles on the road.
         """
         known = self._row
         try:
@@ -133,13 +106,7 @@ class VehicleBodies:
         return tuple([kinds[row] for row in rows]), self._numbers[rows]
 
     def forget(self, vehicles: Sequence[str]) -> None:
-        """Forget vehicles whose ids others may bear now.
-
-        Parameters
-        ----------
-        vehicles : sequence of str
-            Their ids.
-        """
+        """Forget vehicles whose ids others may bear now."""
         for vehicle in vehicles:
             self._row.pop(vehicle, None)
 
@@ -161,19 +128,7 @@ class VehicleBodies:
 
 
 class VehicleReader:
-    """Reads vehicles by SUMO's plain getters, which inside the process beat subscriptions.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    ego : str or None
-        Id of the ego, which is always read; None to read everybody, wherever they are.
-    radius : float
-        Vehicles farther from the ego than this are left out [m].
-    roster : Roster or None
-        Who is on the road; None for one of its own.
-    """
+    """Reads vehicles by SUMO's plain getters, which inside the process beat subscriptions (`radius` [m])."""
 
     def __init__(self, api: Api, ego: str | None, radius: float, roster: Roster | None = None) -> None:
         self._api = api
@@ -200,17 +155,7 @@ class VehicleReader:
         heard: Mapping[str, float] | None = None,
         lamps_of: Mapping[str, Lamp] | None = None,
     ) -> TrafficState:
-        """Vehicles near the ego.
-
-        Parameters
-        ----------
-        ego_lamps : Lamp
-            Lamps of the command; the ego lights its stop lamps itself.
-        heard : mapping from vehicle id to float or None
-            What drivers have heard advised [m/s]; None if nobody has heard anything.
-        lamps_of : mapping from vehicle id to Lamp or None
-            Lamps of the command of others, likewise; None for nobody's.
-        """
+        """Vehicles near the ego (`heard` [m/s])."""
         self._roster.update()
         new, self._mark = self._roster.entered_since(self._mark)
         self._bodies.forget(new)

@@ -16,19 +16,7 @@ _UNLIMITED = 10.0
 def depart(api: Api, action: Depart, present: Collection[str]) -> bool:
     """Bring a vehicle onto the road with the next step; SUMO waits with it as long as it would hit somebody.
 
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    action : Depart
-        Which, and where.
-    present : collection of str
-        Vehicles on the road.
-
-    Returns
-    -------
-    bool
-        False if there is such a vehicle already, the other one is not on a lane, or the place is off its way.
+    Returns false if there is such a vehicle already, the other one is not on a lane, or the place is off its way.
     """
     get, like = api.vehicle, action.like
     if action.vehicle in present or like not in present or is_off_lanes(api, like):
@@ -73,19 +61,7 @@ def _footways(api: Api, edge: str) -> int:
 def enter(api: Api, action: Enter, present: Collection[str]) -> bool:
     """Bring a vehicle onto the road on a way of its own; SUMO waits with it as long as it would hit somebody.
 
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    action : Enter
-        Which, and where.
-    present : collection of str
-        Vehicles on the road.
-
-    Returns
-    -------
-    bool
-        False if there is such a vehicle already, or no way leads along its edges.
+    Returns false if there is such a vehicle already, or no way leads along its edges.
     """
     if action.vehicle in present:
         return False

@@ -98,24 +98,12 @@ class DriverTable:
         self.values = np.empty((64, len(Column)))
 
     def rows(self, vehicles: Sequence[str]) -> NDArray[np.intp]:
-        """Rows of vehicles (n,); a new one gets one.
-
-        Parameters
-        ----------
-        vehicles : (n,) sequence of str
-            Their ids.
-        """
+        """Rows of vehicles (n,); a new one gets one."""
         known = self._row
         return np.array([known[v] if v in known else self._fill(v) for v in vehicles], dtype=np.intp)
 
     def reset(self, vehicles: Sequence[str]) -> None:
-        """Fill rows anew for vehicles that have entered, come back, or bear the id of one that was there.
-
-        Parameters
-        ----------
-        vehicles : sequence of str
-            Their ids.
-        """
+        """Fill rows anew for vehicles that have entered, come back, or bear the id of one that was there."""
         for vehicle in vehicles:
             self._fill(vehicle)
 

@@ -11,17 +11,7 @@ _STAY = 1.0  # [s]
 
 
 class EgoDriving:
-    """Drives the ego as it is told; SUMO's driver has it back when nothing is told any more.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    ego : str or None
-        Its id.
-    step_length : float
-        Time between two calls [s].
-    """
+    """Drives the ego as it is told; SUMO's driver has it back when nothing is told any more (`step_length` [s])."""
 
     def __init__(self, api: Api, ego: str | None, step_length: float) -> None:
         self._api = api
@@ -33,17 +23,7 @@ class EgoDriving:
     def apply(self, control: EgoControl | None, present: set[str]) -> bool:
         """Drive for the next step.
 
-        Parameters
-        ----------
-        control : EgoControl or None
-            What is told; its change of lane is made once as long as it is the same object.
-        present : set of str
-            Vehicles on the road.
-
-        Returns
-        -------
-        bool
-            Whether the ego is driven by hand.
+        Returns whether the ego is driven by hand.
         """
         ego, vehicles = self._ego, self._api.vehicle
         if ego is None or ego not in present:

@@ -12,17 +12,7 @@ from fogsim.units import visibility_from_extinction
 
 
 class FogChoices:
-    """Writes into the table what drivers choose.
-
-    Parameters
-    ----------
-    table : DriverTable
-        The drivers.
-    setup : DriverSetup
-        What they are like.
-    sight : DriverSight or None
-        Their eyes; None if they see through the fog.
-    """
+    """Writes into the table what drivers choose."""
 
     def __init__(self, table: DriverTable, setup: DriverSetup, sight: DriverSight | None) -> None:
         self._table = table
@@ -31,15 +21,7 @@ class FogChoices:
         self._sight = None if plain and setup.misjudgement == 0.0 else sight
 
     def update(self, rows: NDArray[np.intp], extinction: NDArray[np.float64]) -> None:
-        """Choose where the fog is another than at the last choice.
-
-        Parameters
-        ----------
-        rows : (n,) intp
-            Rows of the drivers.
-        extinction : (n,) float64
-            Extinction coefficients where they are [1/m].
-        """
+        """Choose where the fog is another than at the last choice (`rows` (n,) int, `extinction` (n,) [1/m])."""
         table = self._table
         changed = np.flatnonzero(extinction != table.values[rows, Column.EXTINCTION])
         if not len(changed):

@@ -17,19 +17,7 @@ UNNOTICED_RATIO = 0.03
 
 
 class HeadwayControl:
-    """Sets time headways; where the fog does not matter they are the vehicles' own.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    table : DriverTable
-        The drivers.
-    misjudgement : float
-        By which share they overestimate distances where they see lamps alone [-].
-    sight : DriverSight or None
-        Their eyes; None if they see through the fog.
-    """
+    """Sets time headways; where the fog does not matter they are the vehicles' own."""
 
     def __init__(self, api: Api, table: DriverTable, misjudgement: float, sight: DriverSight | None) -> None:
         self._speed = vehicle_getter(api, "getSpeed")
@@ -40,15 +28,7 @@ class HeadwayControl:
         self._kept_share = np.array([kind.kept_share for kind in table.kinds])
 
     def update(self, vehicles: Sequence[str], rows: NDArray[np.intp]) -> None:
-        """Set the headways of drivers, by the fog and the speed at which they drive.
-
-        Parameters
-        ----------
-        vehicles : (n,) sequence of str
-            Their vehicles.
-        rows : (n,) intp
-            Their rows of the table.
-        """
+        """Set the headways of drivers, by the fog and the speed at which they drive (`rows` (n,) int)."""
         if self._sight is None or not self._matters.any():
             return
         values = self._table.values[rows]
@@ -98,15 +78,7 @@ class HeadwayControl:
         table.values[row, Column.HEADWAY_SET] = headway
 
     def release(self, vehicles: Sequence[str], rows: NDArray[np.intp]) -> None:
-        """Give vehicles their own headways back.
-
-        Parameters
-        ----------
-        vehicles : (n,) sequence of str
-            Vehicles on the road.
-        rows : (n,) intp
-            Their rows of the table.
-        """
+        """Give vehicles their own headways back (`rows` (n,) int)."""
         own = self._table.values[rows, Column.HEADWAY]
         for i in np.flatnonzero(self._table.values[rows, Column.HEADWAY_SET] != own).tolist():
             self._set(vehicles[i], int(rows[i]), float(own[i]))

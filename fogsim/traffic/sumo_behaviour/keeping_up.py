@@ -16,19 +16,7 @@ from fogsim.traffic.sumo_lanes.leaders import Leaders
 
 
 class KeepingUp:
-    """Tells how fast leaders are who are kept up with.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    table : DriverTable
-        The drivers.
-    sight : DriverSight or None
-        Their eyes; None if they see through the fog.
-    remote : bool
-        True where every call is a message to another process: leaders and speeds are subscribed to.
-    """
+    """Tells how fast leaders are who are kept up with."""
 
     def __init__(self, api: Api, table: DriverTable, sight: DriverSight | None, remote: bool) -> None:
         self._leader = Leaders(api, remote).within(REACH)
@@ -38,13 +26,7 @@ class KeepingUp:
         self._keeps_up = np.array([kind.keeps_up for kind in table.kinds])
 
     def keepers(self, rows: NDArray[np.intp]) -> NDArray[np.intp]:
-        """Which of some drivers keep up with a leader in the fog where they are.
-
-        Parameters
-        ----------
-        rows : (n,) intp
-            Their rows of the table.
-        """
+        """Which of some drivers keep up with a leader in the fog where they are (`rows` (n,) int)."""
         if self._sight is None or not self._keeps_up.any():
             return np.empty(0, dtype=np.intp)
         values = self._table.values[rows]
@@ -52,15 +34,7 @@ class KeepingUp:
         return np.flatnonzero(in_fog & self._keeps_up[values[:, Column.KIND].astype(np.intp)])
 
     def kept_speeds(self, vehicles: Sequence[str], rows: NDArray[np.intp]) -> NDArray[np.float64]:
-        """Speeds at which drivers keep up with their leaders (n,) [m/s]; 0 where none is seen.
-
-        Parameters
-        ----------
-        vehicles : (n,) sequence of str
-            Vehicles of `keepers`.
-        rows : (n,) intp
-            Their rows of the table.
-        """
+        """Speeds at which drivers keep up with their leaders (n,) [m/s]; 0 where none is seen (`rows` (n,) int)."""
         reaches = self._table.values[rows, Column.REACH].tolist()
         return np.array([self._kept_speed(v, reach) for v, reach in zip(vehicles, reaches, strict=True)])
 

@@ -27,21 +27,7 @@ _ONCOMING_STAY = 1.0
 
 
 class ScriptedActions:
-    """Plays in SUMO what the script has begun.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    speeds : SpeedControl
-        Sets the speeds.
-    lamps : Lamps
-        Lamps that are not the vehicles' own.
-    lane_changes : LaneChangeSmoothing
-        Shows changes of lane.
-    session : str
-        Name of the session.
-    """
+    """Plays in SUMO what the script has begun."""
 
     def __init__(
         self, api: Api, speeds: SpeedControl, lamps: Lamps, lane_changes: LaneChangeSmoothing, session: str
@@ -63,24 +49,7 @@ class ScriptedActions:
     ) -> tuple[TrafficAction, ...]:
         """Begin actions.
 
-        Parameters
-        ----------
-        actions : sequence of TrafficAction
-            What begins.
-        time : float
-            Time since the ego appeared [s].
-        present : collection of str
-            Vehicles on the road.
-
-        Returns
-        -------
-        tuple of TrafficAction
-            Those that could not begin: the vehicle has left, or has no such lane.
-
-        Raises
-        ------
-        InputError
-            If there are no such traffic lights, or not in such a state.
+        Returns those that could not begin: the vehicle has left, or has no such lane. Takes `time` [s].
         """
         refused, motion = list[TrafficAction](), self._motion(time, present)
         for action in actions:
@@ -143,15 +112,7 @@ class ScriptedActions:
         return Motion(time, self._step, present, LaneDirections(self._api).driven, vehicle.getSpeed, gap)
 
     def play(self, time: float, present: Collection[str]) -> None:
-        """Go on with what has begun, for the next step.
-
-        Parameters
-        ----------
-        time : float
-            Time since the ego appeared [s].
-        present : collection of str
-            Vehicles on the road.
-        """
+        """Go on with what has begun, for the next step (`time` [s])."""
         self._signals.update(time)
         self._end_changes(time, present)
         if not self._playing.is_idle or self._paths.vehicles:
@@ -199,13 +160,7 @@ class ScriptedActions:
                 self._modes.withdraw(vehicle)
 
     def release(self, present: Collection[str]) -> None:
-        """Give traffic lights and lane changing back; speeds are `SpeedControl`'s.
-
-        Parameters
-        ----------
-        present : collection of str
-            Vehicles on the road.
-        """
+        """Give traffic lights and lane changing back; speeds are `SpeedControl`'s."""
         self._signals.release()
         self._paths.release(present)
         for vehicle in self._changing.keys() & set(present):
@@ -214,17 +169,7 @@ class ScriptedActions:
 
 
 def has_lane(api: Api, vehicle: str, lanes: int) -> bool:
-    """Tell whether a vehicle could go so many lanes to the left, negative to the right, where it is.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    vehicle : str
-        Its id.
-    lanes : int
-        How many.
-    """
+    """Tell whether a vehicle could go so many lanes to the left, negative to the right, where it is."""
     if is_off_lanes(api, vehicle):
         return False
     edge, lane = str(api.vehicle.getRoadID(vehicle)), int(api.vehicle.getLaneIndex(vehicle)) + lanes

@@ -8,13 +8,7 @@ from fogsim.values.script import SetSignal
 
 
 class SignalControl:
-    """Sets traffic lights; remembers which, to give them back.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    """
+    """Sets traffic lights; remembers which, to give them back."""
 
     def __init__(self, api: Api) -> None:
         self._lights = api.trafficlight
@@ -22,20 +16,7 @@ class SignalControl:
         self._until: dict[str, float] = {}
 
     def begin(self, action: SetSignal, time: float) -> None:
-        """Let traffic lights show something else.
-
-        Parameters
-        ----------
-        action : SetSignal
-            Which, and what.
-        time : float
-            Now [s].
-
-        Raises
-        ------
-        InputError
-            If there are no such lights, or they have no such phase, or another number of links.
-        """
+        """Let traffic lights show something else (`time` [s])."""
         known, signal = list(self._lights.getIDList()), action.signal
         if signal not in known:
             raise InputError(f"there are no traffic lights {signal!r} in the net; {suggest(signal, known)}")
@@ -70,13 +51,7 @@ class SignalControl:
         return action.phase
 
     def update(self, time: float) -> None:
-        """Give back the lights whose time is over.
-
-        Parameters
-        ----------
-        time : float
-            Now [s].
-        """
+        """Give back the lights whose time is over (`time` [s])."""
         for signal in [one for one, end in self._until.items() if time >= end - 1e-9]:
             self._give_back(signal)
 

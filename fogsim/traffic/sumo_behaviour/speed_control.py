@@ -45,12 +45,7 @@ _SAME = 1e-6  # [m/s], [m/s²]
 class SpeedControl:
     """Brings the ego to its advised speed and vehicles to scripted ones; remembers which, to free them again.
 
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    step_length : float
-        Time between two calls [s].
+    Takes `step_length` [s].
     """
 
     def __init__(self, api: Api, step_length: float) -> None:
@@ -61,13 +56,7 @@ class SpeedControl:
         self._modes: dict[str, int] = {}
 
     def apply(self, orders: Mapping[str, Order]) -> None:
-        """Apply the orders of this step.
-
-        Parameters
-        ----------
-        orders : mapping from vehicle id to Order
-            Orders for vehicles on the road.
-        """
+        """Apply the orders of this step."""
         for vehicle, (target, deceleration) in orders.items():
             if math.isfinite(target):
                 self._hold(vehicle, target, deceleration)
@@ -80,12 +69,7 @@ class SpeedControl:
 
         They speed up no faster than their type can, and brake as hard as it can in an emergency.
 
-        Parameters
-        ----------
-        speeds : mapping from vehicle id to float
-            Speeds of vehicles on the road [m/s]; ``inf`` frees one.
-        close : collection of str
-            Those who may come nearer to the one ahead than SUMO's car following holds safe.
+        Takes `speeds` [m/s].
         """
         get = self._vehicles
         for vehicle, wanted in speeds.items():
@@ -126,13 +110,7 @@ class SpeedControl:
             self._vehicles.setSpeedMode(vehicle, self._modes.pop(vehicle))
 
     def release(self, present: Collection[str]) -> None:
-        """Free all vehicles that are held.
-
-        Parameters
-        ----------
-        present : collection of str
-            Vehicles on the road.
-        """
+        """Free all vehicles that are held."""
         for vehicle in self._held.intersection(present):
             self._vehicles.setSpeed(vehicle, _SUMO_DRIVES)
         self._held.clear()
@@ -166,25 +144,7 @@ class SpeedControl:
 
 
 class SumoDesiredSpeeds:
-    """Sets the speed and the headway of every vehicle but the ego by what its driver chooses, sees and is advised.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    setup : TrafficSetup
-        What drivers are like and see, how hard they slow down, and who is the ego, whose speed `SpeedControl` sets.
-    fog : FogAccess
-        The fog.
-    seed : int
-        With a vehicle's id it gives its driver's traits, so that they depend on nothing else.
-    roster : Roster
-        Which vehicles are on the road.
-    session : str
-        Name of the session.
-    remote : bool
-        True where every call is a message to another process.
-    """
+    """Sets the speed and the headway of every vehicle but the ego by what its driver chooses, sees and is advised."""
 
     def __init__(
         self,
@@ -224,13 +184,7 @@ class SumoDesiredSpeeds:
         return self._heard
 
     def update(self, command: Command) -> None:
-        """Let new drivers choose a speed, and all drivers if it is time to choose again.
-
-        Parameters
-        ----------
-        command : Command
-            The advice in force.
-        """
+        """Let new drivers choose a speed, and all drivers if it is time to choose again."""
         roster = self._roster
         roster.update()
         time, present = roster.time, roster.present

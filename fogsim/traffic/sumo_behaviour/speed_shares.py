@@ -20,19 +20,7 @@ _SLOWEST = 1.0
 
 
 class SpeedShareControl:
-    """Sets shares, and lowers them gradually.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    table : DriverTable
-        What was last set.
-    deceleration : float
-        How hard vehicles slow down for it [m/s²], positive.
-    now : float
-        Simulated time [s].
-    """
+    """Sets shares, and lowers them gradually (`deceleration` [m/s²], `now` [s])."""
 
     def __init__(self, api: Api, table: DriverTable, deceleration: float, now: float) -> None:
         self._vehicles = api.vehicle
@@ -44,17 +32,7 @@ class SpeedShareControl:
         self._falling: dict[str, tuple[int, float]] = {}
 
     def set_desired(self, vehicles: Sequence[str], rows: NDArray[np.intp], desired: NDArray[np.float64]) -> None:
-        """Set the shares that drivers want.
-
-        Parameters
-        ----------
-        vehicles : (n,) sequence of str
-            Their vehicles.
-        rows : (n,) intp
-            Their rows of the table.
-        desired : (n,) float64
-            Shares to come to [-].
-        """
+        """Set the shares that drivers want (`rows` (n,) int, `desired` (n,))."""
         table = self._table
         for i in np.flatnonzero(_is_noticed(desired, table.values[rows, Column.SHARE_DESIRED])).tolist():
             vehicle, row, share = vehicles[i], int(rows[i]), float(desired[i])
@@ -70,13 +48,7 @@ class SpeedShareControl:
                 self._falling[vehicle] = (row, self._deceleration / in_clear_air)
 
     def set_at_entry(self, vehicles: Sequence[str], rows: NDArray[np.intp], desired: NDArray[np.float64]) -> None:
-        """Let vehicles that have just departed drive no faster than the share that their drivers want.
-
-        Parameters
-        ----------
-        vehicles, rows, desired
-            As in `set_desired`.
-        """
+        """Let vehicles that have just departed drive no faster than the share that their drivers want."""
         for i in np.flatnonzero(_is_noticed(desired, np.ones(len(desired)))).tolist():
             vehicle, row = vehicles[i], int(rows[i])
             self._table.values[row, Column.SHARE_DESIRED] = desired[i]
@@ -87,15 +59,7 @@ class SpeedShareControl:
                 self._vehicles.setPreviousSpeed(vehicle, allowed, 0.0)
 
     def update(self, time: float, present: Collection[str]) -> None:
-        """Lower further the shares that are being lowered.
-
-        Parameters
-        ----------
-        time : float
-            Simulated time [s].
-        present : collection of str
-            Vehicles on the road.
-        """
+        """Lower further the shares that are being lowered (`time` [s])."""
         passed, self._updated_at = min(max(time - self._updated_at, 0.0), MAX_INTERVAL), time
         for vehicle, (row, rate) in list(self._falling.items()) if self._falling else ():
             if vehicle not in present:
@@ -116,15 +80,7 @@ class SpeedShareControl:
         table.values[row, Column.SHARE_SET] = share
 
     def release(self, vehicles: Sequence[str], rows: NDArray[np.intp]) -> None:
-        """Give vehicles their own speed factors back.
-
-        Parameters
-        ----------
-        vehicles : (n,) sequence of str
-            Vehicles on the road.
-        rows : (n,) intp
-            Their rows of the table.
-        """
+        """Give vehicles their own speed factors back (`rows` (n,) int)."""
         self._falling.clear()
         for i in np.flatnonzero(self._table.values[rows, Column.SHARE_DESIRED] != 1.0).tolist():
             self._set(vehicles[i], int(rows[i]), 1.0)

@@ -15,11 +15,6 @@ class ToldLamps:
 
     A parameter says it and not SUMO's own signals of the vehicle: who sets those takes braking and turning out of
     SUMO's hands, so that its stop lamps would stay dark.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
     """
 
     def __init__(self, api: Api) -> None:
@@ -27,15 +22,7 @@ class ToldLamps:
         self._told: dict[str, Lamp] = {}
 
     def tell(self, lamps: Mapping[str, Lamp], present: set[str]) -> None:
-        """Tell the lamps that are other ones than before.
-
-        Parameters
-        ----------
-        lamps : mapping from vehicle id to Lamp
-            Lit lamps.
-        present : set of str
-            Vehicles on the road.
-        """
+        """Tell the lamps that are other ones than before."""
         for vehicle, lit in lamps.items():
             if lit != self._told.get(vehicle) and vehicle in present:
                 self._api.vehicle.setParameter(vehicle, LAMPS_PARAMETER, lamp_names(lit))

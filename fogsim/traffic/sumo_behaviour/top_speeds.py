@@ -23,21 +23,7 @@ MAX_INTERVAL = 1.0
 
 
 class TopSpeedControl:
-    """Sets top speeds, and lowers them gradually.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    table : DriverTable
-        What was last set.
-    claims : Claims
-        The session's claims to top speeds.
-    deceleration : float
-        How fast a top speed falls [m/s²], positive.
-    now : float
-        Simulated time [s].
-    """
+    """Sets top speeds, and lowers them gradually (`deceleration` [m/s²], `now` [s])."""
 
     def __init__(self, api: Api, table: DriverTable, claims: Claims, deceleration: float, now: float) -> None:
         self._vehicles = api.vehicle
@@ -49,17 +35,7 @@ class TopSpeedControl:
         self._falling: dict[str, int] = {}
 
     def set_desired(self, vehicles: Sequence[str], rows: NDArray[np.intp], desired: NDArray[np.float64]) -> None:
-        """Set the desired speeds of drivers.
-
-        Parameters
-        ----------
-        vehicles : (n,) sequence of str
-            Their vehicles.
-        rows : (n,) intp
-            Their rows of the table.
-        desired : (n,) float64
-            Top speeds to come to [m/s].
-        """
+        """Set the desired speeds of drivers (`rows` (n,) int, `desired` (n,) [m/s])."""
         table = self._table
         for i in np.flatnonzero(np.abs(desired - table.values[rows, Column.SPEED_DESIRED]) > UNNOTICED_SPEED).tolist():
             vehicle, row, speed = vehicles[i], int(rows[i]), float(desired[i])
@@ -76,13 +52,7 @@ class TopSpeedControl:
                 self._set(vehicle, row, speed)
 
     def set_at_entry(self, vehicles: Sequence[str], rows: NDArray[np.intp], desired: NDArray[np.float64]) -> None:
-        """Let vehicles that have just departed drive no faster than their drivers desire.
-
-        Parameters
-        ----------
-        vehicles, rows, desired
-            As in `set_desired`.
-        """
+        """Let vehicles that have just departed drive no faster than their drivers desire."""
         table = self._table
         slower = np.flatnonzero(desired < table.values[rows, Column.TOP_SPEED] - UNNOTICED_SPEED)
         for i in slower.tolist():
@@ -94,15 +64,7 @@ class TopSpeedControl:
             self._set(vehicle, int(rows[i]), speed)
 
     def update(self, time: float, present: Collection[str]) -> None:
-        """Lower further the top speeds that are being lowered.
-
-        Parameters
-        ----------
-        time : float
-            Simulated time [s].
-        present : collection of str
-            Vehicles on the road.
-        """
+        """Lower further the top speeds that are being lowered (`time` [s])."""
         passed, self._updated_at = min(max(time - self._updated_at, 0.0), MAX_INTERVAL), time
         for vehicle, row in list(self._falling.items()) if self._falling else ():
             if vehicle not in present:
@@ -124,15 +86,7 @@ class TopSpeedControl:
         self._table.values[row, Column.SPEED_SET] = speed
 
     def release(self, vehicles: Sequence[str], rows: NDArray[np.intp]) -> None:
-        """Withdraw all claims to the top speeds of vehicles.
-
-        Parameters
-        ----------
-        vehicles : (n,) sequence of str
-            Vehicles on the road.
-        rows : (n,) intp
-            Their rows of the table.
-        """
+        """Withdraw all claims to the top speeds of vehicles (`rows` (n,) int)."""
         self._falling.clear()
         own = self._table.values[rows, Column.TOP_SPEED]
         for i in np.flatnonzero(self._table.values[rows, Column.SPEED_SET] != own).tolist():

@@ -25,40 +25,20 @@ class PerceivedPart(Protocol):
     """What drivers perceive of one kind of thing; it does nothing where everything is certainly seen."""
 
     def update(self, own_lamps: OwnLamps) -> None:
-        """Tell SUMO's drivers, before a step, what they do not see.
-
-        Parameters
-        ----------
-        own_lamps : dict
-            Lamps of vehicles whose lamps are not SUMO's.
-        """
+        """Tell SUMO's drivers, before a step, what they do not see."""
 
     def release(self) -> None:
         """Let everybody on the road see everything again, as SUMO's own drivers do."""
 
 
 class DriversPerception:
-    """Updates and releases the parts in turn.
-
-    Parameters
-    ----------
-    parts : sequence of PerceivedPart
-        What drivers perceive.
-    """
+    """Updates and releases the parts in turn."""
 
     def __init__(self, parts: Sequence[PerceivedPart]) -> None:
         self._parts = tuple(parts)
 
     def update(self, told: Mapping[str, Lamp], lamps: Lamps) -> None:
-        """Tell SUMO's drivers, before a step, what they do not see.
-
-        Parameters
-        ----------
-        told : mapping from vehicle id to Lamp
-            Lit lamps of the ego and of other equipped vehicles, whose lamps are not SUMO's.
-        lamps : Lamps
-            Lamps that are switched by hand or have failed.
-        """
+        """Tell SUMO's drivers, before a step, what they do not see."""
         own_lamps: OwnLamps = {vehicle: int(lit) for vehicle, lit in told.items()}
         own_lamps.update((v, lamps.switched(v, own_lamps.get(v, int(OTHERS_LAMPS)))) for v in lamps.vehicles)
         for part in self._parts:
@@ -80,27 +60,7 @@ def drivers_perception(
     net: Path | None = None,
     obstructions: Obstructions = CLEAR_SIGHT,
 ) -> DriversPerception:
-    """All parts.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    fog : FogAccess
-        The fog.
-    sight : DriverSight
-        The drivers' eyes.
-    roster : Roster
-        Who is on the road.
-    remote : bool
-        True where every call is a message to another process.
-    session : str
-        Name of the session.
-    net : Path or None
-        Its network; None for the file that it says it has loaded.
-    obstructions : Obstructions
-        What stands beside its roads.
-    """
+    """All parts."""
     leaders = Perception(api, fog, sight, roster, remote, session, obstructions)
     vehicle_sight = VehicleSight(api, fog, sight, remote, obstructions)
     return DriversPerception(

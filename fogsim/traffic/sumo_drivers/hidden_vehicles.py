@@ -20,17 +20,7 @@ _CORNERS = np.array(list(itertools.product((-1.0, 0.0), (-0.5, 0.5), (0.5, 1.0))
 
 
 class HiddenVehicles:
-    """Tells whom obstructions hide: those of whose body no corner is in sight, neither halfway up nor at the top.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    obstructions : Obstructions
-        What stands there.
-    remote : bool
-        True where every call is a message to another process: what is asked often is subscribed to.
-    """
+    """Tells whom obstructions hide: those of whose body no corner is in sight, neither halfway up nor at the top."""
 
     def __init__(self, api: Api, obstructions: Obstructions, remote: bool = False) -> None:
         self._obstructions = obstructions
@@ -41,26 +31,14 @@ class HiddenVehicles:
         self._sizes: dict[str, _Point] = {}
 
     def forget(self, vehicles: Iterable[str]) -> None:
-        """Forget vehicles whose ids others may bear now.
-
-        Parameters
-        ----------
-        vehicles : iterable of str
-            Their ids.
-        """
+        """Forget vehicles whose ids others may bear now."""
         gone = tuple(vehicles)
         for vehicle in gone:
             self._sizes.pop(vehicle, None)
         self._vehicles.forget(gone)
 
     def are_hidden(self, pairs: Sequence[tuple[str, str]]) -> list[bool]:
-        """Whether each observer's target is hidden, however clear the air is.
-
-        Parameters
-        ----------
-        pairs : sequence of (str, str)
-            Observers and targets.
-        """
+        """Whether each observer's target is hidden, however clear the air is (`pairs` (str, str))."""
         if not pairs:
             return []
         # Mostly who leads one follows another.

@@ -60,17 +60,7 @@ _NO_OVERLAP = 0x100
 
 
 class StandingLeaders:
-    """Keeps drivers in their lanes behind leaders that stand out of sight.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    leaders : Perception
-        Which leaders are out of sight.
-    session : str
-        Name of the session.
-    """
+    """Keeps drivers in their lanes behind leaders that stand out of sight."""
 
     def __init__(self, api: Api, leaders: Perception, session: str) -> None:
         self._vehicles = api.vehicle
@@ -78,27 +68,13 @@ class StandingLeaders:
         self._strategic = LaneChangeSwitch(api, STRATEGIC, _NEVER, session)
 
     def update(self, drivers: Sequence[str], present: set[str]) -> None:
-        """Decide anew for some drivers.
-
-        Parameters
-        ----------
-        drivers : sequence of str
-            Their vehicles.
-        present : set of str
-            Vehicles on the road.
-        """
+        """Decide anew for some drivers."""
         # A hidden leader may have left since the driver's last look ahead.
         behind = [(v, leader) for v in drivers if (leader := self._leaders.hidden.get(v)) in present]
         self._strategic.decide(drivers, [v for v, leader in behind if leader and self._would_be_left_for(v, leader)])
 
     def expect_unseen(self, driver: str, leader: str) -> None:
-        """Keep a driver in the lane to which he changes until the next look, if he does not see who stands there.
-
-        Parameters
-        ----------
-        driver, leader : str
-            Their vehicles.
-        """
+        """Keep a driver in the lane to which he changes until the next look, if he does not see who stands there."""
         if self._may_soon_stand(leader):
             self._strategic.turn_on(driver)
 
@@ -126,15 +102,7 @@ class StandingLeaders:
 
 
 class RequestedChanges:
-    """Changes of lane that are asked of SUMO, each for one step; in the sublane model for as long as a change takes.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    session : str
-        Name of the session.
-    """
+    """Changes of lane that are asked of SUMO, each for one step; in the sublane model for as long as a change takes."""
 
     def __init__(self, api: Api, session: str) -> None:
         self._vehicles = api.vehicle
@@ -147,19 +115,7 @@ class RequestedChanges:
     def ask(self, driver: str, lanes: int, time: float) -> bool:
         """Let a driver change lane from the next step on, whoever is there, but not into an overlap.
 
-        Parameters
-        ----------
-        driver : str
-            Id of the vehicle.
-        lanes : int
-            1 to the left, -1 to the right.
-        time : float
-            Simulated time [s].
-
-        Returns
-        -------
-        bool
-            False if there is no such lane on the same edge.
+        Returns false if there is no such lane on the same edge. Takes `time` [s].
         """
         edge, lane = str(self._vehicles.getRoadID(driver)), int(self._vehicles.getLaneIndex(driver)) + lanes
         # Nobody changes lanes on a junction.
@@ -171,15 +127,7 @@ class RequestedChanges:
         return True
 
     def end(self, present: set[str], time: float) -> None:
-        """Give back the lane-change modes of those whose changes have had their time.
-
-        Parameters
-        ----------
-        present : set of str
-            Vehicles on the road.
-        time : float
-            Simulated time [s]; ``inf`` for all.
-        """
+        """Give back the lane-change modes of those whose changes have had their time (`time` [s])."""
         for driver in [v for v, until in self._asked.items() if until < time] if self._asked else ():
             del self._asked[driver]
             if driver in present:
@@ -187,27 +135,7 @@ class RequestedChanges:
 
 
 class LaneChanging:
-    """What drivers perceive of the neighbouring lanes, and of leaders that stand; a part of their perception.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    fog : FogAccess
-        The fog.
-    sight : DriverSight
-        The drivers' eyes.
-    roster : Roster
-        Who is on the road.
-    leaders : Perception
-        What they perceive of their leaders, updated before this.
-    vehicle_sight : VehicleSight
-        Whom they see.
-    remote : bool
-        True where every call is a message to another process.
-    session : str
-        Name of the session.
-    """
+    """What drivers perceive of the neighbouring lanes, and of leaders that stand; a part of their perception."""
 
     def __init__(
         self,
@@ -239,13 +167,7 @@ class LaneChanging:
         self._certain_until: dict[str, float] = {}
 
     def update(self, own_lamps: OwnLamps) -> None:
-        """Let those who are due look at the lanes beside them.
-
-        Parameters
-        ----------
-        own_lamps : dict
-            Lamps of vehicles whose lamps are not SUMO's.
-        """
+        """Let those who are due look at the lanes beside them."""
         if self._certainly_seen >= REACH:
             return
         due, _, gone = self._due.take()

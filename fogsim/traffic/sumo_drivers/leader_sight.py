@@ -51,21 +51,7 @@ Pair = tuple[str, str, float]
 
 
 class LeaderSight:
-    """Computes sight along the fog between drivers and the vehicles ahead of them.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    fog : FogAccess
-        The fog.
-    sight : DriverSight
-        The drivers' eyes.
-    speed : Getter
-        Speed of a vehicle [m/s].
-    remote : bool
-        True where every call is a message to another process: what is asked often is subscribed to.
-    """
+    """Computes sight along the fog between drivers and the vehicles ahead of them (`speed` [m/s])."""
 
     def __init__(self, api: Api, fog: FogAccess, sight: DriverSight, speed: Getter, remote: bool = False) -> None:
         self._speed = speed
@@ -83,29 +69,13 @@ class LeaderSight:
         self._traits, self._traits_end = np.empty((64, 3)), 0
 
     def forget(self, vehicles: Collection[str]) -> None:
-        """Forget vehicles whose ids others may bear now.
-
-        Parameters
-        ----------
-        vehicles : iterable of str
-            Their ids.
-        """
+        """Forget vehicles whose ids others may bear now."""
         for vehicle in vehicles:
             self._rows.pop(vehicle, None)
         self._vehicles.forget(vehicles)
 
     def assess(self, pairs: Sequence[Pair], own_lamps: OwnLamps, horizon: float) -> list[tuple[bool, float]]:
-        """Whether each leader is seen, and for how long that is sure to stay so [s].
-
-        Parameters
-        ----------
-        pairs : sequence of Pair
-            Followers and their leaders.
-        own_lamps : dict
-            Lamps of vehicles whose lamps are not SUMO's.
-        horizon : float
-            Longest time of interest [s].
-        """
+        """Whether each leader is seen, and for how long that is sure to stay so [s] (`horizon` [s])."""
         facing = self._facing(pairs, horizon)
         if own_lamps:
             self._add_own_lamps(facing, pairs, own_lamps)

@@ -20,23 +20,15 @@ _LEFT_LEADERS = _LEADERS
 
 @dataclass(frozen=True, slots=True)
 class Side:
-    """One side of a vehicle, in SUMO's numbers.
+    """One side of a vehicle, in SUMO's numbers."""
 
-    Attributes
-    ----------
-    offset : int
-        From the vehicle's lane to the neighbouring one.
-    wanted, leader, follower : int
-        Bits of the lane-change state: the driver wants to go there, is blocked there by a vehicle ahead, or behind.
-    neighbours : int
-        What to ask for its followers by.
-    """
-
-    offset: int
+    offset: int  # From the vehicle's lane to the neighbouring one
+    # wanted, leader, follower: bits of the lane-change state: the driver wants to go there, is blocked there by a
+    # vehicle ahead, or behind
     wanted: int
     leader: int
     follower: int
-    neighbours: int
+    neighbours: int  # What to ask for its followers by
 
 
 LEFT = Side(1, 2, 512, 1024, 0)
@@ -45,23 +37,12 @@ RIGHT = Side(-1, 4, 2048, 4096, 1)
 
 @dataclass(frozen=True, slots=True)
 class WantedChange:
-    """A change of lane that a driver wants.
+    """A change of lane that a driver wants."""
 
-    Attributes
-    ----------
-    driver : str
-        Id of the vehicle.
-    side : Side
-        Where to.
-    is_urgent : bool
-        True if the route needs it, for which drivers ask others to make room.
-    leaders, followers : tuple of (str, float)
-        Vehicles that are in the way in the other lane, and the gaps to them [m].
-    """
-
-    driver: str
-    side: Side
-    is_urgent: bool
+    driver: str  # Id of the vehicle
+    side: Side  # Where to
+    is_urgent: bool  # True if the route needs it, for which drivers ask others to make room
+    # leaders, followers (str, float): vehicles that are in the way in the other lane, and the gaps to them [m]
     leaders: tuple[tuple[str, float], ...]
     followers: tuple[tuple[str, float], ...]
 
@@ -72,17 +53,7 @@ class WantedChange:
 
 
 class Neighbours:
-    """Asks SUMO for neighbours and for changes that are blocked.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    reach : float
-        Neighbours farther along the road than this do not matter [m].
-    remote : bool
-        True where every call is a message to another process: what is asked for every driver is subscribed to.
-    """
+    """Asks SUMO for neighbours and for changes that are blocked (`reach` [m])."""
 
     def __init__(self, api: Api, reach: float, remote: bool) -> None:
         names = ("getSignals", "getNeighbors")
@@ -92,13 +63,7 @@ class Neighbours:
         self._reach = reach
 
     def left_leader(self, vehicle: str) -> tuple[str, float] | None:
-        """Next vehicle ahead in the lane to the left, and the gap to it [m]; None if there is none within reach.
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        """
+        """Next vehicle ahead in the lane to the left, and the gap to it [m]; None if there is none within reach."""
         found = self._left_leaders(vehicle, _LEFT_LEADERS)
         if not found:
             return None
@@ -106,15 +71,7 @@ class Neighbours:
         return nearest if nearest[1] <= self._reach else None
 
     def wanted_changes(self, vehicles: Iterable[str], wishing: Iterable[str]) -> list[WantedChange]:
-        """Changes that drivers want by their own model and that others block, and some more to the left.
-
-        Parameters
-        ----------
-        vehicles : iterable of str
-            The drivers' vehicles.
-        wishing : iterable of str
-            Those who want to change to the left, whether their own model wants it or not.
-        """
+        """Changes that drivers want by their own model and that others block, and some more to the left."""
         # Who wants to change lanes blinks.
         blinking = [v for v in vehicles if self._signals(v) & _BLINKERS]
         states = ((v, side, int(self._state(v, side.offset)[1])) for v in blinking for side in (LEFT, RIGHT))
@@ -131,13 +88,7 @@ class Neighbours:
         return WantedChange(vehicle, side, bool(state & _URGENT), leaders, followers)
 
     def ahead(self, change: WantedChange) -> str | None:
-        """Next vehicle ahead in the other lane, in the way or not.
-
-        Parameters
-        ----------
-        change : WantedChange
-            The change.
-        """
+        """Next vehicle ahead in the other lane, in the way or not."""
         found = self._neighbours(change.driver, change.side.neighbours | _LEADERS)
         return str(_nearest(found)[0]) if found else None
 
@@ -154,12 +105,7 @@ def _is_blocked(side: Side, state: int) -> bool:
 class NeighbourSight:
     """Which neighbours drivers perceive: those in sight, but not within the reaction time after they were not.
 
-    Parameters
-    ----------
-    sight : VehicleSight
-        Whom drivers see.
-    reaction_time : float
-        From the first sight of a vehicle that was hidden to the first reaction [s].
+    Takes `reaction_time` [s].
     """
 
     def __init__(self, sight: VehicleSight, reaction_time: float) -> None:
@@ -168,29 +114,13 @@ class NeighbourSight:
         self._hidden_at: dict[tuple[str, str], float] = {}
 
     def was_hidden(self, observer: str, target: str) -> bool:
-        """Whether a target was out of sight at a look that is no longer ago than the reaction time.
-
-        Parameters
-        ----------
-        observer, target : str
-            The vehicles.
-        """
+        """Whether a target was out of sight at a look that is no longer ago than the reaction time."""
         return (observer, target) in self._hidden_at
 
     def perceive(
         self, pairs: Iterable[tuple[str, str]], own_lamps: OwnLamps, time: float
     ) -> dict[tuple[str, str], bool]:
-        """Whether each observer perceives a target.
-
-        Parameters
-        ----------
-        pairs : iterable of (str, str)
-            Observers and targets.
-        own_lamps : dict
-            Lamps of vehicles whose lamps are not SUMO's.
-        time : float
-            Simulated time [s].
-        """
+        """Whether each observer perceives a target (`pairs` (str, str), `time` [s])."""
         if self._hidden_at:
             self._hidden_at = {pair: at for pair, at in self._hidden_at.items() if time - at < self._reaction_time}
         asked = tuple(dict.fromkeys(pairs))

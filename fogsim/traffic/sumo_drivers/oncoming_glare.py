@@ -39,28 +39,13 @@ _Point = tuple[float, float, float]
 def most_glare(illuminance: float) -> float:
     """Veil of glare that there can be at most [cd/m²]; none by day, when it is nothing beside the airlight.
 
-    Parameters
-    ----------
-    illuminance : float
-        Horizontal illuminance of the scene [lx].
+    Takes `illuminance` [lx].
     """
     return 0.0 if illuminance >= DAY_ILLUMINANCE else MOST_GLARE
 
 
 class OncomingGlare:
-    """Computes the veil that oncoming head lamps lay over drivers' eyes.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    fog : FogAccess
-        The fog.
-    vehicles : SeenVehicles
-        Lamps and heights of eyes.
-    remote : bool
-        True where every call is a message to another process: what is asked often is subscribed to.
-    """
+    """Computes the veil that oncoming head lamps lay over drivers' eyes."""
 
     def __init__(self, api: Api, fog: FogAccess, vehicles: SeenVehicles, remote: bool = False) -> None:
         self._fog = fog
@@ -73,15 +58,7 @@ class OncomingGlare:
         self._position, self._angle = vehicle_getters(api, remote, ("getPosition3D", "getAngle"))
 
     def veil(self, observer: str, target: str, own_lamps: OwnLamps) -> float:
-        """Veil inside an observer's eyes who looks at a target [cd/m²], at most `MOST_GLARE`.
-
-        Parameters
-        ----------
-        observer, target : str
-            The vehicles.
-        own_lamps : dict
-            Lamps of vehicles whose lamps are not SUMO's.
-        """
+        """Veil inside an observer's eyes who looks at a target [cd/m²], at most `MOST_GLARE`."""
         edges = {e for vehicle in (observer, target) for e in self._oncoming_edges(vehicle)}
         oncoming = [v for edge in sorted(edges) for v in self._on_edge(edge)]
         veil = self._veil_of(observer, target, oncoming, own_lamps) if oncoming else 0.0

@@ -37,33 +37,14 @@ def safe_speed(gap: float, leader_speed: float, deceleration: float, headway: fl
 
     Source: Krauss, S. (1998), Microscopic modeling of traffic flow: investigation of collision free vehicle dynamics.
 
-    Parameters
-    ----------
-    gap : float
-        Gap to it, without what is left over when both stand [m].
-    leader_speed : float
-        Speed of the leader [m/s].
-    deceleration : float
-        Deceleration of both [m/s²], positive.
-    headway : float
-        Time before one brakes [s].
+    Takes `gap` [m], `leader_speed` [m/s], `deceleration` [m/s²], `headway` [s].
     """
     delay = deceleration * headway
     return math.sqrt(delay**2 + leader_speed**2 + 2.0 * deceleration * max(gap, 0.0)) - delay
 
 
 class OvertakingWishes:
-    """Adds up what drivers gain in a lane to the left that looks free to them.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    leaders : Perception
-        What they perceive of their leaders.
-    period : float
-        Time between two looks [s].
-    """
+    """Adds up what drivers gain in a lane to the left that looks free to them (`period` [s])."""
 
     def __init__(self, api: Api, leaders: Perception, period: float) -> None:
         self._vehicles = api.vehicle
@@ -73,13 +54,7 @@ class OvertakingWishes:
         self._gains: dict[str, float] = {}
 
     def update(self, drivers: Iterable[str]) -> list[str]:
-        """Those of some drivers who want to overtake; all others begin anew.
-
-        Parameters
-        ----------
-        drivers : iterable of str
-            Vehicles whose drivers see what is ahead of them and see nobody ahead in the lane to the left.
-        """
+        """Those of some drivers who want to overtake; all others begin anew."""
         before, self._gains = self._gains, {}
         for driver in drivers:
             gain = self._relative_gain(driver)

@@ -53,13 +53,6 @@ class IgnoredLeaders:
 
     SUMO's lane changing takes no notice of `_IGNORED`: it would avoid a slow leader that its driver cannot see. To a
     driver who sees no vehicle ahead the lane is free, and there is no speed to gain in another.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    session : str
-        Name of the session; a driver ignores what any session has it ignore.
     """
 
     def __init__(self, api: Api, session: str) -> None:
@@ -70,26 +63,14 @@ class IgnoredLeaders:
         self._speed_gain = LaneChangeSwitch(api, SPEED_GAIN, _NO_SPEED_GAIN, session)
 
     def ignore(self, follower: str, leader: str) -> None:
-        """Let a follower ignore one vehicle.
-
-        Parameters
-        ----------
-        follower, leader : str
-            The vehicles.
-        """
+        """Let a follower ignore one vehicle."""
         leaders = self._ignored.read(follower)
         leaders[self._session] = leader
         self._set(follower, leaders)
         self._speed_gain.turn_on(follower)
 
     def stop_ignoring(self, follower: str) -> None:
-        """Let a follower react again to the vehicle that this session had it ignore, and change lanes as before.
-
-        Parameters
-        ----------
-        follower : str
-            The vehicle.
-        """
+        """Let a follower react again to the vehicle that this session had it ignore, and change lanes as before."""
         leaders = self._ignored.read(follower)
         if leaders.pop(self._session, None) is not None:
             self._set(follower, leaders)
@@ -166,24 +147,12 @@ class Perception:
         return dict(self._ignored)
 
     def expect_unseen(self, follower: str, leader: str) -> None:
-        """Hide a vehicle that is about to come before a driver who does not see it, and look again in the next step.
-
-        Parameters
-        ----------
-        follower, leader : str
-            The vehicles.
-        """
+        """Hide a vehicle that is about to come before a driver who does not see it, and look again in the next step."""
         self._hide(follower, leader)
         self._schedule.bring_forward(follower)
 
     def update(self, own_lamps: OwnLamps) -> None:
-        """Tell SUMO's drivers which leader they do not see.
-
-        Parameters
-        ----------
-        own_lamps : dict
-            Lamps of vehicles whose lamps are not SUMO's.
-        """
+        """Tell SUMO's drivers which leader they do not see."""
         due = self._due()
         doubtful = self._decide_by_gap(due) if due else ()
         if doubtful:

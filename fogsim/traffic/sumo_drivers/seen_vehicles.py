@@ -20,36 +20,17 @@ _NO_THIRD_STOP_LAMP = frozenset({"truck", "motorcycle"})
 
 
 class SeenBody(NamedTuple):
-    """A vehicle's body.
+    """A vehicle's body."""
 
-    Attributes
-    ----------
-    length, width : float
-        [m]
-    contrast : float
-        To the airlight without fog between, 0 … 1.
-    missing : int
-        Bits of sides on which there is no lamp.
-    """
-
+    # length, width: [m]
     length: float
     width: float
-    contrast: float
-    missing: int
+    contrast: float  # To the airlight without fog between, 0 … 1
+    missing: int  # Bits of sides on which there is no lamp
 
 
 class SeenVehicles:
-    """Bodies and heights of eyes, each read once, and lit lamps of vehicles.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    remote : bool
-        True where every call is a message to another process: what is asked often is subscribed to.
-    airlight_share : float
-        The airlight that they are seen before, over that of a white horizontal surface [-].
-    """
+    """Bodies and heights of eyes, each read once, and lit lamps of vehicles."""
 
     def __init__(self, api: Api, remote: bool = False, airlight_share: float = AIRLIGHT_SHARE) -> None:
         self._airlight_share = airlight_share
@@ -63,25 +44,13 @@ class SeenVehicles:
         self._eye_heights: dict[str, float] = {}
 
     def forget(self, vehicles: Iterable[str]) -> None:
-        """Forget vehicles whose ids others may bear now.
-
-        Parameters
-        ----------
-        vehicles : iterable of str
-            Their ids.
-        """
+        """Forget vehicles whose ids others may bear now."""
         for vehicle in vehicles:
             self._bodies.pop(vehicle, None)
             self._eye_heights.pop(vehicle, None)
 
     def body(self, vehicle: str) -> SeenBody:
-        """Body of a vehicle.
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        """
+        """Body of a vehicle."""
         known = self._bodies.get(vehicle)
         if known is None:
             contrast = inherent_contrast(paint(vehicle, self._get_colour(vehicle)), self._airlight_share)
@@ -93,13 +62,7 @@ class SeenVehicles:
         return known
 
     def eye_height(self, vehicle: str) -> float:
-        """Height of the driver's eyes above the road [m].
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        """
+        """Height of the driver's eyes above the road [m]."""
         known = self._eye_heights.get(vehicle)
         if known is None:
             shape, length = self._get_shape(vehicle), float(self._get_length(vehicle))
@@ -107,29 +70,13 @@ class SeenVehicles:
         return known
 
     def lamps(self, vehicle: str, own_lamps: OwnLamps) -> int:
-        """Lit lamps of a vehicle, with sides that are dark.
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        own_lamps : dict
-            Lamps of vehicles whose lamps are not SUMO's.
-        """
+        """Lit lamps of a vehicle, with sides that are dark."""
         own = own_lamps.get(vehicle)
         usual = lamps_from_signals(self._signals(vehicle))
         return usual | int(OTHERS_LAMPS) if own is None else usual | own | self.body(vehicle).missing
 
     @staticmethod
     def head_lamps(vehicle: str, own_lamps: OwnLamps) -> float:
-        """Light of a vehicle's head lamps over that of low beams [-]; SUMO's vehicles have these, by `OTHERS_LAMPS`.
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        own_lamps : dict
-            Lamps of vehicles whose lamps are not SUMO's.
-        """
+        """Light of a vehicle's head lamps over that of low beams [-]; SUMO's vehicles have these, by `OTHERS_LAMPS`."""
         own = own_lamps.get(vehicle)
         return 1.0 if own is None else head_lamp_light(own)

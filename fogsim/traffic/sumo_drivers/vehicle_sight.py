@@ -25,24 +25,14 @@ _Point = tuple[float, float, float]
 
 
 class LineOfSight(NamedTuple):
-    """The straight line from a driver's eyes to the nearest part of another vehicle.
+    """The straight line from a driver's eyes to the nearest part of another vehicle."""
 
-    Attributes
-    ----------
-    eyes, end : tuple of float
-        Where it begins and ends [m].
-    distance : float
-        Its length [m].
-    bearing : float
-        Its horizontal angle from straight ahead [rad].
-    ahead, aside : float
-        Where the eyes are, from the middle of the other's front bumper: ahead of it and to its left [m].
-    """
-
+    # eyes, end: where it begins and ends [m]
     eyes: _Point
     end: _Point
-    distance: float
-    bearing: float
+    distance: float  # Its length [m]
+    bearing: float  # Its horizontal angle from straight ahead [rad]
+    # ahead, aside: where the eyes are, from the middle of the other's front bumper: ahead of it and to its left [m]
     ahead: float
     aside: float
 
@@ -51,19 +41,6 @@ class VehicleSight:
     """Tells which vehicles drivers see, along straight lines through the fog and past what stands beside the road.
 
     Other vehicles hide nobody.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    fog : FogAccess
-        The fog.
-    sight : DriverSight
-        The drivers' eyes.
-    remote : bool
-        True where every call is a message to another process: what is asked often is subscribed to.
-    obstructions : Obstructions
-        What stands beside the roads.
     """
 
     def __init__(
@@ -89,27 +66,13 @@ class VehicleSight:
         return self._seen_through_fog if self._hidden_vehicles is None else 0.0
 
     def forget(self, vehicles: Iterable[str]) -> None:
-        """Forget vehicles whose ids others may bear now.
-
-        Parameters
-        ----------
-        vehicles : iterable of str
-            Their ids.
-        """
+        """Forget vehicles whose ids others may bear now."""
         self._vehicles.forget(vehicles)
         if self._hidden_vehicles is not None:
             self._hidden_vehicles.forget(vehicles)
 
     def sees(self, pairs: Sequence[tuple[str, str]], own_lamps: OwnLamps) -> list[bool]:
-        """Whether each observer sees its target.
-
-        Parameters
-        ----------
-        pairs : sequence of tuple of str
-            Observer and target.
-        own_lamps : dict
-            Lamps of vehicles whose lamps are not SUMO's.
-        """
+        """Whether each observer sees its target."""
         lines = [self.line_of_sight(observer, target) for observer, target in pairs]
         seen = [line.distance <= self._seen_through_fog for line in lines]
         doubtful = [n for n, line in enumerate(lines) if not seen[n] and line.distance <= FARTHEST]
@@ -121,13 +84,7 @@ class VehicleSight:
         return [is_seen and not is_hidden for is_seen, is_hidden in zip(seen, hidden, strict=True)]
 
     def line_of_sight(self, observer: str, target: str) -> LineOfSight:
-        """The straight line from an observer's eyes, above the front bumper, to the nearest part of a target.
-
-        Parameters
-        ----------
-        observer, target : str
-            The vehicles.
-        """
+        """The straight line from an observer's eyes, above the front bumper, to the nearest part of a target."""
         # Plain numbers: mostly there is a pair or two, and making arrays of them would cost more than all the rest.
         x, y, z = self._position(observer)
         body, heading = self._vehicles.body(target), math.radians(90.0 - self._angle(target))
@@ -141,13 +98,7 @@ class VehicleSight:
         return LineOfSight(eyes, end, max(math.dist(eyes, end), NEAREST), bearing, ahead, aside)
 
     def length(self, vehicle: str) -> float:
-        """Length of a vehicle [m]; no part of it is farther from its front.
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        """
+        """Length of a vehicle [m]; no part of it is farther from its front."""
         return self._vehicles.body(vehicle).length
 
     def _depth_limit(self, pair: tuple[str, str], line: LineOfSight, own_lamps: OwnLamps) -> float:

@@ -11,15 +11,7 @@ from fogsim.values import TrafficState
 
 
 class Courses:
-    """Adds to a state what vehicles drive along where that is not their lane alone.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    remote : bool
-        True where every call is a message to another process: what is asked often is subscribed to.
-    """
+    """Adds to a state what vehicles drive along where that is not their lane alone."""
 
     def __init__(self, api: Api, remote: bool = False) -> None:
         self._spots = LaneSpots(api, remote)
@@ -29,13 +21,7 @@ class Courses:
         self._against: tuple[int, ...] = ()
 
     def add(self, state: TrafficState) -> TrafficState:
-        """The state with `TrafficState.course` and `TrafficState.across`; as it is where all just keep to lanes.
-
-        Parameters
-        ----------
-        state : TrafficState
-            The vehicles as SUMO has them.
-        """
+        """The state with `TrafficState.course` and `TrafficState.across`; as it is where all just keep to lanes."""
         if (state.ids, state.lane) != self._last:
             self._last = state.ids, state.lane
             self._against = self._find_against(state)

@@ -6,13 +6,7 @@ from fogsim.traffic.sumo.link import Api, getter, vehicle_getter
 
 
 class OppositeEdges:
-    """Edges that lead from an edge's end back to its beginning: the other side of a two-way road.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    """
+    """Edges that lead from an edge's end back to its beginning: the other side of a two-way road."""
 
     def __init__(self, api: Api) -> None:
         self._from, self._to = getter(api, "edge", "getFromJunction"), getter(api, "edge", "getToJunction")
@@ -20,13 +14,7 @@ class OppositeEdges:
         self._known: dict[str, tuple[str, ...]] = {}
 
     def of(self, edge: str) -> tuple[str, ...]:
-        """Ids of the edges opposite to one; none for what lies inside a junction.
-
-        Parameters
-        ----------
-        edge : str
-            Its id.
-        """
+        """Ids of the edges opposite to one; none for what lies inside a junction."""
         known = self._known.get(edge)
         if known is None:
             inside = not edge or edge.startswith(":")
@@ -37,13 +25,7 @@ class OppositeEdges:
 
 
 class LaneDirections:
-    """Tells which vehicles drive against the direction of their lane, as those that overtake on the oncoming one.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    """
+    """Tells which vehicles drive against the direction of their lane, as those that overtake on the oncoming one."""
 
     def __init__(self, api: Api) -> None:
         self._get = api.vehicle
@@ -54,26 +36,14 @@ class LaneDirections:
         self._known: dict[str, tuple[str, bool]] = {}
 
     def is_against(self, vehicle: str, lane: str) -> bool:
-        """Whether a vehicle drives against the direction of its lane; read again only where the lane is another.
-
-        Parameters
-        ----------
-        vehicle, lane : str
-            Ids of the vehicle and of the lane that it is on; no lane for one that is on none.
-        """
+        """Whether a vehicle drives against the direction of its lane; read again only where the lane is another."""
         known = self._known.get(vehicle)
         if known is None or known[0] != lane:
             known = self._known[vehicle] = lane, self.is_two_way(lane) and self._turns_back(vehicle, lane)
         return known[1]
 
     def is_two_way(self, lane: str) -> bool:
-        """Whether somebody may overtake on a lane against its direction; inside junctions it is taken to be so.
-
-        Parameters
-        ----------
-        lane : str
-            Its id; no lane is none.
-        """
+        """Whether somebody may overtake on a lane against its direction; inside junctions it is taken to be so."""
         edge = lane.rpartition("_")[0]
         return edge.startswith(":") or bool(self._opposite.of(edge))
 
@@ -86,15 +56,7 @@ class LaneDirections:
         return bool(index < 0 or lane.rpartition("_")[0] != route[index])
 
     def driven(self, vehicle: str, lane: str | None = None) -> float:
-        """Distance that a vehicle has driven [m]; SUMO's own jumps where it overtakes on the oncoming lane.
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        lane : str or None
-            Id of the lane that it is on; None to read it.
-        """
+        """Distance that a vehicle has driven [m]; SUMO's own jumps where it overtakes on the oncoming lane."""
         distance = float(self._distance(vehicle))
         lane = self._get.getLaneID(vehicle) if lane is None else lane
         if self.is_against(vehicle, lane):

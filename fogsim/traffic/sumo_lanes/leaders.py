@@ -45,23 +45,11 @@ class LaneSpots:
         self._middles: dict[str, float] = {}
 
     def across(self, vehicle: str, lane: str) -> float:
-        """Offset of a vehicle's middle from the border of its edge next to lane 0 [m].
-
-        Parameters
-        ----------
-        vehicle, lane : str
-            Ids of the vehicle and of its lane.
-        """
+        """Offset of a vehicle's middle from the border of its edge next to lane 0 [m]."""
         return self.middle(lane) + float(self._lateral(vehicle))
 
     def middle(self, lane: str) -> float:
-        """Offset of a lane's middle from the border of its edge next to lane 0 [m].
-
-        Parameters
-        ----------
-        lane : str
-            Its id.
-        """
+        """Offset of a lane's middle from the border of its edge next to lane 0 [m]."""
         known = self._middles.get(lane)
         if known is None:
             edge, _, number = lane.rpartition("_")
@@ -83,15 +71,7 @@ class _Spot(NamedTuple):
 
 
 class Leaders:
-    """Finds leaders.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    remote : bool
-        True where every call is a message to another process: what is asked often is subscribed to.
-    """
+    """Finds leaders."""
 
     def __init__(self, api: Api, remote: bool = False) -> None:
         self._api, self._remote = api, remote
@@ -111,10 +91,7 @@ class Leaders:
 
         Where lanes are not shared it is SUMO's own.
 
-        Parameters
-        ----------
-        reach : float
-            How far ahead a leader is searched [m].
+        Takes `reach` [m].
         """
         if self._spots.is_divided:
             return self.find
@@ -122,13 +99,7 @@ class Leaders:
         return in_lane
 
     def of_ego(self, ego: str) -> Leader | None:
-        """The ego's leader.
-
-        Parameters
-        ----------
-        ego : str
-            Its id.
-        """
+        """The ego's leader."""
         found = self.find(ego, EGO_REACH) if self._spots.is_divided else self._of_ego_in_lane(ego)
         if not found or not found[0]:
             return None
@@ -145,12 +116,7 @@ class Leaders:
     def find(self, vehicle: str, reach: float) -> tuple[str, float] | None:
         """Leader of a vehicle, and the gap to it less the follower's minimum gap [m]; None if there is none.
 
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        reach : float
-            How far ahead a leader is searched [m].
+        Takes `reach` [m].
         """
         lane = self._lane(vehicle)
         if not lane:
@@ -235,13 +201,5 @@ class Leaders:
 
 
 def leads_to(link: Sequence[str], edge: str) -> bool:
-    """Whether a link of a lane leads to an edge.
-
-    Parameters
-    ----------
-    link : sequence
-        One of SUMO's ``lane.getLinks``.
-    edge : str
-        The edge's id.
-    """
+    """Whether a link of a lane leads to an edge."""
     return link[0].rpartition("_")[0] == edge

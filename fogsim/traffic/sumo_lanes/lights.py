@@ -14,11 +14,6 @@ class LightsAhead:
 
     A link that its lights do not control has the index −1, as that of a track across a level crossing: what the lights
     show is for the road. While a vehicle overtakes on the oncoming lane, SUMO counts the way from the wrong end.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
     """
 
     def __init__(self, api: Api) -> None:
@@ -28,13 +23,7 @@ class LightsAhead:
         self._has_lights = int(api.trafficlight.getIDCount()) > 0
 
     def next_of(self, vehicle: str) -> Light | None:
-        """The next light of a vehicle; None without one.
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        """
+        """The next light of a vehicle; None without one."""
         lights = self._lights(vehicle) if self._has_lights else ()
         light: Light | None = next((one for one in lights if one[1] >= 0 and one[3] in SIGNAL_COLOURS), None)
         if light is None or not self._directions.is_against(vehicle, lane := self._lane(vehicle)):
@@ -43,12 +32,6 @@ class LightsAhead:
         return name, link, way + 2.0 * float(self._station(vehicle)) - float(self._length(lane)), letter
 
     def shown_to(self, vehicle: str) -> SignalAhead | None:
-        """The next light of a vehicle as what it shows; None without one.
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        """
+        """The next light of a vehicle as what it shows; None without one."""
         light = self.next_of(vehicle)
         return None if light is None else SignalAhead(light[0], SIGNAL_COLOURS[light[3]], light[2])

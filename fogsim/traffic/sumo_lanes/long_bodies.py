@@ -53,36 +53,16 @@ class _Section(NamedTuple):
 
 
 class Part(NamedTuple):
-    """A straight part of a body.
+    """A straight part of a body."""
 
-    Attributes
-    ----------
-    front : tuple of float
-        Middle of its front end on the road [m].
-    heading : float
-        Its direction [rad].
-    length : float
-        Its length [m].
-    behind : float
-        How far behind the front bumper of the body it begins [m].
-    """
-
-    front: _Point
-    heading: float
-    length: float
-    behind: float
+    front: _Point  # Middle of its front end on the road [m]
+    heading: float  # Its direction [rad]
+    length: float  # Its length [m]
+    behind: float  # How far behind the front bumper of the body it begins [m]
 
 
 class LongBodies:
-    """Adds the pieces of long bodies to a state.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    remote : bool
-        True where every call is a message to another process: what is asked often is subscribed to.
-    """
+    """Adds the pieces of long bodies to a state."""
 
     def __init__(self, api: Api, remote: bool = False) -> None:
         self._api, self._remote = api, remote
@@ -102,13 +82,7 @@ class LongBodies:
         return LaneDirections(self._api)
 
     def add(self, state: TrafficState) -> TrafficState:
-        """The state with `TrafficState.pieces`; as it is where no body bends.
-
-        Parameters
-        ----------
-        state : TrafficState
-            The vehicles.
-        """
+        """The state with `TrafficState.pieces`; as it is where no body bends."""
         if state.ids is not self._ids:
             self._ids = state.ids
             long = np.flatnonzero(state.length > LONGEST_RIGID).tolist()
@@ -119,16 +93,7 @@ class LongBodies:
     def parts(self, vehicle: str, length: float, front: _Point, heading: float) -> list[Part]:
         """Straight parts of one body, the front first; the body itself where it does not bend.
 
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        length : float
-            Its length [m].
-        front : (float, float, float)
-            Middle of its front bumper [m].
-        heading : float
-            Its heading [rad].
+        Takes `length` [m], `front` (float, float, float) [m], `heading` [rad].
         """
         joints = None
         if length > LONGEST_RIGID:
@@ -246,17 +211,7 @@ class LongBodies:
 
 
 def sections(vehicle_class: str, length: float, carriage: float = math.nan) -> tuple[_Section, ...]:
-    """Rigid parts of a long body.
-
-    Parameters
-    ----------
-    vehicle_class : str
-        SUMO's class.
-    length : float
-        Length of the whole [m].
-    carriage : float
-        Length of a piece, where its type has one [m].
-    """
+    """Rigid parts of a long body (`length` [m], `carriage` [m])."""
     if vehicle_class in RAILWAYS:
         usual = TRAM_CARRIAGE if vehicle_class == "tram" else RAIL_CARRIAGE
         return _equal("carriage", "carriage", length, usual if math.isnan(carriage) else carriage, _RAIL_GAP)

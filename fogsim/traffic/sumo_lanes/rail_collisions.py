@@ -12,13 +12,7 @@ _CARRIAGE = "carriage"
 
 
 def rail_collisions(state: TrafficState) -> Iterator[Collision]:
-    """Road vehicles whose rectangles overlap with those of pieces of a train or tram, in every step while they do.
-
-    Parameters
-    ----------
-    state : TrafficState
-        The vehicles.
-    """
+    """Road vehicles whose rectangles overlap with those of pieces of a train or tram, in every step while they do."""
     pieces = state.pieces
     if _CARRIAGE not in pieces.kind:
         return

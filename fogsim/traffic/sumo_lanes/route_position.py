@@ -14,13 +14,7 @@ MOVE_TOLERANCE = 5.0
 
 
 class RouteLengths:
-    """Lengths of edges, and of the ways across the junctions between them.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    """
+    """Lengths of edges, and of the ways across the junctions between them."""
 
     def __init__(self, api: Api) -> None:
         self._api = api
@@ -44,32 +38,17 @@ class RouteLengths:
 
 
 class Place(NamedTuple):
-    """Where a front bumper is: on an edge of the vehicle's route, or past its end on the way across a junction.
+    """Where a front bumper is: on an edge of the vehicle's route, or past its end on the way across a junction."""
 
-    Attributes
-    ----------
-    edge : str
-        The edge.
-    number : int
-        Its number in the route.
-    station, past_end : float
-        Way from the edge's beginning, at most to its end, and from its end on [m].
-    """
-
-    edge: str
-    number: int
+    edge: str  # The edge
+    number: int  # Its number in the route
+    # station, past_end: way from the edge's beginning, at most to its end, and from its end on [m]
     station: float
     past_end: float
 
 
 class RoutePlaces:
-    """Finds vehicles on their routes, also those that overtake on the oncoming lane.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    """
+    """Finds vehicles on their routes, also those that overtake on the oncoming lane."""
 
     def __init__(self, api: Api) -> None:
         self._api = api
@@ -77,13 +56,7 @@ class RoutePlaces:
         self.directions = LaneDirections(api)
 
     def find(self, vehicle: str) -> Place:
-        """Where a vehicle on the road is.
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        """
+        """Where a vehicle on the road is."""
         get = self._api.vehicle
         lane, station = get.getLaneID(vehicle), float(get.getLanePosition(vehicle))
         station = 0.0 if station == UNKNOWN else station
@@ -111,15 +84,7 @@ class RoutePlaces:
         return 0.0
 
     def distance(self, vehicle: str, here: Place, there: Place) -> float | None:
-        """Distance along a vehicle's route from its own place to another [m]; None if its route does not lead there.
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
-        here, there : Place
-            Its place, and the other.
-        """
+        """Distance along a vehicle's route from its own place to another [m]; None if its route does not lead there."""
         if here.edge == there.edge:
             apart = there.station + there.past_end - here.station - here.past_end
             if apart >= 0.0:
@@ -144,13 +109,6 @@ class RoutePosition:
 
     Follows a route that changes on the way, and a vehicle that is moved by hand, whose odometer SUMO sets anew. Off the
     lanes, a vehicle stays where it left them.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    vehicle : str
-        Id of a vehicle that is on the road.
     """
 
     def __init__(self, api: Api, vehicle: str) -> None:
@@ -172,15 +130,7 @@ class RoutePosition:
         self._place = here, self._length
 
     def update(self, here: Sequence[float], lane: str) -> tuple[float, float]:
-        """Position of the front bumper along the route, and the route's length [m].
-
-        Parameters
-        ----------
-        here : sequence of float
-            Position of the front bumper [m].
-        lane : str
-            Id of the lane that it is on; empty off the lanes.
-        """
+        """Position of the front bumper along the route, and the route's length [m] (`here` [m])."""
         if not lane:
             self._held, self._last = True, None
             return self._place
@@ -205,13 +155,6 @@ class GapToEgo:
     """Measures gaps to an ego in SUMO along the routes of both, junctions included, whichever lanes they are on.
 
     A vehicle is ahead if the ego's route leads to where it is, and behind if its own route leads to the ego.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    ego : str
-        Id of the ego.
     """
 
     def __init__(self, api: Api, ego: str) -> None:
@@ -223,11 +166,6 @@ class GapToEgo:
         """Gap of a vehicle [m], with the sign and the None of `signed_gap`; None if one of them is off the lanes.
 
         Both must be on the road.
-
-        Parameters
-        ----------
-        vehicle : str
-            Its id.
         """
         if is_off_lanes(self._api, self._ego) or is_off_lanes(self._api, vehicle):
             return None
@@ -238,15 +176,7 @@ class GapToEgo:
 
 
 def connections(api: Api, edge: str) -> Iterator[tuple[str, Iterator[str]]]:
-    """Edges that the lanes of an edge lead to, each with the lanes inside the junction on the way there.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    edge : str
-        The edge.
-    """
+    """Edges that the lanes of an edge lead to, each with the lanes inside the junction on the way there."""
     links = api.lane.getLinks
 
     def inner(lane: str) -> Iterator[str]:

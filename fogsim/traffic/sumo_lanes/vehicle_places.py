@@ -27,17 +27,7 @@ class _Piece(NamedTuple):
 
 
 class SumoVehiclePlaces:
-    """Finds vehicles edge by edge; see `VehiclePlaces`.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    ego : str or None
-        Id of the ego; without one, everybody is near what would be it.
-    roster : Roster
-        Which vehicles are on the road.
-    """
+    """Finds vehicles edge by edge; see `VehiclePlaces`."""
 
     def __init__(self, api: Api, ego: str | None, roster: Roster) -> None:
         self._api = api
@@ -54,20 +44,7 @@ class SumoVehiclePlaces:
         self._roads: dict[tuple[str, ...], tuple[_Piece, ...]] = {}
 
     def on_stretch(self, stretch: Stretch, among: Collection[str] | None = None) -> dict[str, float]:
-        """Vehicles on a stretch, and how far past its beginning they are [m]; see `VehiclePlaces.on_stretch`.
-
-        Parameters
-        ----------
-        stretch : Stretch
-            The stretch.
-        among : collection of str or None
-            Vehicles that are asked about; None for all.
-
-        Raises
-        ------
-        InputError
-            If the network has no such edge, edges do not follow one another, or the stretch begins behind their end.
-        """
+        """Vehicles on a stretch, and how far past its beginning they are [m]; see `VehiclePlaces.on_stretch`."""
         past = {}
         for vehicle, piece, is_against in self._on_pieces(self._find_pieces(stretch), among):
             station = float(self._station(vehicle))  # far below 0 off the lanes
@@ -150,15 +127,7 @@ class SumoVehiclePlaces:
         return tuple(dict.fromkeys(lane.rpartition("_")[0] for lane in lanes))
 
     def near_ego(self, distance: float, among: Collection[str] | None = None) -> Collection[str]:
-        """Vehicles near the ego; see `VehiclePlaces.near_ego`.
-
-        Parameters
-        ----------
-        distance : float
-            From front bumper to front bumper, at most [m].
-        among : collection of str or None
-            Vehicles that are asked about; None for all.
-        """
+        """Vehicles near the ego; see `VehiclePlaces.near_ego` (`distance` [m])."""
         asked = self._roster.present if among is None else among
         if self._ego is None:
             return asked

@@ -23,15 +23,7 @@ _ON_FOOT = ("pedestrian",)
 
 
 class PersonReader:
-    """Reads persons who walk or stand; those who ride are in their vehicles.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    shared : bool
-        Whether others may remove persons, of which SUMO says nothing: all are asked for each time.
-    """
+    """Reads persons who walk or stand; those who ride are in their vehicles."""
 
     def __init__(self, api: Api, shared: bool = False) -> None:
         self._shared = shared
@@ -45,15 +37,7 @@ class PersonReader:
         self._footways: dict[str, bool] = {}
 
     def state(self, here: NDArray[np.float64] | None, time: float) -> PersonState:
-        """Persons on foot nearer than `REACH` to a place, or all.
-
-        Parameters
-        ----------
-        here : (3,) float64 or None
-            The place [m]; None for all.
-        time : float
-            Now [s].
-        """
+        """Persons on foot nearer than `REACH` to a place, or all (`here` (3,) [m], `time` [s])."""
         if not self._count():
             return NO_PERSONS
         persons = [person for person in self._candidates(here, time) if not self._vehicle(person)]

@@ -21,15 +21,7 @@ _FIRST = "GgyYursoO"
 
 
 class SignalReader:
-    """Reads the heads near a place.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    heads : sequence of SignalHead
-        All heads of its network.
-    """
+    """Reads the heads near a place."""
 
     def __init__(self, api: Api, heads: Sequence[SignalHead]) -> None:
         self._letters = getter(api, "trafficlight", "getRedYellowGreenState")
@@ -41,13 +33,7 @@ class SignalReader:
         self._last = NO_SIGNALS
 
     def state(self, here: NDArray[np.float64]) -> SignalState:
-        """Heads nearer than `REACH` to a place, and what they show.
-
-        Parameters
-        ----------
-        here : (3,) float64
-            The place [m].
-        """
+        """Heads nearer than `REACH` to a place, and what they show (`here` (3,) [m])."""
         if not self._heads:
             return self._last
         if not np.hypot(*(here[:2] - self._asked)) < _MOVED:

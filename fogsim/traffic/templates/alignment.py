@@ -18,38 +18,21 @@ _SAME = 1e-6  # [m]
 
 @dataclass(frozen=True, slots=True)
 class Bend:
-    """A stretch of plan whose curvature is linear in its length.
+    """A stretch of plan whose curvature is linear in its length."""
 
-    Attributes
-    ----------
-    length : float
-        Length [m].
-    start, end : float
-        Curvature where it begins and ends [1/m]; positive to the left, 0 for straight ahead.
-    """
-
-    length: float
+    length: float  # Length [m]
+    # start, end: curvature where it begins and ends [1/m]; positive to the left, 0 for straight ahead
     start: float = 0.0
     end: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """A line with a direction at each point.
+    """A line with a direction at each point."""
 
-    Attributes
-    ----------
-    points : (n, 3) float64
-        Its points [m].
-    headings : (n,) float64
-        Direction at each, counterclockwise from east [rad].
-    stations : (n,) float64
-        How far along the axis that it was cut from each lies, in plan [m].
-    """
-
-    points: Points
-    headings: NDArray[np.float64]
-    stations: NDArray[np.float64]
+    points: Points  # (n, 3): Its points [m]
+    headings: NDArray[np.float64]  # (n,): Direction at each, counterclockwise from east [rad]
+    stations: NDArray[np.float64]  # (n,): How far along the axis that it was cut from each lies, in plan [m]
 
     @property
     def length(self) -> float:
@@ -57,25 +40,13 @@ class Axis:
         return float(self.stations[-1] - self.stations[0])
 
     def beside(self, left: float) -> Points:
-        """Points (n, 3) at a distance to its left [m].
-
-        Parameters
-        ----------
-        left : float
-            The distance; negative to the right [m].
-        """
+        """Points (n, 3) at a distance to its left [m] (`left` [m])."""
         aside = np.stack([-np.sin(self.headings), np.cos(self.headings), np.zeros(len(self.headings))], axis=-1)
         shifted: Points = self.points + left * aside
         return shifted
 
     def moved(self, left: float) -> "Axis":
-        """The same axis at a distance to its left; stations stay.
-
-        Parameters
-        ----------
-        left : float
-            The distance; negative to the right [m].
-        """
+        """The same axis at a distance to its left; stations stay (`left` [m])."""
         return Axis(self.beside(left), self.headings, self.stations)
 
     def reversed(self) -> "Axis":
@@ -83,13 +54,7 @@ class Axis:
         return Axis(self.points[::-1], self.headings[::-1] + math.pi, self.stations[-1] - self.stations[::-1])
 
     def part(self, start: float, end: float) -> "Axis":
-        """What lies between two stations.
-
-        Parameters
-        ----------
-        start, end : float
-            The stations [m].
-        """
+        """What lies between two stations (`start`, `end` [m])."""
         inside = self.stations[(self.stations > start + _SAME) & (self.stations < end - _SAME)]
         return self._at(np.concatenate([[start], inside, [end]]))
 
@@ -101,17 +66,7 @@ class Axis:
 def axis_of(
     bends: Sequence[Bend], grades: Sequence[tuple[float, float]] = (), start: tuple[float, float, float] = (0, 0, 0)
 ) -> Axis:
-    """Axis from its bends.
-
-    Parameters
-    ----------
-    bends : sequence of Bend
-        They, one after the other.
-    grades : sequence of (float, float)
-        Stations [m] and grades there [-], linear in between, as on vertical curves; none for a level road.
-    start : tuple of float
-        x, y [m] and heading where it begins [rad].
-    """
+    """Axis from its bends (`grades` (float, float) [m], `start` [m], [rad])."""
     station, place = 0.0, start
     rows = [(station, *place)]
     for bend in bends:

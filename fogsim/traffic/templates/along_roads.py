@@ -27,21 +27,7 @@ _BETWEEN_ZEBRAS = 40.0  # [m]
 
 
 def chain(name: str, axes: Sequence[Axis], nodes: Sequence[str], road: "AlongRoad", lanes: int) -> tuple[Edge, ...]:
-    """Edges of one direction, end to end: ``name``, ``name.1`` and so on.
-
-    Parameters
-    ----------
-    name : str
-        Id of the first.
-    axes : sequence of Axis
-        Their left borders.
-    nodes : sequence of str
-        Ids of the nodes between which they lie: one more than there are edges.
-    road : AlongRoad
-        Whose lane width and limit they have.
-    lanes : int
-        How many lanes they have.
-    """
+    """Edges of one direction, end to end: ``name``, ``name.1`` and so on."""
     names = [name, *(f"{name}.{number}" for number in range(1, len(nodes) - 1))]
     return tuple(
         Edge(own, *between, part, lanes, road.lane_width, road.limit, _PRIORITY)
@@ -50,13 +36,7 @@ def chain(name: str, axes: Sequence[Axis], nodes: Sequence[str], road: "AlongRoa
 
 
 def straight_links(edges: Sequence[Edge]) -> list[Link]:
-    """Connections of edges that follow one another, lane to lane.
-
-    Parameters
-    ----------
-    edges : sequence of Edge
-        The edges, with as many lanes each.
-    """
+    """Connections of edges that follow one another, lane to lane."""
     return [
         Link(one.name, other.name, lane, lane) for one, other in itertools.pairwise(edges) for lane in range(one.lanes)
     ]
@@ -204,15 +184,7 @@ class AlongRoad:
 
 
 def spirals_and_arc(radius: float, turn: float) -> list[Bend]:
-    """A curve: a spiral into it, an arc, and a spiral out of it.
-
-    Parameters
-    ----------
-    radius : float
-        Radius of the arc [m].
-    turn : float
-        By how much the whole turns to the left [rad].
-    """
+    """A curve: a spiral into it, an arc, and a spiral out of it (`radius` [m], `turn` [rad])."""
     curvature = math.copysign(1.0 / radius, turn)
     spiral = min(_SPIRAL_SHARE * radius, 0.5 * radius * abs(turn))
     arc = radius * abs(turn) - spiral

@@ -19,49 +19,22 @@ _KERB = 1.0  # between a tunnel's carriageway and its walls [m]
 
 @dataclass(frozen=True, slots=True)
 class Obstruction:
-    """Something beside a way that hides what is behind it.
+    """Something beside a way that hides what is behind it."""
 
-    Attributes
-    ----------
-    kind : str
-        ``wall``, ``hedge``, ``building`` or ``truck``.
-    way : str
-        Way beside which it is.
-    at, length : float
-        Where along it it begins, and how long it is [m].
-    is_left : bool
-        Whether it stands to the left of the road, beyond the oncoming lanes.
-    distance : float
-        From the border of the carriageway to its near side [m].
-    width, height : float
-        Its size across the road, and its height [m].
-    """
-
-    kind: str
-    way: str
+    kind: str  # ``wall``, ``hedge``, ``building`` or ``truck``
+    way: str  # Way beside which it is
+    # at, length: where along it it begins, and how long it is [m]
     at: float
     length: float
-    is_left: bool
-    distance: float
+    is_left: bool  # Whether it stands to the left of the road, beyond the oncoming lanes
+    distance: float  # From the border of the carriageway to its near side [m]
+    # width, height: its size across the road, and its height [m]
     width: float
     height: float
 
 
 def additional_text(layout: Layout, obstructions: Sequence[Obstruction]) -> str:
-    """Text of an additional file with all that stands beside a road; "" if nothing does.
-
-    Parameters
-    ----------
-    layout : Layout
-        The road.
-    obstructions : sequence of Obstruction
-        What a scenario puts beside it.
-
-    Raises
-    ------
-    InputError
-        If an obstruction is beside no way of the road, or beyond its end.
-    """
+    """Text of an additional file with all that stands beside a road; "" if nothing does."""
     lines = list[str]()
     for number, one in enumerate(obstructions):
         name = f"obstruction.{number}"

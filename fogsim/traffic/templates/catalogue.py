@@ -16,13 +16,7 @@ class RoadTemplate(Protocol):
     """A kind of road; its attributes are its measures, in SI units."""
 
     def layout(self, cuts: Sequence[float] = ()) -> Layout:
-        """The road.
-
-        Parameters
-        ----------
-        cuts : sequence of float
-            Stations at which the ego's way is cut into edges [m].
-        """
+        """The road (`cuts` [m])."""
         ...
 
     @property
@@ -49,22 +43,10 @@ ROAD_TEMPLATES: Registry[type[RoadTemplate]] = Registry(
 
 
 def usual_mix(template: str) -> tuple[tuple[str, float], ...]:
-    """Shares of types of vehicles on a template's roads, where nothing else is said.
-
-    Parameters
-    ----------
-    template : str
-        Its name.
-    """
+    """Shares of types of vehicles on a template's roads, where nothing else is said."""
     return TOWN_MIX if issubclass(ROAD_TEMPLATES[template], Streets) else USUAL_MIX
 
 
 def measures(template: str) -> tuple[str, ...]:
-    """Names of the measures that a template has.
-
-    Parameters
-    ----------
-    template : str
-        Its name.
-    """
+    """Names of the measures that a template has."""
     return tuple(field.name for field in dataclasses.fields(ROAD_TEMPLATES[template]))  # type: ignore[arg-type]

@@ -17,17 +17,10 @@ _OPPOSITE = math.radians(135)  # ways that come from directions farther apart th
 
 @dataclass(frozen=True)
 class CrossingWay:
-    """A way across a node.
+    """A way across a node."""
 
-    Attributes
-    ----------
-    link : Link
-        What it connects.
-    source, target : Edge
-        The edges.
-    """
-
-    link: Link
+    link: Link  # What it connects
+    # source, target: the edges
     source: Edge
     target: Edge
 
@@ -59,13 +52,7 @@ class CrossingWay:
         return min(usual, math.sqrt(5.5 * self.length / abs(self.turn))) if abs(self.turn) > 0.05 else usual
 
     def meets(self, other: "CrossingWay") -> bool:
-        """Whether vehicles on it and on another way could collide.
-
-        Parameters
-        ----------
-        other : CrossingWay
-            The other way.
-        """
+        """Whether vehicles on it and on another way could collide."""
         if (self.link.source, self.link.from_lane) == (other.link.source, other.link.from_lane):
             return False
         if (self.link.target, self.link.to_lane) == (other.link.target, other.link.to_lane):
@@ -73,13 +60,7 @@ class CrossingWay:
         return bool(np.min(distances(self.line, other.line)) < _CLEARANCE)
 
     def yields_to(self, other: "CrossingWay") -> bool:
-        """Whether who drives on it must let those on a way that it meets go first.
-
-        Parameters
-        ----------
-        other : CrossingWay
-            The other way.
-        """
+        """Whether who drives on it must let those on a way that it meets go first."""
         if self.source.priority != other.source.priority:
             return self.source.priority < other.source.priority
         left, others_left = self.link.direction == "l", other.link.direction == "l"
@@ -91,24 +72,12 @@ class CrossingWay:
         return clockwise_from_north(self.source) < clockwise_from_north(other.source)
 
     def is_opposite(self, other: "CrossingWay") -> bool:
-        """Whether it comes from about where another way comes from on the other side of the node.
-
-        Parameters
-        ----------
-        other : CrossingWay
-            The other way.
-        """
+        """Whether it comes from about where another way comes from on the other side of the node."""
         return abs(_turned(float(self.source.axis.headings[-1] - other.source.axis.headings[-1]))) > _OPPOSITE
 
 
 def clockwise_from_north(edge: Edge) -> float:
-    """Direction in which an edge lies as seen from the node that it leads to, clockwise from north [rad].
-
-    Parameters
-    ----------
-    edge : Edge
-        The edge.
-    """
+    """Direction in which an edge lies as seen from the node that it leads to, clockwise from north [rad]."""
     return (1.5 * math.pi - float(edge.axis.headings[-1]) + 1e-9) % (2.0 * math.pi)
 
 
@@ -120,12 +89,7 @@ def _turned(angle: float) -> float:
 def curve(one: Points, heading: float, other: Points, last_heading: float) -> Points:
     """Cubic Bézier curve from a place and direction to another.
 
-    Parameters
-    ----------
-    one, other : (3,) float64
-        Where it begins and ends [m].
-    heading, last_heading : float
-        Directions there [rad].
+    Takes `one`, `other` (3,) [m], `heading`, `last_heading` [rad].
     """
     turn = abs(_turned(last_heading - heading))
     # Handles that make a quarter of a circle of a quarter turn: 4/3 tan(θ/4) of the radius.
@@ -144,23 +108,14 @@ def _direction(heading: float) -> Points:
 
 
 def line_length(line: Points) -> float:
-    """Length of a line [m].
-
-    Parameters
-    ----------
-    line : (n, 3) float64
-        The line [m].
-    """
+    """Length of a line [m] (`line` (n, 3) [m])."""
     return float(np.sum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
 
 
 def distances(line: Points, other: Points) -> Points:
     """Distance of each place along a line (in steps of about half a metre) from another line [m].
 
-    Parameters
-    ----------
-    line, other : (n, 3) float64
-        The lines [m].
+    Takes `line`, `other` (n, 3) [m].
     """
     one, two = _dense(line), _dense(other)
     apart: Points = np.min(np.linalg.norm(one[:, None, :2] - two[None, :, :2], axis=-1), axis=1)
@@ -176,17 +131,7 @@ def _dense(line: Points) -> Points:
 def waiting_place(way: CrossingWay, others: Sequence[CrossingWay]) -> float | None:
     """Where on its way across a node who turns left waits for those who come towards him; None if there is none.
 
-    Parameters
-    ----------
-    way : CrossingWay
-        The way.
-    others : sequence of CrossingWay
-        Those that it meets.
-
-    Returns
-    -------
-    float or None
-        Share of the way's length [-].
+    Returns share of the way's length [-].
     """
     meeting = [distances(way.line, other.line) for other in others if other.link.target != way.link.target]
     if not meeting:

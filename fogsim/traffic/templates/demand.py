@@ -20,32 +20,17 @@ _SHORTEST = 25.0  # edge that is filled [m]
 
 @dataclass(frozen=True, slots=True)
 class Demand:
-    """Traffic beside the actors.
+    """Traffic beside the actors."""
 
-    Attributes
-    ----------
-    flows : tuple of (str, float)
-        Vehicles per second [1/s] by way.
-    mix : tuple of (str, float)
-        Shares of types, together 1.
-    turning : float
-        Share that turns where roads meet, half to either side [-].
-    """
-
-    flows: tuple[tuple[str, float], ...]
-    mix: tuple[tuple[str, float], ...]
-    turning: float = 0.2
+    flows: tuple[tuple[str, float], ...]  # (str, float): Vehicles per second [1/s] by way
+    mix: tuple[tuple[str, float], ...]  # (str, float): Shares of types, together 1
+    turning: float = 0.2  # Share that turns where roads meet, half to either side [-]
 
 
 def cuts_around(placed: Sequence[Placed], length: float) -> tuple[float, ...]:
     """Where the ego's way is cut so that the lanes of actors stay free around and between them, and the rest fills.
 
-    Parameters
-    ----------
-    placed : sequence of Placed
-        Actors on that way.
-    length : float
-        Length of what may be cut [m].
+    Takes `length` [m].
     """
     if not placed:
         return ()
@@ -61,26 +46,7 @@ def routes_text(
     walkers: Sequence[Walker] = (),
     footfall: Footfall = Footfall(),  # noqa: B008 - a constant
 ) -> str:
-    """Text of a route file.
-
-    Parameters
-    ----------
-    layout : Layout
-        The road.
-    demand : Demand
-        Traffic beside the actors.
-    placed : sequence of Placed
-        The actors.
-    walkers : sequence of Walker
-        Persons that a scenario places.
-    footfall : Footfall
-        Persons beside them.
-
-    Raises
-    ------
-    PlacementError
-        If a person cannot walk where it is to.
-    """
+    """Text of a route file."""
     lines = [*_types(demand.mix, max(edge.lanes for edge in layout.net.edges)), *_actors(placed, layout)]
     taken = _taken_lanes(layout, placed)
     for way, rate in _rates(layout, demand):
@@ -90,15 +56,7 @@ def routes_text(
 
 
 def actors_text(ways: Ways, placed: Sequence[Placed]) -> str:
-    """Text of a route file with actors alone.
-
-    Parameters
-    ----------
-    ways : Ways
-        The road.
-    placed : sequence of Placed
-        The actors.
-    """
+    """Text of a route file with actors alone."""
     return _routes(list(_actors(placed, ways)))
 
 

@@ -24,17 +24,10 @@ _SAME_ARM = 0.3  # angle up to which two edges are one road [rad]
 
 @dataclass(frozen=True, slots=True)
 class Zebra:
-    """A crossing of persons over a road, at one of its ends.
+    """A crossing of persons over a road, at one of its ends."""
 
-    Attributes
-    ----------
-    name : str
-        Id of its edge.
-    into, away : Edge
-        The edges of that road that lead to the node, and away from it.
-    """
-
-    name: str
+    name: str  # Id of its edge
+    # into, away: the edges of that road that lead to the node, and away from it
     into: Edge
     away: Edge
 
@@ -49,34 +42,19 @@ class Zebra:
         return np.stack([middle + self.away.width * left, middle - self.into.width * left])
 
     def is_met_by(self, way: CrossingWay) -> bool:
-        """Whether a way of vehicles leads over it.
-
-        Parameters
-        ----------
-        way : CrossingWay
-            The way.
-        """
+        """Whether a way of vehicles leads over it."""
         return way.source == self.into or way.target == self.away
 
 
 @dataclass(frozen=True, slots=True)
 class WalkingArea:
-    """Where a footway that leads to a node goes on as one that leads away, around a corner or along the road.
+    """Where a footway that leads to a node goes on as one that leads away, around a corner or along the road."""
 
-    Attributes
-    ----------
-    name : str
-        Id of its edge.
-    into, away : Edge
-        The edges beside which the footways lie.
-    leads : tuple of float
-        How far the kerb goes straight on from either: past a crossing [m].
-    """
-
-    name: str
+    name: str  # Id of its edge
+    # into, away: the edges beside which the footways lie
     into: Edge
     away: Edge
-    leads: tuple[float, float]
+    leads: tuple[float, float]  # How far the kerb goes straight on from either: past a crossing [m]
 
     @property
     def outline(self) -> Points:
@@ -100,17 +78,7 @@ class WalkingArea:
 def place_before(way: CrossingWay, zebra: Zebra) -> float:
     """Where on its way across a node who turns waits for those who cross the road that it turns into.
 
-    Parameters
-    ----------
-    way : CrossingWay
-        The way.
-    zebra : Zebra
-        The crossing over that road.
-
-    Returns
-    -------
-    float
-        Share of the way's length [-].
+    Returns share of the way's length [-].
     """
     apart = distances(way.line, zebra.line)
     return max(1, int(np.argmax(apart < 0.5 * ZEBRA_WIDTH))) / (len(apart) - 1)
@@ -123,17 +91,7 @@ def _ahead(heading: float) -> Points:
 def walking_areas(
     node: str, around: tuple[Sequence[Edge], Sequence[Edge]], zebras: Sequence[Zebra]
 ) -> tuple[WalkingArea, ...]:
-    """Areas that join the footways at a node; none where a road ends.
-
-    Parameters
-    ----------
-    node : str
-        Its id.
-    around : tuple of sequences of Edge
-        Edges that lead to it, and from it.
-    zebras : sequence of Zebra
-        Its crossings.
-    """
+    """Areas that join the footways at a node; none where a road ends."""
     crossed_in, crossed_out = ({zebra.into.name for zebra in zebras}, {zebra.away.name for zebra in zebras})
     joined = list[tuple[Edge, Edge]]()
     for into in (edge for edge in around[0] if edge.footway):

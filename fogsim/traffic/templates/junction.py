@@ -20,40 +20,19 @@ _FARTHER = 20.0  # how far out the direction is taken in which an edge lies [m]
 
 @dataclass(frozen=True, slots=True)
 class Junction:
-    """A node of a network.
+    """A node of a network."""
 
-    Attributes
-    ----------
-    name : str
-        Its id.
-    incoming, outgoing : tuple of Edge
-        Edges that lead to it, clockwise from north, and from it.
-    ways : tuple of CrossingWay
-        Ways across it in the order of their numbers.
-    meets : tuple of tuple of bool
-        Which ways, and then crossings of persons, meet which.
-    yields : tuple of tuple of bool
-        Which ways, and then crossings, let which go first.
-    waits_at : tuple of (float or None)
-        Share of each way after which it is waited within the junction.
-    has_signals : bool
-        Whether it has traffic lights.
-    zebras : tuple of Zebra
-        Crossings of persons, in the order of their numbers.
-    areas : tuple of WalkingArea
-        What joins its footways.
-    """
-
-    name: str
+    name: str  # Its id
+    # incoming, outgoing: edges that lead to it, clockwise from north, and from it
     incoming: tuple[Edge, ...]
     outgoing: tuple[Edge, ...]
-    ways: tuple[CrossingWay, ...]
-    meets: tuple[tuple[bool, ...], ...]
-    yields: tuple[tuple[bool, ...], ...]
-    waits_at: tuple[float | None, ...]
-    has_signals: bool
-    zebras: tuple[Zebra, ...] = ()
-    areas: tuple[WalkingArea, ...] = ()
+    ways: tuple[CrossingWay, ...]  # Ways across it in the order of their numbers
+    meets: tuple[tuple[bool, ...], ...]  # Which ways, and then crossings of persons, meet which
+    yields: tuple[tuple[bool, ...], ...]  # Which ways, and then crossings, let which go first
+    waits_at: tuple[float | None, ...]  # Share of each way after which it is waited within the junction
+    has_signals: bool  # Whether it has traffic lights
+    zebras: tuple[Zebra, ...] = ()  # Crossings of persons, in the order of their numbers
+    areas: tuple[WalkingArea, ...] = ()  # What joins its footways
 
     @property
     def place(self) -> Points:
@@ -68,13 +47,7 @@ class Junction:
         return "dead_end" if not self.ways else "traffic_light" if self.has_signals else "priority"
 
     def entry(self, number: int) -> tuple[str, int]:
-        """Internal edge with which a way begins, and the number of its lane there.
-
-        Parameters
-        ----------
-        number : int
-            Number of the way.
-        """
+        """Internal edge with which a way begins, and the number of its lane there."""
         first = number
         while first and self._run_beside(first - 1, number):
             first -= 1
@@ -87,13 +60,7 @@ class Junction:
         return (one.source, one.target) == (two.source, two.target) and not waits
 
     def second_part(self, number: int) -> tuple[str, int]:
-        """Internal edge with which a way goes on from where it is waited, and the number of its lane there.
-
-        Parameters
-        ----------
-        number : int
-            Number of the way.
-        """
+        """Internal edge with which a way goes on from where it is waited, and the number of its lane there."""
         before = sum(share is not None for share in self.waits_at[:number])
         return f":{self.name}_{len(self.ways) + before}", 0
 
@@ -134,13 +101,7 @@ class _End:
 
 
 def junctions(plan: NetPlan) -> Iterator[Junction]:
-    """Nodes of a network.
-
-    Parameters
-    ----------
-    plan : NetPlan
-        The network.
-    """
+    """Nodes of a network."""
     edges = {edge.name: edge for edge in plan.edges}
     lit = {name for name, _ in plan.signals}
     for name in dict.fromkeys(itertools.chain.from_iterable((edge.start, edge.end) for edge in plan.edges)):

@@ -9,64 +9,29 @@ from fogsim.traffic.templates.alignment import Axis, Points
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """One direction of a road between two nodes.
+    """One direction of a road between two nodes."""
 
-    Attributes
-    ----------
-    name, start, end : str
-        Its id, and those of the nodes that it leads from and to.
-    axis : Axis
-        Its left border, as far as the junctions at its ends.
-    lanes : int
-        How many lanes it has.
-    lane_width : float
-        Width of each [m].
-    limit : float
-        Speed limit [m/s].
-    priority : int
-        At junctions the edge of more priority goes first.
-    footway : float
-        Width of the footway to its right [m]; 0 for none.
-    """
-
+    # name, start, end: its id, and those of the nodes that it leads from and to
     name: str
     start: str
     end: str
-    axis: Axis
-    lanes: int
-    lane_width: float
-    limit: float
-    priority: int = 1
-    footway: float = 0.0
+    axis: Axis  # Its left border, as far as the junctions at its ends
+    lanes: int  # How many lanes it has
+    lane_width: float  # Width of each [m]
+    limit: float  # Speed limit [m/s]
+    priority: int = 1  # At junctions the edge of more priority goes first
+    footway: float = 0.0  # Width of the footway to its right [m]; 0 for none
 
     def lane(self, number: int) -> Points:
-        """Centreline of a lane (n, 3) [m].
-
-        Parameters
-        ----------
-        number : int
-            Its number from the right, from 0.
-        """
+        """Centreline of a lane (n, 3) [m]."""
         return self.axis.beside(-(self.lanes - number - 0.5) * self.lane_width)
 
     def index(self, number: int) -> int:
-        """Number of a lane in SUMO, where a footway is lane 0.
-
-        Parameters
-        ----------
-        number : int
-            Its number from the right, from 0.
-        """
+        """Number of a lane in SUMO, where a footway is lane 0."""
         return number + (self.footway > 0.0)
 
     def lane_id(self, number: int) -> str:
-        """Id of a lane.
-
-        Parameters
-        ----------
-        number : int
-            Its number from the right, from 0.
-        """
+        """Id of a lane."""
         return f"{self.name}_{self.index(number)}"
 
     @property
@@ -88,81 +53,42 @@ class Edge:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A way across a node from a lane to a lane.
+    """A way across a node from a lane to a lane."""
 
-    Attributes
-    ----------
-    source, target : str
-        Ids of the edges.
-    from_lane, to_lane : int
-        Numbers of the lanes.
-    direction : str
-        ``s`` straight on, ``l`` left, ``r`` right.
-    """
-
+    # source, target: ids of the edges
     source: str
     target: str
+    # from_lane, to_lane: numbers of the lanes
     from_lane: int = 0
     to_lane: int = 0
-    direction: str = "s"
+    direction: str = "s"  # ``s`` straight on, ``l`` left, ``r`` right
 
 
 @dataclass(frozen=True, slots=True)
 class Phase:
-    """A phase of traffic lights.
+    """A phase of traffic lights."""
 
-    Attributes
-    ----------
-    duration : float
-        How long it lasts [s].
-    greens : tuple of str
-        Edges that have green.
-    state : str
-        ``G`` for green, ``y`` for the yellow after it.
-    walks : bool
-        Whether persons may begin to cross the roads that do not have green.
-    """
-
-    duration: float
-    greens: tuple[str, ...]
-    state: str = "G"
-    walks: bool = False
+    duration: float  # How long it lasts [s]
+    greens: tuple[str, ...]  # Edges that have green
+    state: str = "G"  # ``G`` for green, ``y`` for the yellow after it
+    walks: bool = False  # Whether persons may begin to cross the roads that do not have green
 
 
 @dataclass(frozen=True, slots=True)
 class ZebraPlan:
-    """Where persons cross a road at a node.
+    """Where persons cross a road at a node."""
 
-    Attributes
-    ----------
-    node : str
-        The node.
-    into, away : str
-        Ids of the edges that it crosses: the one that leads to the node, and the one that leads away.
-    """
-
-    node: str
+    node: str  # The node
+    # into, away: ids of the edges that it crosses: the one that leads to the node, and the one that leads away
     into: str
     away: str
 
 
 @dataclass(frozen=True, slots=True)
 class NetPlan:
-    """A network.
+    """A network."""
 
-    Attributes
-    ----------
-    edges : tuple of Edge
-        Its edges.
-    links : tuple of Link
-        What connects them.
-    signals : mapping from node to phases
-        Traffic lights by node, as pairs.
-    zebras : tuple of ZebraPlan
-        Where persons cross.
-    """
-
-    edges: tuple[Edge, ...]
-    links: tuple[Link, ...] = ()
-    signals: tuple[tuple[str, tuple[Phase, ...]], ...] = ()
-    zebras: tuple[ZebraPlan, ...] = ()
+    edges: tuple[Edge, ...]  # Its edges
+    links: tuple[Link, ...] = ()  # What connects them
+    signals: tuple[tuple[str, tuple[Phase, ...]], ...] = ()  # Traffic lights by node, as pairs
+    zebras: tuple[ZebraPlan, ...] = ()  # Where persons cross

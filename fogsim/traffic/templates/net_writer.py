@@ -23,13 +23,7 @@ _HEADER = """<?xml version="1.0" encoding="UTF-8"?>
 
 
 def net_text(plan: NetPlan) -> str:
-    """Text of a network file.
-
-    Parameters
-    ----------
-    plan : NetPlan
-        The network.
-    """
+    """Text of a network file."""
     nodes = list(junctions(plan))
     lines = [_location(plan)]
     for node in nodes:

@@ -25,74 +25,30 @@ _TYPE = "person.demand"
 
 @dataclass(frozen=True, slots=True)
 class Walker:
-    """A person that a scenario places.
+    """A person that a scenario places."""
 
-    Attributes
-    ----------
-    name : str
-        Its id.
-    way : str
-        Way beside which it walks.
-    is_left : bool
-        Whether it begins on the footway to the left of the road.
-    position : float
-        Where along that way it begins [m].
-    speed : float
-        How fast it walks [m/s].
-    depart : float
-        When it appears [s].
-    crosses_at : float or None
-        Place along that way of the crossing that it takes [m]; None if it walks on to the end of the way.
-    waits : bool
-        Whether it waits where it begins until it is told to walk.
-    """
-
-    name: str
-    way: str = "same_way"
-    is_left: bool = False
-    position: float = 200.0
-    speed: float = WALKING_SPEED
-    depart: float = 0.0
+    name: str  # Its id
+    way: str = "same_way"  # Way beside which it walks
+    is_left: bool = False  # Whether it begins on the footway to the left of the road
+    position: float = 200.0  # Where along that way it begins [m]
+    speed: float = WALKING_SPEED  # How fast it walks [m/s]
+    depart: float = 0.0  # When it appears [s]
+    # Place along that way of the crossing that it takes [m]; None if it walks on to the end of the way
     crosses_at: float | None = None
-    waits: bool = False
+    waits: bool = False  # Whether it waits where it begins until it is told to walk
 
 
 @dataclass(frozen=True, slots=True)
 class Footfall:
-    """Persons beside those that a scenario places.
+    """Persons beside those that a scenario places."""
 
-    Attributes
-    ----------
-    along : float
-        Persons who walk along each footway, in both directions together [1/s].
-    across : float
-        Persons who cross at each crossing, from both sides together [1/s].
-    until : float
-        When the last of them come [s]: SUMO makes all persons of a flow when it reads it.
-    """
-
-    along: float = 0.0
-    across: float = 0.0
-    until: float = 600.0
+    along: float = 0.0  # Persons who walk along each footway, in both directions together [1/s]
+    across: float = 0.0  # Persons who cross at each crossing, from both sides together [1/s]
+    until: float = 600.0  # When the last of them come [s]: SUMO makes all persons of a flow when it reads it
 
 
 def walkers_text(layout: Layout, walkers: Sequence[Walker], footfall: Footfall) -> list[str]:
-    """Elements of a route file of all who are on foot.
-
-    Parameters
-    ----------
-    layout : Layout
-        The road.
-    walkers : sequence of Walker
-        Persons that a scenario places.
-    footfall : Footfall
-        Persons beside them.
-
-    Raises
-    ------
-    PlacementError
-        If a person cannot walk where it is to.
-    """
+    """Elements of a route file of all who are on foot."""
     lines = list[str]()
     if footfall.along or footfall.across:
         lines.append(_person_type(_TYPE, WALKING_SPEED, _SPEEDS))
@@ -189,15 +145,7 @@ def _zebra(walker: Walker, layout: Layout) -> ZebraPlan:
 
 
 def zebra_places(layout: Layout, way: str) -> dict[ZebraPlan, float]:
-    """Crossings over a way, with the place of their middles along it [m].
-
-    Parameters
-    ----------
-    layout : Layout
-        The road.
-    way : str
-        The way.
-    """
+    """Crossings over a way, with the place of their middles along it [m]."""
     found, passed = dict[ZebraPlan, float](), 0.0
     aside = STOP_TO_ZEBRA + 0.5 * ZEBRA_WIDTH
     names = layout.way(way)

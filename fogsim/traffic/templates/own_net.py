@@ -12,92 +12,40 @@ _MOST_BYTES = 2_000_000_000
 
 @dataclass(frozen=True, slots=True)
 class KnownEdge:
-    """What is known of an edge.
+    """What is known of an edge."""
 
-    Attributes
-    ----------
-    lanes : int
-        How many lanes it has, beside footways.
-    length : float
-        Its length [m].
-    limit : float
-        Its speed limit [m/s].
-    footways : int
-        How many footways lie to the right of its lanes.
-    """
-
-    lanes: int
-    length: float
-    limit: float
-    footways: int = 0
+    lanes: int  # How many lanes it has, beside footways
+    length: float  # Its length [m]
+    limit: float  # Its speed limit [m/s]
+    footways: int = 0  # How many footways lie to the right of its lanes
 
     def index(self, number: int) -> int:
-        """Number of a lane in SUMO, which counts footways, too.
-
-        Parameters
-        ----------
-        number : int
-            Its number from the right, from 0.
-        """
+        """Number of a lane in SUMO, which counts footways, too."""
         return number + self.footways
 
 
 @dataclass(frozen=True, slots=True)
 class KnownWays:
-    """Ways on a network.
+    """Ways on a network."""
 
-    Attributes
-    ----------
-    ways : mapping from name to edge ids, as pairs
-        The ways by name.
-    edges : mapping from edge id to KnownEdge
-        What is known of their edges; those that the network does not have are missing.
-    """
-
-    ways: tuple[tuple[str, tuple[str, ...]], ...]
-    edges: Mapping[str, KnownEdge]
+    ways: tuple[tuple[str, tuple[str, ...]], ...]  # The ways by name
+    edges: Mapping[str, KnownEdge]  # What is known of their edges; those that the network does not have are missing
 
     def way(self, name: str) -> tuple[str, ...]:
-        """Edges of a way; none where there is no such way.
-
-        Parameters
-        ----------
-        name : str
-            Its name.
-        """
+        """Edges of a way; none where there is no such way."""
         return dict(self.ways).get(name, ())
 
     def edge(self, name: str) -> KnownEdge:
-        """An edge by its id.
-
-        Parameters
-        ----------
-        name : str
-            The id.
-        """
+        """An edge by its id."""
         return self.edges[name]
 
     def between(self, one: str, other: str) -> float:  # noqa: ARG002 - as of `Ways`
-        """Length of the way across the junction between two edges, which is not looked up: 0.
-
-        Parameters
-        ----------
-        one, other : str
-            Their ids.
-        """
+        """Length of the way across the junction between two edges, which is not looked up: 0."""
         return 0.0
 
 
 def read_ways(net: Path, ways: Mapping[str, tuple[str, ...]]) -> KnownWays:
-    """Read what a network says of the edges of ways.
-
-    Parameters
-    ----------
-    net : Path
-        SUMO network file.
-    ways : mapping from name to tuple of str
-        Edges of each way.
-    """
+    """Read what a network says of the edges of ways."""
     reader = _Reader(frozenset(edge for edges in ways.values() for edge in edges))
     try:
         read_elements(net, reader, _MOST_BYTES)

@@ -49,55 +49,27 @@ class Ways(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Relation:
-    """Where an actor is as seen from another.
+    """Where an actor is as seen from another."""
 
-    Attributes
-    ----------
-    other : str
-        The other's id.
-    gap : float
-        Gap between bumpers [m]; negative behind the other; where `is_beside`, of the front bumpers.
-    is_beside : bool
-        Whether the front bumpers count.
-    """
-
-    other: str
-    gap: float
-    is_beside: bool = False
+    other: str  # The other's id
+    gap: float  # Gap between bumpers [m]; negative behind the other; where `is_beside`, of the front bumpers
+    is_beside: bool = False  # Whether the front bumpers count
 
 
 @dataclass(frozen=True, slots=True)
 class Actor:
-    """A vehicle that a scenario places.
+    """A vehicle that a scenario places."""
 
-    Attributes
-    ----------
-    name : str
-        Its id.
-    kind : str
-        One of `VEHICLE_KINDS`.
-    way : str
-        Way that it takes.
-    lane : int
-        Number of its lane from the right; negative ones count from the left.
-    place : float or Relation
-        Position of its front bumper along its way [m], or where it is as seen from another.
-    speed : float or None
-        Speed with which it begins and which it keeps where it can [m/s]; None for what its road and type allow.
-    depart : float
-        When it appears [s].
-    stands : bool
-        Whether it stands still for good.
-    """
-
-    name: str
-    kind: str = "car"
-    way: str = "same_way"
-    lane: int = 0
+    name: str  # Its id
+    kind: str = "car"  # One of `VEHICLE_KINDS`
+    way: str = "same_way"  # Way that it takes
+    lane: int = 0  # Number of its lane from the right; negative ones count from the left
+    # Position of its front bumper along its way [m], or where it is as seen from another
     place: float | Relation = 200.0
+    # Speed with which it begins and which it keeps where it can [m/s]; None for what its road and type allow
     speed: float | None = None
-    depart: float = 0.0
-    stands: bool = False
+    depart: float = 0.0  # When it appears [s]
+    stands: bool = False  # Whether it stands still for good
 
     @property
     def length(self) -> float:
@@ -107,30 +79,14 @@ class Actor:
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """An actor where it begins.
+    """An actor where it begins."""
 
-    Attributes
-    ----------
-    actor : Actor
-        The actor.
-    position : float
-        Position of its front bumper along its way [m].
-    """
-
-    actor: Actor
-    position: float
+    actor: Actor  # The actor
+    position: float  # Position of its front bumper along its way [m]
 
 
 class PlacementError(InputError):
-    """An actor that cannot be where it is to be.
-
-    Parameters
-    ----------
-    actor : str
-        Its id.
-    told : str
-        What is wrong.
-    """
+    """An actor that cannot be where it is to be."""
 
     def __init__(self, actor: str, told: str) -> None:
         super().__init__(f"{actor}: {told}")
@@ -139,18 +95,7 @@ class PlacementError(InputError):
 
 
 def place_actors(actors: Sequence[Actor]) -> tuple[Placed, ...]:
-    """Positions of actors along their ways.
-
-    Parameters
-    ----------
-    actors : sequence of Actor
-        They.
-
-    Raises
-    ------
-    PlacementError
-        If one is placed beside an actor that is not there, has another way, or is placed beside itself in the end.
-    """
+    """Positions of actors along their ways."""
     by_name = {actor.name: actor for actor in actors}
     return tuple(Placed(actor, _position(actor, by_name, ())) for actor in actors)
 
@@ -174,20 +119,7 @@ def _position(actor: Actor, by_name: Mapping[str, Actor], asked: tuple[str, ...]
 
 
 def check_placement(placed: Sequence[Placed], layout: Ways) -> None:
-    """Refuse actors that lie off their way or in one another.
-
-    Parameters
-    ----------
-    placed : sequence of Placed
-        The actors.
-    layout : Ways
-        The road.
-
-    Raises
-    ------
-    PlacementError
-        If one does.
-    """
+    """Refuse actors that lie off their way or in one another."""
     ways = dict(layout.ways)
     for one in placed:
         actor = one.actor
@@ -223,17 +155,7 @@ def _lane(one: Placed, layout: Ways) -> tuple[str, int]:
 
 
 def edge_at(layout: Ways, way: str, position: float) -> tuple[str, float]:
-    """Edge of a way at a position, and the position along that edge [m].
-
-    Parameters
-    ----------
-    layout : Ways
-        The road.
-    way : str
-        The way.
-    position : float
-        Position along it [m].
-    """
+    """Edge of a way at a position, and the position along that edge [m] (`position` [m])."""
     names = layout.way(way)
     for name, following in itertools.pairwise(names):
         length, across = layout.edge(name).length, layout.between(name, following)
@@ -245,15 +167,7 @@ def edge_at(layout: Ways, way: str, position: float) -> tuple[str, float]:
 
 
 def way_length(layout: Ways, way: str) -> float:
-    """Length of a way, junctions included [m].
-
-    Parameters
-    ----------
-    layout : Ways
-        The road.
-    way : str
-        The way.
-    """
+    """Length of a way, junctions included [m]."""
     names = layout.way(way)
     across = (layout.between(one, other) for one, other in itertools.pairwise(names))
     return sum(layout.edge(name).length for name in names) + sum(across)

@@ -81,15 +81,7 @@ class Streets:
 
 
 def straight_axis(direction: float, reach: tuple[float, float]) -> Axis:
-    """A straight line away from the middle.
-
-    Parameters
-    ----------
-    direction : float
-        Where it leads [rad].
-    reach : tuple of float
-        Distances from the middle between which it lies [m].
-    """
+    """A straight line away from the middle (`direction` [rad], `reach` [m])."""
     along = np.linspace(*reach, 2)
     points = np.stack([along * math.cos(direction), along * math.sin(direction), np.zeros(2)], axis=-1)
     return Axis(points, np.full(2, direction), along)
@@ -136,13 +128,7 @@ class Crossing(Streets):
 
 
 def two_phases(walks: bool = False) -> tuple[Phase, ...]:
-    """Phases of traffic lights: one road after the other.
-
-    Parameters
-    ----------
-    walks : bool
-        Whether persons cross, beside the road that has green; those who have begun have time to reach the other side.
-    """
+    """Phases of traffic lights: one road after the other."""
     phases = list[Phase]()
     for greens in ((SAME_WAY, ONCOMING), (SOUTH, NORTH)):
         green = [Phase(_WALK, greens, walks=True), Phase(_GREEN - _WALK, greens)] if walks else [Phase(_GREEN, greens)]

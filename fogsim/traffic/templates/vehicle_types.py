@@ -7,36 +7,21 @@ from fogsim.registry import Registry
 
 @dataclass(frozen=True, slots=True)
 class VehicleKind:
-    """A kind of vehicle.
+    """A kind of vehicle."""
 
-    Attributes
-    ----------
-    vehicle_class : str
-        SUMO's ``vClass``.
-    length, width, height : float
-        Size [m].
-    top_speed : float
-        What it can drive at most [m/s].
-    speed_factor : str
-        Share of the limit that its drivers want to drive, as SUMO has it: ``normc(mean,deviation,least,most)``.
-    headway : float
-        Time that they keep to who is ahead (Krauss' tau) [s].
-    acceleration, deceleration : float
-        What they use at most [m/s²].
-    imperfection : float
-        How imperfectly they drive (Krauss' sigma) [-].
-    """
-
-    vehicle_class: str
+    vehicle_class: str  # SUMO's ``vClass``
+    # length, width, height: size [m]
     length: float
     width: float
     height: float
-    top_speed: float
+    top_speed: float  # What it can drive at most [m/s]
+    # Share of the limit that its drivers want to drive, as SUMO has it: ``normc(mean,deviation,least,most)``
     speed_factor: str
-    headway: float
+    headway: float  # Time that they keep to who is ahead (Krauss' tau) [s]
+    # acceleration, deceleration: what they use at most [m/s²]
     acceleration: float = 2.6
     deceleration: float = 4.5
-    imperfection: float = 0.4
+    imperfection: float = 0.4  # How imperfectly they drive (Krauss' sigma) [-]
 
 
 CAR = VehicleKind("passenger", 4.6, 1.85, 1.5, 55.0, "normc(0.95,0.10,0.75,1.20)", 1.4)

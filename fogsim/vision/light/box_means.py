@@ -14,21 +14,7 @@ Floats = NDArray[np.float64]
 def box_means(picture: Floats, rows: Floats, cols: Floats, box: float) -> tuple[Floats, float]:
     """Means over square boxes about the crossings of rows and columns.
 
-    Parameters
-    ----------
-    picture : (n, m) float64
-        The picture.
-    rows, cols : (k,) and (l,) float64
-        Middles of the boxes, which may lie outside: beyond the border there is nothing to share.
-    box : float
-        Their side [px].
-
-    Returns
-    -------
-    means : (k, l) float64
-        0 where a box is wholly outside.
-    noise : float
-        Mean variance of them over that of single pixels, if theirs is independent [-].
+    Takes `picture` (n, m), `rows`, `cols` (l,), `box` [px].
     """
     down, top, down_power = _shares(picture.shape[0], rows, box)
     across, left, across_power = _shares(picture.shape[1], cols, box)

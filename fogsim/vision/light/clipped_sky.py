@@ -26,21 +26,12 @@ _NORMAL = NormalDist()
 
 @dataclass(frozen=True, slots=True)
 class Clipping:
-    """What clipping does to an even surface.
+    """What clipping does to an even surface."""
 
-    Attributes
-    ----------
-    loss : float
-        By how much its mean luminance comes out too low [linear grey levels].
-    noise : float
-        Deviation of the luminance of single pixels, were none clipped; 0 where none is, or all [linear grey levels].
-    spread : float
-        The same of their single channels [linear grey levels].
-    """
-
-    loss: float
+    loss: float  # By how much its mean luminance comes out too low [linear grey levels]
+    # Deviation of the luminance of single pixels, were none clipped; 0 where none is, or all [linear grey levels]
     noise: float
-    spread: float
+    spread: float  # The same of their single channels [linear grey levels]
 
 
 def clipping(pixels: Pixels, camera: Camera) -> Clipping:
@@ -49,12 +40,7 @@ def clipping(pixels: Pixels, camera: Camera) -> Clipping:
     Noise about a light near the largest value is cut off on one side. Of a normal law μ, σ the shares p₁ and p₂ below
     two lights c₁ and c₂ give both: cᵢ = μ + σ Φ⁻¹(pᵢ).
 
-    Parameters
-    ----------
-    pixels : (n,) or (n, 1 or 3) uint8 or uint16
-        Pixels of an even surface.
-    camera : Camera
-        The assumed calibration.
+    Takes `pixels` (n,).
     """
     channels = pixels.reshape(pixels.shape[0], -1)
     weights = LUMINANCE_WEIGHTS if channels.shape[1] == 3 else (1.0,)
@@ -70,19 +56,7 @@ def clipping(pixels: Pixels, camera: Camera) -> Clipping:
 def darker_by(fall: float, headroom: float, spread: float) -> tuple[float, float]:
     """By how much pixels of an even surface are darker than the airlight, of how much they seem to be.
 
-    Parameters
-    ----------
-    fall : float
-        How much darker their mean is than the airlight.
-    headroom : float
-        By how much the light from which pixels are clipped is above the airlight.
-    spread : float
-        Deviation of single pixels, all three in one unit.
-
-    Returns
-    -------
-    tuple of float
-        How much darker they are, and what of the seeming was lost light.
+    Returns how much darker they are, and what of the seeming was lost light.
     """
     if spread <= 0.0:
         return fall, 0.0

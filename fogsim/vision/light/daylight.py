@@ -45,17 +45,11 @@ Strip = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 @dataclass(frozen=True, slots=True)
 class _View:
-    """Where a camera sees the sky and the near road.
+    """Where a camera sees the sky and the near road."""
 
-    Attributes
-    ----------
-    rows : (n + ROAD_ROWS,) int64
-        Rows of the sky, from the top down, and of the road, from near to far.
-    lane, left, right : ((rows of the road,) int64, (rows of the road,) int64)
-        First and last column of a strip of the road, the last before the first where the strip is not seen.
-    """
-
-    rows: NDArray[np.int64]
+    rows: NDArray[np.int64]  # Rows of the sky, from the top down, and of the road, from near to far
+    # lane, left, right (rows of the road,) int64: first and last column of a strip of the road, the last before the
+    # first where the strip is not seen
     lane: Strip
     left: Strip
     right: Strip
@@ -71,14 +65,7 @@ def lit_by_lamps(level: Pixels, camera: Camera, lead: LeadMeasurement | None = N
     ceiling over the lane is darker than the road, though bright walls may be seen at the height of the sky; the dark
     rear of a truck right ahead says nothing of that kind.
 
-    Parameters
-    ----------
-    level : (rows, cols) or (rows, cols, 3) uint8 or uint16
-        A level image, its horizon inside.
-    camera : Camera
-        The assumed calibration.
-    lead : LeadMeasurement or None
-        The tracked vehicle ahead, if it is known.
+    Takes `level` (rows, cols).
     """
     view = _view_of(camera)
     luminance = linear_luminance(level[view.rows], camera.response, camera.bits, camera.black_level)

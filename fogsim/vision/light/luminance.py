@@ -18,19 +18,7 @@ from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels
 def linear_table(response: Response, bits: int = 8, black_level: float = 0.0) -> NDArray[np.float32]:
     """Light behind each pixel value, in linear grey levels that are the same for every bit depth.
 
-    Parameters
-    ----------
-    response : Response
-        The assumed response of the camera.
-    bits : int
-        Its bit depth.
-    black_level : float
-        Its black level, as a share of full scale [-].
-
-    Returns
-    -------
-    (2^bits,) float32
-        Linear grey levels, read-only: 0 at the black level, 255 the last. sRGB: IEC 61966-2-1.
+    Returns linear grey levels, read-only: 0 at the black level, 255 the last. sRGB: IEC 61966-2-1.
     """
     share = np.arange(2**bits, dtype=np.float64) / (2**bits - 1)
     table: NDArray[np.float32] = (255.0 * exposure_of(share, response, black_level)).astype(np.float32)
@@ -39,15 +27,7 @@ def linear_table(response: Response, bits: int = 8, black_level: float = 0.0) ->
 
 
 def linear_pixels(image: Pixels, camera: Camera) -> LinearPixels:
-    """Pair an image with the inverse of its camera's response; no pixel is touched.
-
-    Parameters
-    ----------
-    image : (rows, cols) or (rows, cols, 3) uint8 or uint16
-        An image of the camera.
-    camera : Camera
-        The assumed calibration.
-    """
+    """Pair an image with the inverse of its camera's response; no pixel is touched (`image` (rows, cols))."""
     table = linear_table(camera.response, camera.bits, camera.black_level)
     weights = np.array(LUMINANCE_WEIGHTS if image.ndim == 3 else (1.0,), np.float32)
     pixels: NDArray[Any] = np.ascontiguousarray(image if image.ndim == 3 else image[:, :, None])
@@ -57,27 +37,8 @@ def linear_pixels(image: Pixels, camera: Camera) -> LinearPixels:
 def linear_luminance(image: Pixels, response: Response, bits: int = 8, black_level: float = 0.0) -> NDArray[np.float32]:
     """Undo a camera's response and weigh the colours to luminance (ITU-R BT.709).
 
-    Parameters
-    ----------
-    image : (rows, cols) or (rows, cols, 3) uint8, or uint16 for more than 8 bits
-        Pixel values 0 … 2^bits − 1, red first.
-    response : Response
-        The assumed response of the camera.
-    bits : int
-        Its bit depth.
-    black_level : float
-        Its black level, as a share of full scale [-].
-
-    Returns
-    -------
-    (rows, cols) float32
-        Linear grey levels 0 … 255 at every bit depth; of a grey image and of a colour image with three equal channels
-        the same.
-
-    Raises
-    ------
-    InputError
-        If the image is not of the type that its bit depth has.
+    Returns linear grey levels 0 … 255 at every bit depth; of a grey image and of a colour image with three equal
+    channels the same (rows, cols). Takes `image` (rows, cols).
     """
     expected = np.uint8 if bits == 8 else np.uint16
     if image.dtype != expected:

@@ -17,17 +17,8 @@ FEWEST_SAMPLES = 3
 def columns_apart(image: NDArray[Any], step: int) -> NDArray[Any]:
     """Columns some way apart, from both sides of an image inward: of a mirrored image the same pixels.
 
-    Parameters
-    ----------
-    image : (rows, cols, …) array
-        The image.
-    step : int
-        Columns from one to the next.
-
-    Returns
-    -------
-    (rows, n, …) array
-        Those of the left half from left to right, then those of the right half from right to left.
+    Returns those of the left half from left to right, then those of the right half from right to left (rows, n, …).
+    Takes `image` (rows, cols, …).
     """
     cols = image.shape[1]
     # Two slices: numpy takes columns by their numbers several times as slowly.
@@ -35,13 +26,7 @@ def columns_apart(image: NDArray[Any], step: int) -> NDArray[Any]:
 
 
 def median(values: NDArray[np.floating[Any]]) -> float:
-    """Median of numbers that are all finite.
-
-    Parameters
-    ----------
-    values : (n, …) float
-        At least one number.
-    """
+    """Median of numbers that are all finite (`values` (n, …))."""
     flat = values.ravel()
     half = flat.size // 2
     if flat.size % 2:
@@ -52,15 +37,7 @@ def median(values: NDArray[np.floating[Any]]) -> float:
 
 
 def quantile(values: NDArray[np.floating[Any]], share: float) -> float:
-    """What a share of numbers lie below, linear between neighbours.
-
-    Parameters
-    ----------
-    values : (n, …) float
-        At least one number; all are finite.
-    share : float
-        0 … 1.
-    """
+    """What a share of numbers lie below, linear between neighbours (`values` (n, …))."""
     flat = values.ravel()
     place = share * (flat.size - 1)
     below = min(int(place), flat.size - 1)
@@ -71,13 +48,7 @@ def quantile(values: NDArray[np.floating[Any]], share: float) -> float:
 
 
 def row_medians(values: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-    """Median of each row of numbers that are all finite.
-
-    Parameters
-    ----------
-    values : (rows, n) float
-        At least one column.
-    """
+    """Median of each row of numbers that are all finite (`values` (rows, n))."""
     half = values.shape[1] // 2
     ordered = np.sort(values, axis=1)
     if values.shape[1] % 2:
@@ -86,18 +57,10 @@ def row_medians(values: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
 
 
 class SpanMedians(NamedTuple):
-    """Medians of spans of an image's rows.
+    """Medians of spans of an image's rows."""
 
-    Attributes
-    ----------
-    luminance : (rows,) float64
-        0 where there are too few pixels.
-    number : (rows,) int64
-        Pixels that the median is of; 0 where there are too few.
-    """
-
-    luminance: NDArray[np.float64]
-    number: NDArray[np.int64]
+    luminance: NDArray[np.float64]  # (rows,): 0 where there are too few pixels
+    number: NDArray[np.int64]  # (rows,) int64: Pixels that the median is of; 0 where there are too few
 
 
 @kernel
@@ -111,18 +74,7 @@ def span_medians(
 ) -> SpanMedians:
     """Median of each row's pixels that lie in a region and between two columns.
 
-    Parameters
-    ----------
-    luminance : (rows, cols) float32
-        Linear luminance.
-    region : (rows, cols) uint8
-        Non-zero inside the region.
-    left, right : (rows,) int64
-        First and last column of each row; they may lie outside the image.
-    most : int
-        Pixels of a span, evenly over it, that a median is of, or up to twice as many.
-    fewest : int
-        Fewest pixels that make a median.
+    Takes `luminance` (rows, cols), `region` (rows, cols) uint8, `left`, `right` (rows,) int64.
     """
     rows, cols = luminance.shape
     medians, counts = np.zeros(rows), np.zeros(rows, np.int64)
@@ -143,12 +95,7 @@ def span_medians(
 def sort_few(values: NDArray[np.float32], out: NDArray[np.float32]) -> None:
     """Sort a few dozen numbers, which quicksort is slow for, by counting for each those that come before it.
 
-    Parameters
-    ----------
-    values : (n,) float32
-        The numbers.
-    out : (n,) float32
-        The same in ascending order; is written.
+    Takes `values` (n,), `out` (n,).
     """
     # 32 bits, as the numbers have: else half as many fit into a register.
     for i in range(values.size):
@@ -162,14 +109,6 @@ def sort_few(values: NDArray[np.float32], out: NDArray[np.float32]) -> None:
 
 @kernel
 def median_of_few(values: NDArray[np.float32], ordered: NDArray[np.float32]) -> float:
-    """Median of a few dozen numbers.
-
-    Parameters
-    ----------
-    values : (n,) float32
-        The numbers.
-    ordered : (n,) float32
-        The same in ascending order; is written.
-    """
+    """Median of a few dozen numbers (`values` (n,), `ordered` (n,))."""
     sort_few(values, ordered)
     return 0.5 * (float(ordered[(values.size - 1) // 2]) + float(ordered[values.size // 2]))

@@ -18,35 +18,17 @@ _RED, _GREEN, _BLUE = (np.float32(share) for share in LUMINANCE_WEIGHTS)
 
 
 class LinearPixels(NamedTuple):
-    """An image with what makes light of its values, see `fogsim.vision.light.luminance.linear_pixels`.
+    """An image with what makes light of its values, see `fogsim.vision.light.luminance.linear_pixels`."""
 
-    Attributes
-    ----------
-    pixels : (rows, cols, channels) uint8 or uint16
-        Contiguous.
-    tables : (channels, levels) float32
-        Linear grey levels that each channel adds.
-    """
-
-    pixels: Pixels
-    tables: NDArray[np.float32]
+    pixels: Pixels  # (rows, cols, channels) uint8: Contiguous
+    tables: NDArray[np.float32]  # (channels, levels): Linear grey levels that each channel adds
 
 
 @kernel
 def grey_luminance(image: Pixels, table: NDArray[np.float32]) -> NDArray[np.float32]:
     """Look every pixel up.
 
-    Parameters
-    ----------
-    image : (rows, cols) uint8 or uint16
-        Pixel values.
-    table : (2^bits,) float32
-        Linear grey levels of each value.
-
-    Returns
-    -------
-    (rows, cols) float32
-        Luminance [linear grey levels].
+    Returns luminance [linear grey levels] (rows, cols). Takes `image` (rows, cols) uint8.
     """
     rows, cols = image.shape
     out = np.empty((rows, cols), np.float32)
@@ -60,17 +42,7 @@ def grey_luminance(image: Pixels, table: NDArray[np.float32]) -> NDArray[np.floa
 def colour_luminance(image: Pixels, table: NDArray[np.float32]) -> NDArray[np.float32]:
     """Look every channel up and weigh them.
 
-    Parameters
-    ----------
-    image : (rows, cols, 3) uint8 or uint16
-        Pixel values, red first.
-    table : (2^bits,) float32
-        Linear grey levels of each value.
-
-    Returns
-    -------
-    (rows, cols) float32
-        Luminance [linear grey levels].
+    Returns luminance [linear grey levels] (rows, cols). Takes `image` (rows, cols, 3) uint8.
     """
     rows, cols, _ = image.shape
     red, green, blue = table * _RED, table * _GREEN, table * _BLUE
@@ -84,15 +56,7 @@ def colour_luminance(image: Pixels, table: NDArray[np.float32]) -> NDArray[np.fl
 
 @kernel
 def pixel_luminance(image: LinearPixels, row: int, col: int) -> float:
-    """Luminance of a pixel [linear grey levels].
-
-    Parameters
-    ----------
-    image : LinearPixels
-        The image.
-    row, col : int
-        Which pixel.
-    """
+    """Luminance of a pixel [linear grey levels]."""
     total = np.float32(0.0)
     for channel in range(image.pixels.shape[2]):
         total += image.tables[channel, image.pixels[row, col, channel]]
@@ -101,17 +65,7 @@ def pixel_luminance(image: LinearPixels, row: int, col: int) -> float:
 
 @kernel
 def row_luminance(pixels: Pixels, tables: NDArray[np.float32], row: int, line: NDArray[np.float32]) -> None:
-    """Luminance of all pixels of a row.
-
-    Parameters
-    ----------
-    pixels, tables
-        See `LinearPixels`.
-    row : int
-        Which row.
-    line : (cols,) float32
-        Their luminance [linear grey levels]; is written.
-    """
+    """Luminance of all pixels of a row (`line` (cols,) [linear grey levels])."""
     seen = pixels[row]
     if pixels.shape[2] == 3:
         red, green, blue = tables[0], tables[1], tables[2]
@@ -126,12 +80,7 @@ def row_luminance(pixels: Pixels, tables: NDArray[np.float32], row: int, line: N
 def even_column(j: int, count: int, left: float, right: float) -> int:
     """Column of one of several samples evenly between two sides [px]; those of a mirrored image are mirrored.
 
-    Parameters
-    ----------
-    j, count : int
-        Which sample of how many.
-    left, right : float
-        The sides [px].
+    Takes `left`, `right` [px].
     """
     apart = (min(j, count - 1 - j) + 0.5) * (right - left) / count
     return math.floor(left + apart + 0.5) if 2 * j < count else math.ceil(right - apart - 0.5)

@@ -22,15 +22,8 @@ REACH = 7.0
 def smoothing_kernel(alpha: float = ALPHA) -> NDArray[np.float64]:
     """Deriche's smoothing, h(n) = s (α|n| + 1) e^(−α|n|), of sum 1.
 
-    Parameters
-    ----------
-    alpha : float
-        α [1/px].
-
-    Returns
-    -------
-    (2 n + 1,) float64
-        Read-only; what the recursion of the same α converges to, cut off at `REACH`.
+    Returns read-only; what the recursion of the same α converges to, cut off at `REACH` (2 n + 1,). Takes `alpha`
+    [1/px].
     """
     n = np.abs(_taps(alpha))
     e = math.exp(-alpha)
@@ -43,16 +36,8 @@ def smoothing_kernel(alpha: float = ALPHA) -> NDArray[np.float64]:
 def derivative_kernel(alpha: float = ALPHA) -> NDArray[np.float64]:
     """Deriche's derivative, ∝ n e^(−α|n|), of response 1 to a slope of 1 per pixel.
 
-    Parameters
-    ----------
-    alpha : float
-        α [1/px].
-
-    Returns
-    -------
-    (2 n + 1,) float64
-        Read-only, to be correlated with an image; the slope's sum is Σ n² e^(−α|n|) = 2 e (1 + e) / (1 − e)³ with
-        e = e^(−α).
+    Returns read-only, to be correlated with an image; the slope's sum is Σ n² e^(−α|n|) = 2 e (1 + e) / (1 − e)³ with e
+    = e^(−α). Takes `alpha` [1/px].
     """
     n = _taps(alpha)
     e = math.exp(-alpha)
@@ -80,12 +65,7 @@ class CannyDeriche(EdgeDetector):
 def derivatives(image: Image, across: Image, down: Image) -> None:
     """Derivatives of an image, each smoothed across its own direction.
 
-    Parameters
-    ----------
-    image : (rows, cols) float32
-        The image; what lies outside is as its border.
-    across, down : (rows, cols) float32
-        Change a pixel to the right and downward; are written.
+    Takes `image` (rows, cols), `across`, `down` (rows, cols).
     """
     _derivatives(image, _half(smoothing_kernel()), _half(derivative_kernel()), across, down)
 

@@ -34,45 +34,24 @@ _WEAK, _EDGE = 1, 2
 
 @dataclass(frozen=True, slots=True)
 class Gradient:
-    """First derivatives of a smoothed image.
+    """First derivatives of a smoothed image."""
 
-    Attributes
-    ----------
-    across, down : (rows, cols) float32
-        Change a pixel to the right and downward [linear grey levels per px].
-    """
-
+    # across, down (rows, cols): change a pixel to the right and downward [linear grey levels per px]
     across: Image
     down: Image
 
 
 @dataclass(frozen=True, slots=True)
 class Edges:
-    """Where an image has edges.
+    """Where an image has edges."""
 
-    Attributes
-    ----------
-    pixels : (rows, cols) uint8
-        Non-zero on edges.
-    threshold : float
-        Gradient above which a pixel starts an edge [linear grey levels per px].
-    gradient : Gradient
-        Derivatives of the image, the fog's own gradient taken away.
-    """
-
-    pixels: NDArray[np.uint8]
-    threshold: float
-    gradient: Gradient
+    pixels: NDArray[np.uint8]  # (rows, cols) uint8: Non-zero on edges
+    threshold: float  # Gradient above which a pixel starts an edge [linear grey levels per px]
+    gradient: Gradient  # Derivatives of the image, the fog's own gradient taken away
 
 
 def smoothed(luminance: Image) -> Image:
-    """Smooth with a Gaussian of 1 px, over 5 px; what lies outside is as the border.
-
-    Parameters
-    ----------
-    luminance : (rows, cols) float32
-        The image.
-    """
+    """Smooth with a Gaussian of 1 px, over 5 px; what lies outside is as the border (`luminance` (rows, cols))."""
     blurred = np.empty_like(luminance)
     smooth(luminance, _gaussian(), blurred)
     return blurred
@@ -89,12 +68,7 @@ class EdgeDetector:
 
     Large arrays made anew for every frame cost more than the filters: the result of a call is overwritten by the next.
 
-    Parameters
-    ----------
-    derivatives : callable
-        Writes the derivatives of its first argument, across and down, into its second and third.
-    of_row, of_road : int
-        Every which column a row's median gradient is of, and every which row and column the road's [px].
+    Takes `of_row`, `of_road` [px].
     """
 
     def __init__(
@@ -116,18 +90,8 @@ class EdgeDetector:
         from its own row (vehicles, marks, kerbs) stays, and so does what is too steep for fog where it is. The
         thresholds follow the median gradient of the lower half, where the road is.
 
-        Parameters
-        ----------
-        luminance : (rows, cols) float32
-            Linear luminance, 0 … 255.
-        fog_slope : (rows,) float32 or None
-            Steepest brightening upward that fog can make of each row [linear grey levels per px]; None leaves the
-            fog's gradient in, as published.
-
-        Returns
-        -------
-        Edges
-            The edge pixels, the threshold that they had to pass, and the gradient.
+        Returns the edge pixels, the threshold that they had to pass, and the gradient. Takes `luminance` (rows, cols),
+        `fog_slope` (rows,).
         """
         self._make_room(luminance.shape)
         across, down = self._gradient.across, self._gradient.down
@@ -153,17 +117,7 @@ class EdgeDetector:
 def edge_map(blurred: Image, fog_slope: Image) -> Edges:
     """Edge pixels after Canny by Sobel's derivatives of an image that is smooth already.
 
-    Parameters
-    ----------
-    blurred : (rows, cols) float32
-        Smoothed linear luminance, 0 … 255.
-    fog_slope : (rows,) float32
-        Steepest brightening upward that fog can make of each row [linear grey levels per px].
-
-    Returns
-    -------
-    Edges
-        See `EdgeDetector`.
+    Returns see `EdgeDetector`. Takes `blurred` (rows, cols), `fog_slope` (rows,).
     """
     return EdgeDetector(_sobel, of_row=8, of_road=4)(blurred, fog_slope)
 
@@ -185,14 +139,7 @@ def squared_lengths(
 ) -> None:
     """Take each row's slope from the downward gradient, in place, and square the gradient's length.
 
-    Parameters
-    ----------
-    across, down : (rows, cols) float32
-        The gradient; `down` is changed.
-    slope : (rows,) float32
-        What is taken off.
-    squares : (rows + 2, cols + 2) float32
-        Is written, all but its border.
+    Takes `across`, `down` (rows, cols), `slope` (rows,), `squares` (rows + 2, cols + 2).
     """
     rows, cols = across.shape
     for row in range(rows):
@@ -213,16 +160,7 @@ def trace_edges(
 ) -> None:
     """Find the ridges of the gradient above `low` that touch one above `high`, or another such ridge.
 
-    Parameters
-    ----------
-    across, down : (rows, cols) float32
-        The gradient.
-    squares : (rows + 2, cols + 2) float32
-        Squares of its length, 0 on the border.
-    low, high : float
-        Thresholds of its length.
-    pixels : (rows, cols) uint8
-        Is written: 255 on edges and 0 elsewhere.
+    Takes `across`, `down` (rows, cols), `squares` (rows + 2, cols + 2), `pixels` (rows, cols) uint8.
     """
     marks, waiting = np.zeros(squares.shape, np.uint8), np.empty(pixels.size, np.int64)
     bounds = np.float32(low * low), np.float32(high * high)
@@ -288,15 +226,7 @@ def _follow(marks: NDArray[np.uint8], width: int, waiting: NDArray[np.int64], co
 
 @kernel
 def smooth(image: NDArray[np.float32], weights: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-    """Smooth down the columns and along each row; what lies outside is as the border.
-
-    Parameters
-    ----------
-    image, out : (rows, cols) float32
-        The image, and what is written.
-    weights : (`SMOOTH_TAPS` + 1,) float32
-        Weights from the middle one on.
-    """
+    """Smooth down the columns and along each row; what lies outside is as the border (`image`, `out` (rows, cols))."""
     rows, cols = image.shape
     line = np.empty(cols + 2 * SMOOTH_TAPS, np.float32)
     for row in range(rows):
@@ -317,15 +247,7 @@ def smooth(image: NDArray[np.float32], weights: NDArray[np.float32], out: NDArra
 def peak_offset(before: float, here: float, behind: float) -> float:
     """Place of the peak of a parabola through three neighbouring pixels.
 
-    Parameters
-    ----------
-    before, here, behind : float
-        Their values.
-
-    Returns
-    -------
-    float
-        Distance from the middle one [px]; 0 where the parabola has no peak.
+    Returns distance from the middle one [px]; 0 where the parabola has no peak.
     """
     bend = before - 2.0 * here + behind
     return 0.5 * (before - behind) / bend if bend < 0.0 else 0.0

@@ -39,21 +39,7 @@ def consensus_vanishing_point(
     random pairs of lines that one is kept through whose crossing the most votes pass, and the centre of mass of the
     crossings of all that pass there is the answer. It is several pixels off; see `fogsim.vision.lines.road_lines`.
 
-    Parameters
-    ----------
-    gradient : Gradient
-        Derivatives of the image.
-    edges : (rows, cols) uint8
-        Non-zero on edges.
-    guess : tuple of float
-        Column and row of the first guess, in rows of `edges` [px].
-    reach : float
-        How far from it lines may pass [px].
-
-    Returns
-    -------
-    VanishingPoint or None
-        None if no two lines agree.
+    Returns None if no two lines agree. Takes `edges` (rows, cols) uint8, `guess` [px], `reach` [px].
     """
     points = edge_points(gradient.across, gradient.down, edges, guess[0], guess[1])
     found, votes = hough_peaks(points, reach, PEAKS, VOTES)
@@ -89,19 +75,8 @@ def edge_points(
 ) -> Floats:
     """Edges below a point, placed within the pixel along the gradient.
 
-    Parameters
-    ----------
-    across, down : (rows, cols) float32
-        The gradient.
-    edges : (rows, cols) uint8
-        Non-zero on edges.
-    col, row : float
-        The point [px].
-
-    Returns
-    -------
-    (n, 3) float64
-        Column and row from the point [px], and direction of the gradient [rad].
+    Returns column and row from the point [px], and direction of the gradient [rad] (n, 3). Takes `across`, `down`
+    (rows, cols), `edges` (rows, cols) uint8, `col`, `row` [px].
     """
     rows, cols = edges.shape
     out = np.empty((MOST_POINTS, 3))
@@ -135,19 +110,8 @@ def edge_points(
 def hough_peaks(points: Floats, reach: float, most: int, least: int) -> tuple[Floats, Floats]:
     """Highest peaks of Hough's transform of edge points, each voting near the direction of its gradient.
 
-    Parameters
-    ----------
-    points : (n, 3) float64
-        From `edge_points`.
-    reach : float
-        Largest offset of a line [px].
-    most, least : int
-        Most lines, and fewest votes of one.
-
-    Returns
-    -------
-    tuple of (n, 2) and (n,) float64
-        Direction θ of each line's normal [rad] and offset ρ [px] of u cos θ + v sin θ = ρ; votes.
+    Returns direction θ of each line's normal [rad] and offset ρ [px] of u cos θ + v sin θ = ρ; votes (n,). Takes
+    `points` (n, 3), `reach` [px].
     """
     offsets = int(2.0 * reach / OFFSET_STEP) + 1
     cells = np.zeros((ANGLES, offsets), np.int32)

@@ -32,38 +32,19 @@ EDGE_DEVIATION = 0.15
 
 @dataclass(frozen=True, slots=True)
 class LaneLine:
-    """A straight line u = offset + slope · v in the image.
+    """A straight line u = offset + slope · v in the image."""
 
-    Attributes
-    ----------
-    slope : float
-        du/dv [-].
-    offset : float
-        Its column at row 0 [px].
-    votes : int
-        Edge pixels on it.
-    centre, spread : float
-        Mean and root of the summed square deviation of its edges' rows [px].
-    """
-
-    slope: float
-    offset: float
-    votes: int
+    slope: float  # du/dv [-]
+    offset: float  # Its column at row 0 [px]
+    votes: int  # Edge pixels on it
+    # centre, spread: mean and root of the summed square deviation of its edges' rows [px]
     centre: float
     spread: float
 
     def column(self, row: float) -> float:
         """Column of the line.
 
-        Parameters
-        ----------
-        row : float
-            Row [px].
-
-        Returns
-        -------
-        float
-            [px].
+        Returns [px]. Takes `row` [px].
         """
         return self.offset + self.slope * row
 
@@ -75,16 +56,7 @@ def hough_lines(
 
     Cells are 1 px by 1°, as published, so slope and offset are those of a cell's middle.
 
-    Parameters
-    ----------
-    edges : (rows, cols) uint8
-        Non-zero on edges.
-    first_row : int
-        Rows above it are not looked at; they are sky, trees and signs.
-    lowest_angle, steepest_angle : float
-        Range of the angle between line and rows [rad]: zhu2015 drops lines within 10° of the rows.
-    most : int
-        Lines a half.
+    Takes `edges` (rows, cols) uint8, `lowest_angle`, `steepest_angle` [rad].
     """
     lower = np.ascontiguousarray(edges[first_row:])
     threshold = max(LEAST_PIXELS, lower.shape[0] // 12)
@@ -117,16 +89,7 @@ def refined_lines(
     An edge's column is where the horizontal gradient peaks (parabola through three pixels); only edges of the line's
     own polarity count, for a marking has a bright and a dark side.
 
-    Parameters
-    ----------
-    lines : list of LaneLine
-        From `hough_lines`.
-    edges : (rows, cols) uint8
-        The same edges.
-    luminance : (rows, cols) float32
-        The smoothed image that they are of.
-    first_row : int
-        First row that is used.
+    Takes `edges` (rows, cols) uint8, `luminance` (rows, cols).
     """
     # Edges of a gradient against the rows cannot be placed within a row.
     points = _edge_points(edges, luminance, first_row)
@@ -202,15 +165,7 @@ def longest_pair(lines: Sequence[LaneLine]) -> tuple[LaneLine, LaneLine] | None:
 def published_vanishing_point(lines: list[LaneLine]) -> VanishingPoint | None:
     """Intersection of the longest line of either half, as published.
 
-    Parameters
-    ----------
-    lines : list of LaneLine
-        Longest first in each half.
-
-    Returns
-    -------
-    VanishingPoint or None
-        None if a half has no line; its deviation is that of 1° and 1 px at either line.
+    Returns None if a half has no line; its deviation is that of 1° and 1 px at either line.
     """
     pair = longest_pair(lines)
     if pair is None:
@@ -226,19 +181,7 @@ def lane_vanishing_point(
 ) -> VanishingPoint | None:
     """Least-squares intersection of the lines that pass near where the calibration expects it.
 
-    Parameters
-    ----------
-    lines : list of LaneLine
-        Refined lines.
-    expected : tuple of float
-        Column and row by the calibration [px].
-    tolerance : float
-        Largest distance of the intersection's row from the expected one [px].
-
-    Returns
-    -------
-    VanishingPoint or None
-        None if fewer than two lines of different slope meet there.
+    Returns None if fewer than two lines of different slope meet there. Takes `expected` [px], `tolerance` [px].
     """
     kept = [line for line in lines if abs(line.column(expected[1]) - expected[0]) < tolerance * (3.0 + abs(line.slope))]
     for _ in range(4):

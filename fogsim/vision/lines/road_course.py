@@ -64,33 +64,19 @@ SHOWN = 0.5
 
 @dataclass(frozen=True, slots=True)
 class RoadCourse:
-    """Course of the road ahead, relative to its tangent under the camera.
+    """Course of the road ahead, relative to its tangent under the camera."""
 
-    Attributes
-    ----------
-    column, row : float
-        Where that tangent vanishes [px].
-    sag, bend : (pieces,) float64
-        Vertical curvature, positive in a sag, and horizontal curvature, positive to the right, by piece of road (see
-        `fogsim.vision.lines.road_course_kernels.KNOTS`); 0 where none shows [1/m].
-    covariance : (1 + pieces, 1 + pieces) float64
-        Of the row and the vertical curvatures [px², px/m, 1/m²].
-    bend_covariance : (pieces, pieces) float64
-        Of the horizontal curvatures, where the road bends; else 0 [1/m²].
-    lines : int
-        How many lines showed it; 0 for what is known without any.
-    ahead : SagsAhead
-        What is known of sags and crests that may begin farther on.
-    """
-
+    # column, row: where that tangent vanishes [px]
     column: float
     row: float
+    # sag, bend (pieces,): vertical curvature, positive in a sag, and horizontal curvature, positive to the right, by
+    # piece of road (see `fogsim.vision.lines.road_course_kernels.KNOTS`); 0 where none shows [1/m]
     sag: Floats
     bend: Floats
-    covariance: Floats
-    bend_covariance: Floats
-    lines: int
-    ahead: SagsAhead
+    covariance: Floats  # (1 + pieces, 1 + pieces): Of the row and the vertical curvatures [px², px/m, 1/m²]
+    bend_covariance: Floats  # (pieces, pieces): Of the horizontal curvatures, where the road bends; else 0 [1/m²]
+    lines: int  # How many lines showed it; 0 for what is known without any
+    ahead: SagsAhead  # What is known of sags and crests that may begin farther on
 
     @property
     def is_straight(self) -> bool:
@@ -109,15 +95,7 @@ class RoadCourse:
 
 
 def unseen_course(camera: Camera, horizon: Horizon) -> RoadCourse:
-    """What is known of the road's course where no lines show it: that it is straight, if not for sure.
-
-    Parameters
-    ----------
-    camera : Camera
-        The assumed calibration.
-    horizon : Horizon
-        What is known of the horizon.
-    """
+    """What is known of the road's course where no lines show it: that it is straight, if not for sure."""
     covariance = np.zeros((1 + PIECES, 1 + PIECES))
     covariance[0, 0] = horizon.standard_deviation**2
     covariance[1:, 1:] = CURVED_SHARE * sag_covariance()
@@ -140,21 +118,7 @@ def road_course(seen: SeenLines, image: LinearPixels, camera: Camera, horizon: H
     A lane is as wide there as here, so the distance between its lines tells the distance of every row, whatever the
     road's profile.
 
-    Parameters
-    ----------
-    seen : SeenLines
-        Lines along the road.
-    image : LinearPixels
-        The level image that they are of.
-    camera : Camera
-        Its assumed calibration.
-    horizon : Horizon
-        What is known of the horizon.
-
-    Returns
-    -------
-    RoadCourse or None
-        None if too few lines show one that is to be believed.
+    Returns None if too few lines show one that is to be believed.
     """
     points = stripe_middles(_points(seen, image, camera, horizon), WIDEST / camera.mount_height)
     fit = _fitted(points, 0.0, camera, horizon)

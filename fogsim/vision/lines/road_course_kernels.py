@@ -42,42 +42,21 @@ BENT_WITHIN_ROW = 0.5
 
 
 class CourseFit(NamedTuple):
-    """Posterior of the fit.
+    """Posterior of the fit."""
 
-    Attributes
-    ----------
-    unknown : (10,) float64
-        Column and row [px], vertical curvature and curvature by piece [1/m].
-    covariance : (10, 10) float64
-        Theirs.
-    lines : int
-        How many lines have points enough.
-    span : float
-        Range of their slopes [-].
-    points : int
-        How many points they are of.
-    scatter : float
-        Root mean square of their residuals [px].
-    """
-
-    unknown: Floats
-    covariance: Floats
-    lines: int
-    span: float
-    points: int
-    scatter: float
+    unknown: Floats  # (10,): Column and row [px], vertical curvature and curvature by piece [1/m]
+    covariance: Floats  # (10, 10): Theirs
+    lines: int  # How many lines have points enough
+    span: float  # Range of their slopes [-]
+    points: int  # How many points they are of
+    scatter: float  # Root mean square of their residuals [px]
 
 
 @kernel
 def turned(distance: float, piece: int) -> tuple[float, float]:
     """Offset that a unit of a piece's curvature has made at a distance, and its change by the distance.
 
-    Parameters
-    ----------
-    distance : float
-        Along the road [m].
-    piece : int
-        Which.
+    Takes `distance` [m].
     """
     start, end = KNOTS[piece], KNOTS[piece + 1]
     if distance <= start:
@@ -93,23 +72,8 @@ def row_on_plane(below: float, sag: Floats, unit: float, height: float, start: f
 
     A point at a distance s, z above the tangent under the camera, is seen λ / s · (1 − z / h) below the horizon.
 
-    Parameters
-    ----------
-    below : float
-        Row on which it is seen, below the tangent's horizon [px].
-    sag : (pieces,) float64
-        Vertical curvature [1/m].
-    unit : float
-        λ, see `fogsim.values.camera.Camera.row_distance` [px·m].
-    height : float
-        Height of the camera [m].
-    start : float
-        First guess [px].
-
-    Returns
-    -------
-    tuple of float
-        Row below the horizon [px], 0 where the road is hidden behind a crest, and its change [-].
+    Returns row below the horizon [px], 0 where the road is hidden behind a crest, and its change [-]. Takes `below`
+    [px], `sag` (pieces,) [1/m], `unit` [px·m], `height` [m], `start` [px].
     """
     row = start
     for _ in range(20):
@@ -132,15 +96,7 @@ def row_on_plane(below: float, sag: Floats, unit: float, height: float, start: f
 
 @kernel
 def stripe_middles(points: Points, widest: float) -> Points:
-    """Make one point of both edges of a mark, in its middle.
-
-    Parameters
-    ----------
-    points : Points
-        All points, by row and in each row by column.
-    widest : float
-        Width of marks over the camera's height, up to which that is done [-].
-    """
+    """Make one point of both edges of a mark, in its middle."""
     count = points.across.size
     across, below, kind = points.across.copy(), points.below.copy(), points.kind.copy()
     kept, i = 0, 0
@@ -187,18 +143,7 @@ def fit_course(
 ) -> CourseFit:
     """Gauss–Newton for all lines at once, of ever farther points.
 
-    Parameters
-    ----------
-    points : Points
-        All points.
-    lines : RoadLines
-        Straight lines that may touch the road's, of points that have been straightened.
-    bend : float
-        By how much they were straightened at one row below the horizon [px²].
-    precision : (10, 10) float64
-        Inverse of the prior's covariance; its mean is 0.
-    unit, height, focal : float
-        λ [px·m], height of the camera [m], focal length [px].
+    Takes `bend` [px²], `precision` (10, 10), `unit`, `height`, `focal` [px·m], [m], [px].
     """
     count = lines.slope.size
     size = SLOPE + count

@@ -24,90 +24,43 @@ COLUMN, ROW, BEND, SLOPE = range(4)
 
 
 class Points(NamedTuple):
-    """Points of edges, by row.
+    """Points of edges, by row."""
 
-    Attributes
-    ----------
-    across, below : (m,) float64
-        Columns and rows from the expected vanishing point [px].
-    kind : (m,) int64
-        Their kinds: `RISING`, `FALLING` or `RIDGE`.
-    """
-
+    # across, below (m,): columns and rows from the expected vanishing point [px]
     across: Floats
     below: Floats
-    kind: NDArray[np.int64]
+    kind: NDArray[np.int64]  # (m,) int64: Their kinds: `RISING`, `FALLING` or `RIDGE`
 
 
 class RoadLines(NamedTuple):
-    """Straight lines across = offset + slope · below, the ones with most points first.
+    """Straight lines across = offset + slope · below, the ones with most points first."""
 
-    Attributes
-    ----------
-    offset, slope : (n,) float64
-        Column at the expected horizon [px], and columns per row [-].
-    kind : (n,) int64
-        Kind of their points.
-    points : (n,) float64
-        How many points they are of.
-    """
-
+    # offset, slope (n,): column at the expected horizon [px], and columns per row [-]
     offset: Floats
     slope: Floats
-    kind: NDArray[np.int64]
-    points: Floats
+    kind: NDArray[np.int64]  # (n,) int64: Kind of their points
+    points: Floats  # (n,): How many points they are of
 
     def chosen(self, mask: NDArray[np.bool_]) -> "RoadLines":
-        """Some of the lines.
-
-        Parameters
-        ----------
-        mask : (n,) bool
-            Which.
-        """
+        """Some of the lines (`mask` (n,) bool)."""
         return RoadLines(self.offset[mask], self.slope[mask], self.kind[mask], self.points[mask])
 
 
 class RoadFit(NamedTuple):
-    """Least squares of all lines at once.
+    """Least squares of all lines at once."""
 
-    Attributes
-    ----------
-    column, row : float
-        Where they meet, from the expected vanishing point [px].
-    variance : float
-        Variance of the row [px²].
-    lines : int
-        How many lines have points enough.
-    span : float
-        Range of their slopes [-].
-    points : float
-        How many points they are of.
-    """
-
+    # column, row: where they meet, from the expected vanishing point [px]
     column: float
     row: float
-    variance: float
-    lines: int
-    span: float
-    points: float
+    variance: float  # Variance of the row [px²]
+    lines: int  # How many lines have points enough
+    span: float  # Range of their slopes [-]
+    points: float  # How many points they are of
 
 
 @kernel
 def hough_road_lines(points: Points, offsets: Floats, slopes: Floats, most: int, least: int) -> RoadLines:
-    """Straight lines that many points of one kind lie on (Hough's transform).
-
-    Parameters
-    ----------
-    points : Points
-        All points.
-    offsets : (b,) float64
-        Columns at which lines may cross the expected horizon [px], evenly.
-    slopes : (s,) float64
-        Middles of the cells for slopes, columns per row [-], evenly.
-    most, least : int
-        Most lines, and fewest points of one.
-    """
+    """Straight lines that many points of one kind lie on (Hough's transform) (`offsets` (b,) [px], `slopes` (s,))."""
     across, below, kind = points
     cells = np.zeros((KINDS, offsets.size, slopes.size), np.int16)
     step, width = slopes[1] - slopes[0], offsets[1] - offsets[0]
@@ -184,14 +137,7 @@ def _cast_votes(
 def refitted_lines(points: Points, lines: RoadLines, reach: float) -> RoadLines:
     """Fit each line to the points of its kind near it; lines of too few points, or of none far apart, are left out.
 
-    Parameters
-    ----------
-    points : Points
-        All points.
-    lines : RoadLines
-        From `hough_road_lines`.
-    reach : float
-        Distance along a row within which points count at first [px].
+    Takes `reach` [px].
     """
     across, below, kind = points
     out, kept = _first_lines(lines, lines.slope.size), 0
@@ -237,16 +183,7 @@ def fit_road_lines(points: Points, lines: RoadLines, column: float, row: float, 
 
     A line along a road of constant curvature is u = u_h + s (v − v_h) + c / (v − v_h), with the same c for all lines.
 
-    Parameters
-    ----------
-    points : Points
-        All points.
-    lines : RoadLines
-        Those that pass the first guess of the point.
-    column, row : float
-        This guess, from the expected vanishing point [px].
-    bend_deviation : float
-        Deviation of c [px²].
+    Takes `column`, `row` [px], `bend_deviation` [px²].
     """
     count = lines.slope.size
     size = SLOPE + count

@@ -54,18 +54,10 @@ AGREES = 4.0
 
 
 class SeenLines(NamedTuple):
-    """Lines along a road, before it is asked where they meet.
+    """Lines along a road, before it is asked where they meet."""
 
-    Attributes
-    ----------
-    points : Points
-        Points of edges, from the horizon downward.
-    lines : RoadLines
-        Straight lines through those from `CLEAR_OF_HORIZON` downward.
-    """
-
-    points: Points
-    lines: RoadLines
+    points: Points  # Points of edges, from the horizon downward
+    lines: RoadLines  # Straight lines through those from `CLEAR_OF_HORIZON` downward
 
 
 def seen_lines(image: LinearPixels, camera: Camera, horizon: Horizon) -> SeenLines | None:
@@ -74,19 +66,7 @@ def seen_lines(image: LinearPixels, camera: Camera, horizon: Horizon) -> SeenLin
     Edges along single rows, placed within the pixel; Hough's transform of those that can lie on lines toward the
     neighbourhood of the expected vanishing point.
 
-    Parameters
-    ----------
-    image : LinearPixels
-        A level image.
-    camera : Camera
-        Its assumed calibration.
-    horizon : Horizon
-        What is known of the horizon.
-
-    Returns
-    -------
-    SeenLines or None
-        None if the image shows too few rows of road.
+    Returns None if the image shows too few rows of road.
     """
     rows = _rows(camera, horizon)
     if rows.size < LEAST_POINTS:
@@ -96,17 +76,7 @@ def seen_lines(image: LinearPixels, camera: Camera, horizon: Horizon) -> SeenLin
 
 
 def straight_lines(points: Points, camera: Camera, horizon: Horizon) -> RoadLines:
-    """Straight lines through points that are not too near to the horizon.
-
-    Parameters
-    ----------
-    points : Points
-        Points of edges, by row.
-    camera : Camera
-        The assumed calibration.
-    horizon : Horizon
-        What is known of the horizon.
-    """
+    """Straight lines through points that are not too near to the horizon."""
     rows, (offsets, slopes) = _rows(camera, horizon), _cells(YAW * camera.focal_length)
     near = _below(points, rows[0] - horizon.row)
     found = hough_road_lines(near, offsets, slopes, MOST_LINES, max(int(LEAST_POINTS), rows.size // 8))
@@ -116,15 +86,7 @@ def straight_lines(points: Points, camera: Camera, horizon: Horizon) -> RoadLine
 def road_vanishing_point(image: LinearPixels, camera: Camera, horizon: Horizon) -> VanishingPoint | None:
     """Find the vanishing point of the road's lines near the one by the calibration; see `vanishing_point_of`.
 
-    Parameters
-    ----------
-    image, camera, horizon
-        See `seen_lines`.
-
-    Returns
-    -------
-    VanishingPoint or None
-        None if no two lines meet near the assumed horizon.
+    Returns None if no two lines meet near the assumed horizon.
     """
     seen = seen_lines(image, camera, horizon)
     return None if seen is None else vanishing_point_of(seen, camera, horizon)
@@ -133,19 +95,7 @@ def road_vanishing_point(image: LinearPixels, camera: Camera, horizon: Horizon) 
 def vanishing_point_of(seen: SeenLines, camera: Camera, horizon: Horizon) -> VanishingPoint | None:
     """Point through which most of the lines pass, and least squares of all of them at once, which lets the road bend.
 
-    Parameters
-    ----------
-    seen : SeenLines
-        Lines along the road.
-    camera : Camera
-        The assumed calibration.
-    horizon : Horizon
-        What is known of the horizon.
-
-    Returns
-    -------
-    VanishingPoint or None
-        None if no two lines meet near the assumed horizon.
+    Returns None if no two lines meet near the assumed horizon.
     """
     first = first_point(seen.lines, AGREES * horizon.standard_deviation + 2.0)
     if first is None:
@@ -164,17 +114,7 @@ def vanishing_point_of(seen: SeenLines, camera: Camera, horizon: Horizon) -> Van
 
 
 def lines_through(lines: RoadLines, point: tuple[float, float], tolerance: float) -> RoadLines:
-    """Lines that pass a point.
-
-    Parameters
-    ----------
-    lines : RoadLines
-        All.
-    point : tuple of float
-        Its column and row, from the expected vanishing point [px].
-    tolerance : float
-        Largest distance along the row [px].
-    """
+    """Lines that pass a point (`point` [px], `tolerance` [px])."""
     return lines.chosen(np.abs(lines.offset + lines.slope * point[1] - point[0]) <= tolerance)
 
 
@@ -196,12 +136,7 @@ def _points(image: LinearPixels, rows: NDArray[np.int64], camera: Camera, horizo
 def first_point(found: RoadLines, farthest: float) -> tuple[float, float] | None:
     """Crossing of two lines, near the expected point, through which lines with most points pass: column and row.
 
-    Parameters
-    ----------
-    found : RoadLines
-        The lines.
-    farthest : float
-        Largest distance from the expected row [px].
+    Takes `farthest` [px].
     """
     first, second = all_pairs(found.slope.size)
     lines = sloped_lines(found.offset, found.slope)

@@ -50,19 +50,8 @@ def row_points(
 
     Each row is looked at alone: what fog does from row to row moves no edge within it.
 
-    Parameters
-    ----------
-    pixels : (rows, cols, channels) uint8 or uint16
-        The image.
-    tables : (channels, levels) float32
-        Linear grey levels that each channel adds.
-    rows : (n,) int64
-        Which rows.
-
-    Returns
-    -------
-    tuple of (m, 2) float64 and (m,) int64
-        Column and row of each point [px], and its kind.
+    Returns column and row of each point [px], and its kind (m, 2). Takes `pixels` (rows, cols, channels) uint8,
+    `tables` (channels, levels), `rows` (n,) int64.
     """
     cols = pixels.shape[1]
     place, kind = np.empty((MOST_POINTS, 2)), np.empty(MOST_POINTS, np.int64)
@@ -136,21 +125,10 @@ def may_lie_on_road(place: NDArray[np.float64], step: int) -> NDArray[np.bool_]:
 
     The side of a vehicle ahead ends near where the lines of its lane pass it. With a dash of such a line it makes a
     line that is straight within two pixels, and long, which the dash alone is not: the point in which the lines meet
-    would move by several of its deviations. What lies on the road and seems upright is below the camera, within a
-    tenth of its height to either side, and tells nothing of the horizon.
+    would move by several of its deviations. What lies on the road and seems upright is below the camera, within a tenth
+    of its height to either side, and tells nothing of the horizon.
 
-    Parameters
-    ----------
-    place : (m, 2) float64
-        Column and row of each point [px], by row. Of what kind they are does not count: a vehicle's side is brighter
-        than what is behind it in one place and darker in another.
-    step : int
-        Rows from one that is looked at to the next [px].
-
-    Returns
-    -------
-    (m,) bool
-        False of points on upright edges.
+    Returns false of points on upright edges (m,) bool. Takes `place` (m, 2) [px], `step` [px].
     """
     count = place.shape[0]
     first, last, points = np.arange(count), np.arange(count), np.ones(count, np.int64)

@@ -24,27 +24,17 @@ third does, in stretches of 200 to 400 m."""
 
 @dataclass(frozen=True, slots=True)
 class SagsAhead:
-    """What is known of vertical curvature ahead, if each piece of road may have some.
+    """What is known of vertical curvature ahead, if each piece of road may have some."""
 
-    Attributes
-    ----------
-    mean : (1 + pieces,) float64
-        Row in which the road's tangent under the camera vanishes [px], and vertical curvature by piece, positive in a
-        sag [1/m].
-    covariance : (1 + pieces, 1 + pieces) float64
-        Theirs [px², px/m, 1/m²].
-    """
-
+    # (1 + pieces,): Row in which the road's tangent under the camera vanishes [px], and vertical curvature by piece,
+    # positive in a sag [1/m]
     mean: Floats
-    covariance: Floats
+    covariance: Floats  # (1 + pieces, 1 + pieces): Theirs [px², px/m, 1/m²]
 
     def row(self, sag: Floats) -> tuple[float, float]:
         """Row in which the tangent vanishes if the road is curved so, and its variance [px, px²].
 
-        Parameters
-        ----------
-        sag : (pieces,) float64
-            Vertical curvature by piece [1/m].
+        Takes `sag` (pieces,) [1/m].
         """
         gain = matrix_product(self.covariance[0, 1:], self._precision())
         row = self.mean[0] + float(matrix_product(gain, sag - self.mean[1:]))
@@ -55,10 +45,7 @@ class SagsAhead:
 
         What is known of curvature before any lines are seen is not in it.
 
-        Parameters
-        ----------
-        sag : (pieces,) float64
-            Vertical curvature by piece [1/m].
+        Takes `sag` (pieces,) [1/m].
         """
         return _square(sag - self.mean[1:], self._precision()) - _square(sag, inverse_of(sag_covariance()))
 
@@ -67,15 +54,7 @@ class SagsAhead:
 
 
 def sag_from(piece: int, curvature: float) -> Floats:
-    """(pieces,) float64: vertical curvature of a road that is straight up to a piece [1/m].
-
-    Parameters
-    ----------
-    piece : int
-        First curved one.
-    curvature : float
-        Curvature from there on [1/m].
-    """
+    """(pieces,) float64: vertical curvature of a road that is straight up to a piece [1/m] (`curvature` [1/m])."""
     return np.where(np.arange(PIECES) >= piece, curvature, 0.0)
 
 
@@ -88,25 +67,14 @@ def sag_covariance() -> Floats:
 def curvature_covariance(deviation: float, length: float) -> Floats:
     """(pieces, pieces) float64: covariance of curvatures that change over a length [1/m²].
 
-    Parameters
-    ----------
-    deviation : float
-        Standard deviation of each [1/m].
-    length : float
-        Over which they change [m].
+    Takes `deviation` [1/m], `length` [m].
     """
     knots = np.array(KNOTS[:-1])
     return np.asarray(deviation**2 * np.exp(-np.abs(knots[:, None] - knots) / length))
 
 
 def unseen_sags(row: float, deviation: float) -> SagsAhead:
-    """What is known of vertical curvature where no lines are seen.
-
-    Parameters
-    ----------
-    row, deviation : float
-        Row of the horizon, and its standard deviation [px].
-    """
+    """What is known of vertical curvature where no lines are seen (`row`, `deviation` [px])."""
     covariance = np.zeros((1 + PIECES, 1 + PIECES))
     covariance[0, 0], covariance[1:, 1:] = deviation**2, sag_covariance()
     return SagsAhead(np.array([row, *np.zeros(PIECES)]), covariance)
@@ -120,9 +88,6 @@ def _square(values: Floats, precision: Floats) -> float:
 def beginning_cost(curvature: float) -> float:
     """Minus twice the logarithm of how likely a curvature from some piece on is beforehand, but for its density [-].
 
-    Parameters
-    ----------
-    curvature : float
-        Curvature [1/m].
+    Takes `curvature` [1/m].
     """
     return (curvature / SAG_DEVIATION) ** 2 - 2.0 * math.log(BEGINS)

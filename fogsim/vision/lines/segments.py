@@ -59,21 +59,12 @@ class _Segments:
 
 @dataclass(frozen=True, slots=True)
 class RoadSegments:
-    """Segments along the road, and the point where they meet.
+    """Segments along the road, and the point where they meet."""
 
-    Attributes
-    ----------
-    point : VanishingPoint
-        Their vanishing point.
-    slopes : (n,) float64
-        Columns per row below that point: lateral offset over the camera's height [-]; negative on the left.
-    length : (n,) float64
-        Their lengths [px].
-    """
-
-    point: VanishingPoint
+    point: VanishingPoint  # Their vanishing point
+    # (n,): Columns per row below that point: lateral offset over the camera's height [-]; negative on the left
     slopes: Floats
-    length: Floats
+    length: Floats  # (n,): Their lengths [px]
 
 
 def road_segments(image: Pixels, response: Response, bits: int) -> RoadSegments | None:
@@ -83,19 +74,8 @@ def road_segments(image: Pixels, response: Response, bits: int) -> RoadSegments 
     either side at which the greatest length of segments points; then least squares over all that point there, each
     weighted by how surely it points.
 
-    Parameters
-    ----------
-    image : (rows, cols) or (rows, cols, 3) uint8 or uint16
-        Pixel values, red first.
-    response : Response
-        Curve of the camera.
-    bits : int
-        Bit depth of the pixel values.
-
-    Returns
-    -------
-    RoadSegments or None
-        None if no two segments that lean to either side meet between the image's top and its lower fifth.
+    Returns None if no two segments that lean to either side meet between the image's top and its lower fifth. Takes
+    `image` (rows, cols).
     """
     segments = _segments(linear_luminance(image, response, bits))
     rows, cols = image.shape[:2]

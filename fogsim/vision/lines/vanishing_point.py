@@ -22,25 +22,14 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class VanishingPoint:
-    """Where the lines along the road meet.
+    """Where the lines along the road meet."""
 
-    Attributes
-    ----------
-    column, row : float
-        In the image [px].
-    row_deviation : float
-        Standard deviation of the row [px].
-    lines : int
-        How many lines meet there.
-    support : float
-        Edge pixels on these lines.
-    """
-
+    # column, row: in the image [px]
     column: float
     row: float
-    row_deviation: float
-    lines: int
-    support: float
+    row_deviation: float  # Standard deviation of the row [px]
+    lines: int  # How many lines meet there
+    support: float  # Edge pixels on these lines
 
     @property
     def horizon(self) -> Horizon:
@@ -49,31 +38,15 @@ class VanishingPoint:
 
 
 class Lines(NamedTuple):
-    """Straight lines n · (column, row) = c in the image.
+    """Straight lines n · (column, row) = c in the image."""
 
-    Attributes
-    ----------
-    normal : (n, 2) float64
-        Normals n, of any length: distances from a line are in units of one over it.
-    offset : (n,) float64
-        Right-hand sides c.
-    """
-
-    normal: Floats
-    offset: Floats
+    normal: Floats  # (n, 2): Normals n, of any length: distances from a line are in units of one over it
+    offset: Floats  # (n,): Right-hand sides c
 
     def misses(self, points: Floats) -> Floats:
         """By how much lines pass points: n · p − c.
 
-        Parameters
-        ----------
-        points : (2,) or (m, 2) float64
-            Column and row [px].
-
-        Returns
-        -------
-        (n,) or (m, n) float64
-            In pixels where normals are unit vectors.
+        Returns In pixels where normals are unit vectors (n,). Takes `points` (2,) [px].
         """
         if points.ndim == 1:
             return matrix_product(self.normal, points) - self.offset
@@ -83,10 +56,7 @@ class Lines(NamedTuple):
 def sloped_lines(offset: ArrayLike, slope: ArrayLike) -> Lines:
     """Lines column = offset + slope · row; their distances are measured along the rows.
 
-    Parameters
-    ----------
-    offset, slope : (n,) array_like
-        Column at row 0 [px], and columns per row [-].
+    Takes `offset`, `slope` (n,) [px].
     """
     slope = np.asarray(slope, np.float64)
     return Lines(np.column_stack((np.ones_like(slope), -slope)), np.asarray(offset, np.float64))
@@ -94,13 +64,7 @@ def sloped_lines(offset: ArrayLike, slope: ArrayLike) -> Lines:
 
 @functools.cache
 def all_pairs(count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Both indices of every pair of so many lines, the first one's the larger.
-
-    Parameters
-    ----------
-    count : int
-        How many lines.
-    """
+    """Both indices of every pair of so many lines, the first one's the larger."""
     first, second = np.tril_indices(count, -1)
     return first, second
 
@@ -109,19 +73,7 @@ def all_pairs(count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 def crossings(lines: Lines, first: NDArray[np.int64], second: NDArray[np.int64], least_turn: float) -> Floats:
     """Points in which pairs of lines cross.
 
-    Parameters
-    ----------
-    lines : Lines
-        All lines.
-    first, second : (m,) int64
-        The pairs.
-    least_turn : float
-        Least determinant of the two normals: the sine of the lines' angle, or the difference of their slopes.
-
-    Returns
-    -------
-    (m, 2) float64
-        Column and row [px]; NaN for lines nearer to parallel.
+    Returns column and row [px]; NaN for lines nearer to parallel (m, 2). Takes `first`, `second` (m,) int64.
     """
     normal, offset = lines
     out = np.full((first.size, 2), np.nan)
@@ -139,21 +91,7 @@ def crossings(lines: Lines, first: NDArray[np.int64], second: NDArray[np.int64],
 def supports(lines: Lines, weight: Floats, points: Floats, reach: float) -> Floats:
     """Sum, for each point, the weights of the lines that pass it within reach.
 
-    Parameters
-    ----------
-    lines : Lines
-        All lines.
-    weight : (n,) float64
-        What each one counts: its edge pixels.
-    points : (m, 2) float64
-        Column and row [px]; no line passes NaN.
-    reach : float
-        Largest distance, in that of `Lines.misses`.
-
-    Returns
-    -------
-    (m,) float64
-        The support of each point.
+    Returns the support of each point (m,). Takes `weight` (n,), `points` (m, 2) [px].
     """
     normal, offset = lines
     out = np.zeros(len(points))
@@ -167,17 +105,7 @@ def supports(lines: Lines, weight: Floats, points: Floats, reach: float) -> Floa
 def nearest_point(lines: Lines, weight: Floats) -> tuple[Floats, Floats]:
     """Point of least squares to weighted lines.
 
-    Parameters
-    ----------
-    lines : Lines
-        Two or more that are not parallel.
-    weight : (n,) float64
-        One over each one's variance, in the distance of `Lines.misses`.
-
-    Returns
-    -------
-    tuple of (2,) and (2, 2) float64
-        Column and row [px], and their covariance [px²].
+    Returns column and row [px], and their covariance [px²] (2, 2). Takes `weight` (n,).
     """
     weighted = lines.normal * weight[:, None]
     covariance = inverse_of(matrix_product(weighted.T, lines.normal))
@@ -185,11 +113,5 @@ def nearest_point(lines: Lines, weight: Floats) -> tuple[Floats, Floats]:
 
 
 def residual_scale(residual: Floats) -> float:
-    """Factor by which residuals scatter more than their deviations say; 1 at least.
-
-    Parameters
-    ----------
-    residual : (n,) float64
-        Residuals of lines about their common point, in their own standard deviations [-].
-    """
+    """Factor by which residuals scatter more than their deviations say; 1 at least (`residual` (n,))."""
     return max(1.0, math.sqrt(float(matrix_product(residual, residual)) / max(residual.size - 2, 1)))

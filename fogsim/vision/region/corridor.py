@@ -37,23 +37,8 @@ def hide_vehicle(
 ) -> float:
     """Take what a tracked vehicle may cover out of a region.
 
-    Parameters
-    ----------
-    region : (rows, cols) uint8
-        Is changed.
-    road : RoadImage
-        The picture.
-    camera : Camera
-        The assumed calibration.
-    lead : LeadMeasurement or None
-        The vehicle.
-    half_width : float
-        What it hides to either side of the axis [m].
-
-    Returns
-    -------
-    float
-        Half the width of what is hidden [px]; 0 without a vehicle.
+    Returns half the width of what is hidden [px]; 0 without a vehicle. Takes `region` (rows, cols) uint8, `half_width`
+    [m].
     """
     if lead is None or not lead.distance > VEHICLE_MARGIN:
         return 0.0
@@ -78,27 +63,8 @@ def corridor_curve(
 ) -> RoadCurve:
     """Medians of the region's rows within a corridor that narrows toward the horizon as the road does.
 
-    Parameters
-    ----------
-    road : RoadImage
-        The picture.
-    region : (rows, cols) uint8
-        Non-zero on the road and on the sky above it.
-    horizon_row : float
-        Row of the horizon in the whole image [px].
-    axis : float
-        Column of the road's vanishing point [px]: what lies straight ahead, along the road, is below it.
-    camera : Camera
-        The assumed calibration.
-    own_lane : bool
-        Whether the region counts only within the corridor.
-    hidden : float
-        Half the width of what a vehicle ahead hides, see `hide_vehicle` [px].
-
-    Returns
-    -------
-    RoadCurve
-        Of all rows of the picture; those without region, or saturated, have no weight.
+    Returns of all rows of the picture; those without region, or saturated, have no weight. Takes `region` (rows, cols)
+    uint8, `horizon_row` [px], `axis` [px], `hidden` [px].
     """
     rows, cols = road.luminance.shape
     below = np.arange(rows, dtype=np.float64) + (road.first_row - horizon_row)

@@ -36,18 +36,7 @@ CLEAR = OPTICAL_DEPTH_AT_VISIBILITY / 300.0
 
 
 def seen_up_to(curve: RoadCurve) -> float:
-    """Topmost row that is seen, below the horizon [px].
-
-    Parameters
-    ----------
-    curve : RoadCurve
-        Luminance by row; rows that are saturated are seen, too.
-
-    Raises
-    ------
-    CannotTellError
-        If the region ends below the horizon, or has hardly any rows.
-    """
+    """Topmost row that is seen, below the horizon [px]."""
     seen = np.flatnonzero((curve.weight > 0.0) | (curve.luminance >= SATURATED))
     if seen.size < MIN_ROWS // 2:
         raise CannotTellError("no road is seen")
@@ -58,15 +47,7 @@ def seen_up_to(curve: RoadCurve) -> float:
 
 
 def is_clear(curve: RoadCurve, road: RoadImage) -> bool:
-    """Whether a road hardly brightens as far as it is seen.
-
-    Parameters
-    ----------
-    curve : RoadCurve
-        Luminance by row.
-    road : RoadImage
-        The picture.
-    """
+    """Whether a road hardly brightens as far as it is seen."""
     seen = curve.luminance[(curve.weight > 0.0) & (curve.below_horizon >= 1.0)]
     return seen.size >= MIN_ROWS // 2 and bool(np.median(seen[:3]) <= road.road + RISE * road.contrast)
 
@@ -74,24 +55,7 @@ def is_clear(curve: RoadCurve, road: RoadImage) -> bool:
 def check_law(curve: RoadCurve, extinction: float, road: RoadImage) -> tuple[float, float]:
     """Airlight and luminance of the road that an extinction makes of a curve, if Koschmieder's law is what it follows.
 
-    Parameters
-    ----------
-    curve : RoadCurve
-        Luminance by row.
-    extinction : float
-        k [1/m].
-    road : RoadImage
-        The picture.
-
-    Returns
-    -------
-    (float, float)
-        A and R [linear grey levels].
-
-    Raises
-    ------
-    CannotTellError
-        If it follows no such law.
+    Returns A and R [linear grey levels] (float, float). Takes `extinction` [1/m].
     """
     fit = law_fit(curve, extinction)
     if fit.airlight - fit.road < max(MIN_CONTRAST, 0.05 * fit.airlight):
@@ -124,13 +88,6 @@ def fog_or_clear(extinction: float, deviation: float) -> tuple[float, float]:
 def detection_limit(top: float, horizon_deviation: float, row_distance: float) -> float:
     """Standard deviation of "no fog" where no inflection was seen: one needs a row on either side [1/m].
 
-    Parameters
-    ----------
-    top : float
-        Topmost row that is seen, below the horizon [px].
-    horizon_deviation : float
-        Standard deviation of the horizon's row [px].
-    row_distance : float
-        λ of the camera [px·m].
+    Takes `top` [px], `horizon_deviation` [px], `row_distance` [px·m].
     """
     return 2.0 / row_distance * math.hypot(max(top, 1.0) + 1.0, horizon_deviation)

@@ -16,41 +16,20 @@ Parameters = Callable[[Floats, Floats, Floats, float], tuple[Floats, Floats, Flo
 
 @dataclass(frozen=True, slots=True)
 class FogModel:
-    """The parameters of Koschmieder's law.
+    """The parameters of Koschmieder's law."""
 
-    Attributes
-    ----------
-    extinction : float
-        Extinction coefficient k [1/m].
-    road : float
-        Luminance R of the road without fog [linear grey levels].
-    airlight : float
-        Luminance A of an infinite path through the fog [linear grey levels].
-    standard_deviation : float
-        Standard deviation of k [1/m], the horizon taken as known.
-    horizon_sensitivity : float
-        dk/dv_h, the change of k where the horizon is one row lower [1/(m·px)].
-    residual : float
-        Root of the mean square of what the model leaves of the curve [linear grey levels].
-    """
-
-    extinction: float
-    road: float
-    airlight: float
-    standard_deviation: float
-    horizon_sensitivity: float
-    residual: float
+    extinction: float  # Extinction coefficient k [1/m]
+    road: float  # Luminance R of the road without fog [linear grey levels]
+    airlight: float  # Luminance A of an infinite path through the fog [linear grey levels]
+    standard_deviation: float  # Standard deviation of k [1/m], the horizon taken as known
+    horizon_sensitivity: float  # dk/dv_h, the change of k where the horizon is one row lower [1/(m·px)]
+    residual: float  # Root of the mean square of what the model leaves of the curve [linear grey levels]
 
 
 def koschmieder(extinction: Floats | float, road: Floats | float, airlight: Floats | float, distance: Floats) -> Floats:
     """Luminance of a surface seen through fog, L = R e^(−kd) + A (1 − e^(−kd)) (negru2013 eq. 4).
 
-    Parameters
-    ----------
-    extinction, road, airlight : float or float64
-        k > 0 [1/m], R and A in one unit of luminance; broadcast against `distance`.
-    distance : float64
-        Length of the path [m]; ``inf`` gives A.
+    Takes `extinction`, `road`, `airlight` [1/m], `distance` [m].
     """
     transmission: Floats = np.exp(-extinction * distance)
     return airlight + (road - airlight) * transmission
@@ -59,21 +38,11 @@ def koschmieder(extinction: Floats | float, road: Floats | float, airlight: Floa
 def steepest_slope(below_horizon: Floats, airlight: float) -> Floats:
     """Steepest change from row to row that fog of any density can make of a road.
 
-    |dI/dv| = (kλ / (v − v_h)²) (A − R) e^(−kλ/(v − v_h)) (negru2013 eq. 13) is greatest over k where kλ = v − v_h:
-    (A − R) / (e (v − v_h)), and R is not negative.
+    |dI/dv| = (kλ / (v − v_h)²) (A − R) e^(−kλ/(v − v_h)) (negru2013 eq. 13) is greatest over k where kλ = v − v_h: (A −
+    R) / (e (v − v_h)), and R is not negative.
 
-    Parameters
-    ----------
-    below_horizon : float64
-        v − v_h [px].
-    airlight : float
-        A, in any unit of luminance.
-
-    Returns
-    -------
-    float64
-        Greatest |dI/dv| [that unit per px]; one row nearer to the horizon than asked, for smoothing spreads it, and
-        from there up as it is there.
+    Returns greatest |dI/dv| [that unit per px]; one row nearer to the horizon than asked, for smoothing spreads it, and
+    from there up as it is there. Takes `below_horizon` [px].
     """
     return np.asarray(airlight / (math.e * np.maximum(below_horizon - 1.0, 0.5)))
 
@@ -83,25 +52,12 @@ def inflection_parameters(
 ) -> tuple[Floats, Floats, Floats]:
     """Fog from the row at which the luminance of the road inflects.
 
-    negru2013 eqs. 15, 17 and 18 with the signs set right: for rows that count downward dI/dv is negative in fog over
-    a dark road, and with X = (v_i − v_h)/2 · dI/dv the equations hold as A = I_i − X and R = I_i + (e² − 1) X. (As
+    negru2013 eqs. 15, 17 and 18 with the signs set right: for rows that count downward dI/dv is negative in fog over a
+    dark road, and with X = (v_i − v_h)/2 · dI/dv the equations hold as A = I_i − X and R = I_i + (e² − 1) X. (As
     printed they give A = 162 where the truth is 200.)
 
-    Parameters
-    ----------
-    below_horizon : float64
-        v_i − v_h [px], positive.
-    luminance : float64
-        I_i, the luminance at v_i.
-    gradient : float64
-        dI/dv at v_i [1/px].
-    row_distance : float
-        λ of the camera [px·m].
-
-    Returns
-    -------
-    tuple of float64
-        Extinction k = 2 (v_i − v_h) / λ [1/m], luminance R of the road, airlight A.
+    Returns extinction k = 2 (v_i − v_h) / λ [1/m], luminance R of the road, airlight A. Takes `below_horizon` [px],
+    `gradient` [1/px], `row_distance` [px·m].
     """
     change = 0.5 * below_horizon * gradient
     return 2.0 * below_horizon / row_distance, luminance + (math.e**2 - 1.0) * change, luminance - change
@@ -115,15 +71,7 @@ def printed_parameters(
     R = I_i − (1 − e²) e² (v_i − v_h)/2 · dI/dv and A = I_i + (v_i − v_h)/2 · dI/dv, for rows that count downward. Only
     for comparison with the paper: see `inflection_parameters`.
 
-    Parameters
-    ----------
-    below_horizon, luminance, gradient, row_distance
-        As in `inflection_parameters`.
-
-    Returns
-    -------
-    tuple of float64
-        k [1/m], R, A.
+    Returns k [1/m], R, A.
     """
     change = 0.5 * below_horizon * gradient
     square = math.e**2
@@ -131,13 +79,7 @@ def printed_parameters(
 
 
 def printed_inflection(curve: RoadCurve) -> FogModel | None:
-    """As `best_inflection`, with the equations as the paper prints them.
-
-    Parameters
-    ----------
-    curve : RoadCurve
-        Luminance of the road by row.
-    """
+    """As `best_inflection`, with the equations as the paper prints them."""
     return best_inflection(curve, printed_parameters)
 
 
@@ -147,17 +89,7 @@ def best_inflection(curve: RoadCurve, parameters: Parameters = inflection_parame
     Candidates are the local maxima of |dI/dv| of the monotone curve below the horizon. The standard deviation is that
     of a row known to within the rows where the slope exceeds 90 % of its peak ("measurement bandwidth", Hautière 2006).
 
-    Parameters
-    ----------
-    curve : RoadCurve
-        Luminance of the road by row.
-    parameters : callable
-        k, R and A from row, luminance, slope and λ.
-
-    Returns
-    -------
-    FogModel or None
-        None if the curve has no slope with a row on either side.
+    Returns None if the curve has no slope with a row on either side.
     """
     smooth = decreasing(curve.luminance)
     slope = -np.gradient(smooth)

@@ -30,33 +30,19 @@ SMALLEST = 0.05
 
 @dataclass(frozen=True, slots=True)
 class LawFit:
-    """Road and airlight of an extinction, by least squares over a curve.
+    """Road and airlight of an extinction, by least squares over a curve."""
 
-    Attributes
-    ----------
-    airlight, road : float
-        A and R [linear grey levels].
-    model : (n,) float64
-        The law at the curve's rows [linear grey levels].
-    misfit : float
-        Root of the mean square of what it leaves, over A − R [-]; infinite where R is not below A.
-    """
-
+    # airlight, road: A and R [linear grey levels]
     airlight: float
     road: float
-    model: Floats
-    misfit: float
+    model: Floats  # (n,): The law at the curve's rows [linear grey levels]
+    misfit: float  # Root of the mean square of what it leaves, over A − R [-]; infinite where R is not below A
 
 
 def transmittance(optical: Floats | float, below_horizon: Floats) -> Floats:
     """Mean of e^(−K / (v − v_h)) over each row's height (Simpson's rule); 0 above the horizon.
 
-    Parameters
-    ----------
-    optical : float64
-        K = kλ [px]; broadcast against the rows.
-    below_horizon : float64
-        v − v_h of the rows' middles [px].
+    Takes `optical` [px], `below_horizon` [px].
     """
     ends = [np.maximum(below_horizon + part, SMALLEST) for part in (-0.5, 0.0, 0.5)]
     top, middle, bottom = (np.exp(-optical / end) * (end > SMALLEST) for end in ends)
@@ -64,30 +50,14 @@ def transmittance(optical: Floats | float, below_horizon: Floats) -> Floats:
 
 
 def slants(curve: RoadCurve) -> Floats:
-    """Length of the path to each row's road over the depth along the axis, 1 above the horizon [-].
-
-    Parameters
-    ----------
-    curve : RoadCurve
-        The rows.
-    """
+    """Length of the path to each row's road over the depth along the axis, 1 above the horizon [-]."""
     lies = (curve.below_horizon > 0.0) & np.isfinite(curve.distance)
     distance, below = np.where(lies, curve.distance, curve.row_distance), np.where(lies, curve.below_horizon, 1.0)
     return np.asarray(distance * below / curve.row_distance)
 
 
 def law_fit(curve: RoadCurve, extinction: float, airlight: float | None = None) -> LawFit:
-    """Fit road and airlight of an extinction to a curve.
-
-    Parameters
-    ----------
-    curve : RoadCurve
-        Luminance by row.
-    extinction : float
-        k [1/m].
-    airlight : float, optional
-        A where it is known [linear grey levels].
-    """
+    """Fit road and airlight of an extinction to a curve (`extinction` [1/m], `airlight` [linear grey levels])."""
     optical = extinction * curve.row_distance * slants(curve)
     shape, weight = transmittance(optical, curve.below_horizon), curve.weight
     total = max(float(weight.sum()), 1e-9)
@@ -113,17 +83,7 @@ def redrawn(curve: RoadCurve, model: Floats) -> Floats:
     (wild block bootstrap: Shao 2010, J. Am. Stat. Assoc. 105, 218–235): of rows of equal ratios of distances, because
     patches farther away fill fewer rows.
 
-    Parameters
-    ----------
-    curve : RoadCurve
-        Luminance by row.
-    model : (n,) float64
-        What was fitted to it.
-
-    Returns
-    -------
-    (n, `PATTERNS`) float64
-        Luminance [linear grey levels].
+    Returns luminance [linear grey levels]. Takes `model` (n,).
     """
     below = np.maximum(curve.below_horizon, 1.0)
     log = np.log(below / below[0]) if below[0] > 0.0 else np.zeros(below.size)
@@ -143,21 +103,7 @@ Read = Callable[[RoadCurve, Floats], Floats]
 def extinction_deviation(curve: RoadCurve, extinction: float, read: Read, horizon_deviation: float) -> float:
     """Standard deviation of what a method reads off a curve, by the road's texture, the noise, and the horizon.
 
-    Parameters
-    ----------
-    curve : RoadCurve
-        Luminance by row.
-    extinction : float
-        What it read [1/m].
-    read : callable
-        The method.
-    horizon_deviation : float
-        Standard deviation of the horizon's row [px].
-
-    Returns
-    -------
-    float
-        [1/m]; infinite where curves like this one give nothing.
+    Returns [1/m]; infinite where curves like this one give nothing. Takes `extinction` [1/m], `horizon_deviation` [px].
     """
     by_road = ABSORBED * spread(read(curve, redrawn(curve, law_fit(curve, extinction).model)), extinction)
     moved = [_read_below(curve, side * horizon_deviation, read) for side in (1.0, -1.0)]
@@ -173,15 +119,7 @@ def _read_below(curve: RoadCurve, shift: float, read: Read) -> float:
 
 
 def spread(values: Floats, about: float) -> float:
-    """Robust standard deviation of what curves drawn anew gave about what the curve itself gave.
-
-    Parameters
-    ----------
-    values : (n,) float64
-        Results; NaN where there was none.
-    about : float
-        The result of the curve itself.
-    """
+    """Robust standard deviation of what curves drawn anew gave about what the curve itself gave (`values` (n,))."""
     apart = np.abs(values[np.isfinite(values)] - about)
     if apart.size < 2:
         return math.inf

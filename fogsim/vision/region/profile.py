@@ -15,20 +15,10 @@ MAX_BLOCKS = 48  # columns that a row's median is taken over; more cost time and
 def band_profile(luminance: NDArray[np.float32], band: Band) -> NDArray[np.float64]:
     """Median luminance of each row of a band.
 
-    A wide band is first averaged over equal blocks of columns: that keeps the median's indifference to marks and
-    other narrow things, and loses less to noise than a median of single pixels.
+    A wide band is first averaged over equal blocks of columns: that keeps the median's indifference to marks and other
+    narrow things, and loses less to noise than a median of single pixels.
 
-    Parameters
-    ----------
-    luminance : (rows, cols) float32
-        Linear luminance.
-    band : Band
-        Where to look.
-
-    Returns
-    -------
-    (n,) float64
-        Rows ``band.top`` … ``band.bottom`` from the top down.
+    Returns rows ``band.top`` … ``band.bottom`` from the top down. Takes `luminance` (rows, cols).
     """
     width = band.right - band.left + 1
     block = -(-width // MAX_BLOCKS)
@@ -45,10 +35,7 @@ def decreasing(profile: NDArray[np.float64]) -> NDArray[np.float64]:
 
     Isotonic regression, then the binomial 1-2-1, which keeps the order and rounds the steps off.
 
-    Parameters
-    ----------
-    profile : (n,) float64
-        Luminance by row from the top down.
+    Takes `profile` (n,).
     """
     ordered: NDArray[np.float64] = _isotonic_decreasing(np.ascontiguousarray(profile))
     padded = np.concatenate([ordered[:1], ordered, ordered[-1:]])
@@ -75,27 +62,13 @@ def _isotonic_decreasing(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, slots=True)
 class RoadCurve:
-    """The luminance of the road by row, with what the flat world says about the rows.
+    """The luminance of the road by row, with what the flat world says about the rows."""
 
-    Attributes
-    ----------
-    below_horizon : (n,) float64
-        v − v_h of each row, ascending [px]; not positive for rows of sky.
-    luminance : (n,) float64
-        Linear luminance of each row.
-    distance : (n,) float64
-        Length of the fog path to each row's road [m]; ``inf`` for rows of sky.
-    weight : (n,) float64
-        1, or 0 for rows that say nothing (saturated).
-    row_distance : float
-        λ of the camera [px·m].
-    """
-
-    below_horizon: NDArray[np.float64]
-    luminance: NDArray[np.float64]
-    distance: NDArray[np.float64]
-    weight: NDArray[np.float64]
-    row_distance: float
+    below_horizon: NDArray[np.float64]  # (n,): v − v_h of each row, ascending [px]; not positive for rows of sky
+    luminance: NDArray[np.float64]  # (n,): Linear luminance of each row
+    distance: NDArray[np.float64]  # (n,): Length of the fog path to each row's road [m]; ``inf`` for rows of sky
+    weight: NDArray[np.float64]  # (n,): 1, or 0 for rows that say nothing (saturated)
+    row_distance: float  # λ of the camera [px·m]
 
 
 def path_lengths(
@@ -103,19 +76,8 @@ def path_lengths(
 ) -> NDArray[np.float64]:
     """Distance from the optical centre to the road by row.
 
-    Parameters
-    ----------
-    below_horizon : (n,) float64
-        v − v_h [px].
-    row_distance : float
-        λ of the camera [px·m]; λ / (v − v_h) is the depth along the optical axis (negru2013 eq. 11).
-    slant : (n,) float64
-        Ratio of the length along the ray to that depth, ≥ 1.
-
-    Returns
-    -------
-    (n,) float64
-        Distances [m]; ``inf`` at and above the horizon.
+    Returns distances [m]; ``inf`` at and above the horizon. Takes `below_horizon` (n,) [px], `row_distance` [px·m],
+    `slant` (n,).
     """
     distance = np.full(below_horizon.shape, np.inf)
     np.divide(row_distance * slant, below_horizon, out=distance, where=below_horizon > 0)

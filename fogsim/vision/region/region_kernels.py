@@ -12,18 +12,10 @@ from fogsim.jit import kernel
 
 
 class GrowthLimits(NamedTuple):
-    """What a pixel may differ by to join a region that grows upward, see `fogsim.vision.region.road_region`.
+    """What a pixel may differ by to join a region that grows upward, see `fogsim.vision.region.road_region`."""
 
-    Attributes
-    ----------
-    steps : (rows,) float32
-        From a neighbour in the row below [linear grey levels].
-    from_seed : (rows,) float64
-        From the seed [linear grey levels].
-    """
-
-    steps: NDArray[np.float32]
-    from_seed: NDArray[np.float64]
+    steps: NDArray[np.float32]  # (rows,): From a neighbour in the row below [linear grey levels]
+    from_seed: NDArray[np.float64]  # (rows,): From the seed [linear grey levels]
 
 
 @kernel
@@ -34,16 +26,7 @@ def grow_upward(
 
     Growth only ever goes to the row above, so one sweep from the bottom does what a queue would.
 
-    Parameters
-    ----------
-    luminance : (rows, cols) float32
-        Smoothed linear luminance.
-    edges : (rows, cols) uint8
-        Non-zero on edges.
-    limits : GrowthLimits
-        What a pixel may differ by to join.
-    seed : float
-        Luminance of the seeds [linear grey levels].
+    Takes `luminance` (rows, cols), `edges` (rows, cols) uint8, `seed` [linear grey levels].
     """
     rows, cols = luminance.shape
     region = np.zeros((rows, cols), np.uint8)
@@ -77,15 +60,8 @@ def grow_upward(
 def region_tops(region: NDArray[np.uint8]) -> NDArray[np.int64]:
     """Topmost row of each column of a region that has one.
 
-    Parameters
-    ----------
-    region : (rows, cols) uint8
-        Non-zero inside the region.
-
-    Returns
-    -------
-    (n,) int64
-        From left to right; fewer than `cols` if some columns have none.
+    Returns from left to right; fewer than `cols` if some columns have none (n,) int64. Takes `region` (rows, cols)
+    uint8.
     """
     rows, cols = region.shape
     tops = np.empty(cols, np.int64)
@@ -103,17 +79,8 @@ def region_tops(region: NDArray[np.uint8]) -> NDArray[np.int64]:
 def column_tops(region: NDArray[np.uint8], hole: int) -> NDArray[np.int64]:
     """Row to which each column of a region reaches unbroken from the bottom.
 
-    Parameters
-    ----------
-    region : (rows, cols) uint8
-        Non-zero inside the region.
-    hole : int
-        Length of gaps that are stepped over [px].
-
-    Returns
-    -------
-    (cols,) int64
-        `rows` for a column that does not start at the bottom.
+    Returns `rows` for a column that does not start at the bottom (cols,) int64. Takes `region` (rows, cols) uint8,
+    `hole` [px].
     """
     rows, cols = region.shape
     tops, filled = np.full(cols, rows, np.int32), np.empty(cols, np.int32)
@@ -175,23 +142,8 @@ def highest_band(
 ) -> tuple[int, int, int]:
     """Highest row that neighbouring columns reach, and the best run of them.
 
-    Parameters
-    ----------
-    tops : (cols,) int64
-        Row to which each column reaches, see `column_tops`.
-    bottom : int
-        Last row.
-    min_width, enough : int
-        Fewest columns that count, and how many are as good as more.
-    centre : float
-        Column near which the run should be [px].
-    luminance : (rows, cols) float32
-        Of runs alike in all else, the darker is taken.
-
-    Returns
-    -------
-    tuple of int
-        Top row, first column, width; the width is 0 where no band is wide enough.
+    Returns top row, first column, width; the width is 0 where no band is wide enough. Takes `tops` (cols,) int64,
+    `centre` [px], `luminance` (rows, cols).
     """
     # Only where a column ends can a band appear that was not there a row higher.
     for top in np.unique(tops):

@@ -37,31 +37,16 @@ class CannotTellError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class RoadImage:
-    """The part of an image from a little above the horizon to its bottom row.
+    """The part of an image from a little above the horizon to its bottom row."""
 
-    Attributes
-    ----------
-    luminance : (rows, cols) float32
-        Linear grey levels.
-    first_row : int
-        Row of the whole image that is row 0 here.
-    sky_rows : int
-        Rows here that lie above the horizon.
-    airlight, road : float
-        First guesses: the bright part of what lies above the horizon, and the median of the bottom row.
-    level : (all rows, cols) or (all rows, cols, 3) uint8 or uint16
-        The whole image without roll.
-    first_column : int
-        Column of the whole image that is column 0 here.
-    """
-
-    luminance: NDArray[np.float32]
-    first_row: int
-    sky_rows: int
+    luminance: NDArray[np.float32]  # (rows, cols): Linear grey levels
+    first_row: int  # Row of the whole image that is row 0 here
+    sky_rows: int  # Rows here that lie above the horizon
+    # airlight, road: first guesses: the bright part of what lies above the horizon, and the median of the bottom row
     airlight: float
     road: float
-    level: NDArray[np.uint8] | NDArray[np.uint16]
-    first_column: int = 0
+    level: NDArray[np.uint8] | NDArray[np.uint16]  # (all rows, cols): The whole image without roll
+    first_column: int = 0  # Column of the whole image that is column 0 here
 
     @property
     def contrast(self) -> float:
@@ -77,27 +62,7 @@ def road_image(
     *,
     linear: bool = True,
 ) -> RoadImage:
-    """Cut, level and linearise an image.
-
-    Parameters
-    ----------
-    image : (rows, cols) or (rows, cols, 3) uint8 or uint16
-        An image of the camera.
-    camera : Camera
-        The assumed calibration.
-    horizon : Horizon
-        Where the calibration has the horizon.
-    columns : (int, int) or None
-        First column and that after the last to be cut out; None for all.
-    linear : bool
-        Whether to undo the camera's response; else pixel values are taken for luminance, as papers do.
-
-    Raises
-    ------
-    CannotTellError
-        If the horizon is outside the image, the image too small, too dark or saturated, the road not darker than the
-        airlight, or lamps light it.
-    """
+    """Cut, level and linearise an image (`image` (rows, cols), `columns` (int, int))."""
     rows, cols = image.shape[:2]
     if not 1.0 <= horizon.row <= rows - 1:
         raise CannotTellError(f"the horizon (row {horizon.row:.1f}) is outside the image")

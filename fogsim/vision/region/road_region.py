@@ -12,18 +12,12 @@ from fogsim.vision.region.region_kernels import GrowthLimits
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """A vertical band of an image; rows and columns are counted in the image that it was found in.
+    """A vertical band of an image; rows and columns are counted in the image that it was found in."""
 
-    Attributes
-    ----------
-    left, right : int
-        First and last column [px].
-    top, bottom : int
-        First and last row [px].
-    """
-
+    # left, right: first and last column [px]
     left: int
     right: int
+    # top, bottom: first and last row [px]
     top: int
     bottom: int
 
@@ -33,12 +27,7 @@ def cumulative_limits(steps: NDArray[np.float32], seed_tolerance: float) -> Grow
 
     A pixel may differ from the seed by no more than the sum of the steps on the way.
 
-    Parameters
-    ----------
-    steps : (rows,) float32
-        Largest difference of each row to the one below [linear grey levels].
-    seed_tolerance : float
-        Largest difference of a seed from the median of the bottom row [linear grey levels].
+    Takes `steps` (rows,) [linear grey levels], `seed_tolerance` [linear grey levels].
     """
     upward = np.concatenate(([seed_tolerance], steps[-2::-1].astype(np.float64)))
     return GrowthLimits(steps, np.ascontiguousarray(np.cumsum(upward)[::-1]))
@@ -47,16 +36,7 @@ def cumulative_limits(steps: NDArray[np.float32], seed_tolerance: float) -> Grow
 def constant_limits(rows: int, step: float, per_row: float, seed_tolerance: float) -> GrowthLimits:
     """Limits that are the same in every row (zhu2015 eqs. 8 to 11, huang2015's first three constraints).
 
-    Parameters
-    ----------
-    rows : int
-        Rows of the image.
-    step : float
-        Largest difference from a neighbour in the row below [linear grey levels].
-    per_row : float
-        Largest difference from the seed for each row of distance from it [linear grey levels].
-    seed_tolerance : float
-        Largest difference of a seed from the median of the bottom row [linear grey levels].
+    Takes `step` [linear grey levels], `per_row` [linear grey levels], `seed_tolerance` [linear grey levels].
     """
     from_seed = seed_tolerance + per_row * np.arange(rows - 1, -1, -1, dtype=np.float64)
     return GrowthLimits(np.full(rows, step, np.float32), from_seed)
@@ -65,36 +45,16 @@ def constant_limits(rows: int, step: float, per_row: float, seed_tolerance: floa
 def grow_region(luminance: NDArray[np.float32], edges: NDArray[np.uint8], limits: GrowthLimits) -> NDArray[np.uint8]:
     """Grow the road's region upward from its bottom row.
 
-    Seeds are the pixels of the bottom row near that row's median. From each pixel of the region the three pixels
-    above it join if they are not edges and differ from the pixel below, and from the seed, by no more than allowed.
+    Seeds are the pixels of the bottom row near that row's median. From each pixel of the region the three pixels above
+    it join if they are not edges and differ from the pixel below, and from the seed, by no more than allowed.
 
-    Parameters
-    ----------
-    luminance : (rows, cols) float32
-        Smoothed linear luminance.
-    edges : (rows, cols) uint8
-        Non-zero on edges.
-    limits : GrowthLimits
-        See `cumulative_limits` and `constant_limits`.
-
-    Returns
-    -------
-    (rows, cols) uint8
-        1 inside the region.
+    Returns 1 inside the region (rows, cols) uint8. Takes `luminance` (rows, cols), `edges` (rows, cols) uint8.
     """
     return region_kernels.grow_upward(luminance, edges, limits, median(luminance[-1]))
 
 
 def region_medians(luminance: NDArray[np.float32], region: NDArray[np.uint8]) -> SpanMedians:
-    """Median of each row's pixels that lie in a region.
-
-    Parameters
-    ----------
-    luminance : (rows, cols) float32
-        Linear luminance.
-    region : (rows, cols) uint8
-        Non-zero inside the region.
-    """
+    """Median of each row's pixels that lie in a region (`luminance` (rows, cols), `region` (rows, cols) uint8)."""
     left = np.zeros(region.shape[0], np.int64)
     return span_medians(luminance, region, left, left + region.shape[1], MOST_SAMPLES, FEWEST_SAMPLES)
 
@@ -114,25 +74,8 @@ def crossing_band(
     and of several that reach it the one nearest to the vanishing point's column is taken; of two that are alike in all
     that, the darker one, which shows more of the fog.
 
-    Parameters
-    ----------
-    region : (rows, cols) uint8
-        Non-zero inside the region.
-    luminance : (rows, cols) float32
-        Linear luminance.
-    centre : float
-        Column of the vanishing point [px].
-    min_width : int
-        Narrowest band that counts [px]; the region's top is where it gets narrower than this.
-    max_width : int
-        Width beyond which a band is cut [px].
-    hole : int
-        Length of gaps in a column that do not end it [px].
-
-    Returns
-    -------
-    Band or None
-        None if no band of that width starts at the bottom row.
+    Returns None if no band of that width starts at the bottom row. Takes `region` (rows, cols) uint8, `luminance`
+    (rows, cols), `centre` [px], `min_width` [px], `max_width` [px], `hole` [px].
     """
     bottom = region.shape[0] - 1
     tops = region_kernels.column_tops(region, hole)

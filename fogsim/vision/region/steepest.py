@@ -32,15 +32,7 @@ STEPS = 4
 def places(curve: RoadCurve) -> Floats:
     """Heights below the horizon at which slopes are looked at.
 
-    Parameters
-    ----------
-    curve : RoadCurve
-        Of which rows.
-
-    Returns
-    -------
-    (`PLACES`,) float64
-        v − v_h, ascending [px].
+    Returns v − v_h, ascending [px].
     """
     return np.asarray(np.geomspace(HIGHEST, max(float(curve.below_horizon[-1]), 2.0 * HIGHEST), PLACES))
 
@@ -50,19 +42,8 @@ def slopes(curve: RoadCurve, luminance: Floats, reach: float) -> Floats:
 
     In the logarithm of v − v_h all fogs have one curve, shifted; a window in proportion to v − v_h keeps that.
 
-    Parameters
-    ----------
-    curve : RoadCurve
-        Rows and weights.
-    luminance : (n, m) float64
-        Luminance of m curves over these rows.
-    reach : float
-        Height to either side over that below the horizon [-].
-
-    Returns
-    -------
-    (`PLACES`, m) float64
-        Slopes, positive where it brightens upward [linear grey levels per px]; −inf where too little is seen.
+    Returns slopes, positive where it brightens upward [linear grey levels per px]; −inf where too little is seen. Takes
+    `luminance` (n, m).
     """
     at, rows = places(curve), curve.below_horizon[:, None]
     half = np.maximum(reach * at, LEAST_REACH)
@@ -91,15 +72,7 @@ def _sums_up_to(sums: Floats, place: Floats) -> Floats:
 def steepest_rows(curve: RoadCurve, luminance: Floats, reach: float) -> Floats:
     """Steepest row of each of some curves, by a parabola over the logarithm of v − v_h about the peak.
 
-    Parameters
-    ----------
-    curve, luminance, reach
-        See `slopes`.
-
-    Returns
-    -------
-    (m,) float64
-        v − v_h [px]; NaN where it never brightens upward.
+    Returns v − v_h [px]; NaN where it never brightens upward (m,).
     """
     at = places(curve)
     slope = slopes(curve, luminance, reach)
@@ -146,13 +119,7 @@ def _peaks(at: NDArray[np.float64], slope: NDArray[np.float64]) -> NDArray[np.fl
 
 
 def highest_place(curve: RoadCurve, reach: float) -> float:
-    """Place nearest to the horizon about which enough rows are seen for a slope [px below it]; infinite without any.
-
-    Parameters
-    ----------
-    curve, reach
-        See `slopes`.
-    """
+    """Place nearest to the horizon about which enough rows are seen for a slope [px below it]; infinite without any."""
     seen = np.isfinite(slopes(curve, curve.luminance[:, None], reach)[:, 0])
     return float(places(curve)[seen][0]) if seen.any() else np.inf
 
@@ -163,15 +130,7 @@ def fog_of_steepest_rows(curve: RoadCurve, luminance: Floats, reach: float) -> F
     At the inflection itself that is k = 2 (v_i − v_h) / λ (zhu2015 eq. 21); a window of some width, and rows of one,
     shift the steepest row by a share of v − v_h that the law itself tells.
 
-    Parameters
-    ----------
-    curve, luminance, reach
-        See `slopes`.
-
-    Returns
-    -------
-    (m,) float64
-        k [1/m]; NaN where a curve never brightens upward.
+    Returns k [1/m]; NaN where a curve never brightens upward (m,).
     """
     seen = steepest_rows(curve, luminance, reach)
     optical = 2.0 * seen

@@ -28,22 +28,11 @@ def subpixel_inflections(
     """Inflections of some curves to a fraction of a row.
 
     As negru2013 section IV.B.c, but for candidates between rows as well: for each of them level and slope are those of
-    least squares of Koschmieder's law over the rows about it, R and A follow by eqs. 17 and 18, and the candidate
-    whose model leaves the least of the whole curve is the inflection.
+    least squares of Koschmieder's law over the rows about it, R and A follow by eqs. 17 and 18, and the candidate whose
+    model leaves the least of the whole curve is the inflection.
 
-    Parameters
-    ----------
-    curve : RoadCurve
-        Rows and weights.
-    luminance : (n, m) float64
-        Luminance of m curves over these rows [linear grey levels].
-    parameters : callable
-        k, R and A from row, luminance, slope and λ.
-
-    Returns
-    -------
-    (m,) float64, (m,) float64
-        v_i − v_h [px], and the mean square that the model leaves [squares of grey levels]; NaN where there is none.
+    Returns v_i − v_h [px], and the mean square that the model leaves [squares of grey levels]; NaN where there is none
+    (m,). Takes `luminance` (n, m) [linear grey levels].
     """
     below, weight = curve.below_horizon, curve.weight
     at = np.geomspace(HIGHEST, max(float(below[-1]), 2.0 * HIGHEST), CANDIDATES)

@@ -30,52 +30,26 @@ STEPS = 8
 
 
 class ContrastClass(NamedTuple):
-    """Edges at about one distance.
+    """Edges at about one distance."""
 
-    Attributes
-    ----------
-    distance : float
-        Median distance [m].
-    relative_deviation : float
-        Its standard deviation over itself, by that of the disparity [-].
-    contrast : float
-        Their best contrast [-].
-    """
-
-    distance: float
-    relative_deviation: float
-    contrast: float
+    distance: float  # Median distance [m]
+    relative_deviation: float  # Its standard deviation over itself, by that of the disparity [-]
+    contrast: float  # Their best contrast [-]
 
 
 class ContrastDecay(NamedTuple):
-    """What the fit of ln C = ln C₀ − k d finds.
+    """What the fit of ln C = ln C₀ − k d finds."""
 
-    Attributes
-    ----------
-    extinction, standard_deviation : float
-        k and its standard deviation [1/m].
-    intrinsic : float
-        C₀ [-].
-    """
-
+    # extinction, standard_deviation: k and its standard deviation [1/m]
     extinction: float
     standard_deviation: float
-    intrinsic: float
+    intrinsic: float  # C₀ [-]
 
 
 def contrast_classes(edges: SeenEdges, scale: float, deviation: float, least: float) -> list[ContrastClass]:
     """Classes of distances in which both pictures show edges, nearest first.
 
-    Parameters
-    ----------
-    edges : SeenEdges
-        The edges.
-    scale : float
-        Focal length times baseline: distance times disparity [m px].
-    deviation : float
-        Standard deviation of disparities of one distance that does not average out [px].
-    least : float
-        Disparity below which nothing is told [px].
+    Takes `scale` [m px], `deviation` [px], `least` [px].
     """
     found: list[ContrastClass] = []
     far = float(edges.disparity.max(initial=0.0))
@@ -94,11 +68,6 @@ def fit_decay(classes: list[ContrastClass]) -> ContrastDecay:
 
     Iteratively reweighted least squares: a class's deviation is that of its things and of its distance, k σ_d, and one
     that lies far off counts less (Student's t of four degrees of freedom).
-
-    Parameters
-    ----------
-    classes : list of ContrastClass
-        One at least.
     """
     distance, relative, contrast = (np.array(column) for column in zip(*classes, strict=True))
     seen, prior = np.log(contrast), math.log(INTRINSIC)

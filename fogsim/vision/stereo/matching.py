@@ -33,18 +33,10 @@ BELOW_ROAD = 1.35
 
 
 class SeenEdges(NamedTuple):
-    """Edges that both pictures show.
+    """Edges that both pictures show."""
 
-    Attributes
-    ----------
-    disparity : (n,) float64
-        By how much farther left the second camera has each [px].
-    contrast : (n,) float64
-        Local contrast (L_bright − L_dark) / L_bright [-].
-    """
-
-    disparity: Floats
-    contrast: Floats
+    disparity: Floats  # (n,): By how much farther left the second camera has each [px]
+    contrast: Floats  # (n,): Local contrast (L_bright − L_dark) / L_bright [-]
 
 
 def seen_edges(left: Pixels, right: Pixels, camera: Camera, baseline: float, least: float) -> SeenEdges:
@@ -53,16 +45,7 @@ def seen_edges(left: Pixels, right: Pixels, camera: Camera, baseline: float, lea
     Blocks are compared by the sum of absolute differences of their horizontal gradients (OpenCV's StereoBM, after
     Konolige 1998, Small vision systems).
 
-    Parameters
-    ----------
-    left, right : (rows, cols[, 3]) uint8 or uint16
-        Pictures of two alike cameras with parallel axes.
-    camera : Camera
-        The told calibration of both.
-    baseline : float
-        Distance between their optical centres [m].
-    least : float
-        Least contrast [-].
+    Takes `baseline` [m].
     """
     light = linear_luminance(left, camera.response, camera.bits, camera.black_level)
     smooth = cv2.blur(light, (3, 3))

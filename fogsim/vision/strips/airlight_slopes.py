@@ -54,21 +54,12 @@ ROWS = 24
 
 @dataclass(frozen=True, slots=True)
 class SlopeTable:
-    """Airlight over black land, by the optical height of the eye and the angle of the line of sight to the horizon.
+    """Airlight over black land, by the optical height of the eye and the angle of the line of sight to the horizon."""
 
-    Attributes
-    ----------
-    depth : (n,) float64
-        Optical heights, evenly in their logarithms [-].
-    angle : (m,) float64
-        Angles [rad].
-    below, above : (droplets, n, m) float64
-        By how much it is darker toward the road, and brighter toward the sky, than level, over 1 − the level one in
-        units of E / π [-].
-    """
-
-    depth: Floats
-    angle: Floats
+    depth: Floats  # (n,): Optical heights, evenly in their logarithms [-]
+    angle: Floats  # (m,): Angles [rad]
+    # below, above (droplets, n, m): by how much it is darker toward the road, and brighter toward the sky, than level,
+    # over 1 − the level one in units of E / π [-]
     below: Floats
     above: Floats
 
@@ -83,17 +74,7 @@ def slope_table() -> SlopeTable:
 def darkening_priors(
     prior: JointPrior, sky: Sky, chances: tuple[float, ...] = DROPLET_CHANCES
 ) -> tuple[JointPrior, ...]:
-    """What sky and horizon say about airlight that is not even, by droplets; nothing under a sky that is even.
-
-    Parameters
-    ----------
-    prior : JointPrior
-        What they say about even airlight.
-    sky : Sky
-        The sky above the horizon.
-    chances : tuple of float
-        How likely each kind of droplets is [-].
-    """
+    """What sky and horizon say about airlight that is not even, by droplets; nothing under a sky that is even."""
     if not _brightens(sky):
         return ()
     of_level = LEVEL_DEVIATION * sky.luminance
@@ -129,19 +110,7 @@ def _lines(droplets: int, lowest: float, highest: float) -> tuple[Floats, Floats
 def darkening_of_bins(grazing: Floats, below: Floats, prior: JointPrior) -> tuple[Floats, Floats]:
     """How the airlight darkens toward bins, for `fogsim.vision.strips.joint_kernels.Bins`.
 
-    Parameters
-    ----------
-    grazing : (n,) float64
-        Angle between the line of sight and the road [rad].
-    below : (n,) float64
-        Rows below the horizon [px].
-    prior : JointPrior
-        Whether the airlight counts as even.
-
-    Returns
-    -------
-    tuple of (levels, n) float64
-        ``darker`` and ``darker_by_row``.
+    Returns ``darker`` and ``darker_by_row``. Takes `grazing` (n,) [rad], `below` (n,) [px].
     """
     if prior.rise.size == 0:
         nothing = np.zeros((0, below.size))
@@ -157,13 +126,7 @@ def darkening_of_bins(grazing: Floats, below: Floats, prior: JointPrior) -> tupl
 
 
 def slope_cost(prior: JointPrior) -> float:
-    """Add what the sky's slope says of a prior to minus twice a log likelihood: even airlight may be under any sky.
-
-    Parameters
-    ----------
-    prior : JointPrior
-        Of airlight that is even or not.
-    """
+    """Add what the sky's slope says of a prior to minus twice a log likelihood: even airlight may be under any sky."""
     if prior.rise.size == 0:
         return 0.0
     scale = ANY_SLOPE * prior.airlight
@@ -172,21 +135,11 @@ def slope_cost(prior: JointPrior) -> float:
 
 @dataclass(frozen=True, slots=True)
 class RowAirlight:
-    """Airlight of the rows of a level image before something on the road.
+    """Airlight of the rows of a level image before something on the road."""
 
-    Attributes
-    ----------
-    level : float
-        At the horizon [linear grey levels].
-    share : (rows,) float64
-        Over that at the horizon [-].
-    deviation : (rows,) float64
-        Its standard deviation [-].
-    """
-
-    level: float
-    share: Floats
-    deviation: Floats
+    level: float  # At the horizon [linear grey levels]
+    share: Floats  # (rows,): Over that at the horizon [-]
+    deviation: Floats  # (rows,): Its standard deviation [-]
 
 
 def row_airlight(sky: Sky, camera: Camera, extinction: float = USUAL_EXTINCTION) -> RowAirlight | None:
@@ -194,14 +147,7 @@ def row_airlight(sky: Sky, camera: Camera, extinction: float = USUAL_EXTINCTION)
 
     Over snow it hardly does, and yet a contrast that fog leaves 5 % of changes by a fifth.
 
-    Parameters
-    ----------
-    sky : Sky
-        The sky above the horizon.
-    camera : Camera
-        The assumed calibration; its roll is taken as undone.
-    extinction : float
-        About that of the fog [1/m].
+    Takes `extinction` [1/m].
     """
     if sky.is_clipped or sky.slope <= SURELY * sky.slope_deviation:
         return None

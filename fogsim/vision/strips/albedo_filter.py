@@ -46,66 +46,36 @@ CLOUD_ANGLE = 0.03
 
 
 class Albedo(NamedTuple):
-    """How the albedo of a road wanders, relative to it, and the airlight before it.
+    """How the albedo of a road wanders, relative to it, and the airlight before it."""
 
-    Attributes
-    ----------
-    patch_deviation, patch_length : float
-        Standard deviation [-] and correlation length [m] of patches.
-    drift_deviation, drift_length : float
-        The same of the drift.
-    sheen, sheen_deviation : float
-        Part of the sky's light that the road reflects at grazing angles, and its standard deviation [-].
-    cloud_deviation : float
-        Standard deviation of the airlight over the image, relative to it [-].
-    """
-
+    # patch_deviation, patch_length: standard deviation [-] and correlation length [m] of patches
     patch_deviation: float
     patch_length: float
+    # drift_deviation, drift_length: the same of the drift
     drift_deviation: float
     drift_length: float
+    # sheen, sheen_deviation: part of the sky's light that the road reflects at grazing angles, and its standard
+    # deviation [-]
     sheen: float = 0.0
     sheen_deviation: float = 0.0
-    cloud_deviation: float = 0.0
+    cloud_deviation: float = 0.0  # Standard deviation of the airlight over the image, relative to it [-]
 
 
 class Residuals(NamedTuple):
-    """What the filter takes, bins from near to far.
+    """What the filter takes, bins from near to far."""
 
-    Attributes
-    ----------
-    columns : (strips, n, m) float64
-        Residuals in column 0, and derivatives.
-    scale : (strips, n) float64
-        R t: what a relative change of albedo changes.
-    veil : (strips, n) float64
-        A (1 − t): what a relative change of airlight changes.
-    noise : (strips, n) float64
-        Variance of each bin apart from the albedo's; 0 marks a bin without data.
-    """
-
-    columns: NDArray[np.float64]
-    scale: NDArray[np.float64]
-    veil: NDArray[np.float64]
-    noise: NDArray[np.float64]
+    columns: NDArray[np.float64]  # (strips, n, m): Residuals in column 0, and derivatives
+    scale: NDArray[np.float64]  # (strips, n): R t: what a relative change of albedo changes
+    veil: NDArray[np.float64]  # (strips, n): A (1 − t): what a relative change of airlight changes
+    noise: NDArray[np.float64]  # (strips, n): Variance of each bin apart from the albedo's; 0 marks a bin without data
 
 
 class Whitened(NamedTuple):
-    """What the filter makes of them.
+    """What the filter makes of them."""
 
-    Attributes
-    ----------
-    innovations : (strips, n, m) float64
-        Over their standard deviations; 0 where a bin is not used.
-    constants : (strips, m) float64
-        What each column says of the strips' constants.
-    used : (strips, n) uint8
-        `USED`, `HIDDEN` or 0.
-    """
-
-    innovations: NDArray[np.float64]
-    constants: NDArray[np.float64]
-    used: NDArray[np.uint8]
+    innovations: NDArray[np.float64]  # (strips, n, m): Over their standard deviations; 0 where a bin is not used
+    constants: NDArray[np.float64]  # (strips, m): What each column says of the strips' constants
+    used: NDArray[np.uint8]  # (strips, n) uint8: `USED`, `HIDDEN` or 0
 
 
 @kernel
@@ -122,21 +92,9 @@ def albedo_transitions(
 
     The drift is a Matérn process of smoothness 3/2: it has a slope, as wear and weathering have.
 
-    Parameters
-    ----------
-    distance, extent : (n,) float64
-        Distance of each bin and how much road it covers [m].
-    grazing : (n,) float64
-        Angle between the line of sight and the road [rad].
-    albedo : Albedo
-        How it wanders.
-
-    Returns
-    -------
-    (n, 9) float64
-        The four factors by which drift and its slope pass into themselves and each other, that by which patches keep,
-        the shares of drift and of patches that a bin's mean shows, the factor by which uneven airlight keeps, and the
-        sheen relative to that at the horizon.
+    Returns the four factors by which drift and its slope pass into themselves and each other, that by which patches
+    keep, the shares of drift and of patches that a bin's mean shows, the factor by which uneven airlight keeps, and the
+    sheen relative to that at the horizon (n, 9). Takes `distance`, `extent` (n,) [m], `grazing` (n,) [rad].
     """
     out = np.zeros((distance.size, 9))
     rate = math.sqrt(3.0) / albedo.drift_length
@@ -293,20 +251,7 @@ def whiten(
 ) -> float:
     """Innovations of residuals and derivatives of all strips, near to far; returns the logarithm of the determinant.
 
-    Parameters
-    ----------
-    residuals : Residuals
-        Residuals and derivatives.
-    changes : (n, 9) float64
-        See `albedo_transitions`.
-    albedo : Albedo
-        How the albedo wanders.
-    airlight : float
-        Luminance that no bin much exceeds [linear grey levels].
-    reject : bool
-        Look for outliers and note in `out.used` what is left; else go by that.
-    out : Whitened
-        The innovations; is written.
+    Takes `changes` (n, 9), `airlight` [linear grey levels].
     """
     columns, scale, veil, noise, used = (
         residuals.columns,
@@ -354,17 +299,7 @@ def whiten(
 def hide_behind_obstacles(noise: NDArray[np.float64], used: NDArray[np.uint8]) -> bool:
     """Drop what lies behind each strip's nearest outlier from which on most is outliers: it stands there and hides it.
 
-    Parameters
-    ----------
-    noise : (strips, n) float64
-        Variance of each bin; 0 marks a bin without data.
-    used : (strips, n) uint8
-        See `Whitened`; is written.
-
-    Returns
-    -------
-    bool
-        Whether any bin was in use that now is not.
+    Returns whether any bin was in use that now is not. Takes `noise` (strips, n), `used` (strips, n) uint8.
     """
     changed = False
     for strip in range(noise.shape[0]):

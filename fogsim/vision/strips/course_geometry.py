@@ -22,15 +22,6 @@ def course_geometry(geometry: StripGeometry, camera: Camera, course: RoadCourse)
 
     Rows are told by where they would be seen were the road the plane that touches it under the camera, about the
     course's horizon; so the joint fit takes them as it takes those of a plane.
-
-    Parameters
-    ----------
-    geometry : StripGeometry
-        Strips of a straight road.
-    camera : Camera
-        The assumed calibration; its roll is taken as undone.
-    course : RoadCourse
-        Course of the road.
     """
     shift, unit, height = course.row - camera.horizon_row, camera.row_distance, camera.mount_height
     seen = geometry.below - shift
@@ -56,20 +47,7 @@ def course_deviation(
 ) -> float:
     """Standard deviation of the extinction by what is not known of the course, beyond that by its horizon [1/m].
 
-    Parameters
-    ----------
-    fit : JointFit
-        The joint fit.
-    geometry : StripGeometry
-        Where its bins are.
-    camera : Camera
-        The assumed calibration.
-    course : RoadCourse
-        Course of the road.
-    prior : JointPrior
-        What the fit was told of sky and horizon.
-    noise : float
-        Deviation of single pixels [linear grey levels].
+    Takes `noise` [linear grey levels].
     """
     # A fit with one of both neighbours does not say which.
     strips = len(fit.used) if len(fit.used) == len(geometry.path) else 1

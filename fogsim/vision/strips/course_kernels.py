@@ -23,29 +23,18 @@ EXTINCTION, AIRLIGHT, SHIFT, ROAD = range(4)
 
 
 class Seen(NamedTuple):
-    """What the joint fit has used and found.
+    """What the joint fit has used and found."""
 
-    Attributes
-    ----------
-    used : (strips, n) bool
-        Bins that took part.
-    path : (strips, n) float64
-        λ times the slant [px·m].
-    below, half, distance, extent : (n,) float64
-        See `fogsim.vision.strips.strip_geometry.StripGeometry`.
-    pixels : (strips, n) float64
-        Pixels of each bin.
-    extinction, airlight, road, shift, noise : float
-        k [1/m], luminances [linear grey levels], rows [px], and deviation of single pixels [linear grey levels].
-    """
-
-    used: NDArray[np.bool_]
-    path: Floats
+    used: NDArray[np.bool_]  # (strips, n) bool: Bins that took part
+    path: Floats  # (strips, n): λ times the slant [px·m]
+    # below, half, distance, extent (n,): see `fogsim.vision.strips.strip_geometry.StripGeometry`
     below: Floats
     half: Floats
     distance: Floats
     extent: Floats
-    pixels: Floats
+    pixels: Floats  # (strips, n): Pixels of each bin
+    # extinction, airlight, road, shift, noise: k [1/m], luminances [linear grey levels], rows [px], and deviation of
+    # single pixels [linear grey levels]
     extinction: float
     airlight: float
     road: float
@@ -55,15 +44,7 @@ class Seen(NamedTuple):
 
 @kernel
 def rows_on_plane(below: Floats, sag: Floats, unit: float, height: float) -> Floats:
-    """`row_on_plane` for many rows, nearest first: 0 from the first that shows no road on.
-
-    Parameters
-    ----------
-    below : (n,) float64
-        Rows below the tangent's horizon [px].
-    sag, unit, height
-        See `row_on_plane`.
-    """
+    """`row_on_plane` for many rows, nearest first: 0 from the first that shows no road on (`below` (n,) [px])."""
     out = np.zeros(below.size)
     start = below[0]
     for i in range(below.size):
@@ -78,14 +59,7 @@ def rows_on_plane(below: Floats, sag: Floats, unit: float, height: float) -> Flo
 def sideways(distance: Floats, curvature: Floats, covariance: Floats) -> tuple[Floats, Floats]:
     """How far a curved road has turned aside at distances, and the standard deviation of that [m].
 
-    Parameters
-    ----------
-    distance : (n,) float64
-        Along the road [m].
-    curvature : (pieces,) float64
-        By piece [1/m].
-    covariance : (pieces, pieces) float64
-        Of them [1/m²].
+    Takes `distance` (n,) [m], `curvature` (pieces,) [1/m], `covariance` (pieces, pieces) [1/m²].
     """
     aside, deviation = np.zeros(distance.size), np.zeros(distance.size)
     offset = np.empty(PIECES)
@@ -101,19 +75,8 @@ def sideways(distance: Floats, curvature: Floats, covariance: Floats) -> tuple[F
 def extinction_response(seen: Seen, deviations: Floats, height: float) -> Floats:
     """By how much the extinction errs with the row and with the vertical curvatures, least squares all at once.
 
-    Parameters
-    ----------
-    seen : Seen
-        What the fit has used and found.
-    deviations : (2 + pieces,) float64
-        Deviations of airlight [linear grey levels], row [px], and vertical curvatures [1/m].
-    height : float
-        Height of the camera [m].
-
-    Returns
-    -------
-    (1 + pieces,) float64
-        Error of k by row [1/m per px], and by curvature [-].
+    Returns error of k by row [1/m per px], and by curvature [-] (1 + pieces,). Takes `deviations` (2 + pieces,) [linear
+    grey levels], [px], [1/m], `height` [m].
     """
     strips, count = seen.used.shape
     size = ROAD + strips

@@ -34,15 +34,7 @@ class DropletMemory:
         return tuple((weight / weight.sum()).tolist())
 
     def learn(self, logarithms: tuple[float, ...], time: float, speed: float) -> None:
-        """Learn from a picture.
-
-        Parameters
-        ----------
-        logarithms : tuple of float
-            Log likelihood of it with each kind; nothing is learnt without.
-        time, speed : float
-            When it was taken [s], and the own speed [m/s].
-        """
+        """Learn from a picture (`time`, `speed` [s], [m/s])."""
         if not logarithms:
             return
         moved = 0.0 if self._time is None else max(speed * (time - self._time), 0.0)

@@ -31,36 +31,14 @@ camera and level at the horizon."""
 
 
 def no_road(fit: JointFit, curves: StripCurves, geometry: StripGeometry, camera: Camera) -> str:
-    """Say why strips can be no road in fog; empty if they can.
-
-    Parameters
-    ----------
-    fit : JointFit
-        The fit of the curves.
-    curves : StripCurves
-        Luminance by bin.
-    geometry : StripGeometry
-        Where the bins are.
-    camera : Camera
-        The assumed calibration.
-    """
+    """Say why strips can be no road in fog; empty if they can."""
     if is_scattered(fit, curves, geometry):
         return "what is ahead is too patchy for a road"
     return "it brightens evenly from row to row, as no fog does" if is_ramp(curves, geometry, camera) else ""
 
 
 def is_scattered(fit: JointFit, curves: StripCurves, geometry: StripGeometry) -> bool:
-    """Whether single pixels across the own lane differ as much among themselves as road and airlight do.
-
-    Parameters
-    ----------
-    fit : JointFit
-        The fit of the curves.
-    curves : StripCurves
-        Luminance by bin.
-    geometry : StripGeometry
-        Where the bins are.
-    """
+    """Whether single pixels across the own lane differ as much among themselves as road and airlight do."""
     near = fit.used[0] & (fit.extinction * geometry.distance < 1.5)
     if not near.any():
         return False
@@ -68,17 +46,7 @@ def is_scattered(fit: JointFit, curves: StripCurves, geometry: StripGeometry) ->
 
 
 def is_ramp(curves: StripCurves, geometry: StripGeometry, camera: Camera) -> bool:
-    """Whether the own lane's pixel values rise evenly from row to row, as drawn backgrounds do and fog does not.
-
-    Parameters
-    ----------
-    curves : StripCurves
-        Luminance by bin.
-    geometry : StripGeometry
-        Where the bins are.
-    camera : Camera
-        The assumed calibration.
-    """
+    """Whether the own lane's pixel values rise evenly from row to row, as drawn backgrounds do and fog does not."""
     seen = curves.variance[0] > 0
     if int(seen.sum()) < 3:
         return False

@@ -88,44 +88,22 @@ OVERCONFIDENCE = 1.0
 
 @dataclass(frozen=True, slots=True)
 class JointFit:
-    """Posterior of a joint fit.
+    """Posterior of a joint fit."""
 
-    Attributes
-    ----------
-    extinction, extinction_deviation : float
-        k and its standard deviation [1/m]; k may come out a little below 0.
-    airlight : float
-        A [linear grey levels].
-    shift : float
-        Rows by which the horizon is lower than the calibration has it [px].
-    road : float
-        Luminance of the own lane without fog [linear grey levels].
-    misfit : float
-        Mean square of the standardised residuals; about 1 where the model holds.
-    used : (strips, n) bool
-        Bins that took part.
-    hidden : (n,) bool
-        Bins of the first strip that lie behind an obstacle which stands on it.
-    darkening_chance : float
-        How likely the airlight darkens toward the road [-].
-    droplets : tuple of float
-        Logarithm of how likely this picture is with each kind of droplets, if it darkens, over the likeliest [-]; none
-        where it was not tried.
-    albedos : tuple of int
-        Those of `ALBEDOS` that are not negligible.
-    """
-
+    # extinction, extinction_deviation: k and its standard deviation [1/m]; k may come out a little below 0
     extinction: float
     extinction_deviation: float
-    airlight: float
-    shift: float
-    road: float
-    misfit: float
-    used: NDArray[np.bool_]
-    hidden: NDArray[np.bool_]
-    darkening_chance: float = 0.0
+    airlight: float  # A [linear grey levels]
+    shift: float  # Rows by which the horizon is lower than the calibration has it [px]
+    road: float  # Luminance of the own lane without fog [linear grey levels]
+    misfit: float  # Mean square of the standardised residuals; about 1 where the model holds
+    used: NDArray[np.bool_]  # (strips, n) bool: Bins that took part
+    hidden: NDArray[np.bool_]  # (n,) bool: Bins of the first strip that lie behind an obstacle which stands on it
+    darkening_chance: float = 0.0  # How likely the airlight darkens toward the road [-]
+    # Logarithm of how likely this picture is with each kind of droplets, if it darkens, over the likeliest [-]; none
+    # where it was not tried
     droplets: tuple[float, ...] = ()
-    albedos: tuple[int, ...] = EVERY
+    albedos: tuple[int, ...] = EVERY  # Those of `ALBEDOS` that are not negligible
 
 
 Priors = tuple[JointPrior, ...]
@@ -158,24 +136,7 @@ def fit_jointly(
     The likelihood is that of `joint_kernels`; how much the albedo wanders is unknown, so several answers are tried and
     averaged by their evidence (Laplace's approximation), which makes the deviation honest where the road itself fades.
 
-    Parameters
-    ----------
-    curves : StripCurves
-        Luminance by bin.
-    geometry : StripGeometry
-        Where the bins are.
-    priors : tuple of JointPrior
-        What sky and horizon say of airlight that is even and, where it may be otherwise, of that too: answers with
-        either are averaged by their evidence.
-    near : JointFit or None
-        Answer for some of the strips, from which to start in place of a search.
-    albedos : tuple of int
-        Those of `ALBEDOS` that are tried after the first.
-
-    Returns
-    -------
-    JointFit or None
-        None if there are too few bins.
+    Returns None if there are too few bins.
     """
     if int((curves.variance[0] > 0).sum()) < LEAST_BINS:
         return None
@@ -196,17 +157,7 @@ def _answers(
 
 
 def strip_bins(curves: StripCurves, geometry: StripGeometry, prior: JointPrior) -> Bins:
-    """Strips as the kernels take them, the lens's vignetting undone.
-
-    Parameters
-    ----------
-    curves : StripCurves
-        Luminance by bin.
-    geometry : StripGeometry
-        Where the bins are.
-    prior : JointPrior
-        How much of what a simple lens takes from pixels off its axis this one takes, and whether the airlight is even.
-    """
+    """Strips as the kernels take them, the lens's vignetting undone."""
     luminance, variance, vignetting = curves.luminance, curves.variance, prior.vignetting
     if vignetting != 0.0:
         gain = 1.0 / (1.0 - np.minimum(vignetting * geometry.off_axis, MOST_VIGNETTING))
@@ -267,15 +218,7 @@ def _constant_albedo(bins: Bins, prior: JointPrior) -> tuple[float, float]:
 
 
 def extinction_grid(bins: Bins, count: int) -> Floats:
-    """Extinctions that show, evenly in ln k [1/m].
-
-    Parameters
-    ----------
-    bins : Bins
-        Where the bins are.
-    count : int
-        How many.
-    """
+    """Extinctions that show, evenly in ln k [1/m]."""
     least, most = _span(bins)
     return np.exp(np.linspace(math.log(least), math.log(most), count))
 
@@ -298,15 +241,7 @@ def _refined(bins: Bins, albedo: Albedo, prior: JointPrior, start: Floats, steps
 
 
 def under_sky(albedo: Albedo, prior: JointPrior) -> Albedo:
-    """Albedo seen through an airlight that is as uneven as is known beforehand.
-
-    Parameters
-    ----------
-    albedo : Albedo
-        How it wanders.
-    prior : JointPrior
-        Sky and horizon.
-    """
+    """Albedo seen through an airlight that is as uneven as is known beforehand."""
     return albedo._replace(cloud_deviation=prior.cloud)
 
 
@@ -402,13 +337,7 @@ def _deviation(fit: JointFit) -> float:
 
 
 def agree(own: JointFit, more: JointFit) -> bool:
-    """Whether more strips change the extinction by no more than they sharpen it (Hausman 1978, eq. 2.2).
-
-    Parameters
-    ----------
-    own, more : JointFit
-        Fit of the own lane, and of it with others.
-    """
+    """Whether more strips change the extinction by no more than they sharpen it (Hausman 1978, eq. 2.2)."""
     sharpened = max(own.extinction_deviation**2 - more.extinction_deviation**2, 0.0)
     if own.extinction_deviation > SURE * own.extinction:
         sharpened = (OVERCONFIDENCE * own.extinction_deviation) ** 2

@@ -46,105 +46,69 @@ CONVERGED = 1e-3
 
 
 class Bins(NamedTuple):
-    """Bins of rows of strips of road, nearest first, as the kernels take them.
+    """Bins of rows of strips of road, nearest first, as the kernels take them."""
 
-    Attributes
-    ----------
-    luminance, noise : (strips, n) float64
-        Luminance and its variance apart from the albedo's; see `fogsim.vision.strips.strip_curves.StripCurves`.
-    path, off_axis : (strips, n) float64
-        See `fogsim.vision.strips.strip_geometry.StripGeometry`.
-    below, half, distance, extent, grazing : (n,) float64
-        See there.
-    darker, darker_by_row : (levels, n) float64
-        How the airlight darkens toward the bins, by the optical height of the eye, and its derivative by the horizon's
-        row [1/px]; see `fogsim.vision.strips.airlight_slopes`. No levels where airlight counts as even.
-    eye : float
-        Height of the eye above the road [m].
-    """
-
+    # luminance, noise (strips, n): luminance and its variance apart from the albedo's; see
+    # `fogsim.vision.strips.strip_curves.StripCurves`
     luminance: NDArray[np.float64]
     noise: NDArray[np.float64]
+    # path, off_axis (strips, n): see `fogsim.vision.strips.strip_geometry.StripGeometry`
     path: NDArray[np.float64]
     off_axis: NDArray[np.float64]
+    # below, half, distance, extent, grazing (n,): see there
     below: NDArray[np.float64]
     half: NDArray[np.float64]
     distance: NDArray[np.float64]
     extent: NDArray[np.float64]
     grazing: NDArray[np.float64]
+    # darker, darker_by_row (levels, n): how the airlight darkens toward the bins, by the optical height of the eye, and
+    # its derivative by the horizon's row [1/px]; see `fogsim.vision.strips.airlight_slopes`. No levels where airlight
+    # counts as even
     darker: NDArray[np.float64]
     darker_by_row: NDArray[np.float64]
-    eye: float
+    eye: float  # Height of the eye above the road [m]
 
 
 class JointPrior(NamedTuple):
-    """What is known before the road is looked at.
+    """What is known before the road is looked at."""
 
-    Attributes
-    ----------
-    airlight : float
-        Luminance of the sky [linear grey levels].
-    below, above : float
-        Deviation of the airlight from it, downward and upward; upward it is large where the sky is saturated.
-    shift, shift_deviation : float
-        Rows by which the horizon is lower than the calibration has it, and their standard deviation [px].
-    vignetting, vignetting_deviation : float
-        How much of what a simple lens takes from pixels off its axis (1 − cos⁴) this one takes, and the standard
-        deviation of that [-].
-    cloud : float
-        Deviation of the airlight over the image, relative to it [-].
-    slope, slope_deviation : float
-        By how much the sky brightens upward, as a straight line has it, and the standard deviation of that [linear grey
-        levels per rad].
-    rise, level : (levels,) float64
-        Slope [1/rad] of such a line over the airlight at the horizon, and by which part its level there is above that,
-        if the airlight darkens by 1 toward the road; by the optical height of the eye. None where it counts as even.
-    droplets : int
-        Which sizes of them the latter are of.
-    cost : float
-        Minus twice the logarithm of how likely it is among several, over what its deviations differ by [-].
-    """
-
-    airlight: float
+    airlight: float  # Luminance of the sky [linear grey levels]
+    # below, above: deviation of the airlight from it, downward and upward; upward it is large where the sky is
+    # saturated
     below: float
     above: float
+    # shift, shift_deviation: rows by which the horizon is below the calibrated one, and their deviation [px]
     shift: float
     shift_deviation: float
+    # vignetting, vignetting_deviation: how much of what a simple lens takes from pixels off its axis (1 − cos⁴) this
+    # one takes, and the standard deviation of that [-]
     vignetting: float
     vignetting_deviation: float
-    cloud: float = 0.0
+    cloud: float = 0.0  # Deviation of the airlight over the image, relative to it [-]
+    # slope, slope_deviation: by how much the sky brightens upward, as a straight line has it, and the standard
+    # deviation of that [linear grey levels per rad]
     slope: float = 0.0
     slope_deviation: float = 1.0
+    # rise, level (levels,): slope [1/rad] of such a line over the airlight at the horizon, and by which part its level
+    # there is above that, if the airlight darkens by 1 toward the road; by the optical height of the eye. None where it
+    # counts as even
     rise: NDArray[np.float64] = NO_LEVELS
     level: NDArray[np.float64] = NO_LEVELS
-    droplets: int = 0
+    droplets: int = 0  # Which sizes of them the latter are of
+    # Minus twice the logarithm of how likely it is among several, over what its deviations differ by [-]
     cost: float = 0.0
 
 
 class Solution(NamedTuple):
-    """Answer for one strength of patches and drift.
+    """Answer for one strength of patches and drift."""
 
-    Attributes
-    ----------
-    theta : (4 or 5,) float64
-        k, airlight, shift, vignetting that is left, and by how much the airlight darkens toward the road.
-    covariance : (4, 4) or (5, 5) float64
-        Theirs.
-    cost : float
-        Minus twice the log likelihood, with the parameters' priors and integrated over them.
-    misfit : float
-        Mean square of the innovations.
-    road : float
-        Luminance of the first strip without fog [linear grey levels].
-    used : (strips, n) uint8
-        Which bins took part, see `fogsim.vision.strips.albedo_filter.Whitened`.
-    """
-
+    # (4 or 5,): k, airlight, shift, vignetting that is left, and by how much the airlight darkens toward the road
     theta: NDArray[np.float64]
-    covariance: NDArray[np.float64]
-    cost: float
-    misfit: float
-    road: float
+    covariance: NDArray[np.float64]  # (4, 4): Theirs
+    cost: float  # Minus twice the log likelihood, with the parameters' priors and integrated over them
+    misfit: float  # Mean square of the innovations
+    road: float  # Luminance of the first strip without fog [linear grey levels]
+    # (strips, n) uint8: Which bins took part, see `fogsim.vision.strips.albedo_filter.Whitened`
     used: NDArray[np.uint8]
 
 
@@ -155,14 +119,7 @@ def mean_transmittance(below: float, half: float, path: float, k: float) -> tupl
     Near the horizon a row spans hundreds of metres: Simpson's rule there, farther down e^(−x) with x = k path / below
     and the second term of its Taylor series, which is what Simpson's rule makes of short bins.
 
-    Parameters
-    ----------
-    below, half : float
-        Middle of the bin below the horizon, and half its height [px].
-    path : float
-        λ times the slant: over the rows below the horizon, the length of the ray [px·m].
-    k : float
-        Extinction [1/m].
+    Takes `below`, `half` [px], `path` [px·m], `k` [1/m].
     """
     value, by_k, by_shift = 0.0, 0.0, 0.0
     if half < SHORT * below:
@@ -383,21 +340,7 @@ def allocated(strips: int, count: int, width: int, noise: NDArray[np.float64]) -
 def gauss_newton(
     bins: Bins, albedo: Albedo, prior: JointPrior, start: NDArray[np.float64], iterations: int
 ) -> Solution:
-    """Gauss–Newton from a start.
-
-    Parameters
-    ----------
-    bins : Bins
-        What is seen where.
-    albedo : Albedo
-        How the albedo wanders.
-    prior : JointPrior
-        Sky, horizon and lens.
-    start : (4 or 5,) float64
-        See `Solution.theta`; five where the prior has levels.
-    iterations : int
-        Most steps.
-    """
+    """Gauss–Newton from a start (`start` (4 or 5,))."""
     strips, count = bins.luminance.shape
     theta, road, size = start.copy(), np.empty(strips), start.size
     darker = theta[4] if size > PARAMETERS else 0.0

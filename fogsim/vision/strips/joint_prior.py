@@ -24,17 +24,7 @@ and the most of that [-]: clouds and dirt on the glass go on below the horizon."
 
 
 def joint_prior(sky: Sky, camera: Camera, horizon: Horizon) -> JointPrior:
-    """Prior of airlight, horizon and lens for `fogsim.vision.strips.joint_fit.fit_jointly`.
-
-    Parameters
-    ----------
-    sky : Sky
-        The sky above the horizon; where it is saturated it is brighter than it looks.
-    camera : Camera
-        The assumed calibration, from whose horizon the prior's shift counts.
-    horizon : Horizon
-        What is known of the horizon.
-    """
+    """Prior of airlight, horizon and lens for `fogsim.vision.strips.joint_fit.fit_jointly`."""
     airlight, below, above = _airlight(sky, camera)
     return JointPrior(
         airlight=airlight,

@@ -24,15 +24,7 @@ GRAINY = 0.01
 
 @kernel
 def darkness_of_slope(slope: float, rise: float, above: float) -> float:
-    """By how much the airlight darkens toward the road below a sky of some slope.
-
-    Parameters
-    ----------
-    slope : float
-        Of the sky over its level [1/rad]: its slope is A m rise and its level A (1 + m above), where m is returned.
-    rise, above : float
-        See `fogsim.vision.strips.joint_kernels.JointPrior`.
-    """
+    """By how much the airlight darkens toward the road below a sky of some slope (`slope` [1/rad])."""
     share = min(max(slope, 0.0) / rise, 5.0)
     return min(share / max(1.0 - share * above, 0.2), MOST_DARKER)
 
@@ -55,16 +47,7 @@ def extinction_costs(
 ) -> NDArray[np.float64]:
     """Minus twice the log likelihood of each of several extinctions, the rest at their first guesses; inf for none.
 
-    Parameters
-    ----------
-    bins : Bins
-        What is seen where.
-    albedo : Albedo
-        How the albedo wanders.
-    extinctions : (m,) float64
-        The extinctions [1/m].
-    prior : JointPrior
-        Sky and horizon.
+    Takes `extinctions` (m,) [1/m].
     """
     strips, count = bins.luminance.shape
     shift = prior.shift
@@ -98,14 +81,7 @@ def fit_constant_albedo(bins: Bins, extinctions: NDArray[np.float64], prior: Joi
     A smooth broad search, where `extinction_costs` has narrow minima: what does not fit weighs little, and nothing is
     explained by an albedo that wanders.
 
-    Parameters
-    ----------
-    bins : Bins
-        What is seen where.
-    extinctions : (m,) float64
-        The extinctions that are tried [1/m].
-    prior : JointPrior
-        Sky and horizon.
+    Takes `extinctions` (m,) [1/m].
     """
     luminance, noise = bins.luminance, bins.noise
     strips, count = luminance.shape

@@ -54,36 +54,16 @@ MISLED = 0.15
 
 @dataclass(frozen=True, slots=True)
 class DividedRoad:
-    """Strips in sun and in shade, and their fit.
+    """Strips in sun and in shade, and their fit."""
 
-    Attributes
-    ----------
-    curves : StripCurves
-        Luminance by bin; the first strip is the own lane's, in shade if there is enough of it.
-    geometry : StripGeometry
-        Where they lie.
-    fit : JointFit
-        Of even fog to all of them.
-    share : float
-        Part of the road that is shaded [-].
-    """
-
-    curves: StripCurves
-    geometry: StripGeometry
-    fit: JointFit
-    share: float
+    curves: StripCurves  # Luminance by bin; the first strip is the own lane's, in shade if there is enough of it
+    geometry: StripGeometry  # Where they lie
+    fit: JointFit  # Of even fog to all of them
+    share: float  # Part of the road that is shaded [-]
 
 
 def is_sure(own: JointFit | None, curves: StripCurves) -> bool:
-    """Whether the own lane's fit explains it, so that shade on it need not be looked for.
-
-    Parameters
-    ----------
-    own : JointFit or None
-        Fit of the own lane alone.
-    curves : StripCurves
-        Luminance by bin.
-    """
+    """Whether the own lane's fit explains it, so that shade on it need not be looked for."""
     if own is None or own.hidden.any() or own.extinction_deviation > SURE * own.extinction:
         return False
     return bool(own.used[0].sum() >= ALL_USED * (curves.variance[0] > 0).sum())
@@ -101,29 +81,7 @@ def divided_road(
 ) -> DividedRoad | None:
     """Divide strips into sun and shade, and fit even fog to them.
 
-    Parameters
-    ----------
-    pixels : LinearPixels
-        The image.
-    curves : StripCurves
-        Luminance by bin.
-    geometry : StripGeometry
-        Where the bins are.
-    camera : Camera
-        The assumed calibration.
-    priors : tuple of JointPrior
-        What sky and seen horizon say.
-    told : Horizon
-        What the calibration alone says of the horizon.
-    noise : float
-        Deviation of single pixels [linear grey levels].
-    free : float
-        Depth up to which the own lane is free [m].
-
-    Returns
-    -------
-    DividedRoad or None
-        None if no shade is found.
+    Returns None if no shade is found. Takes `noise` [linear grey levels], `free` [m].
     """
     levels = shade_levels(pixels, curves, geometry, priors[0], noise)
     if levels is None:
@@ -140,17 +98,7 @@ def shade_levels(
 ) -> Levels | None:
     """Luminance of the road in sun and in shade, with the fog before it.
 
-    Parameters
-    ----------
-    pixels, curves, geometry, noise
-        See `divided_road`.
-    prior : JointPrior
-        What sky and horizon say of even airlight.
-
-    Returns
-    -------
-    Levels or None
-        None if no shade is found.
+    Returns None if no shade is found.
     """
     bins = strip_bins(curves, geometry, prior)
     pieces = pieces_of(pixels, np.stack([geometry.first, geometry.last]), geometry.left, geometry.right)

@@ -37,25 +37,17 @@ DARKEST = 0.02
 
 
 class Levels(NamedTuple):
-    """A road that sun and shade divide.
+    """A road that sun and shade divide."""
 
-    Attributes
-    ----------
-    extinction : float
-        k [1/m].
-    airlight, lit, shaded : float
-        Luminance of the airlight, and of the road in sun and in shade without fog [linear grey levels].
-    cost : float
-        Minus twice the log likelihood, over the number of pieces; infinite if there are too few.
-    share, mixed : float
-        Parts of the pieces that are shaded, and of the bins that have both, weighed by what is left of their light [-].
-    """
-
-    extinction: float
+    extinction: float  # k [1/m]
+    # airlight, lit, shaded: luminance of the airlight, and of the road in sun and in shade without fog [linear grey
+    # levels]
     airlight: float
     lit: float
     shaded: float
-    cost: float
+    cost: float  # Minus twice the log likelihood, over the number of pieces; infinite if there are too few
+    # share, mixed: parts of the pieces that are shaded, and of the bins that have both, weighed by what is left of
+    # their light [-]
     share: float
     mixed: float
 
@@ -64,19 +56,7 @@ class Levels(NamedTuple):
 def pieces_of(image: LinearPixels, rows: NDArray[np.int64], left: Floats, right: Floats) -> Floats:
     """Luminance of the pieces of every bin.
 
-    Parameters
-    ----------
-    image : LinearPixels
-        The image.
-    rows : (2, n) int64
-        First and last row of each bin.
-    left, right : (strips, n) float64
-        Columns between which the strips lie.
-
-    Returns
-    -------
-    (strips, n, PIECES) float64
-        From left to right [linear grey levels].
+    Returns from left to right [linear grey levels]. Takes `rows` (2, n) int64, `left`, `right` (strips, n).
     """
     (strips, count), cols = left.shape, image.pixels.shape[1]
     out = np.zeros((strips, count, PIECES))
@@ -198,20 +178,7 @@ def fit_levels(
 ) -> Levels:
     """Find the extinction with which a road has two levels, in sun and in shade, or only one.
 
-    Parameters
-    ----------
-    pieces : (strips, n, PIECES) float64
-        See `pieces_of`.
-    bins : Bins
-        Where the bins are.
-    extinctions : (m,) float64
-        What is tried [1/m].
-    prior : JointPrior
-        Sky and horizon.
-    pixel : float
-        Deviation of single pixels [linear grey levels].
-    divided : bool
-        Whether there are two.
+    Takes `extinctions` (m,) [1/m], `pixel` [linear grey levels].
     """
     count = bins.noise.shape[1]
     used = np.argwhere(bins.noise[:, :: max(count // MOST_BINS, 1)] > 0.0)

@@ -28,40 +28,27 @@ show it, and most that it can be [-]."""
 
 @dataclass(frozen=True, slots=True)
 class Sky:
-    """The sky above the horizon.
+    """The sky above the horizon."""
 
-    Attributes
-    ----------
-    luminance : float
-        At the horizon, of its bright part [linear grey levels].
-    deviation, upward : float
-        Standard deviation of its luminance at the horizon, downward and upward [linear grey levels].
-    noise : float
-        Deviation of single pixels [linear grey levels].
-    saturated, clipped : float
-        Shares of its pixels of which all channels, and of which some, have the largest value [-].
-    vignetting, vignetting_deviation : float
-        How much of what a simple lens takes from pixels off its axis (1 − cos⁴) this one takes, and the standard
-        deviation of that [-].
-    unevenness : float
-        Deviation of its luminance from place to place, relative to it [-]: by clouds, by dirt on the glass, by trees.
-    slope, slope_deviation : float
-        How it brightens upward, as a straight line, and the standard deviation of that [linear grey levels per rad].
-    heights : (float, float)
-        Least and greatest height above the horizon at which that was seen [rad].
-    """
-
-    luminance: float
+    luminance: float  # At the horizon, of its bright part [linear grey levels]
+    # deviation, upward: standard deviation of its luminance at the horizon, downward and upward [linear grey levels]
     deviation: float
     upward: float
-    noise: float
+    noise: float  # Deviation of single pixels [linear grey levels]
+    # saturated, clipped: shares of its pixels of which all channels, and of which some, have the largest value [-]
     saturated: float
     clipped: float
+    # vignetting, vignetting_deviation: how much of what a simple lens takes from pixels off its axis (1 − cos⁴) this
+    # one takes, and the standard deviation of that [-]
     vignetting: float = 0.0
     vignetting_deviation: float = UNKNOWN_VIGNETTING
+    # Deviation of its luminance from place to place, relative to it [-]: by clouds, by dirt on the glass, by trees
     unevenness: float = 0.0
+    # slope, slope_deviation: how it brightens upward, as a straight line, and the standard deviation of that [linear
+    # grey levels per rad]
     slope: float = 0.0
     slope_deviation: float = math.inf
+    # (float, float): Least and greatest height above the horizon at which that was seen [rad]
     heights: tuple[float, float] = (0.0, 0.0)
 
     @property
@@ -101,19 +88,7 @@ the sky may be brighter then, as a deviation [-]."""
 def sky_above(image: LinearPixels, camera: Camera, margin: float) -> Sky | None:
     """Look at the sky in the middle two thirds of the image above the horizon.
 
-    Parameters
-    ----------
-    image : LinearPixels
-        The image.
-    camera : Camera
-        The assumed calibration.
-    margin : float
-        Rows above the horizon that are left out [px].
-
-    Returns
-    -------
-    Sky or None
-        None if there are no such rows, or something high hides the sky all along them.
+    Returns None if there are no such rows, or something high hides the sky all along them. Takes `margin` [px].
     """
     bottom = min(math.floor(camera.horizon_row - margin), camera.height - 1)
     top = max(0, math.floor(camera.horizon_row - SKY_HEIGHT * camera.focal_length))
@@ -195,13 +170,5 @@ def _shading(
 
 @functools.lru_cache(maxsize=64)
 def even_rows(first: int, last: int, count: int) -> NDArray[np.int64]:
-    """Rows evenly from the first to the last, downward; the array is shared, so never to be written.
-
-    Parameters
-    ----------
-    first, last : int
-        First and last row.
-    count : int
-        Most rows.
-    """
+    """Rows evenly from the first to the last, downward; the array is shared, so never to be written."""
     return np.unique(np.linspace(first, last, count).astype(np.int64))

@@ -33,21 +33,8 @@ def sky_rows(
     Starts near the row's brightest and moves to the mean of what lies near, so that what is darker may cover most of
     the row.
 
-    Parameters
-    ----------
-    image : LinearPixels
-        The image.
-    rows : (n,) int64
-        Which rows.
-    left, right : int
-        First column that is looked at, and that after the last.
-    floor : float
-        Least deviation of what counts as equally bright [linear grey levels].
-
-    Returns
-    -------
-    tuple of (n,) float64
-        Brightness [linear grey levels], and the share of each row that is as bright.
+    Returns brightness [linear grey levels], and the share of each row that is as bright (n,). Takes `rows` (n,) int64,
+    `floor` [linear grey levels].
     """
     bright, share = np.zeros(rows.size), np.zeros(rows.size)
     count = min(MOST_SAMPLES, right - left)
@@ -78,19 +65,8 @@ def level_at_horizon(
     Where rows darken downward by more than `step` from one to the next, something stands before the sky, and the rows
     below say nothing.
 
-    Parameters
-    ----------
-    bright : (n,) float64
-        Brightness of rows, the highest first.
-    height : (n,) float64
-        Their height above the horizon.
-    step : float
-        Darkening that is no sky's, as a share.
-
-    Returns
-    -------
-    tuple of float
-        Brightness at height 0, slope, robust deviation of the rows from the line, height of the lowest row in use.
+    Returns brightness at height 0, slope, robust deviation of the rows from the line, height of the lowest row in use.
+    Takes `bright` (n,), `height` (n,).
     """
     drops = np.zeros(bright.size)
     count = 1
@@ -120,12 +96,7 @@ def level_at_horizon(
 def pixel_noise(image: LinearPixels, rows: NDArray[np.int64]) -> float:
     """Robust deviation of single pixels, from the differences of neighbours [linear grey levels].
 
-    Parameters
-    ----------
-    image : LinearPixels
-        The image.
-    rows : (n,) int64
-        Which rows are looked at.
+    Takes `rows` (n,) int64.
     """
     cols = image.pixels.shape[1]
     per_row = max((cols - 1) // 2, 1)
@@ -149,17 +120,7 @@ def pixel_noise(image: LinearPixels, rows: NDArray[np.int64]) -> float:
 
 @kernel
 def saturation(image: LinearPixels, rows: NDArray[np.int64], side: int) -> tuple[float, float]:
-    """Shares of pixels with all, and with some channels saturated.
-
-    Parameters
-    ----------
-    image : LinearPixels
-        The image.
-    rows : (n,) int64
-        Which rows are looked at.
-    side : int
-        Columns that are left out at either end.
-    """
+    """Shares of pixels with all, and with some channels saturated (`rows` (n,) int64)."""
     pixels, largest = image.pixels, image.tables.shape[1] - 1
     cols, channels = pixels.shape[1], pixels.shape[2]
     every, some = 0, 0
@@ -198,24 +159,9 @@ def sky_shading(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float, float]:
     """Sky as L = a + b x + c y + e y² − d (1 − cos⁴ of the angle to the camera's axis), in Cauchy's norm.
 
-    Parameters
-    ----------
-    image : LinearPixels
-        The image.
-    rows : (n,) int64
-        Rows that show sky.
-    axis : (4,) float64
-        Principal point's column and row, the horizon's row, focal length [px].
-    bright : (n,) float64
-        Brightness of the bright part of each row [linear grey levels].
-    noise : float
-        Deviation of single pixels [linear grey levels].
-
-    Returns
-    -------
-    tuple of (5,) and (5, 5) float64 and two floats
-        a, b, c, e, d, their covariance, the share of pixels that lie near, and the robust deviation of all of them
-        beside their noise [linear grey levels].
+    Returns a, b, c, e, d, their covariance, the share of pixels that lie near, and the robust deviation of all of them
+    beside their noise [linear grey levels] (5, 5). Takes `rows` (n,) int64, `axis` (4,) [px], `bright` (n,) [linear
+    grey levels], `noise` [linear grey levels].
     """
     cols, count = image.pixels.shape[1], SHADING_COLS
     level = float(np.median(bright))

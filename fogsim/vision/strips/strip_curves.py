@@ -28,30 +28,17 @@ HALF_VEHICLE = 1.3
 
 @dataclass(frozen=True, slots=True)
 class StripCurves:
-    """Luminance of each strip by bin.
+    """Luminance of each strip by bin."""
 
-    Attributes
-    ----------
-    luminance : (strips, n) float64
-        Mean of the core of each bin [linear grey levels].
-    variance : (strips, n) float64
-        Its variance apart from what patches and drift of the albedo do; 0 where there is no datum.
-    scatter : (strips, n) float64
-        Mean distance of all single pixels from the bin's median, marks and the like included [linear grey levels].
-    """
-
-    luminance: Floats
+    luminance: Floats  # (strips, n): Mean of the core of each bin [linear grey levels]
+    # (strips, n): Its variance apart from what patches and drift of the albedo do; 0 where there is no datum
     variance: Floats
+    # (strips, n): Mean distance of all single pixels from the bin's median, marks and the like included [linear grey
+    # levels]
     scatter: Floats
 
     def only(self, strips: list[int]) -> "StripCurves":
-        """Some of the strips.
-
-        Parameters
-        ----------
-        strips : list of int
-            Which.
-        """
+        """Some of the strips."""
         return StripCurves(self.luminance[strips], self.variance[strips], self.scatter[strips])
 
 
@@ -64,25 +51,7 @@ def strip_curves(
     known: StripCurves | None = None,
     limits: Floats | None = None,
 ) -> StripCurves:
-    """Read the strips.
-
-    Parameters
-    ----------
-    image : LinearPixels
-        The image.
-    geometry : StripGeometry
-        Where to look.
-    noise : float
-        Deviation of single pixels [linear grey levels].
-    camera : Camera
-        The assumed calibration.
-    free : float
-        Depth up to which the own lane is free; a vehicle ahead hides what is behind [m].
-    known : StripCurves or None
-        What was read of a road that is free further on: only what the vehicle hides is read again.
-    limits : (strips, 2, n) float64 or None
-        Least and greatest luminance of pixels that count [linear grey levels]; all if None.
-    """
+    """Read the strips (`noise` [linear grey levels], `free` [m], `limits` (strips, 2, n) [linear grey levels])."""
     vehicle = np.array([math.inf, -math.inf, -math.inf])
     if math.isfinite(free):
         reach, u0 = HALF_VEHICLE * camera.focal_length / free, camera.principal_point[0]
@@ -113,17 +82,7 @@ BONNET_STEP, BONNET_OUTLIER = 0.03, 6.0
 
 
 def lowest_road_row(image: LinearPixels, camera: Camera, airlight: float) -> int:
-    """Lowest row that shows road, above the own vehicle's bonnet or dashboard.
-
-    Parameters
-    ----------
-    image : LinearPixels
-        A level image.
-    camera : Camera
-        The assumed calibration.
-    airlight : float
-        Luminance of the sky [linear grey levels].
-    """
+    """Lowest row that shows road, above the own vehicle's bonnet or dashboard (`airlight` [linear grey levels])."""
     bottom = camera.height - 1
     top = math.floor(bottom - BONNET_SHARE * (bottom - camera.horizon_row))
     rows = even_rows(bottom, top, BONNET_ROWS)[::-1]
@@ -139,13 +98,7 @@ def lowest_road_row(image: LinearPixels, camera: Camera, airlight: float) -> int
 
 
 def mean_curves(frames: tuple[tuple[StripCurves, Sky], ...]) -> StripCurves:
-    """Average the curves of successive frames at the last one's exposure, which the sky shows.
-
-    Parameters
-    ----------
-    frames : tuple of (StripCurves, Sky)
-        Oldest first.
-    """
+    """Average the curves of successive frames at the last one's exposure, which the sky shows."""
     if len(frames) == 1:
         return frames[0][0]
     gains = np.array([frames[-1][1].luminance / sky.luminance for _, sky in frames])[:, None, None]
@@ -163,26 +116,10 @@ CLIPPED = 0.95 * 255.0
 
 
 def without_clipped(curves: StripCurves) -> StripCurves:
-    """Leave out bins so bright that their noise, or one of their colours, is clipped.
-
-    Parameters
-    ----------
-    curves : StripCurves
-        Luminance by bin.
-    """
+    """Leave out bins so bright that their noise, or one of their colours, is clipped."""
     return replace(curves, variance=np.where(curves.luminance > CLIPPED, 0.0, curves.variance))
 
 
 def without_rows_below(curves: StripCurves, geometry: StripGeometry, lowest: int) -> StripCurves:
-    """Leave out bins that reach below a row.
-
-    Parameters
-    ----------
-    curves : StripCurves
-        Luminance by bin.
-    geometry : StripGeometry
-        Where the bins are.
-    lowest : int
-        Last row that is kept.
-    """
+    """Leave out bins that reach below a row."""
     return replace(curves, variance=np.where(geometry.last > lowest, 0.0, curves.variance))

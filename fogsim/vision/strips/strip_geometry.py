@@ -23,36 +23,23 @@ WHOLE_ROWS = 28.0
 
 @dataclass(frozen=True, slots=True)
 class StripGeometry:
-    """Where the strips lie in the image of a camera on a flat road, nearest bin of rows first.
+    """Where the strips lie in the image of a camera on a flat road, nearest bin of rows first."""
 
-    Attributes
-    ----------
-    first, last : (n,) int64
-        Rows of each bin.
-    below, half : (n,) float64
-        Middle of each bin below the assumed horizon, and half its height [px].
-    distance, extent : (n,) float64
-        Depth of each bin along the road, and how much road it covers [m].
-    grazing : (n,) float64
-        Angle between the line of sight and the road [rad].
-    left, right : (strips, n) float64
-        Columns between which each strip lies.
-    path : (strips, n) float64
-        λ times the slant: over the rows below the horizon, the length of the ray [px·m].
-    off_axis : (strips, n) float64
-        1 − cos⁴ of the rays' angle to the camera's axis: the share of light that a simple lens takes [-].
-    """
-
+    # first, last (n,) int64: rows of each bin
     first: NDArray[np.int64]
     last: NDArray[np.int64]
+    # below, half (n,): middle of each bin below the assumed horizon, and half its height [px]
     below: Floats
     half: Floats
+    # distance, extent (n,): depth of each bin along the road, and how much road it covers [m]
     distance: Floats
     extent: Floats
-    grazing: Floats
+    grazing: Floats  # (n,): Angle between the line of sight and the road [rad]
+    # left, right (strips, n): columns between which each strip lies
     left: Floats
     right: Floats
-    path: Floats
+    path: Floats  # (strips, n): λ times the slant: over the rows below the horizon, the length of the ray [px·m]
+    # (strips, n): 1 − cos⁴ of the rays' angle to the camera's axis: the share of light that a simple lens takes [-]
     off_axis: Floats
 
     @property
@@ -61,29 +48,13 @@ class StripGeometry:
         return 2.0 * self.half
 
     def only(self, strips: list[int]) -> "StripGeometry":
-        """Some of the strips.
-
-        Parameters
-        ----------
-        strips : list of int
-            Which.
-        """
+        """Some of the strips."""
         left, right, path, off_axis = (values[strips] for values in (self.left, self.right, self.path, self.off_axis))
         return replace(self, left=left, right=right, path=path, off_axis=off_axis)
 
 
 def strip_geometry(camera: Camera, nearest: float, lanes: tuple[tuple[float, float], ...] = LANES) -> StripGeometry:
-    """Lay strips over the image of a camera.
-
-    Parameters
-    ----------
-    camera : Camera
-        The assumed calibration; its roll is taken as undone.
-    nearest : float
-        Rows below the horizon from which the road is looked at [px].
-    lanes : tuple of (float, float)
-        Sides of each strip to the right of the vehicle's axis [m].
-    """
+    """Lay strips over the image of a camera (`nearest` [px], `lanes` (float, float) [m])."""
     first, last = _row_bins(camera, nearest, camera.height - 1)
     below: Floats = 0.5 * (first + last).astype(np.float64) - camera.horizon_row
     u0 = camera.principal_point[0]
@@ -96,31 +67,14 @@ def strip_geometry(camera: Camera, nearest: float, lanes: tuple[tuple[float, flo
 
 
 def laid_along(geometry: StripGeometry, left: Floats, right: Floats, camera: Camera) -> StripGeometry:
-    """Lay strips between other columns on the same bins of rows.
-
-    Parameters
-    ----------
-    geometry : StripGeometry
-        Bins of rows.
-    left, right : (strips, n) float64
-        Columns; they are cut to the image.
-    camera : Camera
-        The assumed calibration.
-    """
+    """Lay strips between other columns on the same bins of rows (`left`, `right` (strips, n))."""
     return _laid(geometry.first, geometry.last, *_inside(left, right, camera.width), camera)
 
 
 def band_geometry(camera: Camera, nearest: float, columns: tuple[int, int], rows: tuple[int, int]) -> StripGeometry:
     """Take a vertical band of the image, as far as it is road, for the only strip.
 
-    Parameters
-    ----------
-    camera : Camera
-        The assumed calibration; its roll is taken as undone.
-    nearest : float
-        Rows below the horizon from which the road is looked at [px].
-    columns, rows : (int, int)
-        First and last of the band.
+    Takes `nearest` [px], `columns`, `rows` (int, int).
     """
     first, last = _row_bins(camera, max(nearest, rows[0] - camera.horizon_row), rows[1])
     below: Floats = 0.5 * (first + last).astype(np.float64) - camera.horizon_row

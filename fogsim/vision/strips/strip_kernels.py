@@ -24,35 +24,18 @@ MOST_COLUMNS = 128
 
 
 class StripBins(NamedTuple):
-    """Where the bins of one strip of road are.
+    """Where the bins of one strip of road are."""
 
-    Attributes
-    ----------
-    rows : (2, n) int64
-        First and last row of each bin.
-    sides : (2, n) float64
-        Columns between which the strip lies on each bin.
-    pieces : (n,) float64
-        Pieces of road in each bin whose albedo counts as independent.
-    """
-
-    rows: NDArray[np.int64]
-    sides: NDArray[np.float64]
-    pieces: NDArray[np.float64]
+    rows: NDArray[np.int64]  # (2, n) int64: First and last row of each bin
+    sides: NDArray[np.float64]  # (2, n): Columns between which the strip lies on each bin
+    pieces: NDArray[np.float64]  # (n,): Pieces of road in each bin whose albedo counts as independent
 
 
 @kernel
 def row_bins(horizon: float, top: int, bottom: int, whole_rows: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """First and last row of bins from the bottom up to a top row; their height grows with their rows below the horizon.
 
-    Parameters
-    ----------
-    horizon : float
-        Row of the horizon [px].
-    top, bottom : int
-        First and last row.
-    whole_rows : float
-        Rows below the horizon up to which every row is a bin of its own [px].
+    Takes `horizon` [px], `whole_rows` [px].
     """
     first, last = np.empty(max(bottom - top + 1, 0), np.int64), np.empty(max(bottom - top + 1, 0), np.int64)
     row, count = bottom, 0
@@ -106,24 +89,8 @@ def strip_bins(
 ) -> None:
     """Luminance of the core of each bin of rows of one strip, its variance, and the scatter of the whole bin.
 
-    Parameters
-    ----------
-    image : LinearPixels
-        The image.
-    table : (levels,) float32
-        Linear grey levels of all channels together.
-    bins : StripBins
-        Where to look.
-    vehicle : (3,) float64
-        Columns between which a vehicle hides the road, and the row of its foot, from which on upward it does.
-    limits : (2, n) float64
-        Least and greatest luminance of pixels that count [linear grey levels].
-    noise : float
-        Deviation of single pixels [linear grey levels].
-    out : (3, n) float64
-        Luminance, variance (0 where there is no datum) and scatter; is written.
-    again : bool
-        Read only bins that the vehicle hides, if only in part, and that have a datum.
+    Takes `table` (levels,), `vehicle` (3,), `limits` (2, n) [linear grey levels], `noise` [linear grey levels], `out`
+    (3, n).
     """
     cols, rows, sides = image.pixels.shape[1], bins.rows, bins.sides
     samples, ordered = np.empty(MOST_SAMPLES, np.float32), np.empty(MOST_SAMPLES, np.float32)
@@ -170,15 +137,7 @@ def _coarseness(mean: float, deviation: float, noise: float, table: NDArray[np.f
 
 @kernel
 def middle_levels(image: LinearPixels, rows: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Median luminance of the middle third of rows [linear grey levels].
-
-    Parameters
-    ----------
-    image : LinearPixels
-        The image.
-    rows : (n,) int64
-        Which rows.
-    """
+    """Median luminance of the middle third of rows [linear grey levels] (`rows` (n,) int64)."""
     cols = image.pixels.shape[1]
     samples, ordered = np.empty(24, np.float32), np.empty(24, np.float32)
     left, right, out = cols // 3 - 0.5, cols - cols // 3 - 0.5, np.empty(rows.size)
@@ -195,18 +154,7 @@ def airlight_shares(
 ) -> NDArray[np.float64]:
     """Shares of rows' pixels that are as bright as the airlight [-].
 
-    Parameters
-    ----------
-    image : LinearPixels
-        The image.
-    rows : (n,) int64
-        Which rows.
-    columns : (int, int)
-        First column, and that behind the last.
-    airlight : float
-        Luminance of the sky [linear grey levels].
-    alike : float
-        Difference up to which a pixel is as bright, relative to it [-].
+    Takes `rows` (n,) int64, `columns` (int, int), `airlight` [linear grey levels].
     """
     shares: NDArray[np.float64] = np.zeros(rows.size)
     step = max((columns[1] - columns[0]) // MOST_COLUMNS, 1)

@@ -58,43 +58,26 @@ TILE = 96
 
 @dataclass(frozen=True, slots=True)
 class SearchRegion:
-    """Where a sign is looked for.
+    """Where a sign is looked for."""
 
-    Attributes
-    ----------
-    u, v : float
-        Column and row of its middle [px].
-    half_width, half_height : float
-        How far from there the middle of the sign may be [px].
-    radius : float
-        Half of the diameter that the sign should have [px].
-    """
-
+    # u, v: column and row of its middle [px]
     u: float
     v: float
+    # half_width, half_height: how far from there the middle of the sign may be [px]
     half_width: float
     half_height: float
-    radius: float
+    radius: float  # Half of the diameter that the sign should have [px]
 
 
 @dataclass(frozen=True, slots=True)
 class SignDetection:
-    """What looks like a sign.
+    """What looks like a sign."""
 
-    Attributes
-    ----------
-    u, v : float
-        Column and row of the middle of its face [px].
-    radius : float
-        Half of its diameter [px].
-    strength : float
-        Share of its outline that stands out of the picture's noise, 0 … 1 [-].
-    """
-
+    # u, v: column and row of the middle of its face [px]
     u: float
     v: float
-    radius: float
-    strength: float
+    radius: float  # Half of its diameter [px]
+    strength: float  # Share of its outline that stands out of the picture's noise, 0 … 1 [-]
 
 
 def detect_signs(
@@ -114,21 +97,7 @@ def detect_signs(
     Edges count from four times the gradient's noise, which is that of the region itself: signs faint in fog are found
     where the picture is as even.
 
-    Parameters
-    ----------
-    image : (rows, cols) or (rows, cols, 3) uint8, uint16 or float32
-        Pixel values as they are; whatever they are proportional to does not matter, for noise is measured.
-    regions : iterable of SearchRegion or None
-        Where to look, and for what size; None looks all over the picture.
-    least_strength : float or None
-        Least share of an outline that must be seen [-]; None for 0.66 in regions and 0.85 without.
-    radii : tuple of float
-        Least and greatest radius where there are no regions [px].
-
-    Returns
-    -------
-    tuple of SignDetection
-        The surest first; of those in the same place one.
+    Returns the surest first; of those in the same place one. Takes `image` (rows, cols), `radii` [px].
     """
     # numba would compile all anew for an array that cannot be written.
     pixels: NDArray[Any] = np.require(image if image.ndim == 3 else image[:, :, None], requirements=["C", "W"])

@@ -18,21 +18,8 @@ X, Y, NX, NY, SNR = range(5)
 def shrunk(image: Picture, top: int, left: int, rows: int, cols: int, factor: int) -> Floats:
     """Cut a piece out of a picture, each value the mean over a square of pixels.
 
-    Parameters
-    ----------
-    image : (all rows, all cols, channels) uint8, uint16 or float32
-        The picture.
-    top, left : int
-        First row and column of the piece [px].
-    rows, cols : int
-        Size of the piece, in squares.
-    factor : int
-        Side of the squares [px].
-
-    Returns
-    -------
-    (channels, rows, cols) float32
-        Their means.
+    Returns their means (channels, rows, cols). Takes `image` (all rows, all cols, channels) uint8, `top`, `left` [px],
+    `factor` [px].
     """
     piece = np.empty((image.shape[2], rows, cols), np.float32)
     share = np.float32(1.0 / (factor * factor))
@@ -51,19 +38,8 @@ def shrunk(image: Picture, top: int, left: int, rows: int, cols: int, factor: in
 def clearest_gradients(piece: Floats, share: float, least: float) -> tuple[Floats, Floats, Floats]:
     """Gradient of whichever channel shows it clearest above its own noise.
 
-    Parameters
-    ----------
-    piece : (channels, rows, cols) float32
-        Part of a picture, at least 5 × 5.
-    share : float
-        Share of pixels that are taken for even, whose gradient is noise alone [-].
-    least : float
-        Least standard deviation of a component of the gradient by noise, for pictures without [1/px].
-
-    Returns
-    -------
-    tuple of (rows, cols) float32
-        Gradient along columns and rows and its length, over the standard deviation of a component by noise [-].
+    Returns gradient along columns and rows and its length, over the standard deviation of a component by noise [-]
+    (rows, cols). Takes `piece` (channels, rows, cols), `least` [1/px].
     """
     along, down, length = gradients(piece[0])
     _scale(along, down, length, 1.0 / gradient_noise(length, share, least))
@@ -91,15 +67,8 @@ def _scale(along: Floats, down: Floats, length: Floats, by: float) -> None:
 def gradients(piece: Floats) -> tuple[Floats, Floats, Floats]:
     """Gradient by derivatives of a binomial window, of standard deviation 1 px across and 0.7 px along.
 
-    Parameters
-    ----------
-    piece : (rows, cols) float32
-        Part of a picture, at least 5 × 5.
-
-    Returns
-    -------
-    tuple of (rows, cols) float32
-        Derivatives along columns and rows, and the length of both [1/px]; 0 within 2 px of the border.
+    Returns derivatives along columns and rows, and the length of both [1/px]; 0 within 2 px of the border (rows, cols).
+    Takes `piece` (rows, cols).
     """
     rows, cols = piece.shape
     smooth, slope = np.zeros_like(piece), np.zeros_like(piece)
@@ -125,17 +94,7 @@ def gradients(piece: Floats) -> tuple[Floats, Floats, Floats]:
 
 @kernel
 def gradient_noise(length: Floats, share: float, least: float) -> float:
-    """Standard deviation of each component of the gradient by noise [1/px].
-
-    Parameters
-    ----------
-    length : (rows, cols) float32
-        Lengths of the gradient.
-    share : float
-        Share of pixels that are taken for even, whose gradient is noise alone [-].
-    least : float
-        Least answer, for pictures without noise [1/px].
-    """
+    """Standard deviation of each component of the gradient by noise [1/px] (`length` (rows, cols), `least` [1/px])."""
     # A quarter of the pixels tells as well.
     inner = length[2:-2:2, 2:-2:2].copy().ravel()
     if inner.size == 0:
@@ -149,19 +108,7 @@ def gradient_noise(length: Floats, share: float, least: float) -> float:
 def edge_points(along: Floats, down: Floats, length: Floats, least: float) -> tuple[Floats, NDArray[np.int32]]:
     """Ridges of the gradient, each placed between pixels by a parabola across it.
 
-    Parameters
-    ----------
-    along, down, length : (rows, cols) float32
-        See `clearest_gradients`.
-    least : float
-        Least length of the gradient [-].
-
-    Returns
-    -------
-    points : (n, 5) float32
-        See `X`; by the row of the pixel that they come from, and within a row by its column.
-    number : (rows, cols) int32
-        Number of the point that comes from each pixel, or −1.
+    Takes `along`, `down`, `length` (rows, cols).
     """
     rows, cols = length.shape
     number = np.full((rows, cols), -1, np.int32)

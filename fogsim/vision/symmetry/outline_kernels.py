@@ -38,22 +38,8 @@ def support(
 ) -> Floats:
     """Compare an outline with the edges near it.
 
-    Parameters
-    ----------
-    points, number
-        See `fogsim.vision.symmetry.edge_kernels.edge_points`.
-    outline : (SAMPLES, 4) float32
-        Places on the outline of radius 1 about the middle, and its outward normals there.
-    x, y, radius : float
-        Where and how large the outline is supposed to be [px].
-    reach : int
-        Rows and columns about each place in which edges are looked for: 1, or 2 for a first look [px].
-
-    Returns
-    -------
-    (4,) float32
-        Share of the places that have a fitting edge, less where it fits worse [-], and how much farther right, down and
-        larger the outline fits them best [px].
+    Returns share of the places that have a fitting edge, less where it fits worse [-], and how much farther right, down
+    and larger the outline fits them best [px] (4,). Takes `x`, `y`, `radius` [px], `reach` [px].
     """
     tolerance = reach * min(max(0.13 * radius, 0.8), 1.5)
     seen, changes, last, near = 0, 0, 0.0, np.zeros(4)
@@ -136,21 +122,8 @@ def _determinant(a: NDArray[np.float64]) -> float:
 def fitted(points: Floats, number: NDArray[np.int32], outlines: Floats, candidate: Floats, radii: Floats) -> Floats:
     """Outline that is borne out best about a candidate for its middle, fitted to the edges.
 
-    Parameters
-    ----------
-    points, number
-        See `fogsim.vision.symmetry.edge_kernels.edge_points`.
-    outlines : (shapes, SAMPLES, 4) float32
-        Outlines to choose from, see `support`.
-    candidate : (2,) float32
-        Place (x, y) of the middle [px].
-    radii : (m,) float32
-        Radii to choose from, the least first [px].
-
-    Returns
-    -------
-    (5,) float32
-        Middle (x, y) and radius [px], share of the outline that is seen [-] and number of the outline.
+    Returns middle (x, y) and radius [px], share of the outline that is seen [-] and number of the outline. Takes
+    `candidate` (2,) [px], `radii` (m,) [px].
     """
     best, most = np.zeros(5, np.float32), 0.0
     for shape in range(outlines.shape[0]):
@@ -174,14 +147,7 @@ def fitted(points: Floats, number: NDArray[np.int32], outlines: Floats, candidat
 def edge_density(number: NDArray[np.int32], x: float, y: float, reach: float) -> float:
     """Edge points over pixels in a square about a place [-].
 
-    Parameters
-    ----------
-    number : (rows, cols) int32
-        See `fogsim.vision.symmetry.edge_kernels.edge_points`.
-    x, y : float
-        Its middle [px].
-    reach : float
-        Half of its side [px].
+    Takes `number` (rows, cols) int32, `x`, `y` [px], `reach` [px].
     """
     count = area = 0
     for row in range(max(int(y - reach), 0), min(int(y + reach) + 1, number.shape[0])):

@@ -12,15 +12,7 @@ from fogsim.vision.symmetry.outline_kernels import SAMPLES
 def polygon_outline(corners: Sequence[tuple[float, float]]) -> NDArray[np.float32]:
     """Places at even distances along a convex polygon, none on a corner.
 
-    Parameters
-    ----------
-    corners : sequence of (x, y)
-        Its corners, clockwise as seen.
-
-    Returns
-    -------
-    (SAMPLES, 4) float32
-        Place and outward normal.
+    Returns place and outward normal. Takes `corners` (x, y).
     """
     ends = list(zip(corners, [*corners[1:], corners[0]], strict=True))
     lengths = [math.dist(a, b) for a, b in ends]

@@ -28,18 +28,8 @@ _ALIGNED = 0.97
 def pair_votes(points: Floats, number: Numbers, nearest: float, farthest: float) -> Floats:
     """Accumulate the middles of pairs of points with opposite gradients along the line between them.
 
-    Parameters
-    ----------
-    points, number
-        See `fogsim.vision.symmetry.edge_kernels.edge_points`.
-    nearest, farthest : float
-        Distances between the two points of a pair [px].
-
-    Returns
-    -------
-    (rows, cols) float32
-        Votes, one place a pixel: one that counts fully comes from two points that face each other squarely, and weighs
-        as the weaker of their gradients does on a logarithmic scale.
+    Returns votes, one place a pixel: one that counts fully comes from two points that face each other squarely, and
+    weighs as the weaker of their gradients does on a logarithmic scale (rows, cols). Takes `nearest`, `farthest` [px].
     """
     rows = number.shape[0]
     votes = np.zeros(number.shape, np.float32)
@@ -73,19 +63,8 @@ def pair_votes(points: Floats, number: Numbers, nearest: float, farthest: float)
 def triangle_votes(points: Floats, number: Numbers, radii: Floats, direction: float) -> Floats:
     """Accumulate the middles of the upright triangles of which two points lie on two sides.
 
-    Parameters
-    ----------
-    points, number
-        See `fogsim.vision.symmetry.edge_kernels.edge_points`.
-    radii : (m,) float32
-        Halves of the triangles' widths, the largest last [px].
-    direction : float
-        1 with the tip up, −1 with the tip down.
-
-    Returns
-    -------
-    (m, rows, cols) float32
-        Votes for the middle between tip and base; see `pair_votes` for their weight.
+    Returns votes for the middle between tip and base; see `pair_votes` for their weight (m, rows, cols). Takes `radii`
+    (m,) [px].
     """
     votes = np.zeros((radii.size, *number.shape), np.float32)
     # Lines: normal of the side, place along it and across it, weight, direction of the gradient.
@@ -134,23 +113,7 @@ def _add(votes: Floats, x: float, y: float, value: float) -> None:
 def peaks(votes: Floats, box: tuple[float, float, float, float], apart: int, least: float, most: int) -> Floats:
     """Largest sums of 3 × 3 votes within a box, none the neighbour of a larger one, the largest first.
 
-    Parameters
-    ----------
-    votes : (rows, cols) float32
-        Votes.
-    box : tuple of float
-        First and last column, first and last row in which middles are looked for [px].
-    apart : int
-        Rows and columns within which only the largest counts.
-    least : float
-        Least sum.
-    most : int
-        How many at most.
-
-    Returns
-    -------
-    (n, 3) float32
-        Place (x, y) by the centre of the 3 × 3 votes [px], and their sum.
+    Returns place (x, y) by the centre of the 3 × 3 votes [px], and their sum. Takes `votes` (rows, cols), `box` [px].
     """
     rows, cols = votes.shape
     sums = np.zeros_like(votes)

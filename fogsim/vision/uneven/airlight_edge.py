@@ -47,25 +47,8 @@ def airlight_edge(
     A crest whose far side falls away looks the same where nothing stands out beyond it; one that the lane marks show is
     in `geometry`.
 
-    Parameters
-    ----------
-    image : LinearPixels
-        The image, level.
-    geometry : StripGeometry
-        Where the bins of rows are.
-    camera : Camera
-        The assumed calibration.
-    sky : Sky
-        The sky above the horizon.
-    uneven : UnevenFit
-        Fit of the road before the bank.
-    horizon_deviation : float
-        Standard deviation of the horizon's row [px].
-
-    Returns
-    -------
-    tuple of float or None
-        Where it begins [m], the standard deviation of that [m], and the least extinction there [1/m].
+    Returns where it begins [m], the standard deviation of that [m], and the least extinction there [1/m]. Takes
+    `horizon_deviation` [px].
     """
     if sky.is_clipped:
         return None

@@ -29,38 +29,17 @@ STRANGE = 2.0
 
 @dataclass(frozen=True, slots=True)
 class EvenFog:
-    """Even fog over some albedo and course of the road.
+    """Even fog over some albedo and course of the road."""
 
-    Attributes
-    ----------
-    cost : float
-        Minus twice the logarithm of its evidence with its chance [-].
-    extinction, variance : float
-        k [1/m], and its variance.
-    left_out : int
-        How many bins it leaves unexplained.
-    """
-
-    cost: float
+    cost: float  # Minus twice the logarithm of its evidence with its chance [-]
+    # extinction, variance: k [1/m], and its variance
     extinction: float
     variance: float
-    left_out: int
+    left_out: int  # How many bins it leaves unexplained
 
 
 def even_fog_over(bins: Bins, albedo: int, prior: JointPrior, start: JointFit) -> EvenFog:
-    """Even fog over one of the albedos, with ln k as its parameter and what is known of that.
-
-    Parameters
-    ----------
-    bins : Bins
-        Luminance, and where it was seen.
-    albedo : int
-        Which of `fogsim.vision.strips.joint_fit.ALBEDOS`.
-    prior : JointPrior
-        Sky and horizon.
-    start : JointFit
-        A fit near which to begin.
-    """
+    """Even fog over one of the albedos, with ln k as its parameter and what is known of that."""
     albedos = joint_fit.under_sky(ALBEDOS[albedo], prior)
     first = np.array([max(start.extinction, 1e-5), start.airlight, start.shift, 0.0])
     found = joint_kernels.gauss_newton(bins, albedos, prior, first, joint_fit.MORE_STEPS)
@@ -73,15 +52,7 @@ def even_fog_over(bins: Bins, albedo: int, prior: JointPrior, start: JointFit) -
 
 
 def left_out(found: Solution, bins: Bins) -> int:
-    """How many bins a fit leaves unexplained.
-
-    Parameters
-    ----------
-    found : Solution
-        The fit.
-    bins : Bins
-        What it is of.
-    """
+    """How many bins a fit leaves unexplained."""
     return int(((found.used != USED) & (bins.noise > 0)).sum())
 
 
@@ -90,13 +61,6 @@ def hidden_cost(found: Solution, bins: Bins) -> float:
 
     In the fit of one fog they are cheap and dear, so that what is behind an obstacle is left out whole. Beside an
     obstacle, denser fog is another explanation, and the two are weighed fairly: either's luminance may be any.
-
-    Parameters
-    ----------
-    found : Solution
-        The fit.
-    bins : Bins
-        What it is of.
     """
     hidden = (found.used == HIDDEN) & (bins.noise > 0)
     outliers = int(((found.used == 0) & (bins.noise > 0)).sum())
@@ -107,13 +71,7 @@ def hidden_cost(found: Solution, bins: Bins) -> float:
 
 
 def thinned_bins(bins: Bins) -> Bins:
-    """Bins of the near road taken together by threes: there fog varies little from bin to bin.
-
-    Parameters
-    ----------
-    bins : Bins
-        All of them.
-    """
+    """Bins of the near road taken together by threes: there fog varies little from bin to bin."""
     near = _taken_together(bins.distance)
     if near == 0:
         return bins
@@ -146,12 +104,7 @@ def thinned_bins(bins: Bins) -> Bins:
 def of_each_bin(thinned: NDArray[np.bool_], distance: Floats) -> NDArray[np.bool_]:
     """(strips, n) bool: what is told of thinned bins, told of all.
 
-    Parameters
-    ----------
-    thinned : (strips, thinned) bool
-        Of the thinned bins.
-    distance : (n,) float64
-        Of all [m].
+    Takes `thinned` (strips, thinned) bool, `distance` (n,) [m].
     """
     near = _taken_together(distance)
     groups = near // TOGETHER

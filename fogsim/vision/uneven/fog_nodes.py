@@ -27,17 +27,7 @@ BANK = 2.0
 
 @functools.cache
 def fog_nodes(deviation: float, length: float, count: int) -> FogNodes:
-    """Nodes of fog of some unevenness.
-
-    Parameters
-    ----------
-    deviation : float
-        Standard deviation of ln k along the way [-].
-    length : float
-        Correlation length [m].
-    count : int
-        How many nodes.
-    """
+    """Nodes of fog of some unevenness (`length` [m])."""
     nodes = np.array(NODES[:count])
     # Where nodes are farther apart than patches are long, a node stands for their mean.
     size = np.maximum(np.diff(nodes, prepend=-NODES[1]) / length, 1e-3)
@@ -51,15 +41,7 @@ def fog_nodes(deviation: float, length: float, count: int) -> FogNodes:
 
 @functools.cache
 def bank_nodes(first: int, count: int) -> FogNodes:
-    """Nodes of fog that is even up to a bank, and even in it.
-
-    Parameters
-    ----------
-    first : int
-        First node in the bank.
-    count : int
-        How many nodes.
-    """
+    """Nodes of fog that is even up to a bank, and even in it."""
     nodes = fog_nodes(*UNEVENNESS[0], count).nodes
     inside = (np.arange(count) >= first).astype(np.float64)
     covariance = BROAD**2 + BANK**2 * inside[:, None] * inside + ROUGHNESS**2 * np.eye(count)

@@ -37,21 +37,11 @@ _AlongCourse = Callable[[int, float], EvenFog]
 
 @dataclass(frozen=True, slots=True)
 class HiddenCourse:
-    """Sags and crests ahead that lines would not show.
+    """Sags and crests ahead that lines would not show."""
 
-    Attributes
-    ----------
-    straight : StripGeometry
-        Strips of a straight road.
-    camera : Camera
-        The assumed calibration.
-    course : RoadCourse
-        Course as the lines show it.
-    """
-
-    straight: StripGeometry
-    camera: Camera
-    course: RoadCourse
+    straight: StripGeometry  # Strips of a straight road
+    camera: Camera  # The assumed calibration
+    course: RoadCourse  # Course as the lines show it
 
     @property
     def is_bent(self) -> bool:
@@ -61,22 +51,7 @@ class HiddenCourse:
     def even_fogs(
         self, curves: StripCurves, prior: JointPrior, start: JointFit, albedo: int, gain: float
     ) -> list[EvenFog]:
-        """Even fog over roads that sag or crest from one of their pieces on, each with the likeliest curvature.
-
-        Parameters
-        ----------
-        curves : StripCurves
-            Luminance by bin, of the first of the strips.
-        prior : JointPrior
-            Sky and horizon, where the road is as its lines show it.
-        start : JointFit
-            Fit of even fog there.
-        albedo : int
-            The likeliest of `fogsim.vision.strips.joint_fit.ALBEDOS` there; the others are tried where roads are nearly
-            as likely as the likeliest.
-        gain : float
-            How much of a cost uneven fog saves: courses that are much less likely than that are not tried [-].
-        """
+        """Even fog over roads that sag or crest from one of their pieces on, each with the likeliest curvature."""
         found: list[EvenFog] = []
         begun: list[tuple[float, _AlongCourse, float, float]] = []
         for piece in range(1, PIECES):

@@ -87,28 +87,17 @@ DENSER, SURELY_DENSER = math.log(2.5), 2.5
 
 @dataclass(frozen=True, slots=True)
 class UnevenFit:
-    """What road and sky say of the fog along the way.
+    """What road and sky say of the fog along the way."""
 
-    Attributes
-    ----------
-    fit : JointFit
-        The fit; its extinction is the mean up to the meteorological visibility, or to `reach` if that is nearer.
-    reach : float
-        Path up to which the road was seen [m].
-    distance, depth, deviation : (n,) float64
-        Path [m], optical depth up to there [-] and its standard deviation [-].
-    even : float
-        How likely it is that the fog is even [-].
-    denser : tuple of float or None
-        Where much denser fog begins [m], the standard deviation of that [m], and its extinction [1/m].
-    """
-
+    # The fit; its extinction is the mean up to the meteorological visibility, or to `reach` if that is nearer
     fit: JointFit
-    reach: float
+    reach: float  # Path up to which the road was seen [m]
+    # distance, depth, deviation (n,): path [m], optical depth up to there [-] and its standard deviation [-]
     distance: Floats
     depth: Floats
     deviation: Floats
-    even: float = 1.0
+    even: float = 1.0  # How likely it is that the fog is even [-]
+    # Where much denser fog begins [m], the standard deviation of that [m], and its extinction [1/m]
     denser: tuple[float, float, float] | None = None
 
 
@@ -133,19 +122,6 @@ def fit_uneven(
     """Fit strips with fog that may be uneven, weighed against even fog.
 
     All strips count, unless even fog has left out much of them and the own lane tells of another fog than all together.
-
-    Parameters
-    ----------
-    curves : StripCurves
-        Luminance by bin.
-    geometry : StripGeometry
-        Where the bins are.
-    prior : JointPrior
-        Sky and horizon.
-    own, even : JointFit
-        Fits of even fog to the own lane, and to all lanes that agree with it.
-    hidden : HiddenCourse
-        Sags and crests that the road may have where its lines do not show them.
     """
     if even.used.mean() < LEAST_ROAD:
         return even_fog(even, geometry)
@@ -220,15 +196,7 @@ def _is_free(even: JointFit, curves: StripCurves) -> bool:
 
 
 def even_fog(even: JointFit, geometry: StripGeometry) -> UnevenFit:
-    """Fog that is the same all along the way.
-
-    Parameters
-    ----------
-    even : JointFit
-        Its fit.
-    geometry : StripGeometry
-        Where its bins are.
-    """
+    """Fog that is the same all along the way."""
     reach = _reach(even.used, geometry.path / geometry.below)
     k = max(even.extinction, 0.0)
     distance = _distances(reach)

@@ -55,37 +55,17 @@ NEAR = 30.0
 
 
 class FogNodes(NamedTuple):
-    """Nodes of the path ahead, and what is known of their ln k beforehand.
+    """Nodes of the path ahead, and what is known of their ln k beforehand."""
 
-    Attributes
-    ----------
-    nodes : (m,) float64
-        Where they are along the path [m], the first at 0; beyond the last k is as there.
-    mean : float
-        Mean of ln k [ln 1/m].
-    precision : (m, m) float64
-        Inverse of its covariance.
-    log_determinant : float
-        Logarithm of the determinant of its covariance.
-    """
-
-    nodes: NDArray[np.float64]
-    mean: float
-    precision: NDArray[np.float64]
-    log_determinant: float
+    nodes: NDArray[np.float64]  # (m,): Where they are along the path [m], the first at 0; beyond the last k is as there
+    mean: float  # Mean of ln k [ln 1/m]
+    precision: NDArray[np.float64]  # (m, m): Inverse of its covariance
+    log_determinant: float  # Logarithm of the determinant of its covariance
 
 
 @kernel
 def depths_at_nodes(nodes: NDArray[np.float64], extinctions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Optical depth up to each node [-].
-
-    Parameters
-    ----------
-    nodes : (m,) float64
-        Where they are along the path [m].
-    extinctions : (m,) float64
-        k there [1/m].
-    """
+    """Optical depth up to each node [-] (`nodes` (m,) [m], `extinctions` (m,) [1/m])."""
     depths = np.zeros(nodes.size)
     for j in range(1, nodes.size):
         depths[j] = depths[j - 1] + 0.5 * (extinctions[j - 1] + extinctions[j]) * (nodes[j] - nodes[j - 1])
@@ -246,25 +226,7 @@ def fit_uneven(
 ) -> Solution:
     """Gauss–Newton from a start, a step that leads uphill halved.
 
-    Parameters
-    ----------
-    bins : Bins
-        What is seen where.
-    albedo : Albedo
-        How the albedo wanders.
-    prior : JointPrior
-        Sky, horizon and lens.
-    fog : FogNodes
-        Cells of the path.
-    start : (m + 3,) float64
-        ln k of each cell, airlight, shift, vignetting that is left.
-    iterations : int
-        Most steps.
-
-    Returns
-    -------
-    Solution
-        Its ``theta`` as the start.
+    Returns Its ``theta`` as the start. Takes `start` (m + 3,).
     """
     strips, count = bins.luminance.shape
     cells = fog.nodes.size
@@ -309,17 +271,7 @@ def fit_uneven(
 
 @kernel
 def first_profile(bins: Bins, nodes: NDArray[np.float64], prior: JointPrior) -> NDArray[np.float64]:
-    """First guess of ln k of each cell, from the contrast that each bin has left.
-
-    Parameters
-    ----------
-    bins : Bins
-        What is seen where.
-    nodes : (m,) float64
-        Where nodes are along the path [m].
-    prior : JointPrior
-        Sky and horizon.
-    """
+    """First guess of ln k of each cell, from the contrast that each bin has left (`nodes` (m,) [m])."""
     strips, count = bins.luminance.shape
     sums, counts = np.zeros((nodes.size, 2)), np.zeros(nodes.size)
     depth, near = np.empty(strips), 0.0
@@ -362,17 +314,7 @@ def first_profile(bins: Bins, nodes: NDArray[np.float64], prior: JointPrior) -> 
 
 @kernel
 def distance_at_depth(nodes: NDArray[np.float64], logs: NDArray[np.float64], depth: float) -> float:
-    """Distance at which an optical depth is reached [m].
-
-    Parameters
-    ----------
-    nodes : (m,) float64
-        Where nodes are along the path [m].
-    logs : (m,) float64
-        ln k there.
-    depth : float
-        The optical depth [-].
-    """
+    """Distance at which an optical depth is reached [m] (`nodes` (m,) [m], `logs` (m,))."""
     extinctions = np.exp(logs)
     depths, node = depths_at_nodes(nodes, extinctions), nodes.size - 1
     while node > 0 and depths[node] > depth:
@@ -391,14 +333,7 @@ def depth_at(
 ) -> tuple[float, NDArray[np.float64]]:
     """Optical depth up to a distance [-], and its derivatives by ln k of each node.
 
-    Parameters
-    ----------
-    nodes : (m,) float64
-        Where nodes are along the path [m].
-    logs : (m,) float64
-        ln k there.
-    distance : float
-        The distance [m].
+    Takes `nodes` (m,) [m], `logs` (m,), `distance` [m].
     """
     extinctions, node = np.exp(logs), _before(nodes, distance)
     gradient: NDArray[np.float64] = _node_weights(nodes)[node] * extinctions
@@ -411,15 +346,5 @@ def depth_at(
 
 @kernel
 def extinction_at(nodes: NDArray[np.float64], logs: NDArray[np.float64], distance: float) -> float:
-    """Extinction at a distance [1/m].
-
-    Parameters
-    ----------
-    nodes : (m,) float64
-        Where nodes are along the path [m].
-    logs : (m,) float64
-        ln k there.
-    distance : float
-        The distance [m].
-    """
+    """Extinction at a distance [1/m] (`nodes` (m,) [m], `logs` (m,), `distance` [m])."""
     return _extinction_at(nodes, np.exp(logs), _before(nodes, distance), distance)

@@ -39,12 +39,7 @@ and relative to the fall itself, where the road is not flat [-]."""
 def road_before(camera: Camera, depth: float) -> tuple[slice, slice]:
     """Every fourth row, and the columns, of the road between the camera and a vehicle ahead in a level image.
 
-    Parameters
-    ----------
-    camera : Camera
-        The assumed calibration.
-    depth : float
-        From the camera to the vehicle's rear [m].
+    Takes `depth` [m].
     """
     scale = camera.focal_length / depth
     first = min(math.ceil(camera.horizon_row + camera.row_distance / depth + GAP * scale), camera.height - 3)
@@ -59,17 +54,7 @@ def check_road(road: NDArray[np.float32], sky: float) -> None:
     What they light is the vehicle, too, and the fog before it, which then has no airlight of the sky's: contrast to the
     sky no longer falls as Duntley's law has it.
 
-    Parameters
-    ----------
-    road : (rows, cols) float32
-        Luminance of the road before the vehicle, as `road_before` has it; nothing is refused where it is empty.
-    sky : float
-        Luminance of the sky in the same unit.
-
-    Raises
-    ------
-    CannotTellError
-        If it is.
+    Takes `road` (rows, cols).
     """
     if road.size and float(np.median(road)) > BRIGHT_ROAD * sky:
         raise CannotTellError("the road is brighter than the sky: this is a daytime method")
@@ -77,14 +62,10 @@ def check_road(road: NDArray[np.float32], sky: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class RoadFall:
-    """How the road's contrast to the airlight falls near the camera.
+    """How the road's contrast to the airlight falls near the camera."""
 
-    Attributes
-    ----------
-    way, contrast, share : (n,) float64
-        Distances of rows of road [m], their contrast to their airlight, and that over the one at the horizon [-].
-    """
-
+    # way, contrast, share (n,): distances of rows of road [m], their contrast to their airlight, and that over the one
+    # at the horizon [-]
     way: NDArray[np.float64]
     contrast: NDArray[np.float64]
     share: NDArray[np.float64]
@@ -92,10 +73,7 @@ class RoadFall:
     def is_lit(self, extinction: float, deviation: float) -> bool:
         """Whether it falls by so much less than in fog by day that lamps must light what is near.
 
-        Parameters
-        ----------
-        extinction, deviation : float
-            What the vehicle's contrast says, and its standard deviation [1/m].
+        Takes `extinction`, `deviation` [1/m].
         """
         rise = self.rise(extinction - 2.0 * deviation)
         return bool(self.way.size) and rise > UNEVEN + SHARE * extinction * float(np.ptp(self.way))
@@ -103,10 +81,7 @@ class RoadFall:
     def rise(self, extinction: float) -> float:
         """By how much the logarithm of the contrast to the horizon, had there been no fog, rises from near to far [-].
 
-        Parameters
-        ----------
-        extinction : float
-            k of the fog through which the road is seen [1/m]; then it is 0 by day on a road of one reflectance.
+        Takes `extinction` [1/m].
         """
         if not self.way.size:
             return 0.0
@@ -133,23 +108,7 @@ def road_fall(
     By day (A − L)/A = (1 − R/A) e^(−kd) on a road of one reflectance. Head lamps make the nearest metres brightest, so
     it falls less or even grows, at illuminances where the road is still darker than the sky.
 
-    Parameters
-    ----------
-    luminance_of : callable
-        Linear luminance of rows and columns of the level image, over `share`.
-    camera : Camera
-        The assumed calibration.
-    depth : float
-        From the camera to the vehicle's rear, ``inf`` where there is none [m].
-    sky : float
-        Luminance of the airlight at the horizon in the same unit.
-    share : (rows,) float64 or None
-        Airlight of the image's rows over that; None where it is even.
-
-    Returns
-    -------
-    RoadFall
-        Without rows where too little of the road is seen; then nothing is lit.
+    Returns without rows where too little of the road is seen; then nothing is lit. Takes `depth` [m], `share` (rows,).
     """
     nearest = max(camera.row_distance / max(camera.height - 1.0 - camera.horizon_row, 1.0), NEAREST)
     farthest = min(FARTHEST, depth - SHADOW)
@@ -194,19 +153,7 @@ def airlight_beside(light: NDArray[np.float32], about: float, noise: float, axis
     A bright part of an even sky, and not its brightest pixels: at a range where the fog leaves 2 % of a contrast, an
     airlight that is wrong by 0.2 % is a tenth of it.
 
-    Parameters
-    ----------
-    light : (rows, cols) float32
-        Luminance above the horizon.
-    about, noise : float
-        What the sky's light is about, and the deviation of single pixels of it, in the same unit.
-    axis, hidden : float
-        Column of the own axis, and how far from it the vehicle may stand [px].
-
-    Returns
-    -------
-    float
-        In the unit of the luminance.
+    Returns In the unit of the luminance. Takes `light` (rows, cols), `axis`, `hidden` [px].
     """
     columns = _blocks(light.shape[1])
     free = [block for block in columns if abs(0.5 * (block.start + block.stop - 1) - axis) > hidden]
@@ -235,13 +182,5 @@ def _mean(part: NDArray[np.float32], about: float, noise: float) -> float | None
 
 
 def hidden_beside(focal_length: float, depth: float) -> float:
-    """How far from the axis a vehicle ahead may hide the sky [px].
-
-    Parameters
-    ----------
-    focal_length : float
-        [px].
-    depth : float
-        From the camera to its rear, ``inf`` where there is none [m].
-    """
+    """How far from the axis a vehicle ahead may hide the sky [px] (`focal_length` [px], `depth` [m])."""
     return HALF_TRUCK * focal_length / depth if math.isfinite(depth) else 0.0

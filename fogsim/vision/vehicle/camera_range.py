@@ -48,14 +48,7 @@ class CameraRange:
     pictures, for the nearest show it best, and from the usual width of vehicles. An error of W is common to all ranges,
     and so goes into k as a factor.
 
-    Parameters
-    ----------
-    camera : Camera
-        The assumed calibration.
-    width : float or None
-        The vehicle's known width [m].
-    pitch_deviation : float
-        Standard deviation of the true pitch about the assumed one [rad].
+    Takes `width` [m], `pitch_deviation` [rad].
     """
 
     def __init__(self, camera: Camera, width: float | None, pitch_deviation: float) -> None:
@@ -86,18 +79,7 @@ class CameraRange:
         return 1.0 / math.hypot(1.0 / by_contact, 1.0 / WIDTH_SPREAD)
 
     def measure(self, crop_at: Callable[[float], VehicleCrop]) -> tuple[float, float]:
-        """Range from the camera, and its standard deviation that is not common to all [m].
-
-        Parameters
-        ----------
-        crop_at : callable
-            Crop of the image where a vehicle at some range [m] can be.
-
-        Raises
-        ------
-        CannotTellError
-            If no vehicle stands out.
-        """
+        """Range from the camera, and its standard deviation that is not common to all [m] (`crop_at` [m])."""
         box = self._search(crop_at) if self._distance is None else self._follow(crop_at, self._distance)
         width = self._known or self._first_width
         distance = width * self._camera.focal_length / box.width

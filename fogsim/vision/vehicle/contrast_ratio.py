@@ -53,31 +53,17 @@ LEAST_KEPT, LEAST_PIXELS = 0.5, 12
 
 @dataclass(frozen=True, slots=True)
 class RearPicture:
-    """A part of an image around the rear of a vehicle.
+    """A part of an image around the rear of a vehicle."""
 
-    Attributes
-    ----------
-    contrast : (rows, cols) float64
-        (A − L) / A, A the luminance of the sky [-].
-    noise : float
-        Deviation of single pixels of it [-].
-    column, foot : float
-        Where the middle of the rear meets the road, in columns and rows of the picture [px].
-    scale : float
-        Pixels in a metre at the vehicle [px/m].
-    width : float
-        Of the vehicle [m].
-    clipped : tuple of float
-        By how much the light from which channels are clipped is above the sky's, and their single deviation, over it;
-        the latter is 0 where nothing is clipped [-].
-    """
-
-    contrast: Floats
-    noise: float
+    contrast: Floats  # (rows, cols): (A − L) / A, A the luminance of the sky [-]
+    noise: float  # Deviation of single pixels of it [-]
+    # column, foot: where the middle of the rear meets the road, in columns and rows of the picture [px]
     column: float
     foot: float
-    scale: float
-    width: float
+    scale: float  # Pixels in a metre at the vehicle [px/m]
+    width: float  # Of the vehicle [m]
+    # By how much the light from which channels are clipped is above the sky's, and their single deviation, over it; the
+    # latter is 0 where nothing is clipped [-]
     clipped: tuple[float, float] = (1.0, 0.0)
 
     @property
@@ -86,54 +72,30 @@ class RearPicture:
         return HIGH if self.width >= LARGE else HEIGHTS
 
     def displaced(self, right: float, up: float) -> "RearPicture":
-        """The same picture of a vehicle that stands elsewhere in it.
-
-        Parameters
-        ----------
-        right, up : float
-            How much farther right and up [m].
-        """
+        """The same picture of a vehicle that stands elsewhere in it (`right`, `up` [m])."""
         return replace(self, column=self.column + right * self.scale, foot=self.foot - up * self.scale)
 
 
 @dataclass(frozen=True, slots=True)
 class ContrastRatio:
-    """Contrast of a picture over that of another of the same vehicle.
+    """Contrast of a picture over that of another of the same vehicle."""
 
-    Attributes
-    ----------
-    ratio, deviation : float
-        The ratio and its standard deviation by noise and by cells that differ [-].
-    lever : float
-        Change of the ratio with an error of the airlight relative to it [-].
-    visible : float
-        Contrast of the reference in standard deviations of the other picture's cells [-].
-    kept : float
-        Share of the cells that took part [-].
-    """
-
+    # ratio, deviation: the ratio and its standard deviation by noise and by cells that differ [-]
     ratio: float
     deviation: float
-    lever: float
-    visible: float
-    kept: float
+    lever: float  # Change of the ratio with an error of the airlight relative to it [-]
+    visible: float  # Contrast of the reference in standard deviations of the other picture's cells [-]
+    kept: float  # Share of the cells that took part [-]
 
 
 @dataclass(frozen=True, slots=True)
 class MeanLuminances:
-    """Weighted means of the same pixels of two pictures, over the luminance of either's sky.
+    """Weighted means of the same pixels of two pictures, over the luminance of either's sky."""
 
-    Attributes
-    ----------
-    far, near : float
-        Means [-].
-    deviation : float
-        Standard deviation of the far mean by noise, shading and misplacement [-].
-    """
-
+    # far, near: means [-]
     far: float
     near: float
-    deviation: float
+    deviation: float  # Standard deviation of the far mean by noise, shading and misplacement [-]
 
 
 def resample(picture: RearPicture, lateral: Floats, height: Floats, cell: float) -> tuple[Floats, float]:
@@ -141,14 +103,7 @@ def resample(picture: RearPicture, lateral: Floats, height: Floats, cell: float)
 
     A far picture's box is one pixel; a near one's is wider by what a far pixel blurs, and squares of widths add.
 
-    Parameters
-    ----------
-    picture : RearPicture
-        The picture.
-    lateral, height : (n,) and (m,) float64
-        Middles of the cells to the right of the vehicle's middle and above the road [m].
-    cell : float
-        Size of a cell [m].
+    Takes `lateral`, `height` (m,) [m], `cell` [m].
     """
     box = math.sqrt(max(2.0 * (cell * picture.scale) ** 2 - 1.0, 1.0))
     rows, cols = picture.foot - height * picture.scale, picture.column + lateral * picture.scale
@@ -157,26 +112,12 @@ def resample(picture: RearPicture, lateral: Floats, height: Floats, cell: float)
 
 
 def common_cell(one: RearPicture, other: RearPicture) -> float:
-    """Size of a pixel of the coarser of two pictures [m].
-
-    Parameters
-    ----------
-    one, other : RearPicture
-        The two, in either order.
-    """
+    """Size of a pixel of the coarser of two pictures [m]."""
     return max(1.0 / one.scale, 1.0 / other.scale, FINEST)
 
 
 def cell_centres(low: float, high: float, cell: float, least: int) -> Floats:
-    """Middles of cells between two places [m].
-
-    Parameters
-    ----------
-    low, high, cell : float
-        The places and the cells' size [m].
-    least : int
-        How many cells there are at least.
-    """
+    """Middles of cells between two places [m] (`low`, `high`, `cell` [m])."""
     count = max(round((high - low) / cell), least)
     return np.asarray(0.5 * (low + high) + cell * (np.arange(count) - 0.5 * (count - 1)), np.float64)
 
@@ -188,15 +129,7 @@ def contrast_ratio(reference: RearPicture, picture: RearPicture) -> ContrastRati
     loss of detail makes them bright; edges, which are not resolved alike, little; what is as bright as the airlight and
     what has changed (lit lamps) not at all.
 
-    Parameters
-    ----------
-    reference, picture : RearPicture
-        The vehicle, placed in both.
-
-    Returns
-    -------
-    ContrastRatio or None
-        None if the reference shows no contrast, or too much has changed.
+    Returns None if the reference shows no contrast, or too much has changed.
     """
     cell = common_cell(reference, picture)
     side = HALF_BODY * reference.width
@@ -238,21 +171,8 @@ def mean_luminances(
     what moved) not at all. The weights come from the near picture, or with residuals of either sign, so noise does not
     bias the mean.
 
-    Parameters
-    ----------
-    near, far : Patch
-        The two pictures.
-    at : Placement
-        Where the near one is in the far one.
-    skies : tuple of float
-        Luminance of the near and of the far picture's sky [linear grey levels].
-    noise : float
-        Standard deviation of single pixels [linear grey levels].
-
-    Returns
-    -------
-    MeanLuminances or None
-        None if nothing differs from the sky, or too few pixels can be compared.
+    Returns None if nothing differs from the sky, or too few pixels can be compared. Takes `skies` [linear grey levels],
+    `noise` [linear grey levels].
     """
     grid = pixel_grid(near, far, at)
     if grid is None or grid.far.size < LEAST_PIXELS:

@@ -17,22 +17,13 @@ STEPS, HUBER = 12, 2.5
 
 @dataclass(frozen=True, slots=True)
 class DecayFit:
-    """Decay c = C e^(−kd) + o.
+    """Decay c = C e^(−kd) + o."""
 
-    Attributes
-    ----------
-    extinction, deviation : float
-        k and its standard deviation [1/m].
-    contrast : float
-        C [-].
-    misfit : float
-        Mean square of the standardised residuals [-].
-    """
-
+    # extinction, deviation: k and its standard deviation [1/m]
     extinction: float
     deviation: float
-    contrast: float
-    misfit: float
+    contrast: float  # C [-]
+    misfit: float  # Mean square of the standardised residuals [-]
 
 
 def fit_decay(distance: Floats, contrast: Floats, noise: Floats, relative: float, offset: float) -> DecayFit | None:
@@ -40,19 +31,7 @@ def fit_decay(distance: Floats, contrast: Floats, noise: Floats, relative: float
 
     Fitted in the contrasts themselves and not in their logarithms, which noise would bias and make undefined.
 
-    Parameters
-    ----------
-    distance, contrast, noise : (n,) float64
-        Range [m], contrast to the airlight and its noise [-].
-    relative : float
-        Relative deviation of each contrast beside the noise [-].
-    offset : float
-        Deviation of an error o that all contrasts share, as a wrong airlight makes it [-].
-
-    Returns
-    -------
-    DecayFit or None
-        None if there are fewer than three ranges or no contrast.
+    Returns None if there are fewer than three ranges or no contrast. Takes `distance`, `contrast`, `noise` (n,) [m].
     """
     if distance.size < 3 or float(np.abs(contrast).max()) <= 0:
         return None

@@ -17,43 +17,26 @@ LEAST_BOX = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Patch:
-    """A piece of an image and the point in it that is followed.
+    """A piece of an image and the point in it that is followed."""
 
-    Attributes
-    ----------
-    luminance : (rows, cols) float64
-        Linear grey levels.
-    column, row : float
-        Position of the followed point, in columns and rows of the patch [px].
-    half_width, half_height : float
-        Size of the followed thing about that point [px]; the patch may hold more around it.
-    blur : float
-        Standard deviation of the lens' blur beside the pixels' own size [px].
-    """
-
-    luminance: Floats
+    luminance: Floats  # (rows, cols): Linear grey levels
+    # column, row: position of the followed point, in columns and rows of the patch [px]
     column: float
     row: float
+    # half_width, half_height: size of the followed thing about that point [px]; the patch may hold more around it
     half_width: float
     half_height: float
-    blur: float = 0.0
+    blur: float = 0.0  # Standard deviation of the lens' blur beside the pixels' own size [px]
 
 
 @dataclass(frozen=True, slots=True)
 class Placement:
-    """Where a near patch's point is in a far patch, and how much smaller it is there.
+    """Where a near patch's point is in a far patch, and how much smaller it is there."""
 
-    Attributes
-    ----------
-    column, row : float
-        Columns and rows of the far patch [px].
-    scale : float
-        Far size over near size [-].
-    """
-
+    # column, row: columns and rows of the far patch [px]
     column: float
     row: float
-    scale: float
+    scale: float  # Far size over near size [-]
 
 
 def box_weights(
@@ -64,23 +47,8 @@ def box_weights(
     A far pixel covers 1/scale near ones, and its light is their mean: detail that the far picture cannot resolve is
     averaged out of the near one before they are compared. Without that, thin fog is overestimated.
 
-    Parameters
-    ----------
-    near_size : int
-        Near pixels along the axis.
-    centre, far_centre : float
-        The common point in either [px].
-    far : (n,) float64
-        Far pixels [px].
-    scale : float
-        Far size over near size [-].
-    blur : float
-        Standard deviation of the lens' blur [px].
-
-    Returns
-    -------
-    (n, near_size) float64
-        Rows sum to 1 where the far pixel lies inside the near patch.
+    Returns rows sum to 1 where the far pixel lies inside the near patch (n, near_size). Takes `centre`, `far_centre`
+    [px], `far` (n,) [px], `blur` [px].
     """
     # A near pixel is itself a mean over 1 and blurred: squares of widths add, as variances do, and a box of width w
     # has the variance w²/12.
@@ -101,31 +69,16 @@ def pixel_shares(size: int, middle: Floats, half: float) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class PixelGrid:
-    """Far pixels that are compared.
+    """Far pixels that are compared."""
 
-    Attributes
-    ----------
-    rows, cols : (n,) and (m,) float64
-        Which they are in the far patch [px].
-    far : (n, m) float64
-        Their luminance [linear grey levels].
-    """
-
+    # rows, cols (m,): which they are in the far patch [px]
     rows: Floats
     cols: Floats
-    far: Floats
+    far: Floats  # (n, m): Their luminance [linear grey levels]
 
 
 def pixel_grid(near: Patch, far: Patch, at: Placement) -> PixelGrid | None:
-    """Far pixels that the followed thing covers wholly; None if they are too few.
-
-    Parameters
-    ----------
-    near, far : Patch
-        The two pictures.
-    at : Placement
-        Where the near one is in the far one.
-    """
+    """Far pixels that the followed thing covers wholly; None if they are too few."""
     spans = []
     for centre, half, size in (
         (at.row, near.half_height * at.scale, far.luminance.shape[0]),
@@ -142,57 +95,25 @@ def pixel_grid(near: Patch, far: Patch, at: Placement) -> PixelGrid | None:
 
 
 def downsample_to(near: Patch, grid: PixelGrid, at: Placement) -> Floats:
-    """Near patch (n, m) as the far camera would show it without fog.
-
-    Parameters
-    ----------
-    near : Patch
-        The near picture.
-    grid : PixelGrid
-        The far pixels.
-    at : Placement
-        Where the near picture is among them.
-    """
+    """Near patch (n, m) as the far camera would show it without fog."""
     return matrix_product(shrunk_rows(near, grid, at), column_weights(near, grid, at).T)
 
 
 def shrunk_rows(near: Patch, grid: PixelGrid, at: Placement) -> Floats:
-    """Rows of the near patch as the far camera would show them, in its own columns (n, near columns).
-
-    Parameters
-    ----------
-    near, grid, at : Patch, PixelGrid, Placement
-        See `downsample_to`.
-    """
+    """Rows of the near patch as the far camera would show them, in its own columns (n, near columns)."""
     rows = box_weights(near.luminance.shape[0], near.row, grid.rows, at.row, at.scale, near.blur)
     return matrix_product(rows, near.luminance)
 
 
 def column_weights(near: Patch, grid: PixelGrid, at: Placement) -> Floats:
-    """Shares (m, near columns) of the near patch's columns in the far ones.
-
-    Parameters
-    ----------
-    near, grid, at : Patch, PixelGrid, Placement
-        See `downsample_to`.
-    """
+    """Shares (m, near columns) of the near patch's columns in the far ones."""
     return box_weights(near.luminance.shape[1], near.column, grid.cols, at.column, at.scale, near.blur)
 
 
 def shrink(patch: Patch, scale: float) -> Patch:
     """Picture of fewer, larger pixels.
 
-    Parameters
-    ----------
-    patch : Patch
-        The picture.
-    scale : float
-        New size over old size, at most 1 [-].
-
-    Returns
-    -------
-    Patch
-        The same picture; as it is where the scale is 1.
+    Returns the same picture; as it is where the scale is 1.
     """
     if scale >= 1.0:
         return patch
@@ -229,13 +150,6 @@ def _box_means(values: Floats, scale: float, half: float) -> Floats:
 def rescale_position(position: float, scale: float, before: int, after: int) -> float:
     """Row or column of a point once a picture's pixels have become others of another size about the same middle [px].
 
-    Parameters
-    ----------
-    position : float
-        Before [px].
-    scale : float
-        New size of the picture over its old one [-].
-    before, after : int
-        How many pixels there were and are along the axis.
+    Takes `position` [px].
     """
     return (position - 0.5 * (before - 1)) * scale + 0.5 * (after - 1)

@@ -20,21 +20,12 @@ EDGE_GAIN = 0.41
 
 @dataclass(frozen=True, slots=True)
 class Presence:
-    """What came of looking for a vehicle.
+    """What came of looking for a vehicle."""
 
-    Attributes
-    ----------
-    step : float
-        Lesser step of luminance across the sides of what is most like a vehicle, over the airlight; 0 for nothing [-].
-    threshold : float
-        What it must be for a vehicle to be found: by noise and clutter; over the airlight [-].
-    aside : float
-        How far to the right of the own axis the middle is [m].
-    """
-
+    # Lesser step of luminance across the sides of what is most like a vehicle, over the airlight; 0 for nothing [-]
     step: float
-    threshold: float
-    aside: float = 0.0
+    threshold: float  # What it must be for a vehicle to be found: by noise and clutter; over the airlight [-]
+    aside: float = 0.0  # How far to the right of the own axis the middle is [m]
 
     @property
     def found(self) -> bool:
@@ -55,20 +46,7 @@ def vehicle_presence(
     What is brighter than the airlight, as lamps are, counts as bright as that: so no contrast exceeds e^(−kd), by what
     light ever it comes.
 
-    Parameters
-    ----------
-    luminance : (rows, cols) float32
-        A part of a level image [linear grey levels].
-    origin : tuple of int
-        Column and row of the whole image that its first pixel is.
-    camera : Camera
-        The assumed calibration.
-    depth : float
-        From the camera to the vehicle's rear [m].
-    aside : float
-        How far beside the own axis its middle may be [m].
-    light : tuple of float
-        Luminance of the airlight and deviation of single pixels [linear grey levels].
+    Takes `luminance` (rows, cols) [linear grey levels], `depth` [m], `aside` [m], `light` [linear grey levels].
     """
     airlight, noise = light
     scale = camera.focal_length / depth

@@ -57,40 +57,18 @@ TYRES = 0.12
 
 @dataclass(frozen=True, slots=True)
 class RearBox:
-    """Rear of a vehicle in an image.
+    """Rear of a vehicle in an image."""
 
-    Attributes
-    ----------
-    column : float
-        Of its middle [px].
-    foot : float
-        Row at which it stands on the road [px].
-    width : float
-        [px].
-    evidence : float
-        How clearly the foot stands out, ln(1 + (step over the usual one)²) [-].
-    """
-
-    column: float
-    foot: float
-    width: float
-    evidence: float = 0.0
+    column: float  # Of its middle [px]
+    foot: float  # Row at which it stands on the road [px]
+    width: float  # [px]
+    evidence: float = 0.0  # How clearly the foot stands out, ln(1 + (step over the usual one)²) [-]
 
 
 def search_window(camera: Camera, distance: float) -> tuple[slice, slice] | None:
     """Rows and columns of a level image in which a vehicle at a distance can be.
 
-    Parameters
-    ----------
-    camera : Camera
-        The assumed calibration.
-    distance : float
-        From the camera to the vehicle's rear [m].
-
-    Returns
-    -------
-    tuple of two slices, or None
-        None if it is outside the image, or too small to be seen.
+    Returns None if it is outside the image, or too small to be seen. Takes `distance` [m].
     """
     scale = camera.focal_length / distance
     foot, pitch = camera.horizon_row + camera.row_distance / distance, 0.01 * camera.focal_length
@@ -107,27 +85,12 @@ def localise_rear(
 ) -> RearBox | None:
     """Find the rear of a vehicle at a known distance.
 
-    Left and right edge are the pair of columns with the strongest steps over the height of a vehicle's body, one up
-    and one down, at a width that vehicles have, weighted by how symmetric it looks in between and how near to the own
-    axis it is. The foot is the strongest step down the rows near where the calibration has the road.
+    Left and right edge are the pair of columns with the strongest steps over the height of a vehicle's body, one up and
+    one down, at a width that vehicles have, weighted by how symmetric it looks in between and how near to the own axis
+    it is. The foot is the strongest step down the rows near where the calibration has the road.
 
-    Parameters
-    ----------
-    luminance : (rows, cols) float32
-        A part of an image with level horizon that holds all rows and columns that are looked at.
-    origin : tuple of int
-        Column and row of the whole image that its first pixel is.
-    camera : Camera
-        The assumed calibration.
-    distance : float
-        From the camera to the rear [m].
-    noise : float
-        Standard deviation of single pixels [linear grey levels].
-
-    Returns
-    -------
-    RearBox or None
-        In pixels of the whole image; None if no such pair stands out of the noise.
+    Returns In pixels of the whole image; None if no such pair stands out of the noise. Takes `luminance` (rows, cols),
+    `distance` [m], `noise` [linear grey levels].
     """
     scale = camera.focal_length / distance
     foot = camera.horizon_row + camera.row_distance / distance - origin[1]
@@ -153,17 +116,8 @@ def _span(first: float, last: float, size: int) -> slice | None:
 def upright_steps(body: NDArray[np.float32], noise: float) -> tuple[Floats, float]:
     """Steps of luminance across upright edges, column by column, and the least that stands out.
 
-    Parameters
-    ----------
-    body : (rows, cols) float32
-        Rows in which the edges are upright [linear grey levels].
-    noise : float
-        Standard deviation of single pixels [linear grey levels].
-
-    Returns
-    -------
-    (cols,) float64, float
-        Both in linear grey levels per pixel.
+    Returns both in linear grey levels per pixel (cols,). Takes `body` (rows, cols) [linear grey levels], `noise`
+    [linear grey levels].
     """
     padded = np.pad(body.astype(np.float64), ((0, 0), (2, 2)), mode="reflect")
     smooth = np.sum([share * padded[:, i : i + body.shape[1]] for i, share in enumerate(SMOOTHING)], axis=0)

@@ -56,72 +56,37 @@ ASIDE, ABOVE, BELOW = 0.25, 0.15, 0.4
 
 @dataclass(frozen=True, slots=True)
 class PlacementPrior:
-    """What is known of a placement before looking.
+    """What is known of a placement before looking."""
 
-    Attributes
-    ----------
-    placement : Placement
-        The expected one.
-    column_deviation, row_deviation : float
-        Standard deviations of column and row [px].
-    scale_deviation : float
-        Standard deviation of the scale, relative [-].
-    """
-
-    placement: Placement
+    placement: Placement  # The expected one
+    # column_deviation, row_deviation: standard deviations of column and row [px]
     column_deviation: float
     row_deviation: float
-    scale_deviation: float
+    scale_deviation: float  # Standard deviation of the scale, relative [-]
 
 
 @dataclass(frozen=True, slots=True)
 class Regression:
-    """Far luminance as a line in near luminance, far = mean + slope · (near − near_mean).
+    """Far luminance as a line in near luminance, far = mean + slope · (near − near_mean)."""
 
-    Attributes
-    ----------
-    placement : Placement
-        Where the near patch fits.
-    slope, slope_deviation : float
-        Ratio of the contrasts and its standard deviation by noise and by detail that only one of them shows [-];
-        ``inf`` where the near pixels show no detail.
-    noise_deviation : float
-        Its standard deviation by noise alone [-].
-    mean, near_mean : float
-        Means of the far and of the near pixels [linear grey levels].
-    residual : float
-        Robust standard deviation of what is left [linear grey levels].
-    variance : float
-        Variance of the far pixels [linear grey levels²].
-    pixels : int
-        How many took part.
-    """
-
-    placement: Placement
+    placement: Placement  # Where the near patch fits
+    # slope, slope_deviation: ratio of the contrasts and its standard deviation by noise and by detail that only one of
+    # them shows [-]; ``inf`` where the near pixels show no detail
     slope: float
     slope_deviation: float
-    noise_deviation: float
+    noise_deviation: float  # Its standard deviation by noise alone [-]
+    # mean, near_mean: means of the far and of the near pixels [linear grey levels]
     mean: float
     near_mean: float
-    residual: float
-    variance: float
-    pixels: int
+    residual: float  # Robust standard deviation of what is left [linear grey levels]
+    variance: float  # Variance of the far pixels [linear grey levels²]
+    pixels: int  # How many took part
 
 
 def coarse_placement(near: Patch, far: Patch, prior: PlacementPrior) -> Placement | None:
     """Whole-pixel placement of greatest posterior: normalised correlation under the prior.
 
-    Parameters
-    ----------
-    near, far : Patch
-        The two pictures.
-    prior : PlacementPrior
-        Where the near patch is expected in the far one.
-
-    Returns
-    -------
-    Placement or None
-        None if the far patch is too small.
+    Returns None if the far patch is too small.
     """
     grid = pixel_grid(near, far, prior.placement)
     if grid is None:
@@ -145,27 +110,10 @@ def register(
     """Place a near patch in a far one and regress the far pixels on it.
 
     Gauss–Newton on column, row and scale with slope and mean projected out; pixels that have changed (lit lamps) and
-    saturated ones are left out. The noise of the near pixels is taken out of the slope. Where the detail does not
-    stand out of the noise, the best of many placements would be that of the noise: then the expected one is taken.
+    saturated ones are left out. The noise of the near pixels is taken out of the slope. Where the detail does not stand
+    out of the noise, the best of many placements would be that of the noise: then the expected one is taken.
 
-    Parameters
-    ----------
-    near, far : Patch
-        The two pictures; the near one is at least as large.
-    prior : PlacementPrior
-        Where the near one is expected in the far one.
-    noise : float
-        Standard deviation of single pixels [linear grey levels].
-    most : float
-        Largest slope that can be true [-]; a placement that gives more is one on something else.
-    outline : float
-        Size of what is placed over that of what is regressed [-]: the outline of a thing places it where its own
-        detail is faint.
-
-    Returns
-    -------
-    Regression or None
-        None if too few pixels can be compared.
+    Returns None if too few pixels can be compared. Takes `noise` [linear grey levels].
     """
     whole = replace(near, half_width=outline * near.half_width, half_height=outline * near.half_height)
     at = coarse_placement(whole, far, prior)
@@ -287,28 +235,17 @@ def _regression(near: Patch, grid: PixelGrid, at: Placement, noise: float) -> Re
 
 @dataclass(frozen=True, slots=True)
 class RoadBehind:
-    """What is known of the road behind a vehicle: the higher it is seen, the farther it is, and the faster it fades.
+    """What is known of the road behind a vehicle: the higher it is seen, the farther it is, and the faster it fades."""
 
-    Attributes
-    ----------
-    mount_height : float
-        Height of the camera above the road [m].
-    ratio : float
-        Contrast of the vehicle that is expected, over that of the reference [-].
-    """
-
-    mount_height: float
-    ratio: float
+    mount_height: float  # Height of the camera above the road [m]
+    ratio: float  # Contrast of the vehicle that is expected, over that of the reference [-]
 
     def contrast_ratio(self, height: Floats) -> Floats:
         """Ratio of a level road's contrasts over that of the vehicle's: t^(h / (H − h)).
 
         A line of sight at height h over a vehicle's foot at range d ends on the road at d H / (H − h).
 
-        Parameters
-        ----------
-        height : (n,) float64
-            Heights over the vehicle's foot at which the road is seen [m].
+        Takes `height` (n,) [m].
         """
         eye = self.mount_height
         farther = np.where(height < 0.9 * eye, height / np.maximum(eye - height, 0.1 * eye), 9.0)
@@ -320,21 +257,8 @@ def register_rear(
 ) -> tuple[RearPicture, float] | None:
     """Find the vehicle of a reference in a picture.
 
-    Parameters
-    ----------
-    reference : RearPicture
-        The vehicle as it was seen.
-    picture : RearPicture
-        Where it is expected.
-    aside, pitch : float
-        Standard deviations of its place sideways and upward [m].
-    behind : RoadBehind
-        The road beside the vehicle, which is placed by its outline, too.
-
-    Returns
-    -------
-    (RearPicture, float) or None
-        The picture with the place of greatest posterior, and the correlation there [-]; None if it is too small.
+    Returns the picture with the place of greatest posterior, and the correlation there [-]; None if it is too small.
+    Takes `aside`, `pitch` [m].
     """
     cell = common_cell(reference, picture)
     side = 0.5 * reference.width + ASIDE

@@ -18,20 +18,11 @@ INDEPENDENT = 8.0
 
 
 class MatchCost(NamedTuple):
-    """How unlikely each place of a template in an image is.
+    """How unlikely each place of a template in an image is."""
 
-    Attributes
-    ----------
-    correlation : (rows, cols) float64
-        Correlation coefficient, 0 where negative [-].
-    cost : (rows, cols) float64
-        Negative logarithm of the posterior, up to a constant [-].
-    row, col : int
-        Place of the least cost.
-    """
-
-    correlation: Floats
-    cost: Floats
+    correlation: Floats  # (rows, cols): Correlation coefficient, 0 where negative [-]
+    cost: Floats  # (rows, cols): Negative logarithm of the posterior, up to a constant [-]
+    # row, col: place of the least cost
     row: int
     col: int
 
@@ -39,14 +30,7 @@ class MatchCost(NamedTuple):
 def match_cost(image: Floats, template: Floats, prior: Floats) -> MatchCost:
     """Correlate a template with every place of an image that it fits in, under what is known of its place.
 
-    Parameters
-    ----------
-    image : (rows, cols) float64
-        The image.
-    template : (m, n) float64
-        The template, m ≤ rows and n ≤ cols.
-    prior : (rows - m + 1, cols - n + 1) float64
-        Negative logarithm of the prior of its first pixel's place [-].
+    Takes `image` (rows, cols), `template` (m, n), `prior` (rows - m + 1, cols - n + 1).
     """
     correlation = np.clip(correlations(np.ascontiguousarray(image), np.ascontiguousarray(template)), 0.0, 0.9999)
     cost = 0.5 * template.size / INDEPENDENT * np.log1p(-(correlation**2)) + prior
@@ -57,12 +41,7 @@ def match_cost(image: Floats, template: Floats, prior: Floats) -> MatchCost:
 def vertex(values: Floats, at: int) -> float:
     """Where the minimum at a sample lies between its neighbours, by a parabola [samples]; 0 at the border.
 
-    Parameters
-    ----------
-    values : (n,) float64
-        Samples.
-    at : int
-        The least of them.
+    Takes `values` (n,).
     """
     if not 0 < at < values.size - 1:
         return 0.0
@@ -75,17 +54,8 @@ def vertex(values: Floats, at: int) -> float:
 def correlations(image: Floats, template: Floats) -> Floats:
     """Correlation coefficient of a template with each place of an image that it fits in; 0 where either is even.
 
-    Parameters
-    ----------
-    image : (rows, cols) float64
-        The image.
-    template : (m, n) float64
-        The template, m ≤ rows and n ≤ cols.
-
-    Returns
-    -------
-    (rows - m + 1, cols - n + 1) float64
-        By the place of the template's first row and column.
+    Returns by the place of the template's first row and column (rows - m + 1, cols - n + 1). Takes `image` (rows,
+    cols), `template` (m, n).
     """
     height, width = template.shape
     rows, cols = image.shape[0] - height + 1, image.shape[1] - width + 1

@@ -42,56 +42,32 @@ Luminance = NDArray[np.float32]
 
 
 class SkyReading(NamedTuple):
-    """The airlight as a method reads it above the horizon.
+    """The airlight as a method reads it above the horizon."""
 
-    Attributes
-    ----------
-    luminance, noise : float
-        Its luminance, and the deviation of its single pixels [linear grey levels].
-    clipping : Clipping or None
-        What clipping takes of it; None if it is saturated, and its luminance unknown.
-    is_clipped : bool
-        Whether it may be brighter than it looks.
-    deviation : float
-        Relative deviation of the airlight before the vehicle from it, where that is another by elevation [-].
-    """
-
+    # luminance, noise: its luminance, and the deviation of its single pixels [linear grey levels]
     luminance: float
     noise: float
-    clipping: Clipping | None
-    is_clipped: bool
+    clipping: Clipping | None  # What clipping takes of it; None if it is saturated, and its luminance unknown
+    is_clipped: bool  # Whether it may be brighter than it looks
+    # Relative deviation of the airlight before the vehicle from it, where that is another by elevation [-]
     deviation: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class LevelledRows:
-    """Rows that were taken relative to their own airlight, as it is with some extinction.
+    """Rows that were taken relative to their own airlight, as it is with some extinction."""
 
-    Attributes
-    ----------
-    sky : Sky
-        The sky that brightens upward.
-    camera : Camera
-        The assumed calibration.
-    rows, above : slice
-        Rows of the image that were cut out, and those above the horizon where the airlight is read.
-    extinction : float
-        With which their airlight was reckoned [1/m].
-    """
-
-    sky: Sky
-    camera: Camera
+    sky: Sky  # The sky that brightens upward
+    camera: Camera  # The assumed calibration
+    # rows, above: rows of the image that were cut out, and those above the horizon where the airlight is read
     rows: slice
     above: slice
-    extinction: float
+    extinction: float  # With which their airlight was reckoned [1/m]
 
     def change(self, extinction: float) -> NDArray[np.float64]:
         """By which factor luminance over the airlight is another with another extinction, (rows,) float64 [-].
 
-        Parameters
-        ----------
-        extinction : float
-            The other one [1/m].
+        Takes `extinction` [1/m].
         """
         was, now = (row_airlight(self.sky, self.camera, k) for k in (self.extinction, extinction))
         if was is None or now is None:
@@ -102,36 +78,16 @@ class LevelledRows:
 
 @dataclass(frozen=True, slots=True)
 class VehicleCrop:
-    """Where in an image the vehicle ahead is looked for.
+    """Where in an image the vehicle ahead is looked for."""
 
-    Attributes
-    ----------
-    camera : Camera
-        The assumed calibration.
-    depth : float
-        From the camera to the vehicle's rear [m].
-    luminance : (rows, cols) float32
-        The part of the image [linear grey levels].
-    origin : tuple of int
-        Column and row of the whole image that its first pixel is.
-    sky : SkyReading
-        The airlight.
-    noise : float
-        Deviation of its single pixels [linear grey levels].
-    road : RoadFall
-        How the contrast of the nearest road falls.
-    levelled : LevelledRows or None
-        How rows were taken relative to their own airlight; None where that is even.
-    """
-
-    camera: Camera
-    depth: float
-    luminance: NDArray[np.float32]
-    origin: tuple[int, int]
-    sky: SkyReading
-    noise: float
-    road: RoadFall
-    levelled: LevelledRows | None = None
+    camera: Camera  # The assumed calibration
+    depth: float  # From the camera to the vehicle's rear [m]
+    luminance: NDArray[np.float32]  # (rows, cols): The part of the image [linear grey levels]
+    origin: tuple[int, int]  # Column and row of the whole image that its first pixel is
+    sky: SkyReading  # The airlight
+    noise: float  # Deviation of its single pixels [linear grey levels]
+    road: RoadFall  # How the contrast of the nearest road falls
+    levelled: LevelledRows | None = None  # How rows were taken relative to their own airlight; None where that is even
 
     @property
     def scale(self) -> float:
@@ -139,39 +95,19 @@ class VehicleCrop:
         return self.camera.focal_length / self.depth
 
     def localise(self) -> RearPicture:
-        """Find a vehicle that has not been seen before.
-
-        Raises
-        ------
-        CannotTellError
-            If none stands out.
-        """
+        """Find a vehicle that has not been seen before."""
         window = localise_rear(self.luminance, self.origin, self.camera, self.depth, self.noise)
         if window is None or window.width < LEAST_WIDTH:
             raise CannotTellError("no vehicle stands out where the range says that there is one")
         return self.picture(RearBox(window.column, self._road_row, window.width), self.scale)
 
     def expected(self, aside: float, width: float) -> RearPicture:
-        """Picture of a vehicle where it is expected.
-
-        Parameters
-        ----------
-        aside, width : float
-            How far to the right of the axis it is, and its width [m].
-        """
+        """Picture of a vehicle where it is expected (`aside`, `width` [m])."""
         column = self.camera.principal_point[0] + aside * self.scale
         return self.picture(RearBox(column, self._road_row, width * self.scale), self.scale)
 
     def picture(self, window: RearBox, scale: float) -> RearPicture:
-        """Picture of what stands at a place in the image.
-
-        Parameters
-        ----------
-        window : RearBox
-            The place.
-        scale : float
-            Pixels in a metre at the vehicle [px/m].
-        """
+        """Picture of what stands at a place in the image (`scale` [px/m])."""
         spread = 0.0 if self.sky.clipping is None else self.sky.clipping.spread
         contrast = 1.0 - self.luminance.astype(np.float64) / self.sky.luminance
         return RearPicture(
@@ -185,34 +121,16 @@ class VehicleCrop:
         )
 
     def box_of(self, picture: RearPicture) -> RearBox:
-        """Place in the image.
-
-        Parameters
-        ----------
-        picture : RearPicture
-            A picture of this crop.
-        """
+        """Place in the image."""
         column, foot = picture.column + self.origin[0], picture.foot + self.origin[1]
         return RearBox(column, foot, picture.width * picture.scale)
 
     def lateral_offset(self, picture: RearPicture) -> float:
-        """How far the vehicle is to the right of the axis [m].
-
-        Parameters
-        ----------
-        picture : RearPicture
-            A picture of this crop.
-        """
+        """How far the vehicle is to the right of the axis [m]."""
         return (picture.column + self.origin[0] - self.camera.principal_point[0]) / self.scale
 
     def pitch_error(self, picture: RearPicture) -> float:
-        """How far above where the assumed pitch has it the vehicle is [rad].
-
-        Parameters
-        ----------
-        picture : RearPicture
-            A picture of this crop.
-        """
+        """How far above where the assumed pitch has it the vehicle is [rad]."""
         return (self._road_row - picture.foot - self.origin[1]) / self.camera.focal_length
 
     @property
@@ -230,26 +148,7 @@ def vehicle_crop(
 ) -> VehicleCrop:
     """Cut out of a frame where a vehicle can be.
 
-    Parameters
-    ----------
-    camera : Camera
-        The assumed calibration.
-    depth : float
-        From the camera to the vehicle's rear [m].
-    luminance_of : callable
-        Linear luminance of rows and columns of the level image [linear grey levels].
-    read_sky : callable
-        The method's own reading of the airlight; called where a vehicle could be seen.
-    least_noise : float
-        Noise of single pixels that there is at least [linear grey levels].
-    share : (rows,) float64 or None
-        Airlight of the level image's rows over that at the horizon, over which `luminance_of` is; None where it is
-        even.
-
-    Raises
-    ------
-    CannotTellError
-        If no vehicle can be seen there, or this is no road by day.
+    Takes `depth` [m], `luminance_of` [linear grey levels], `least_noise` [linear grey levels], `share` (rows,).
     """
     region = search_window(camera, depth)
     if region is None:
@@ -275,23 +174,7 @@ def daytime_crop(
 
     In the latter case the airlight before the vehicle darkens downward, and each row is taken relative to its own.
 
-    Parameters
-    ----------
-    image : (rows, cols) or (rows, cols, 3) uint8 or uint16
-        An image of the camera.
-    camera : Camera
-        The assumed calibration.
-    depth : float
-        From the camera to the vehicle's rear [m].
-    pitch_deviation : float
-        Standard deviation of the true pitch about the assumed one [rad].
-    extinction : float
-        About that of the fog, by which the airlight darkens downward [1/m].
-
-    Raises
-    ------
-    CannotTellError
-        If no vehicle can be seen there, or this is no road by day.
+    Takes `image` (rows, cols), `depth` [m], `pitch_deviation` [rad], `extinction` [1/m].
     """
     if abs(camera.roll) > math.pi / 4:
         raise CannotTellError("the camera lies on its side or is upside-down")
@@ -382,14 +265,7 @@ def _daylight(day: _DaytimeFrame, depth: float) -> SkyReading:
 def noise_gain(luminance: NDArray[np.float32], sky: float, camera: Camera) -> float:
     """How much larger noise is on a vehicle than on the sky once the response is undone, as noise is of the signal.
 
-    Parameters
-    ----------
-    luminance : (rows, cols) float32
-        The vehicle [linear grey levels].
-    sky : float
-        Luminance of the sky [linear grey levels].
-    camera : Camera
-        The assumed calibration.
+    Takes `luminance` (rows, cols) [linear grey levels], `sky` [linear grey levels].
     """
     table = linear_table(camera.response, camera.bits, camera.black_level)
     slope = np.gradient(table.astype(np.float64))

@@ -21,15 +21,7 @@ _ID = re.compile(rb'\bid="([^"]*)"')
 
 
 class JunctionFoes:
-    """Asks SUMO for foes at junctions.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    net : Path or None
-        Its network; None for the file that it says it has loaded.
-    """
+    """Asks SUMO for foes at junctions."""
 
     def __init__(self, api: Api, net: Path | None = None) -> None:
         self._api = api
@@ -50,15 +42,7 @@ class JunctionFoes:
         return frozenset(edge for name in self._unregulated for edge in get(name))
 
     def ahead_of(self, driver: str, reach: float) -> Sequence[Foe]:
-        """Foes of a driver at the junctions within reach.
-
-        Parameters
-        ----------
-        driver : str
-            Id of the vehicle.
-        reach : float
-            How far ahead [m].
-        """
+        """Foes of a driver at the junctions within reach (`reach` [m])."""
         if self._leading_there and self._meets_unregulated(driver, reach):
             return ()
         foes: Sequence[Foe] = self._foes(driver, reach)
@@ -86,13 +70,7 @@ class JunctionFoes:
 
 
 def unregulated_junctions(net: Path) -> frozenset[str]:
-    """Junctions of a network at which nobody has the right of way; none if there is no such file here.
-
-    Parameters
-    ----------
-    net : Path
-        The network.
-    """
+    """Junctions of a network at which nobody has the right of way; none if there is no such file here."""
     if not net.is_file():
         return frozenset()
     with open_unpacked(net) as source:

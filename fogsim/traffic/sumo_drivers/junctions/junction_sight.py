@@ -58,27 +58,7 @@ _BRIGHTEST = max(BRIGHTEST, intensity_toward(int(OTHERS_LAMPS), 0.0, 1.0, 0.0))
 
 
 class JunctionSight:
-    """Decides which foes at junctions are seen.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    fog : FogAccess
-        The fog.
-    sight : DriverSight
-        The drivers' eyes.
-    roster : Roster
-        Who is on the road.
-    foes : JunctionFoes
-        Tells who may be in the way.
-    vehicle_sight : VehicleSight
-        Tells whom they see.
-    remote : bool
-        True where every call is a message to another process.
-    session : str
-        Name of the session.
-    """
+    """Decides which foes at junctions are seen."""
 
     def __init__(
         self,
@@ -111,13 +91,7 @@ class JunctionSight:
         return {driver: frozenset(self._unseen.of(driver)) for driver in self._unseen.drivers}
 
     def update(self, own_lamps: OwnLamps) -> None:
-        """Tell SUMO's drivers which foes at junctions they do not see.
-
-        Parameters
-        ----------
-        own_lamps : dict
-            Lamps of vehicles whose lamps are not SUMO's.
-        """
+        """Tell SUMO's drivers which foes at junctions they do not see."""
         if self._certainly_seen >= FARTHEST_FOE:
             return
         due = self._due.take()

@@ -44,23 +44,7 @@ _PLACES_ON_FOOT = (_CROSSING, _WALKING_AREA)
 
 
 class PedestrianSight:
-    """Decides which pedestrians at junctions are seen.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    fog : FogAccess
-        The fog.
-    sight : DriverSight
-        The drivers' eyes.
-    roster : Roster
-        Who is on the road.
-    session : str
-        Name of the session.
-    obstructions : Obstructions
-        What stands beside the roads.
-    """
+    """Decides which pedestrians at junctions are seen."""
 
     def __init__(
         self,
@@ -87,13 +71,7 @@ class PedestrianSight:
         self._next = 0.0
 
     def update(self, own_lamps: OwnLamps) -> None:
-        """Tell SUMO's drivers which pedestrians they do not see.
-
-        Parameters
-        ----------
-        own_lamps : dict
-            Lamps of vehicles whose lamps are not SUMO's.
-        """
+        """Tell SUMO's drivers which pedestrians they do not see."""
         self._roster.update()
         now = self._roster.time
         if self._certainly_seen >= FARTHEST_PERSON or now < self._next:

@@ -50,23 +50,7 @@ _NOT_SEEN = math.inf
 
 
 class SignalSight:
-    """Decides which drivers see the light ahead of them.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    fog : FogAccess
-        The fog.
-    sight : DriverSight
-        The drivers' eyes.
-    roster : Roster
-        Who is on the road.
-    session : str
-        Name of the session.
-    obstructions : Obstructions
-        What stands beside the roads.
-    """
+    """Decides which drivers see the light ahead of them."""
 
     def __init__(
         self,
@@ -106,13 +90,7 @@ class SignalSight:
         return self._sight.seen_distance(extinction, 0.0, SIGNAL_INTENSITY, head_lamps=0.0)
 
     def update(self, own_lamps: OwnLamps) -> None:  # noqa: ARG002 - every part is told the lamps
-        """Tell SUMO's drivers which lights they do not see.
-
-        Parameters
-        ----------
-        own_lamps : dict
-            Lamps of vehicles whose lamps are not SUMO's.
-        """
+        """Tell SUMO's drivers which lights they do not see."""
         if self._certainly_seen >= REACH:
             return
         due = self._due.take()

@@ -15,13 +15,6 @@ class IgnoredFoes:
     """Sets whom a driver does not yield to at a junction, outside it or on it, whoever has the right of way.
 
     A driver ignores what any session has it ignore, and whom it ignored by itself before.
-
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    session : str
-        Name of the session, or of a part of it.
     """
 
     def __init__(self, api: Api, session: str) -> None:
@@ -30,15 +23,7 @@ class IgnoredFoes:
         self._values = SessionValues[list[str]](api, "ignoredFoes")
 
     def ignore(self, vehicle: str, foes: Collection[str]) -> None:
-        """Let a driver ignore exactly these, as far as this session goes.
-
-        Parameters
-        ----------
-        vehicle : str
-            The driver's vehicle.
-        foes : collection of str
-            Ids of vehicles or persons; ids that nobody bears do no harm.
-        """
+        """Let a driver ignore exactly these, as far as this session goes."""
         values = self._values.read(vehicle)
         if not foes and self._session not in values:
             return
@@ -55,14 +40,7 @@ class IgnoredFoes:
 class UnseenFoes:
     """Whom drivers do not react to at junctions: who is out of sight, and who has come into view only just now.
 
-    Parameters
-    ----------
-    api : Api
-        The simulation.
-    session : str
-        Name of the session, or of a part of it.
-    reaction_time : float
-        Time from the first sight to the first reaction [s].
+    Takes `reaction_time` [s].
     """
 
     def __init__(self, api: Api, session: str, reaction_time: float) -> None:
@@ -72,13 +50,7 @@ class UnseenFoes:
         self._left: set[str] = set()
 
     def of(self, driver: str) -> Collection[str]:
-        """Those to whom a driver does not react.
-
-        Parameters
-        ----------
-        driver : str
-            The driver's vehicle.
-        """
+        """Those to whom a driver does not react."""
         return self._since.get(driver, ())
 
     @property
@@ -89,19 +61,7 @@ class UnseenFoes:
     def decide(self, driver: str, is_seen: Mapping[str, bool], now: float) -> bool:
         """Decide to whom of those near a driver reacts; to all others he does.
 
-        Parameters
-        ----------
-        driver : str
-            The driver's vehicle.
-        is_seen : mapping from str to bool
-            Those near, and whether he sees them.
-        now : float
-            Simulated time [s].
-
-        Returns
-        -------
-        bool
-            Whether one of them has come into view and is soon reacted to.
+        Returns whether one of them has come into view and is soon reacted to. Takes `now` [s].
         """
         before = self._since.get(driver, {})
         unseen: dict[str, float] = {}
@@ -119,13 +79,7 @@ class UnseenFoes:
         return any(since <= now for since in unseen.values())
 
     def forget(self, gone: Iterable[str], new: Iterable[str]) -> None:
-        """Forget vehicles that have left the road.
-
-        Parameters
-        ----------
-        gone, new : iterable of str
-            Vehicles that have left it, and those that have come, among them those that have come back.
-        """
+        """Forget vehicles that have left the road."""
         self._left.update([v for v in gone if self._since.pop(v, None)])
         # One that comes back from a teleport still ignores whom it ignored.
         for driver in self._left.intersection(new) if self._left else ():
@@ -133,13 +87,7 @@ class UnseenFoes:
             self._ignored.ignore(driver, ())
 
     def release(self, present: Collection[str]) -> None:
-        """Let everybody react to everybody again.
-
-        Parameters
-        ----------
-        present : collection of str
-            Vehicles on the road.
-        """
+        """Let everybody react to everybody again."""
         for driver in self._since.keys() & set(present):
             self._ignored.ignore(driver, ())
         self._since.clear()

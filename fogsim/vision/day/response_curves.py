@@ -27,7 +27,7 @@ OTHERS = {
     "knee .8": 0.1,
     "knee 2.2": 0.06,
     "film 1": 0.06,
-    "film 2": 0.05,
+    "film": 0.1,
     "2.5": 0.08,
     "1.8": 0.05,
 }
@@ -76,6 +76,11 @@ def curves_of(camera: Camera) -> Curves:
     return Curves(np.array(light), slope, np.concatenate([[STATED], (1.0 - STATED) * weights / weights.sum()]))
 
 
+WHITE, BRIGHT = 7.3, 0.95
+"""Light at which a film curve reaches full scale that is not scaled to do so at 1, and signal from which on its light
+counts as full scale [-]."""
+
+
 def _inverse(name: str, signal: Floats) -> Floats:
     light = np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 4000)])
     srgb = respond(light, Response.SRGB)
@@ -87,9 +92,11 @@ def _inverse(name: str, signal: Floats) -> Floats:
         bent = (1.0 - np.exp(-float(number) * light)) / (1.0 - np.exp(-float(number)))
         out = respond(bent, Response.SRGB)
     elif kind == "film":
-        gained = float(number) * light
-        bent = gained * (2.51 * gained + 0.03) / (gained * (2.43 * gained + 0.59) + 0.14)
+        # Scaled to full scale at its end, or as cameras use it: there hardly anything is so bright.
+        light = light if number else WHITE * light
+        bent = light * (2.51 * light + 0.03) / (light * (2.43 * light + 0.59) + 0.14)
         out = respond(bent / bent[-1], Response.SRGB)
+        light = np.minimum(light / np.interp(BRIGHT, out, light), 1.0)
     elif kind == "linear":
         out = light
     elif kind == "srgb":

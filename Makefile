@@ -102,7 +102,7 @@ pythons: $(VENV)/.installed-test ## Install the wheel into an empty environment 
 	@$(BIN)/python -m pytest -q tests/pythons
 
 lint: $(VENV)/.installed-test ## Check style
-	@$(BIN)/ruff check . && $(BIN)/ruff format --check .
+	@$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/python tools/check_docstrings.py
 
 types: $(VENV)/.installed-test ## Check types
 	@$(BIN)/mypy

@@ -70,6 +70,11 @@ def checked_parameters(target: C) -> C:
     Checked are numbers (``float`` is finite unless a `Range` in ``Annotated`` allows more), ``bool``, ``str``,
     ``Literal``, the names of a ``StrEnum``, arrays by their type, instances of classes, callables, and unions,
     sequences, iterables, tuples and mappings of all these. Unknown, missing and surplus arguments raise InputError too.
+
+    Parameters
+    ----------
+    target : class or function
+        What is decorated.
     """
     call: Callable[..., Any] = target.__init__ if isinstance(target, type) else target  # type: ignore[misc]
     who = target.__name__ if isinstance(target, type) else f"{target.__name__}()"

@@ -352,7 +352,15 @@ class EgoEquipment:
         )
 
     def look_from_roadside(self, time: float, state: TrafficState) -> tuple[tuple[str, FogReport], ...]:
-        """See by roadside cameras at a time [s]: part of what is `sent` to all in `complete_step`."""
+        """See by roadside cameras at a time [s]: part of what is `sent` to all in `complete_step`.
+
+        Parameters
+        ----------
+        time : float
+            Time [s].
+        state : TrafficState
+            Traffic at that time.
+        """
         sensors = self._scenario.sensors.reports.roadside
         if sensors is None or sensors.camera is None:
             return ()

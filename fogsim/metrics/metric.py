@@ -96,7 +96,13 @@ class Metric(Protocol):
     """Definition of each key of the result; a key ends in its unit."""
 
     def update(self, sample: Sample) -> None:
-        """Add one step."""
+        """Add one step.
+
+        Parameters
+        ----------
+        sample : Sample
+            What the step and the time to the next one hold.
+        """
 
     def result(self) -> Mapping[str, JsonValue]:
         """Values over the steps so far; the keys are those of `definitions`."""

@@ -34,7 +34,13 @@ class CalibrationDeviations:
         return math.hypot(self.focal_length, self.mount_height)
 
     def widened(self, estimate: Estimate) -> Estimate:
-        """Estimate with the uncertainty of distances on the road in its deviations."""
+        """Estimate with the uncertainty of distances on the road in its deviations.
+
+        Parameters
+        ----------
+        estimate : Estimate
+            Of a method that may measure along the road.
+        """
         if not estimate.valid or self.scale == 0.0 or estimate.method not in ON_THE_ROAD:
             return estimate
         deviation = self._of(estimate.extinction, estimate.standard_deviation)

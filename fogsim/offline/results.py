@@ -86,7 +86,13 @@ def csv_lines(result: FrameEstimates) -> Iterator[str]:
 
 
 def csv_line(values: Mapping[str, object] = dict(zip(CSV_KEYS, CSV_KEYS, strict=True))) -> str:
-    """Cells of a row of CSV as text; the heading by default."""
+    """Cells of a row of CSV as text; the heading by default.
+
+    Parameters
+    ----------
+    values : Mapping
+        Values by the names of `CSV_KEYS`.
+    """
     text = io.StringIO()
     csv.DictWriter(text, CSV_KEYS, extrasaction="ignore", lineterminator="").writerow(dict(values))
     return text.getvalue()

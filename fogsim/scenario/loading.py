@@ -243,7 +243,13 @@ def override(
 
 
 def clock_settings(step: float, camera: float, decision: float) -> list[str]:
-    """Overrides that set the traffic step, the camera period and the decision period [s]."""
+    """Overrides that set the traffic step, the camera period and the decision period [s].
+
+    Parameters
+    ----------
+    step, camera, decision : float
+        Those times [s].
+    """
     times = {"traffic_step": step, "camera_period": camera, "decision_period": decision}
     return [f"clocks.{key}_s={time!r}" for key, time in times.items()]
 

@@ -168,7 +168,13 @@ class LampLobes:
 
     @classmethod
     def alike(cls, count: int) -> "LampLobes":
-        """So many lamps that shine alike in all directions."""
+        """So many lamps that shine alike in all directions.
+
+        Parameters
+        ----------
+        count : int
+            How many.
+        """
         return cls((), np.full(count, -1, np.int64), np.ones(count), np.zeros((count, 3)))
 
 

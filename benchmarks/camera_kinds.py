@@ -195,6 +195,63 @@ def arch(light: Floats, _view: View, rng: Random) -> Floats:
     return np.where(v > 0.92, 0.1, out)[..., None] * np.ones(3)
 
 
+def _across(view: View) -> Floats:
+    """Tangent of the angle of each column from straight ahead."""
+    camera = view.camera
+    columns = (np.arange(camera.width) - camera.principal_point[0]) / camera.focal_length
+    return columns[None, :] * np.ones((camera.height, 1))
+
+
+def _standing(light: Floats, view: View, what: tuple[float, float, float, float], shade: Floats) -> Floats:
+    """Put a wall before a view: its depth, left and right side and height [m], and its shade (rows, cols)."""
+    depth, left, right, height = what
+    up = depth * np.tan(view.elevation) + view.camera.mount_height
+    side = depth * _across(view)
+    wall = (up > 0.0) & (up < height) & (side > left) & (side < right)
+    return np.where(wall[..., None], shade[..., None], light)
+
+
+def tower(light: Floats, view: View, rng: Random) -> Floats:
+    """A tower stands at the end of a pale square."""
+    ground = np.isfinite(view.distance)
+    paved = float(rng.uniform(0.2, 0.5)) * (1.0 + 0.05 * rng.standard_normal(view.distance.shape))
+    square = np.where(ground[..., None], paved[..., None], light)
+    depth, half = float(rng.uniform(15.0, 60.0)), float(rng.uniform(3.0, 8.0))
+    storeys = 1.0 + 0.15 * np.sign(np.sin(view.elevation * depth * float(rng.uniform(1.0, 3.0))))
+    shade = float(rng.uniform(0.15, 0.7)) * storeys
+    return _standing(square, view, (depth, -half, half, float(rng.uniform(15.0, 60.0))), shade)
+
+
+def junction(light: Floats, view: View, rng: Random) -> Floats:
+    """The road ends at another one, behind which a pavement, a fence or hedge, and houses stand."""
+    near = float(rng.uniform(8.0, 15.0))
+    far = near + float(rng.uniform(6.0, 12.0))
+    depth = np.where(np.isfinite(view.distance), view.distance, np.inf)
+    shades = float(rng.uniform(0.1, 0.25)), float(rng.uniform(0.25, 0.6))
+    crossing, pavement = (depth > near) & (depth < far), (depth >= far) & (depth < far + 3.0)
+    out = np.where(crossing[..., None], shades[0], np.where(pavement[..., None], shades[1], light))
+    side = 2.0 * float(rng.uniform(-8.0, 2.0))
+    for left in side + 14.0 * np.arange(-3, 3):
+        house = float(rng.uniform(0.15, 0.8)) * np.ones(depth.shape)
+        out = _standing(out, view, (far + 9.0, left, left + 12.0, float(rng.uniform(5.0, 12.0))), house)
+    hedge = float(rng.uniform(0.03, 0.7)) * (1.0 + 0.1 * rng.standard_normal(depth.shape))
+    return _standing(out, view, (far + 3.0, -60.0, 60.0, float(rng.uniform(0.8, 2.0))), hedge)
+
+
+def street(light: Floats, view: View, rng: Random) -> Floats:
+    """Houses on both sides of a street to where it bends, and one across its end."""
+    far = float(rng.uniform(60.0, 150.0))
+    out = _standing(light, view, (far, -60.0, 60.0, 14.0), float(rng.uniform(0.1, 0.6)) * np.ones(light.shape[:2]))
+    for side in (-1.0, 1.0):
+        across = side * _across(view)
+        depth = float(rng.uniform(5.0, 9.0)) / np.maximum(across, 1e-6)
+        up = depth * np.tan(view.elevation) + view.camera.mount_height
+        house = (across > 0.0) & (depth < far) & (up > 0.0) & (up < float(rng.uniform(8.0, 16.0)))
+        shade = float(rng.uniform(0.1, 0.6)) * (1.0 + 0.2 * np.sign(np.sin(depth)))
+        out = np.where(house[..., None], shade[..., None], out)
+    return out
+
+
 def turned_away(light: Floats, view: View, rng: Random) -> Floats:
     """Fields across the road: bands of grass, hedge and field, brighter far away."""
     depth = np.where(np.isfinite(view.distance), view.distance, 0.0)
@@ -222,6 +279,9 @@ KINDS = {
     "arch": _no_lane(arch),
     "sun and shadows": Kind(sunny=True),
     "turned away": _no_lane(turned_away),
+    "tower": _no_lane(tower),
+    "junction": _no_lane(junction),
+    "street": _no_lane(street),
 }
 
 
@@ -234,17 +294,17 @@ class Frame:
     visibility: float
 
 
-def frames(kind: Kind, name: str, images: int) -> Iterator[Frame]:
+def frames(kind: Kind, name: str, images: int, pool: int = POOL) -> Iterator[Frame]:
     """Every photograph of a kind in every fog."""
-    numbers = (n for n in itertools.count(FIRST) if photograph(POOL, n).is_sunny is kind.sunny)
+    numbers = (n for n in itertools.count(FIRST) if photograph(pool, n).is_sunny is kind.sunny)
     for number in itertools.islice(numbers, images):
-        taken = photograph(POOL, number)
+        taken = photograph(pool, number)
         distance = RoadPlane(Calibration(taken.taken_by)).distance()
         rows = np.arange(taken.taken_by.height, dtype=float)[:, None] * np.ones(distance.shape)
         elevation = np.arctan((taken.taken_by.horizon_row - rows) / taken.taken_by.focal_length)
         view = View(distance, elevation, taken.taken_by)
         for visibility in VISIBILITIES if kind.lane else VISIBILITIES[-1:]:
-            rng = np.random.default_rng([49, number, sum(name.encode())])
+            rng = np.random.default_rng([49 + POOL - pool, number, sum(name.encode())])
             light = kind.scene(taken.light, view, rng)
             sky = light[np.isinf(distance)]
             air = np.median(sky[np.argsort(sky.sum(axis=1))[-len(sky) // 5 :]], axis=0)

@@ -15,7 +15,7 @@ from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import Observation
-from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation
+from fogsim.vision.lines.horizon import PITCH_DEVIATION, SCALE_DEVIATION, PitchDeviation, ScaleDeviation
 
 MEASUREMENTS = 200
 """Measurements that are remembered."""
@@ -110,6 +110,8 @@ class Huang2015:
         Width of the vehicle for ranges from the camera, where it is known [m].
     pitch_deviation : float
         Standard deviation of the true pitch about the assumed one [rad].
+    scale_deviation : float
+        Relative standard deviation of focal length × mount height, with which distances on the road go [-].
     """
 
     method = "huang2015"
@@ -126,9 +128,12 @@ class Huang2015:
         range_from: Literal["sensor", "camera"] = "sensor",
         vehicle_width: Annotated[float, Range(0.5, 4.0, "m")] | None = None,
         pitch_deviation: PitchDeviation = PITCH_DEVIATION,
+        scale_deviation: ScaleDeviation = SCALE_DEVIATION,
     ) -> None:
         self._check = ObservationCheck(camera)
-        self._rough = Huang2015Rough(camera, as_published=as_published, pitch_deviation=pitch_deviation)
+        self._rough = Huang2015Rough(
+            camera, as_published=as_published, pitch_deviation=pitch_deviation, scale_deviation=scale_deviation
+        )
         self._lead = Huang2015Lead(
             camera,
             as_published=as_published,

@@ -16,13 +16,23 @@ from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
+from fogsim.vision.day.confirmation import Confirmation
+from fogsim.vision.day.day_fit import free_road
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.medians import median
 from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.lines.deriche import CannyDeriche
 from fogsim.vision.lines.edges import Edges
 from fogsim.vision.lines.gradient_lines import consensus_vanishing_point
-from fogsim.vision.lines.horizon import PITCH_DEVIATION, Horizon, PitchDeviation, calibrated_horizon, weighted_mean
+from fogsim.vision.lines.horizon import (
+    PITCH_DEVIATION,
+    SCALE_DEVIATION,
+    Horizon,
+    PitchDeviation,
+    ScaleDeviation,
+    calibrated_horizon,
+    weighted_mean,
+)
 from fogsim.vision.lines.road_lines import road_vanishing_point
 from fogsim.vision.lines.vanishing_point import VanishingPoint
 from fogsim.vision.region.curve_checks import SURE_OF_FOG, check_law, detection_limit, fog_or_clear, seen_up_to
@@ -125,6 +135,12 @@ class Negru2013Repair(Repair):
         "of the last N frames the best counts, which holds on to old fog (hundreds of frames for the horizon)",
         "each frame stands alone with its deviation; averaging is the fusion's",
     )
+    CONFIRMED = (
+        "confirmed",
+        "the curve of the road alone is fog or clear air, whatever else the image shows, and the camera is exact",
+        "the day model of road and sky must show fog, or contrast far away, as well; the interval spans both models,"
+        " and what height, focal length and response leave open",
+    )
 
 
 @checked_parameters
@@ -164,6 +180,8 @@ class Negru2013:
         Frames of the temporal schemes, where frames do not stand alone.
     pitch_deviation : float
         Standard deviation of the true pitch about the assumed one [rad].
+    scale_deviation : float
+        Relative standard deviation of focal length × mount height, with which distances on the road go [-].
 
     Raises
     ------
@@ -185,11 +203,13 @@ class Negru2013:
         horizon_frames: Annotated[int, Range(1, 100_000)] = 500,
         inflection_frames: Annotated[int, Range(1, 10_000)] = 5,
         pitch_deviation: PitchDeviation = PITCH_DEVIATION,
+        scale_deviation: ScaleDeviation = SCALE_DEVIATION,
     ) -> None:
         self._check = ObservationCheck(camera)
         self._camera, self._assumed = camera, calibrated_horizon(camera, pitch_deviation)
         made = chosen(Negru2013Repair, repairs, as_published=as_published, published=(Negru2013Repair.SIGNS,))
         self._repairs = made - {Negru2013Repair.SIGNS} if printed_signs else made
+        self._confirmation = Confirmation(camera, self._assumed, scale_deviation)
         self._growth = growth
         self._looks_for_lines = vanishing_point
         alone = Negru2013Repair.SINGLE_FRAMES in self._repairs
@@ -200,6 +220,7 @@ class Negru2013:
     def reset(self) -> None:
         """Forget the vanishing points and inflections of earlier frames."""
         self._check.reset()
+        self._confirmation.reset()
         self._points.clear()
         self._models.clear()
 
@@ -225,9 +246,12 @@ class Negru2013:
         image = self._check.kernel_image(observation)
         diagnostics: dict[str, object] = {"horizon_row": self._camera.horizon_row}
         try:
-            return self._read(image, observation.lead, diagnostics)
+            own = self._read(image, observation.lead, diagnostics)
         except CannotTellError as reason:
             return Estimate.invalid(self.method, str(reason), **diagnostics)
+        if Negru2013Repair.CONFIRMED not in self._repairs:
+            return own
+        return self._confirmation.of(own, image, free_road(observation.lead), observation.time)
 
     def _read(
         self,

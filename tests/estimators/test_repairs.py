@@ -35,8 +35,8 @@ def scenes(render, road):
     off = replace(road.camera, pitch=road.camera.pitch + np.radians(0.15))
     plain = [render(road.but(visibility=150.0))]
     ahead = LeadMeasurement(25.0, 0.0)
-    wooded, horizon = render(road.but(visibility=400.0)), int(road.camera.horizon_row)
-    wooded[horizon - 45 : horizon + 5] = 40
+    wooded, horizon = render(road.but(visibility=1e6)), int(road.camera.horizon_row)
+    wooded[horizon - 45 : horizon] = 20
     verge = road.but(visibility=120.0, verge=True)
     return {
         "linear_luminance": ([render(road.but(camera=gamma))], gamma, None),

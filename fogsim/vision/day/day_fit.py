@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
+from fogsim.values.observation import LeadMeasurement
+from fogsim.vision.day.bin_kernels import RowBins
 from fogsim.vision.day.evidence_kernels import evidence_grid
 from fogsim.vision.day.hypotheses import CUT_CHANCE, LIGHTS, SURFACES, lights_chances
 from fogsim.vision.day.response_curves import curves_of
@@ -50,8 +52,9 @@ UNLIKELY = -1e4
 """Logarithm of the chance of what was not tried."""
 
 
-VEHICLE = 1.8
-"""Height up to which a vehicle ahead may hide the sky [m]."""
+VEHICLE, RANGE_MARGIN = 1.8, 0.5
+"""Height up to which a vehicle ahead may hide the sky, and by how much its foot may be nearer than its range says
+[m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +115,13 @@ class DayFit:
         return float(self.chance[self.log_visibility < math.log(visibility)].sum())
 
 
+def free_road(lead: LeadMeasurement | None) -> float:
+    """Depth up to which the own lane is free of the tracked vehicle [m]."""
+    if lead is None or not math.isfinite(lead.distance):
+        return math.inf
+    return max(lead.distance - RANGE_MARGIN, 1.0)
+
+
 def fit_day(
     image: NDArray[Any], camera: Camera, horizon: Horizon, free: float = math.inf, claimed: float = 0.0
 ) -> DayFit:
@@ -132,9 +142,9 @@ def fit_day(
     """
     pixels = image if image.ndim == 3 else image[:, :, None]
     bins = row_bins(camera, horizon.standard_deviation, round(horizon.row))
-    rows = read_rows(pixels, bins, camera, horizon.row)
     if math.isfinite(free):
-        rows = _without_vehicle(rows, camera, horizon.row, free)
+        bins = _without_vehicle(bins, camera, horizon.row, free)
+    rows = read_rows(pixels, bins, camera, horizon.row)
     return replace(_weighed(rows, camera, horizon), doubt=_doubt(rows, camera, horizon, claimed))
 
 
@@ -256,13 +266,11 @@ class _Grid:
         return np.where(np.isfinite(out), out, UNLIKELY)
 
 
-def _without_vehicle(rows: RowData, camera: Camera, horizon: float, free: float) -> RowData:
+def _without_vehicle(bins: RowBins, camera: Camera, horizon: float, free: float) -> RowBins:
     """Leave out rows that the vehicle ahead may hide."""
     above = max(VEHICLE - camera.mount_height, 0.0) * camera.focal_length / free
-    hidden = (rows.last > horizon - above) & (rows.first < horizon + camera.row_distance / free)
-    contrast = rows.contrast.copy()
-    contrast[0, hidden] = 0.0
-    return rows._replace(noise=np.where(hidden, 0.0, rows.noise), contrast=contrast)
+    seen = (bins.last <= horizon - above) | (bins.first >= horizon + camera.row_distance / free)
+    return RowBins(*(part[seen] for part in bins))
 
 
 def _step(rows: RowData) -> float:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate
 from fogsim.vision.day.day_fit import fit_day
-from fogsim.vision.day.far_objects import share_of_far_objects
-from fogsim.vision.day.verdict import WIDEST, DayVerdict, agree, verdict_of
+from fogsim.vision.day.far_objects import STANDS_OUT, stands_out
+from fogsim.vision.day.verdict import DISAGREE, WIDEST, DayVerdict, agree, verdict_of
 from fogsim.vision.lines.horizon import Horizon
 
 POSSIBLY, MOSTLY = 0.35, 0.6
@@ -20,9 +20,6 @@ up where the day model has no answer [-]."""
 
 MOST_DOUBT = 18.0
 """Doubt by contrast across the road from which on an estimate is given up [-]."""
-
-MOST_FAR = 0.2
-"""Share of the image's width in which things show that fog would hide, from which on an estimate is given up [-]."""
 
 PERIOD = 10.0
 """Time after which an estimate that has been agreed with is looked at again [s]."""
@@ -73,8 +70,8 @@ class SecondOpinion:
             chosen, self._response = own, 0.0
         else:
             chosen = self._with_day_model(own, level, horizon, free)
-        if chosen.valid and share_of_far_objects(level, self._camera, horizon, _ends(chosen)[0]) > MOST_FAR:
-            chosen = _none(own, "what stands at the horizon is darker than fog would leave it")
+        if chosen.valid and stands_out(level, self._camera, horizon, _ends(chosen)[0]):
+            chosen = _none(own, STANDS_OUT)
         self._agreed = time if chosen is own else -math.inf
         return _with_calibration(own, self._scale, self._response) if chosen is own and own.valid else chosen
 
@@ -109,7 +106,7 @@ def _weighed(own: Estimate, verdict: DayVerdict) -> Estimate:
     spanning = _spanning(own, own.extinction if agreed else 0.5 * (own.extinction + verdict.extinction), verdict)
     if spanning is None and agreed:
         return own
-    return spanning or _none(own, "how the road fades and how its image brightens disagree")
+    return spanning or _none(own, DISAGREE)
 
 
 def _spanning(own: Estimate, middle: float, verdict: DayVerdict) -> Estimate | None:

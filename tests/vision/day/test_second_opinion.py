@@ -15,7 +15,7 @@ from fogsim.vision.lines.horizon import Horizon
 CAMERA = Camera(64, 48, 60.0, (31.5, 23.5), 1.3)
 SCALE = 0.05
 OWN = Estimate("joint_road", 0.03, 0.0015, diagnostics={"road": 50.0})
-AGREES = DayVerdict(0.031, 0.002, (88.0, 108.0), "", True, True, 0.0, 0.0, 0.0)
+AGREES = DayVerdict(0.031, 0.002, 0.031, (88.0, 108.0), "", True, True, True, 0.0, 0.0, 0.0)
 DENSER = replace(AGREES, extinction=0.06, deviation=0.003, interval=(46.0, 54.0))
 FAR = replace(AGREES, extinction=0.003, deviation=0.0002, interval=(900.0, 1100.0))
 SILENT = replace(AGREES, reason="dark")

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate
-from fogsim.vision.day.day_fit import fit_day
+from fogsim.vision.day.day_fit import fit_free_road
 from fogsim.vision.day.far_objects import STANDS_OUT, stands_out
 from fogsim.vision.day.verdict import CLEAR, DISAGREE, WIDEST, DayVerdict, agree, verdict_of
 from fogsim.vision.lines.horizon import Horizon, levelled
@@ -98,7 +98,8 @@ class Confirmation:
 
     def _compared(self, own: Estimate, level: NDArray[Any], free: float, time: float) -> _Outcome:
         half, limit = NORMAL_90_PERCENT * own.standard_deviation, extinction_from_visibility(CLEAR)
-        day = verdict_of(fit_day(np.ascontiguousarray(level), self._camera, self._horizon, free), self._scale)
+        fit = fit_free_road(np.ascontiguousarray(level), self._camera, self._horizon, free)
+        day = verdict_of(fit, self._scale)
         reason, absolute, relative = "", 0.0, 0.0
         if own.extinction == 0.0 or own.extinction + half <= limit:
             if not day.is_clear and not self._stands_out(level, limit):

@@ -77,6 +77,8 @@ class DayFit:
         How much brighter the far road is than the near one, over the sky [-].
     response_deviation : float
         Standard deviation of ln k among responses [-].
+    obstacle : float
+        Depth at which something hides the road, if something does [m].
     doubt : float
         How much contrast across the road speaks against the extinction that another method claims, in logarithms of
         chances [-].
@@ -92,6 +94,7 @@ class DayFit:
     brightest: float
     contrast: float
     response_deviation: float
+    obstacle: float
     doubt: float = 0.0
 
     def quantile(self, share: float) -> float:
@@ -148,6 +151,13 @@ def fit_day(
     return replace(_weighed(rows, camera, horizon), doubt=_doubt(rows, camera, horizon, claimed))
 
 
+def fit_free_road(image: NDArray[Any], camera: Camera, horizon: Horizon, free: float) -> DayFit:
+    """Fit the road before what hides it, where something more likely does: see `fit_day`."""
+    fit = fit_day(image, camera, horizon, free)
+    is_hidden = float(fit.surfaces[SURFACES.hidden != math.inf].sum()) > 0.5
+    return fit_day(image, camera, horizon, fit.obstacle) if is_hidden and fit.obstacle < free else fit
+
+
 def _weighed(rows: RowData, camera: Camera, horizon: Horizon) -> DayFit:
     responses, surfaces = np.log(curves_of(camera).chance), np.log(SURFACES.chance)
     ends = rows.cuts.size - 2
@@ -197,6 +207,7 @@ def _weighed(rows: RowData, camera: Camera, horizon: Horizon) -> DayFit:
         clipped=float(np.mean(sky <= 0.0)) if sky.size else 0.0,
         brightest=float(rows.level[0]),
         response_deviation=_apart(np.log(cells[chosen][:, 1]), chance, pairs[:, 0]),
+        obstacle=grid.obstacle,
         contrast=float(rows.light[0, rows.cuts[0] :].max() - rows.light[0, -1]) / float(rows.level[0]),
     )
 
@@ -252,8 +263,8 @@ class _Grid:
         self._rows, self._shift = rows, shift
         self._lens = _lens_of(camera)
         self._surfaces = np.column_stack([SURFACES.albedo, SURFACES.hidden])
-        step = camera.focal_length * camera.mount_height / max(_step(rows) - horizon, 1.0)
-        self._surfaces[np.isnan(self._surfaces)] = step
+        self.obstacle = camera.focal_length * camera.mount_height / max(_step(rows) - horizon, 1.0)
+        self._surfaces[np.isnan(self._surfaces)] = self.obstacle
 
     def evidence(self, cells: Floats, tried: Ints, lights: Ints) -> Floats:
         """(c, t, m) float64: see `evidence_grid`; under all lights there also are roads that end sooner."""

@@ -18,6 +18,10 @@ from fogsim.vision.lines.horizon import Horizon, levelled
 PERIOD, SOON = 10.0, 1.0
 """Times after which an image is compared again: one that confirmed an estimate, and one that did not [s]."""
 
+MODEL_DEVIATION = 0.15
+"""Relative deviation of k by light and surfaces that methods of the road's brightness do not know, next to how far they
+are from the day model; chosen on pool 0 of `benchmarks/camera_kinds.py` [-]."""
+
 NOT_CLEAR = "nothing that fog would hide is seen far away: the air may be clear or not"
 
 
@@ -100,20 +104,22 @@ class Confirmation:
         half, limit = NORMAL_90_PERCENT * own.standard_deviation, extinction_from_visibility(CLEAR)
         fit = fit_free_road(np.ascontiguousarray(level), self._camera, self._horizon, free)
         day = verdict_of(fit, self._scale)
-        reason, absolute, relative = "", 0.0, 0.0
-        if own.extinction == 0.0 or own.extinction + half <= limit:
-            if not day.is_clear and not self._stands_out(level, limit):
-                reason = NOT_CLEAR
-            # Clear air has no upper end, and nothing is taken from a day model that cannot tell.
-            absolute = _beyond(half, max(own.extinction, day.most - own.extinction if day.is_clear else 0.0))
-        elif self._stands_out(level, own.extinction - half):
-            reason = STANDS_OUT
+        # Thin fog may be none, where clear air shows.
+        is_open = not day.shows_fog and (own.extinction <= half or own.extinction + half <= limit)
+        if day.shows_fog:
+            reason = STANDS_OUT if self._stands_out(level, own.extinction - half) else _contradiction(own, day)
+        elif is_open:
+            reason = "" if day.is_clear or self._stands_out(level, limit) else NOT_CLEAR
         else:
-            reason = _contradiction(own, day)
-            # A day model that sees less than the method, as behind a vehicle, widens only by how far it is off.
-            off = abs(day.median - own.extinction)
-            apart = off if day.reason else _beyond(half, max(own.extinction - day.least, day.most - own.extinction))
-            relative = apart / own.extinction
+            reason = day.reason or DISAGREE
+        least, most = (0.0, day.most if day.is_clear else limit) if is_open else (day.least, day.most)
+        more = _beyond(half, max(own.extinction - least, most - own.extinction))
+        if day.shows_fog:
+            # Behind a vehicle it sees less than the method, and is off by as much as it is unsure.
+            unsure = day.deviation if math.isfinite(free) else 0.0
+            off = math.sqrt(max((day.median - own.extinction) ** 2 - unsure**2, 0.0))
+            more = min(more, math.hypot(off, MODEL_DEVIATION * own.extinction))
+        relative, absolute = (more / own.extinction, 0.0) if own.extinction > 0.0 else (0.0, more)
         return _Outcome(time, own.visibility_interval, reason, relative, absolute)
 
     def _stands_out(self, level: NDArray[Any], extinction: float) -> bool:
@@ -126,9 +132,7 @@ def _beyond(half: float, wider: float) -> float:
 
 
 def _contradiction(own: Estimate, day: DayVerdict) -> str:
-    """Say that the day model shows no fog, or another one; empty if it confirms an estimate."""
-    if not day.shows_fog:
-        return day.reason or DISAGREE
+    """Say that the day model shows other fog; empty if it confirms an estimate."""
     half = NORMAL_90_PERCENT * own.standard_deviation
     thin, dense = min(own.extinction - half, day.least), max(own.extinction + half, day.most)
     spans = not day.reason and dense <= WIDEST * thin

@@ -78,6 +78,10 @@ class SecondOpinion:
     def _with_day_model(self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float) -> Estimate:
         fit = fit_day(np.ascontiguousarray(level), self._camera, horizon, free, max(_ends(own)[0], 0.0))
         verdict = verdict_of(fit, self._scale)
+        if own.valid and math.isfinite(free) and verdict.doubt <= MOST_DOUBT:
+            # Before what stands in the lane it sees less.
+            self._response = 0.0
+            return own
         self._response = verdict.response_deviation if verdict.is_sure and verdict.is_even else 0.0
         chosen = _chosen(own, verdict)
         if chosen is own or not chosen.valid:

@@ -12,6 +12,7 @@ from fogsim.values.camera import Camera
 from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate
 from fogsim.vision.day.day_fit import fit_free_road
 from fogsim.vision.day.far_objects import STANDS_OUT, stands_out
+from fogsim.vision.day.second_opinion import refused
 from fogsim.vision.day.verdict import CLEAR, DISAGREE, WIDEST, DayVerdict, agree, verdict_of
 from fogsim.vision.lines.horizon import Horizon, levelled
 
@@ -96,7 +97,7 @@ class Confirmation:
         if not is_recent or not agree(last.seen, own.visibility_interval):
             last = self._last = self._compared(own, levelled(image, self._camera), free, time)
         if last.reason:
-            return Estimate.invalid(own.method, **{**own.diagnostics, "reason": last.reason})
+            return refused(own, last.reason)
         deviation = math.hypot(own.standard_deviation, last.relative * own.extinction, last.absolute)
         return replace(own, standard_deviation=deviation, common_deviation=math.hypot(common, last.relative))
 
@@ -124,6 +125,14 @@ class Confirmation:
 
     def _stands_out(self, level: NDArray[Any], extinction: float) -> bool:
         return stands_out(level, self._camera, self._horizon, extinction)
+
+
+def without_far_objects(own: Estimate, image: NDArray[Any], camera: Camera, horizon: Horizon) -> Estimate:
+    """Return an estimate by the vehicle ahead, or why it does not count."""
+    least = own.extinction - NORMAL_90_PERCENT * own.standard_deviation
+    if not own.valid or not least > 0.0 or not stands_out(levelled(image, camera), camera, horizon, least):
+        return own
+    return refused(own, STANDS_OUT)
 
 
 def _beyond(half: float, wider: float) -> float:

@@ -71,7 +71,7 @@ class SecondOpinion:
         else:
             chosen = self._with_day_model(own, level, horizon, free)
         if chosen.valid and stands_out(level, self._camera, horizon, _ends(chosen)[0]):
-            chosen = _none(own, STANDS_OUT)
+            chosen = refused(own, STANDS_OUT)
         self._agreed = time if chosen is own else -math.inf
         return _with_calibration(own, self._scale, self._response) if chosen is own and own.valid else chosen
 
@@ -93,7 +93,7 @@ def _chosen(own: Estimate, verdict: DayVerdict) -> Estimate:
     if not own.valid:
         return _of_day(own, verdict)
     if verdict.doubt > MOST_DOUBT:
-        return _none(own, "contrast survives where the fog that the road's brightness shows would leave none")
+        return refused(own, "contrast survives where the fog that the road's brightness shows would leave none")
     if verdict.reason:
         return _of_day(own, verdict) if verdict.outside > MOSTLY else own
     return _weighed(own, verdict) if verdict.is_sure and verdict.is_even else own
@@ -110,7 +110,7 @@ def _weighed(own: Estimate, verdict: DayVerdict) -> Estimate:
     spanning = _spanning(own, own.extinction if agreed else 0.5 * (own.extinction + verdict.extinction), verdict)
     if spanning is None and agreed:
         return own
-    return spanning or _none(own, DISAGREE)
+    return spanning or refused(own, DISAGREE)
 
 
 def _spanning(own: Estimate, middle: float, verdict: DayVerdict) -> Estimate | None:
@@ -132,7 +132,7 @@ def _of_day(own: Estimate, verdict: DayVerdict) -> Estimate:
     """Return the day model's answer, or why there is none."""
     if verdict.reason or not verdict.is_sure:
         reason = verdict.reason or str(own.diagnostics.get("reason", ""))
-        return _none(own, reason)
+        return refused(own, reason)
     return Estimate(
         own.method,
         verdict.extinction,
@@ -142,7 +142,8 @@ def _of_day(own: Estimate, verdict: DayVerdict) -> Estimate:
     )
 
 
-def _none(own: Estimate, reason: str) -> Estimate:
+def refused(own: Estimate, reason: str) -> Estimate:
+    """Return the statement that an estimate does not count, and why."""
     return Estimate.invalid(own.method, reason, **_found(own))
 
 

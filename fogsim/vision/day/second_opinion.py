@@ -38,11 +38,12 @@ class SecondOpinion:
 
     def __init__(self, camera: Camera, scale_deviation: float) -> None:
         self._camera, self._scale = camera, scale_deviation
-        self._agreed, self._response = -math.inf, 0.0
+        self.reset()
 
     def reset(self) -> None:
         """Forget all earlier frames."""
         self._agreed, self._response = -math.inf, 0.0
+        self._clear: tuple[float, float] | None = None
 
     def on(
         self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float, time: float, is_straight: bool
@@ -64,24 +65,30 @@ class SecondOpinion:
         is_straight : bool
             Whether the road neither bends nor sags, as the day model has it.
         """
-        if own.valid and self._agreed < time < self._agreed + PERIOD:
-            return _with_calibration(own, self._scale, self._response)
-        if own.valid and not is_straight:
-            chosen, self._response = own, 0.0
-        else:
-            chosen = self._with_day_model(own, level, horizon, free)
+        is_recent = self._agreed < time < self._agreed + PERIOD
+        if own.valid and is_recent and (self._clear is None or agree(own.visibility_interval, self._clear)):
+            return self._kept(own)
+        self._response, self._clear = 0.0, None
+        is_asked = not own.valid or is_straight
+        chosen = self._with_day_model(own, level, horizon, free) if is_asked else own
         if chosen.valid and stands_out(level, self._camera, horizon, _ends(chosen)[0]):
             chosen = refused(own, STANDS_OUT)
         self._agreed = time if chosen is own else -math.inf
-        return _with_calibration(own, self._scale, self._response) if chosen is own and own.valid else chosen
+        return self._kept(own) if chosen is own and own.valid else chosen
+
+    def _kept(self, own: Estimate) -> Estimate:
+        """Return an estimate with what height, focal length and response leave open; open upward if no fog shows."""
+        if self._clear is not None:
+            own = replace(own, standard_deviation=max(own.standard_deviation, own.extinction / NORMAL_90_PERCENT))
+        return _with_calibration(own, self._scale, self._response)
 
     def _with_day_model(self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float) -> Estimate:
         fit = fit_day(np.ascontiguousarray(level), self._camera, horizon, free, max(_ends(own)[0], 0.0))
         verdict = verdict_of(fit, self._scale)
         if own.valid and math.isfinite(free) and verdict.doubt <= MOST_DOUBT:
             # Before what stands in the lane it sees less.
-            self._response = 0.0
             return own
+        self._clear = None if verdict.shows_fog else verdict.interval
         self._response = verdict.response_deviation if verdict.is_sure and verdict.is_even else 0.0
         chosen = _chosen(own, verdict)
         if chosen is own or not chosen.valid:
@@ -94,6 +101,9 @@ def _chosen(own: Estimate, verdict: DayVerdict) -> Estimate:
         return _of_day(own, verdict)
     if verdict.doubt > MOST_DOUBT:
         return refused(own, "contrast survives where the fog that the road's brightness shows would leave none")
+    if not verdict.shows_fog and math.isfinite(own.visibility_interval[1]):
+        agreed = agree(own.visibility_interval, verdict.interval)
+        return own if agreed else refused(own, verdict.reason or DISAGREE)
     if verdict.reason:
         return _of_day(own, verdict) if verdict.outside > MOSTLY else own
     return _weighed(own, verdict) if verdict.is_sure and verdict.is_even else own

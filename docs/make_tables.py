@@ -26,7 +26,7 @@ from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.lighting.legal import LAWS
 from fogsim.metrics import metric_definitions
 from fogsim.openscenario.actions import ACTIONS, LAMPS
-from fogsim.openscenario.elements import HARMLESS, HONOURED, REFUSED
+from fogsim.openscenario.elements import HARMLESS, REFUSED
 from fogsim.openscenario.entities import CLASSES
 from fogsim.openscenario.positions import POSITIONS
 from fogsim.openscenario.triggers import CONDITIONS
@@ -273,8 +273,13 @@ def openscenario_elements() -> list[tuple[str, ...]]:
 
 def openscenario_honoured() -> list[tuple[str, ...]]:
     """Elements of OpenSCENARIO files that are honoured, with their attributes that are."""
-    rows = [(f"`{name}`", ", ".join(f"`{one}`" for one in told)) for name, told in sorted(HONOURED.items()) if told]
-    return [*rows, (", ".join(f"`{name}`" for name, told in sorted(HONOURED.items()) if not told), "none")]
+    decided, honoured = {*HARMLESS, *REFUSED}, {}
+    for line in (HERE.parent / "tests" / "data" / "openscenario_1_3.txt").read_text(encoding="utf-8").splitlines():
+        name, *keys = line.split()
+        if name not in {"#", *decided}:
+            honoured[name] = ", ".join(f"`{key}`" for key in sorted(keys) if f"{name}@{key}" not in decided)
+    rows = [(f"`{name}`", keys) for name, keys in sorted(honoured.items()) if keys]
+    return [*rows, (", ".join(f"`{name}`" for name, keys in sorted(honoured.items()) if not keys), "none")]
 
 
 def openscenario_reasons(decided: Mapping[str, str]) -> list[tuple[str, ...]]:

@@ -1,14 +1,14 @@
 """The initial state: positions, speeds and lamps of vehicles, fog and light."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from fogsim.openscenario.actions import DISPLACEMENTS, Actions
-from fogsim.openscenario.effects import Effect
-from fogsim.openscenario.entities import Vehicle, ego_of
+from fogsim.openscenario.entities import Vehicle
 from fogsim.openscenario.environment import Environment, environment_of
+from fogsim.openscenario.lateral import Effect
 from fogsim.openscenario.positions import ALONG, Positions
 from fogsim.openscenario.xml_tree import Node
 from fogsim.traffic.road.opendrive_lanes import Spot
@@ -19,17 +19,12 @@ _STRAIGHT = 1000.0  # Way of those off the lanes in the direction in which they 
 
 @dataclass
 class Beginning:
-    """Initial state: reference points and ordered speeds of vehicles, fog and light, and further effects.
+    """Initial state: positions, ordered speeds of vehicles, fog and light, and further effects.
 
-    `names` are the vehicles by their names in the timeline, `ways` their edges, `off_lanes` the places of those on no
-    lane, `fronts` the places of front bumpers, and `distances` the actions that place one at a distance to another.
+    `fronts` are the places of front bumpers, and `distances` the actions that place one at a distance to another.
     """
 
-    spots: dict[str, Spot]
-    names: Mapping[str, str]
-    ways: dict[str, tuple[str, ...]]
-    off_lanes: dict[str, tuple[float, float, float]]
-    rerouted: set[str]
+    positions: Positions
     fronts: dict[str, Spot] = field(default_factory=dict)
     orders: dict[str, Mapping[str, Any]] = field(default_factory=dict)
     environment: Environment = field(default_factory=Environment)
@@ -39,7 +34,7 @@ class Beginning:
     @property
     def routed(self) -> set[str]:
         """Vehicles that have a route, from the beginning or later, for which they change lane."""
-        return {*self.effect.routes, *self.rerouted}
+        return {*self.effect.routes, *self.positions.rerouted}
 
     def speed(self, vehicle: str, *asked: str) -> float:
         """Initial speed of a vehicle [m/s]; one that is relative follows from another's."""
@@ -48,34 +43,38 @@ class Beginning:
             return 0.0
         if "to_kmh" in order:
             return float(order["to_kmh"]) / KMH_PER_MPS
-        other = self.speed(self.names[order["like"]], *asked, vehicle)
+        other = self.speed(self.of_name(order["like"]), *asked, vehicle)
         return max(other * float(order.get("factor", 1.0)) + float(order.get("plus_kmh", 0.0)) / KMH_PER_MPS, 0.0)
 
+    def of_name(self, named: str) -> str:
+        """The vehicle that the timeline names so."""
+        return self.positions.vehicles.ego if named == "ego" else named
 
-def read_beginning(init: Node | None, vehicles: Mapping[str, Vehicle], actions: Actions) -> Beginning:
+
+def read_beginning(init: Node | None, actions: Actions) -> Beginning:
     """Initial state from the element ``Init``."""
-    positions = actions.positions
-    names = {actions.called(name).strip('"'): name for name in vehicles}
-    begin = Beginning(positions.entities, names, positions.ways, positions.off_lanes, positions.rerouted)
+    begin, vehicles = Beginning(actions.positions), actions.vehicles
     blocks = init.all("Actions") if init else []
     for block in blocks:
         for action in block.all("GlobalAction"):
             _take_global(action, begin, actions)
-    private = [one for block in blocks for one in block.all("Private")]
+    private = vehicles.known(one for block in blocks for one in block.all("Private"))
     added = {one.get("entityRef"): one for block in blocks for one in _entity_actions(block, "AddEntityAction")}
-    _place(_positions(private, added, vehicles, actions), vehicles, actions)
+    _place(_positions(private, added, actions), actions)
     for one in private:
         for action in one.all("PrivateAction"):
             _take_private(action, one.get("entityRef"), begin, actions)
-    _move_by_distances(begin, actions)
+    for name, action in begin.distances:
+        with action.refusing():
+            actions.spots[name] = _at_distance(action, name, begin, actions)
     absent = {one.get("entityRef") for block in blocks for one in _entity_actions(block, "DeleteEntityAction")}
     for name in absent:
-        begin.spots.pop(name, None)
+        actions.spots.pop(name, None)
     if init and init.above:
         absent |= {one.get("entityRef") for one in _entity_actions(init.above, "AddEntityAction")} - {*added}
     for name, vehicle in vehicles.items():
-        if name not in absent or name == ego_of(dict(vehicles)):
-            _begin(name, vehicle, begin, vehicles, actions)
+        if name not in absent or name == vehicles.ego:
+            _begin(vehicle, begin, actions)
     return begin
 
 
@@ -84,40 +83,42 @@ def _entity_actions(node: Node, kind: str) -> list[Node]:
     return [one for one in node.walk() if one.tag == "EntityAction" and any(c.tag == kind for c in one.children)]
 
 
-def _begin(name: str, vehicle: Vehicle, begin: Beginning, vehicles: Mapping[str, Vehicle], actions: Actions) -> None:
+def _begin(vehicle: Vehicle, begin: Beginning, actions: Actions) -> None:
     """Find where a vehicle's front bumper begins, and its way, or its path off the lanes."""
-    if name in begin.off_lanes or (name not in begin.spots and "path" in begin.effect.do.get(name, {})):
-        _place_off_lanes(name, vehicle, begin, actions.positions)
-    elif name in begin.spots:
+    name, positions = vehicle.name, actions.positions
+    if name in positions.off_lanes or (name not in actions.spots and "path" in begin.effect.do.get(name, {})):
+        _place_off_lanes(vehicle, begin)
+    elif name in actions.spots:
         try:
-            begin.fronts[name] = _front(name, begin, vehicles, actions)
+            begin.fronts[name] = _front(vehicle, begin)
             wanted = begin.effect.routes.get(name, ())
-            begin.ways[name] = actions.positions.lanes.route(begin.fronts[name].lane.edge, wanted)
+            positions.ways[name] = positions.lanes.route(begin.fronts[name].lane.edge, wanted)
         except ValueError as error:
-            actions.findings.refuse(vehicle.node, f"{name} cannot begin where it is to: {error}")
-            del begin.spots[name]
-    elif not actions.findings.refused:
-        actions.findings.refuse(vehicle.node, f"{name} has no place: Init needs a TeleportAction of it")
+            vehicle.node.refuse(f"{name} cannot begin where it is to: {error}")
+            del actions.spots[name]
+    elif not vehicle.node.findings.refused:
+        vehicle.node.refuse(f"{name} has no place: Init needs a TeleportAction of it")
 
 
-def _place_off_lanes(name: str, vehicle: Vehicle, begin: Beginning, positions: Positions) -> None:
+def _place_off_lanes(vehicle: Vehicle, begin: Beginning) -> None:
     """Let one begin off the lanes, or turned on one; without a path it moves straight on, a vehicle along its lane."""
-    (x, y, heading), speed = begin.off_lanes.setdefault(name, (math.inf, 0.0, 0.0)), begin.speed(name)
+    name, lanes = vehicle.name, begin.positions.lanes
+    (x, y, heading), speed = begin.positions.off_lanes.setdefault(name, (math.inf, 0.0, 0.0)), begin.speed(name)
     far, degrees = _STRAIGHT if speed or vehicle.body else 0.0, math.degrees(heading)
     ends = [[x + way * math.cos(heading), y + way * math.sin(heading), degrees] for way in (0.0, far)]
-    lane = None if vehicle.body else positions.lanes.nearest(x, y)
-    path = {"points": positions.lanes.backwards(lane) if lane else ends, "ahead_m": vehicle.front, "stays": True}
+    lane = None if vehicle.body else lanes.nearest(x, y)
+    path = {"points": lanes.backwards(lane) if lane else ends, "ahead_m": vehicle.front, "stays": True}
     done = begin.effect.do.setdefault(name, {})
     done["path"] = {**done.get("path", path), "speed_kmh": speed * KMH_PER_MPS}
 
 
-def _front(name: str, begin: Beginning, vehicles: Mapping[str, Vehicle], actions: Actions) -> Spot:
+def _front(vehicle: Vehicle, begin: Beginning) -> Spot:
     """Place of a front bumper; ValueError if it is on no road or, all places being as written, in another vehicle."""
-    wanted, vehicle = begin.effect.routes.get(name, ()), vehicles[name]
-    front = actions.positions.lanes.along(begin.spots[name], vehicle.front, wanted)
-    for other, there in begin.fronts.items() if not actions.findings.refused else ():
+    positions, wanted = begin.positions, begin.effect.routes.get(vehicle.name, ())
+    front = positions.lanes.along(positions.spots[vehicle.name], vehicle.front, wanted)
+    for other, there in begin.fronts.items() if not vehicle.node.findings.refused else ():
         is_same = (there.lane.edge, there.lane.index) == (front.lane.edge, front.lane.index)
-        if is_same and -vehicles[other].length < front.position - there.position < vehicle.length:
+        if is_same and -positions.vehicles[other].length < front.position - there.position < vehicle.length:
             raise ValueError(f"{other} is there")
     return front
 
@@ -127,44 +128,38 @@ def _take_global(action: Node, begin: Beginning, actions: Actions) -> None:
         if one.tag == "EntityAction":
             # `read_beginning` has seen to it.
             one.all("AddEntityAction", "DeleteEntityAction")
+            actions.vehicles.known([one])
         elif one.tag == "EnvironmentAction":
-            begin.environment = environment_of(one, actions.catalogs, actions.positions.lanes)
+            begin.environment = environment_of(one, actions.positions.catalogs, actions.positions.lanes)
         else:
             actions.take(action, [], begin.effect)
 
 
-def _positions(
-    private: list[Node], added: Mapping[str, Node], vehicles: Mapping[str, Vehicle], actions: Actions
-) -> dict[str, Node]:
+def _positions(private: list[Node], added: Mapping[str, Node], actions: Actions) -> dict[str, Node]:
     """Positions at which vehicles are added, or put, at the beginning."""
-    holders = [(name, one.all("AddEntityAction")) for name, one in added.items() if name in vehicles]
+    holders = [(name, one.all("AddEntityAction")) for name, one in added.items() if name in actions.vehicles]
     for one in private:
-        name = one.get("entityRef")
-        if name in vehicles:
-            places = [t for action in one.all("PrivateAction") for t in action.all("TeleportAction")]
-            # Who only follows a trajectory begins at its first vertex.
-            holders.append((name, places or [vertex for vertex in one.walk() if vertex.tag == "Vertex"][:1]))
-        else:
-            actions.findings.refuse(one, f"there is no vehicle {name!r}")
+        places = [t for action in one.all("PrivateAction") for t in action.all("TeleportAction")]
+        # Who only follows a trajectory begins at its first vertex.
+        vertices = [vertex for vertex in one.walk() if vertex.tag == "Vertex"]
+        holders.append((one.get("entityRef"), places or vertices[:1]))
     return {name: position for name, inside in holders for one in inside for position in one.all("Position")}
 
 
-def _place(wanted: dict[str, Node], vehicles: Mapping[str, Vehicle], actions: Actions) -> None:
+def _place(wanted: dict[str, Node], actions: Actions) -> None:
     """Place vehicles; those relative to another one last."""
     positions = actions.positions
     while wanted:
         ready = [n for n, position in wanted.items() if positions.refers_to(position) not in wanted] or list(wanted)
         for name in ready:
             position = wanted.pop(name)
-            if (point := _off_lanes(position, vehicles[name], vehicles, positions)) is not None:
+            if (point := _off_lanes(position, actions.vehicles[name], positions)) is not None:
                 positions.off_lanes[name] = point
             elif (spot := positions.spot(position)) is not None:
-                positions.entities[name] = spot
+                positions.spots[name] = spot
 
 
-def _off_lanes(
-    position: Node, vehicle: Vehicle, vehicles: Mapping[str, Vehicle], positions: Positions
-) -> tuple[float, float, float] | None:
+def _off_lanes(position: Node, vehicle: Vehicle, positions: Positions) -> tuple[float, float, float] | None:
     """x, y [m] and heading [rad] of one on no lane, of a body turned on one, or of a vehicle against one; else None."""
     try:
         x, y, heading, along = positions.point(position)
@@ -174,7 +169,7 @@ def _off_lanes(
     facing = along if heading is None else heading
     along_lane = 1.0 if lane is None or facing is None else math.cos(facing - lane.world[2])
     is_turned = along_lane < (ALONG if vehicle.body else -ALONG)
-    if vehicle.name == ego_of(dict(vehicles)) or not (lane is None or is_turned):
+    if vehicle.name == positions.vehicles.ego or not (lane is None or is_turned):
         return None
     if lane is not None and not vehicle.body:
         positions.against[vehicle.name] = positions.named(position) or lane
@@ -185,43 +180,34 @@ def _take_private(action: Node, name: str, begin: Beginning, actions: Actions) -
     if action.one("TeleportAction"):
         return
     distance = action.within("LongitudinalAction", "LongitudinalDistanceAction")
-    if distance and distance.one("DynamicConstraints") is None and name in actions.vehicles:
+    if distance and distance.one("DynamicConstraints") is None:
         # Without limits to its motion it is there at once.
         begin.distances.append((name, distance))
-        if not actions.findings.flag(distance, "continuous"):
+        if not distance.flag("continuous"):
             return
     effect = Effect(is_at_start=True)
     actions.take(action, [name], effect)
     begin.effect.routes.update(effect.routes)
     done = effect.do.get(name, {})
-    speed, leader = done.pop("speed", None), begin.names.get(done.get("follow", {}).get("vehicle", ""))
+    speed, leader = done.pop("speed", None), begin.of_name(done.get("follow", {}).get("vehicle", ""))
     if speed is not None:
         # At the start there is no earlier speed to change from.
         begin.orders[name] = speed
         if speed.get("continuous"):
             begin.effect.add(name, speed={**speed, "shape": "step"})
-    if leader is not None and not _is_ahead(begin.spots.get(leader), begin.spots.get(name)):
-        actions.findings.refuse(action, f"FogSim keeps a distance to a vehicle ahead; {leader} is not ahead of {name}")
+    if leader in actions.vehicles and not _is_ahead(actions.spots.get(leader), actions.spots.get(name)):
+        action.refuse(f"FogSim keeps a distance to a vehicle ahead; {leader} is not ahead of {name}")
     if done:
         begin.effect.add(name, **done)
-
-
-def _move_by_distances(begin: Beginning, actions: Actions) -> None:
-    """Put those at a distance to another vehicle there."""
-    for name, action in begin.distances:
-        try:
-            begin.spots[name] = _at_distance(action, name, begin, actions)
-        except ValueError as error:
-            actions.findings.refuse(action, str(error))
 
 
 def _at_distance(action: Node, name: str, begin: Beginning, actions: Actions) -> Spot:
     """Place at a distance to another vehicle, on the lane on which the vehicle is; ValueError if there is none."""
     headway, distance, is_between_bumpers = actions.gap(action)
-    own, other, reference = begin.spots.get(name), begin.spots.get(action.get("entityRef")), action.get("entityRef")
+    own, other, reference = actions.spots.get(name), actions.spots.get(action.get("entityRef")), action.get("entityRef")
     if own is None or other is None:
         raise ValueError(f"{name} or {reference} has no place")
-    where = actions.findings.word(action, "displacement", DISPLACEMENTS, "any")
+    where = action.word("displacement", DISPLACEMENTS, "any")
     is_ahead = _is_ahead(own, other) if where == "any" else where == DISPLACEMENTS[1]
     ahead, behind = (name, reference) if is_ahead else (reference, name)
     away = headway * begin.speed(behind) + distance
@@ -238,26 +224,3 @@ def _is_ahead(one: Spot | None, other: Spot | None) -> bool:
         return True
     (x, y, _), (from_x, from_y, heading) = one.world, other.world
     return (x - from_x) * math.cos(heading) + (y - from_y) * math.sin(heading) > 0.0
-
-
-Along = Callable[[str | Node], float | None]
-
-
-def along_route(route: tuple[str, ...], begin: Beginning, vehicles: Mapping[str, Vehicle], actions: Actions) -> Along:
-    """Position along the ego's route: of a vehicle's front bumper at the beginning, or of a position."""
-    # On a closed road, the first time counts.
-    starts = dict(reversed([*zip(route, actions.positions.lanes.starts(route), strict=False)]))
-
-    def position(what: str | Node) -> float | None:
-        if isinstance(what, str):
-            spot, further = begin.spots.get(what), vehicles[what].front
-        else:
-            try:
-                spot, further = actions.positions.on_lanes(what, is_of_vehicle=False), 0.0
-            except ValueError:
-                return None
-        if spot is None or spot.lane.edge not in starts:
-            return None
-        return starts[spot.lane.edge] + spot.position + further
-
-    return position

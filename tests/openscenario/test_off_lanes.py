@@ -303,7 +303,7 @@ def test_a_vehicle_arrives_when_the_ego_does(tmp_path: Path, final: str, speed_t
             "closed: write the first",
         ),
         (_offset(_absolute(2.0)), "2 m from the middle is not in its lane, 3.5 m wide"),
-        (_offset("<Whatever/>"), "expected LaneOffsetActionDynamics and a LaneOffsetTarget"),
+        (_offset("<Whatever/>"), "expected an AbsoluteTargetLaneOffset or RelativeTargetLaneOffset"),
     ],
 )
 def test_what_cannot_be_followed_is_refused(tmp_path: Path, action: str, told: str) -> None:

@@ -263,12 +263,22 @@ def compliances() -> list[tuple[str, ...]]:
     return [(f"`{name}`", *(f"{value:g}" for value in astuple(how))) for name, how in COMPLIANCES.items()]
 
 
+VALUES = {
+    "SimulationTimeCondition": "`time`.",
+    "ParameterCondition": "`happened(EVENT)` that sets it, if that makes a difference; otherwise always or never.",
+    "VariableCondition": "As `ParameterCondition`.",
+    "StoryboardElementStateCondition": "`happened(EVENT)`, for states of beginning, and of being over by the time that "
+    "the actions take.",
+}
+"""Conditions of OpenSCENARIO files by value, and what becomes of them."""
+
+
 def openscenario_elements() -> list[tuple[str, ...]]:
     """Elements of OpenSCENARIO files that are read."""
     kinds = {f"vehicleCategory {kind}": f"SUMO's class `{name}`." for kind, name in CLASSES.items()}
     lamps = {f"vehicleLightType {kind}": ", ".join(f"`{one}`" for one in named) for kind, named in LAMPS.items()}
-    tables = (POSITIONS, ACTIONS, CONDITIONS, kinds, lamps)
-    return [(f"`{element}`", told) for table in tables for element, told in table.items()]
+    read = {tag: inspect.getdoc(method) or "" for tag, method in {**POSITIONS, **ACTIONS, **CONDITIONS}.items()}
+    return [(f"`{element}`", told) for table in (read, VALUES, kinds, lamps) for element, told in table.items()]
 
 
 def openscenario_honoured() -> list[tuple[str, ...]]:

@@ -7,7 +7,7 @@ from fogsim.openscenario.elements import HARMLESS, REFUSED
 from fogsim.openscenario.environment import environment_of
 from fogsim.openscenario.lateral import SHAPES, Effect, LateralActions
 from fogsim.openscenario.triggers import NEAR
-from fogsim.openscenario.xml_tree import Node, NodeError, documented, handlers
+from fogsim.openscenario.xml_tree import Node, NodeError, handlers
 from fogsim.units import KMH_PER_MPS
 
 LAMPS = {
@@ -36,14 +36,14 @@ class Actions(LateralActions):
     def take(self, action: Node, actors: list[str], effect: Effect) -> None:
         """Add an action (``PrivateAction``, ``GlobalAction``, or their parent) of some actors to an effect."""
         for one in action.all():
-            if one.tag in _GROUPS:
+            if one.tag.removesuffix("Action") in _GROUPS:
                 self.take(one, actors, effect)
             elif one.tag in _GLOBAL:
                 with one.refusing():
-                    _READERS[one.tag](self, one, effect)
+                    ACTIONS[one.tag](self, one, effect)
             elif one.tag in HARMLESS:
                 one.remark(HARMLESS[one.tag], is_whole=True)
-            elif one.tag not in _READERS:
+            elif one.tag not in ACTIONS:
                 message = REFUSED.get(one.tag, "FogSim does not know this element here")
                 one.refuse(f"{message}; actions are {', '.join(ACTIONS)}")
             elif not actors:
@@ -60,7 +60,7 @@ class Actions(LateralActions):
                 if effect.do.get(actor, {}).keys() & orders:
                     raise ValueError(f"another action of this event orders the motion of {actor} as well")
                 if actor in self.vehicles:
-                    (Actions.aside if across else _READERS[action.tag])(self, action, actor, effect)
+                    (Actions.aside if across else ACTIONS[action.tag])(self, action, actor, effect)
                 else:
                     # The group of the action is refused.
                     action.see()
@@ -72,23 +72,20 @@ class Actions(LateralActions):
 
     def parameter_action(self, action: Node, effect: Effect) -> None:
         """Nothing that can be seen: what conditions on a parameter or variable compare."""
-        to, name = action.one("SetAction"), action.get("parameterRef") or action.get("variableRef")
-        if to is None:
-            raise ValueError("expected a SetAction: values are set, not changed by others")
-        effect.sets[name] = to.get("value")
+        name = action.get("parameterRef") or action.get("variableRef")
+        effect.sets[name] = action.need("SetAction").get("value")
 
     variable_action = parameter_action
 
     def entity_action(self, action: Node, effect: Effect) -> None:
         """`path` to the place where a vehicle comes onto the road, and there it stands; or `leave`."""
-        name, position = action.get("entityRef"), action.within("AddEntityAction", "Position")
+        name, change = action.get("entityRef"), action.need("AddEntityAction", "DeleteEntityAction")
         if name not in self.vehicles or name == self.vehicles.ego:
             raise ValueError(f"expected a vehicle other than the ego, got {name!r}")
-        if position is None:
-            if action.one("DeleteEntityAction") is None:
-                raise ValueError("expected an AddEntityAction with a Position, or a DeleteEntityAction")
+        if change.tag == "DeleteEntityAction":
             effect.add(name, leave=True)
             return
+        position = change.need("Position")
         if self.positions.refers_to(position):
             message = "in a story, where others are by then is not known; give a place on the map"
             raise ValueError(f"AddEntityAction: {message}")
@@ -111,10 +108,8 @@ class Actions(LateralActions):
 
     def speed_action(self, action: Node, actor: str, effect: Effect) -> None:
         """`speed`: absolute, or relative to a vehicle at that moment, or continuously; by time or rate."""
-        dynamics, target = action.one("SpeedActionDynamics"), action.one("SpeedActionTarget")
-        to = target.one("AbsoluteTargetSpeed", "RelativeTargetSpeed") if target else None
-        if to is None:
-            raise ValueError("expected a SpeedActionTarget with an AbsoluteTargetSpeed or RelativeTargetSpeed")
+        dynamics, target = action.one("SpeedActionDynamics"), action.need("SpeedActionTarget")
+        to = target.need("AbsoluteTargetSpeed", "RelativeTargetSpeed")
         speed = {**self._target(to), **(self._pace(dynamics, effect) if dynamics else {"shape": "step"})}
         if "rate_mps2" in speed and "to_kmh" in speed:
             own, final = f"{self.vehicles[actor].called}.speed", speed["to_kmh"] / KMH_PER_MPS
@@ -125,11 +120,8 @@ class Actions(LateralActions):
 
     def speed_profile_action(self, action: Node, actor: str, effect: Effect) -> None:
         """`speed` by its `profile`; without a time as fast as `DynamicConstraints` or the vehicle allow."""
-        vehicle, limits, entries = (
-            self.vehicles[actor],
-            action.one("DynamicConstraints"),
-            action.all("SpeedProfileEntry"),
-        )
+        vehicle, limits = self.vehicles[actor], action.one("DynamicConstraints")
+        entries = action.all("SpeedProfileEntry")
         if action.get("entityRef") or not entries:
             raise ValueError("expected SpeedProfileEntry elements whose speeds are absolute, without entityRef")
         action.word("followingMode", ("position", "follow"))
@@ -172,9 +164,7 @@ class Actions(LateralActions):
 
     def light_state_action(self, action: Node, actor: str, effect: Effect) -> None:
         """`lamps`; a flashing lamp is an indicator, or on."""
-        light, state = action.within("LightType", "VehicleLight"), action.one("LightState")
-        if light is None or state is None:
-            raise ValueError("expected a LightType with a VehicleLight, and a LightState")
+        light, state = action.need("LightType").need("VehicleLight"), action.need("LightState")
         mode, kind = state.word("mode", ("on", "off", "flashing")), light.word("vehicleLightType", (*LAMPS, *_UNLIT))
         if action.number("transitionTime", 0.0):
             action.refuse("transitionTime: lamps are lit at once; write 0")
@@ -199,13 +189,10 @@ class Actions(LateralActions):
 
     def synchronize_action(self, action: Node, actor: str, effect: Effect) -> None:
         """`arrive`: at its target when another vehicle is at its own, each on the way that it has from `Init` on."""
-        master, final = action.get("masterEntityRef"), action.one("FinalSpeed")
-        own, other = action.one("TargetPosition"), action.one("TargetPositionMaster")
-        if master not in self.vehicles or own is None or other is None:
-            raise ValueError(f"expected TargetPosition, TargetPositionMaster and a vehicle, got {master!r}")
-        (place, begins), (its_place, its_begins) = self._on_the_way(own, actor), self._on_the_way(other, master)
-        name = self.vehicles[master].named
-        arrive = {"vehicle": name, "distance_m": place - begins, "its_distance_m": its_place - its_begins}
+        master, final = self.vehicles.of(action, "masterEntityRef"), action.one("FinalSpeed")
+        place, begins = self._on_the_way(action.need("TargetPosition"), actor)
+        its_place, its_begins = self._on_the_way(action.need("TargetPositionMaster"), master.name)
+        arrive = {"vehicle": master.named, "distance_m": place - begins, "its_distance_m": its_place - its_begins}
         speed = final.one("AbsoluteSpeed", "RelativeSpeedToMaster") if final else None
         if speed is not None:
             value, is_relative = speed.number("value"), speed.tag != "AbsoluteSpeed"
@@ -213,8 +200,8 @@ class Actions(LateralActions):
             arrive["to_kmh"] = 0.0 if is_factor else value * KMH_PER_MPS
             arrive["factor"] = value if is_factor else float(is_relative)
         near = action.number("targetToleranceMaster", 0.0)
-        effect.has_unknown_end = name != "ego"
-        effect.ends.append(f"ego.position >= {its_place - near + self.vehicles[master].front:.3f} m")
+        effect.has_unknown_end = master.named != "ego"
+        effect.ends.append(f"ego.position >= {its_place - near + master.front:.3f} m")
         effect.add(actor, arrive=arrive)
 
     def _on_the_way(self, position: Node, vehicle: str) -> tuple[float, float]:
@@ -238,12 +225,11 @@ class Actions(LateralActions):
 
     def follow_trajectory_action(self, action: Node, actor: str, effect: Effect) -> None:
         """`path`: a polyline, by its times or at the vehicle's speed, on the lanes or off them."""
-        trajectory = self.positions.catalogs.within(action.one("TrajectoryRef") or action, "Trajectory")
-        polyline = trajectory.within("Shape", "Polyline") if trajectory else None
-        vertices = polyline.all("Vertex") if polyline else []
-        places = [place for one in vertices for place in one.all("Position")]
-        if trajectory is None or not vertices or len(places) != len(vertices):
-            raise ValueError("expected a Trajectory with a Polyline of Vertex elements that have a Position")
+        trajectory = self.positions.catalogs.need(action.one("TrajectoryRef") or action, "Trajectory")
+        vertices = trajectory.need("Shape").need("Polyline").all("Vertex")
+        places = [one.need("Position") for one in vertices]
+        if not vertices:
+            raise ValueError("expected a Trajectory with a Polyline of Vertex elements")
         mode = action.one("TrajectoryFollowingMode") or action
         mode.word("followingMode", ("position", "follow"), "follow")
         has_times = action.within("TimeReference", "None") is None
@@ -278,11 +264,10 @@ class Actions(LateralActions):
     def _own_points(self, places: list[Node], actor: str, effect: Effect) -> tuple[str, list[list[float]]] | None:
         """Points from the place that the actor itself has when it begins, and along which axes; None if not all are."""
         inner = [one for place in places for one in place.all()]
-        kinds = {
-            one.tag * (one.tag in _OWN_AXES and one.get("entityRef") == actor and not one.children) for one in inner
-        }
-        origin = _OWN_AXES.get(kinds.pop()) if len(kinds) == 1 and not effect.is_at_start else None
-        return None if origin is None else (origin, [[one.number(key) for key in ("dx", "dy")] for one in inner])
+        own = [one for one in inner if one.tag in _OWN_AXES and one.get("entityRef") == actor and not one.children]
+        if effect.is_at_start or own != inner or len({one.tag for one in inner}) != 1:
+            return None
+        return _OWN_AXES[inner[0].tag], [[one.number(key) for key in ("dx", "dy")] for one in inner]
 
     def assign_route_action(self, action: Node, actor: str, effect: Effect) -> None:
         """The way through the waypoints, with changes of lane as needed, and then straight on; the ego's in `Init`."""
@@ -290,15 +275,10 @@ class Actions(LateralActions):
 
     def acquire_position_action(self, action: Node, actor: str, effect: Effect) -> None:
         """The shortest way there, and then straight on; the ego's in `Init`."""
-        position, begins = action.one("Position"), self.spots.get(actor)
-        spot = None if position is None else self.positions.spot(position)
-        if begins is None or spot is None:
-            raise ValueError("expected a Position, and a vehicle that has one")
-        edge, lanes = spot.lane.edge, self.positions.lanes
-        self._drive(lanes.way(begins.lane.edge, edge) if effect.is_at_start else (edge,), actor, effect)
+        edge, begins = self.positions.on_lanes(action.need("Position")).lane.edge, self._begin(actor).lane.edge
+        self._drive(self.positions.lanes.way(begins, edge) if effect.is_at_start else (edge,), actor, effect)
 
     def _drive(self, edges: tuple[str, ...], actor: str, effect: Effect) -> None:
-        """Give a vehicle its way, at the beginning or later."""
         if effect.is_at_start:
             effect.routes[actor] = edges
         elif actor == self.vehicles.ego:
@@ -309,14 +289,10 @@ class Actions(LateralActions):
             effect.add(actor, take_route=[*edges, *self.positions.lanes.route(edges[-1])[1:]])
 
 
-_READERS = handlers(Actions, "action")
+ACTIONS = handlers(Actions, "action")
 _GLOBAL = ("EnvironmentAction", "ParameterAction", "VariableAction", "EntityAction", "OverrideControllerValueAction")
 _ACROSS = ("LaneChangeAction", "LaneOffsetAction")
 _ANYWHERE = ("SpeedAction", "SpeedProfileAction", "FollowTrajectoryAction", "LightStateAction")
 _ORDERS = {"LongitudinalAction": {"speed", "follow"}, "PrivateAction": {"arrive"}, "LateralAction": {"change_lane"}}
 _OWN_AXES = {"RelativeWorldPosition": "place", "RelativeObjectPosition": "vehicle"}
-_GROUPS = [
-    f"{kind}Action" for kind in ("Private", "Global", "Controller", "Longitudinal", "Lateral", "Appearance", "Routing")
-]
-ACTIONS = documented(_READERS)
-"""Actions that are read, and their translation."""
+_GROUPS = ("Private", "Global", "Controller", "Longitudinal", "Lateral", "Appearance", "Routing")

@@ -2,7 +2,6 @@
 
 import itertools
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -10,21 +9,14 @@ from typing import Any
 import numpy as np
 
 from fogsim.errors import InputError, shown, suggest
-from fogsim.openscenario.parameters import declared
+from fogsim.openscenario.parameters import Parameters, declared
 from fogsim.openscenario.xml_tree import Findings, Node, NodeError, read_xml
 from fogsim.randomness import named_generator
 
-MOST_CASES = 100_000
-"""Maximum number of cases of a file."""
-
-_DRAWN = (
-    *("ProbabilityDistributionSet", "Histogram", "UniformDistribution"),
-    *("NormalDistribution", "LogNormalDistribution", "PoissonDistribution"),
-)
+MOST_CASES = 100_000  # of a file
+_SHAPES = ("Uniform", "Normal", "LogNormal", "Poisson")
+_DRAWN = ("ProbabilityDistributionSet", "Histogram", *(f"{shape}Distribution" for shape in _SHAPES))
 _MOST_ROUNDS = 1_000  # Draws for all test runs before limits that hardly any draw meets are refused
-
-Assignment = Mapping[str, str]
-"""Values of parameters by name, as the file has them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +24,7 @@ class ParameterCases:
     """Values of the parameters of the file `base` in each case; `are_drawn` if the cases are random test runs."""
 
     base: Path
-    cases: tuple[Assignment, ...]
+    cases: tuple[Parameters, ...]
     are_drawn: bool
 
 
@@ -45,12 +37,10 @@ def read_parameter_cases(path: Path) -> ParameterCases | None:
     if whole is None:
         return None
     base, root = _base(whole)
-    fixed, drawn = whole.one("Deterministic"), whole.one("Stochastic")
-    cases: list[Assignment] = []
+    cases: list[Parameters] = []
+    are_drawn = whole.one("Stochastic") is not None
     with whole.refusing():
-        cases = _test_runs(drawn) if drawn else _grid(fixed) if fixed else []
-        if not (fixed or drawn):
-            raise ValueError("there are no cases; expected Deterministic or Stochastic")
+        cases = (_test_runs if are_drawn else _grid)(whole.need("Stochastic", "Deterministic"))
     whole.check_read()
     declarations = [one for block in root.all("ParameterDeclarations") for one in block.children]
     known = {one.name: one.attributes.get("value", "") for one in declarations}
@@ -60,30 +50,26 @@ def read_parameter_cases(path: Path) -> ParameterCases | None:
             whole.refuse(f"{base} declares no parameter {shown(name)}; {suggest(name, known)}")
     whole.findings.close(path)
     # Where a set leaves a parameter out, it has the value of its declaration.
-    filled: list[Assignment] = [{name: case.get(name, known[name]) for name in names} for case in cases]
-    if drawn is None and any(one.children for one in declarations):
+    filled: list[Parameters] = [{name: case.get(name, known[name]) for name in names} for case in cases]
+    if not are_drawn and any(one.children for one in declarations):
         filled = _allowed(filled, replace(root, children=root.all("ParameterDeclarations")), whole)
         whole.findings.close(path)
-    return ParameterCases(base, tuple(filled), drawn is not None)
+    return ParameterCases(base, tuple(filled), are_drawn)
 
 
-def _allowed(cases: list[Assignment], declaring: Node, whole: Node) -> list[Assignment]:
-    """Cases that keep the constraints of all declarations."""
+def _allowed(cases: list[Parameters], declaring: Node, whole: Node) -> list[Parameters]:
     allowed, broken = [], ""
     for case in cases:
         declared(declaring.copy(trial := Findings()), {}, case)
         allowed += [] if trial.refused else [case]
         broken = next(iter(trial.refused), broken)
     if len(allowed) < len(cases):
-        message = (
-            f"{len(cases) - len(allowed):,} of {len(cases):,} cases break a ConstraintGroup and are none; {broken}"
-        )
-        (whole.remark if allowed else whole.refuse)(message)
+        number = f"{len(cases) - len(allowed):,} of {len(cases):,}"
+        (whole.remark if allowed else whole.refuse)(f"{number} cases break a ConstraintGroup and are none; {broken}")
     return allowed
 
 
 def _base(whole: Node) -> tuple[Path, Node]:
-    """The file that is varied, and its root."""
     file = whole.one("ScenarioFile")
     path = whole.file.parent / (file.get("filepath").replace("\\", "/") if file else "")
     if file is None or not path.is_file():
@@ -96,13 +82,13 @@ def _base(whole: Node) -> tuple[Path, Node]:
     return path, root
 
 
-def _grid(block: Node) -> list[Assignment]:
+def _grid(block: Node) -> list[Parameters]:
     """All combinations of deterministic distributions, the last one fastest; those that are the same once."""
-    axes: list[list[Assignment]] = []
+    axes: list[list[Parameters]] = []
     for one in block.all("DeterministicSingleParameterDistribution", "DeterministicMultiParameterDistribution"):
         name, sets = one.get("parameterName"), one.one("ValueSetDistribution")
         listed = [each.all("ParameterAssignment") for each in (sets.all("ParameterValueSet") if sets else ())]
-        axis: list[Assignment] = [{each.get("parameterRef"): each.get("value") for each in row} for row in listed]
+        axis: list[Parameters] = [{each.get("parameterRef"): each.get("value") for each in row} for row in listed]
         with one.refusing():
             axes.append(axis or [{name: value} for value in _values(one)])
             if {name for case in axes[-1] for name in case} & {name for axis in axes[:-1] for c in axis for name in c}:
@@ -123,8 +109,7 @@ def _values(node: Node) -> list[str]:
     (low, high), step = _limits(ranged), ranged.number("stepWidth")
     number = math.floor((high - low) / step + 1e-9) + 1 if step > 0.0 and math.isfinite(high - low) else 0
     if not 0 < number <= MOST_CASES:
-        message = f"expected a stepWidth above 0 with 1 … {MOST_CASES:,} values from lowerLimit on"
-        raise NodeError(ranged, message)
+        raise NodeError(ranged, f"expected a stepWidth above 0 with 1 … {MOST_CASES:,} values from lowerLimit on")
     return [f"{low + i * step:.9g}" for i in range(number)]
 
 
@@ -139,29 +124,25 @@ def _limits(node: Node) -> tuple[float, float]:
     return low, high
 
 
-def _test_runs(block: Node) -> list[Assignment]:
+def _test_runs(block: Node) -> list[Parameters]:
     """Random test runs; with the same seed a parameter has the same values, whatever else is drawn."""
     number, seed = block.number("numberOfTestRuns"), block.number("randomSeed", 0.0)
     if not (number.is_integer() and 1 <= number <= MOST_CASES):
-        message = f"numberOfTestRuns: expected a whole number of 1 … {MOST_CASES:,}, got {number:g}"
-        raise NodeError(block, message)
+        raise NodeError(block, f"numberOfTestRuns: expected a whole number of 1 … {MOST_CASES:,}, got {number:g}")
     columns: dict[str, list[str]] = {}
+    block.need("StochasticDistribution")
     for one in block.all("StochasticDistribution"):
-        name, kind = one.get("parameterName"), one.one(*_DRAWN)
+        name = one.get("parameterName")
         generator = named_generator(int(np.float64(seed).view(np.uint64)), name)
         with one.refusing():
-            if kind is None:
-                raise ValueError(f"expected one of {', '.join(_DRAWN)}")
+            kind = one.need(*_DRAWN)
             if name in columns:
                 raise ValueError("an earlier distribution has the same parameter")
             try:
                 columns[name] = _drawn(kind, generator, int(number))
-            except NodeError:
-                raise
             except (ValueError, ArithmeticError) as error:
-                raise NodeError(kind, f"its numbers make no distribution: {error}") from error
-    if not columns:
-        raise NodeError(block, "there are no cases; expected a StochasticDistribution")
+                node = getattr(error, "node", kind)
+                raise NodeError(node, f"its numbers make no distribution: {error}") from error
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 

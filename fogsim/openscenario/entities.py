@@ -4,39 +4,23 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from fogsim.openscenario.catalogs import Catalogs
 from fogsim.openscenario.elements import HARMLESS
+from fogsim.openscenario.parameters import Catalogs
 from fogsim.openscenario.xml_tree import Node, NodeError, sumo_name
 from fogsim.values.traffic import BOX, PEDESTRIAN
 
-CLASSES = {
-    "car": "passenger",
-    "van": "delivery",
-    "truck": "truck",
-    "bus": "bus",
-    "motorbike": "motorcycle",
-    "bicycle": "bicycle",
-    "train": "rail",
-    "tram": "tram",
-}
-"""SUMO's class of each vehicle category that is read."""
-
+# SUMO's class of each vehicle category that is read
+CLASSES = {"car": "passenger", "van": "delivery", "truck": "truck", "bus": "bus"}
+CLASSES |= {"motorbike": "motorcycle", "bicycle": "bicycle", "train": "rail", "tram": "tram"}
 _ASIDE = 0.1  # Distance between the middles of axle and body that is none [m]
 _RUNNER = 10.0  # Top speed of persons and obstacles, and their acceleration [m/s, m/s²]
-_CATEGORIES = {
+_THINGS: tuple[str, ...] = ("none", "obstacle", "barrier", "railing", "soundBarrier", "trafficIsland")
+_THINGS += ("pole", "streetLamp", "tree", "vegetation", "building")
+_CATEGORIES = {  # Attribute, its words, and the usual one
     "Vehicle": ("vehicleCategory", tuple(CLASSES), "car"),
     "Pedestrian": ("pedestrianCategory", ("pedestrian", "wheelchair", "animal"), ""),
-    "MiscObject": (
-        "miscObjectCategory",
-        (
-            *("none", "obstacle", "barrier", "railing", "soundBarrier", "trafficIsland"),
-            *("pole", "streetLamp", "tree", "vegetation", "building"),
-        ),
-        "",
-    ),
+    "MiscObject": ("miscObjectCategory", _THINGS, ""),
 }
-"""Attribute with the category of each type of entity, its words, and the usual one."""
-
 _TAKEN = ("fog", "light")
 _EGO_NAMES = ("ego", "hero", "ego_vehicle", "egovehicle")
 _WORD = re.compile(r"[A-Za-z_][\w:#@\-]*")
@@ -44,11 +28,7 @@ _WORD = re.compile(r"[A-Za-z_][\w:#@\-]*")
 
 @dataclass(frozen=True, slots=True)
 class Vehicle:
-    """A vehicle: its size [m] and limits [m/s, m/s²].
-
-    `front` is the distance from its reference point, the middle of the rear axle, to the front bumper [m]. Persons and
-    obstacles have a `body`, and no lamps. Timelines know it as `named`.
-    """
+    """A vehicle: its size [m] and limits [m/s, m/s²]; persons and obstacles have a `body`, and no lamps."""
 
     name: str
     node: Node
@@ -56,12 +36,12 @@ class Vehicle:
     length: float
     width: float
     height: float
-    front: float
+    front: float  # From its reference point, the middle of the rear axle, to the front bumper [m]
     top_speed: float = _RUNNER
     acceleration: float = _RUNNER
     deceleration: float = _RUNNER
     body: str = ""
-    named: str = ""
+    named: str = ""  # In timelines
 
     @property
     def called(self) -> str:
@@ -110,11 +90,9 @@ def read_vehicles(entities: Node, catalogs: Catalogs) -> Vehicles:
         for controller in entity.all("ObjectController"):
             if controller.children or controller.attributes:
                 controller.remark(HARMLESS["ObjectController"], is_whole=True)
-        node = catalogs.within(entity, *_CATEGORIES)
-        if node is not None:
-            found[name] = _vehicle(name, node)
-        elif not entity.one("CatalogReference"):
-            entity.refuse("expected a Vehicle, Pedestrian, MiscObject or reference to one")
+        found[name] = Vehicle(name, entity, "car", 4.6, 1.85, 1.5, 3.7)
+        with entity.refusing():
+            found[name] = _vehicle(name, catalogs.need(entity, *_CATEGORIES))
     for name, vehicle in found.items():
         found[name] = replace(vehicle, named="ego" if name == found.ego else name)
     return found
@@ -129,10 +107,7 @@ def _vehicle(name: str, node: Node) -> Vehicle:
     for trailer in node.all("Trailer"):
         if any(one.tag != "TrailerRef" or one.get("entityRef") for one in trailer.all()):
             trailer.refuse("vehicles have no trailers; describe the whole as one vehicle")
-    performance, size = node.one("Performance"), _size(node)
-    if performance is None:
-        node.refuse("a vehicle needs a Performance")
-        return Vehicle(name, node, category, *size)
+    performance, size = node.need("Performance"), _size(node)
     limits = {"Speed": 138.0, "Acceleration": 50.0, "Deceleration": 50.0}
     top, up, down = (min(max(performance.number(f"max{key}"), 0.1), most) for key, most in limits.items())
     return Vehicle(name, node, category, *size, top, up, down)
@@ -140,10 +115,8 @@ def _vehicle(name: str, node: Node) -> Vehicle:
 
 def _size(node: Node) -> tuple[float, float, float, float]:
     """Length, width, height, and from the reference point to the front [m]."""
-    centre, size = node.within("BoundingBox", "Center"), node.within("BoundingBox", "Dimensions")
-    if centre is None or size is None:
-        node.refuse(f"a {node.tag} needs a BoundingBox with Center and Dimensions")
-        return 4.6, 1.85, 1.5, 3.7
+    box = node.need("BoundingBox")
+    centre, size = box.need("Center"), box.need("Dimensions")
     length, width, height = (size.number(key) for key in ("length", "width", "height"))
     centre.get("z")  # All stand on the road.
     if abs(centre.number("y")) > _ASIDE:

@@ -8,18 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import polynomial
 
-from fogsim.openscenario.catalogs import Catalogs
+from fogsim.openscenario.parameters import Catalogs
 from fogsim.openscenario.xml_tree import Node
 from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes
 
 _CLOUDS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
-_OLD_CLOUDS = {"free": 0.0, "cloudy": 4.0, "overcast": 8.0, "rainy": 8.0, "skyOff": 0.0}
-"""Oktas of the words for the sky in OpenSCENARIO 1.0."""
-
-USUAL_LATITUDE = math.radians(50.0)
-"""Latitude if a map gives none [rad]."""
-
-_BRANCHES = (
+_OLD_CLOUDS = {"free": 0.0, "cloudy": 4.0, "overcast": 8.0, "rainy": 8.0, "skyOff": 0.0}  # In 1.0
+USUAL_LATITUDE = math.radians(50.0)  # If a map gives none [rad]
+_BRANCHES = (  # Lowest elevation [deg] and coefficients of each piece of `clear_sky_illuminance`
     (20.0, (3.74, 3.97, -4.07, 1.47)),
     (5.0, (3.05, 13.28, -45.98, 64.33)),
     (-0.8, (2.88, 22.26, -207.64, 1034.30)),
@@ -27,71 +23,51 @@ _BRANCHES = (
     (-12.0, (2.70, 12.17, -431.69, -1899.83)),
     (-18.0, (13.84, 262.72, 1447.42, 2797.93)),
 )
-"""Lowest elevation [deg] and coefficients of each piece of `clear_sky_illuminance`."""
-
 BRIGHTEST = 200_000.0
 _DARKEST = 0.001  # Of a clear day, under any clouds
 _STEP = 1.0  # along a route, in the search for the start of a box [m]
 _EDGE = 1.0  # of a box of fog, whose border is sharp [m]
 
 
+Box = tuple[tuple[float, ...], tuple[float, ...]]  # Centre, and length, width and height [m]
+
+
 @dataclass(frozen=True, slots=True)
 class Environment:
-    """Fog and light: V_met [m], and illuminance of the ground [lx], None if not given.
-
-    A `box` holds the fog, by its centre and its length, width and height [m]; with None it is everywhere.
-    """
+    """Fog, everywhere or in a box, by its V_met [m], and illuminance of the ground [lx]; None if not given."""
 
     visibility: float | None = None
-    box: tuple[tuple[float, ...], tuple[float, ...]] | None = None
+    box: Box | None = None
     illuminance: float | None = None
 
 
 def environment_of(action: Node, catalogs: Catalogs, lanes: OpenDriveLanes) -> Environment:
     """Fog and light of an ``EnvironmentAction``; the map may give its geographic position."""
-    node = catalogs.within(action, "Environment")
-    if node is None:
-        return Environment()
-    weather = node.one("Weather")
+    node = catalogs.need(action, "Environment")
+    weather, road = node.one("Weather"), node.one("RoadCondition")
     fog = weather.one("Fog") if weather else None
-    box = fog.one("BoundingBox") if fog else None
-    read = Environment(
-        _visibility(fog) if fog else None, _box(box) if box else None, _illuminance(node, weather, lanes)
-    )
+    extent, box, visibility = fog.one("BoundingBox") if fog else None, None, None
+    if fog and (visibility := fog.number("visualRange", is_finite=False)) < 1.0:
+        fog.refuse(f"visualRange: expected 1 m or more, got {visibility:g}")
+    if extent:
+        centre, size = extent.need("Center"), extent.need("Dimensions")
+        box = tuple(map(centre.number, "xyz")), tuple(map(size.number, ("length", "width", "height")))
     for one in weather.all("Precipitation") if weather else ():
         falls = one.number("precipitationIntensity", one.number("intensity", 0.0))
         if one.get("precipitationType") != "dry" and falls > 0.0:
             one.refuse("rain and snow are not drawn: write precipitationType=dry, or an intensity of 0")
-    road = node.one("RoadCondition")
     if road and (road.number("frictionScaleFactor", 1.0) != 1.0 or road.get("wetness", "dry") != "dry"):
         road.refuse("roads are dry: write frictionScaleFactor=1; advice.parameters.friction is for advice")
-    return read
-
-
-def _visibility(fog: Node) -> float:
-    visibility = fog.number("visualRange", is_finite=False)
-    if visibility >= 1.0:
-        return visibility
-    fog.refuse(f"visualRange: expected 1 m or more, got {visibility:g}")
-    return math.inf
-
-
-def _box(node: Node) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
-    centre, size = node.one("Center"), node.one("Dimensions")
-    if centre is None or size is None:
-        node.refuse("a box needs a Center and Dimensions")
-        return None
-    return tuple(map(centre.number, "xyz")), tuple(map(size.number, ("length", "width", "height")))
+    return Environment(visibility, box, _illuminance(node, weather, lanes))
 
 
 def _illuminance(node: Node, weather: Node | None, lanes: OpenDriveLanes) -> float | None:
     clouds = _oktas(weather) if weather else 0.0
     sun, time = (weather.one("Sun") if weather else None), node.one("TimeOfDay")
     given = next((key for key in ("illuminance", "intensity") if sun and sun.get(key)), None)
-    moment = None if time is None else _moment(time)
-    elevation = sun.number("elevation") if sun and sun.get("elevation") else None
-    if elevation is None and moment is not None:
-        elevation = sun_elevation(moment, lanes.latitude, lanes.longitude)
+    elevation = _elevation(time, lanes) if time else None
+    if sun and sun.get("elevation"):
+        elevation = sun.number("elevation")
     clear = None if elevation is None else clear_sky_illuminance(elevation)
     if sun is None or given is None:
         return None if clear is None else through_clouds(clear, clouds)
@@ -114,20 +90,17 @@ def _oktas(weather: Node) -> float:
     return _OLD_CLOUDS.get(old, 0.0)
 
 
-def _moment(time: Node) -> dt.datetime | None:
+def _elevation(time: Node, lanes: OpenDriveLanes) -> float | None:
     text = time.get("dateTime")
     try:
-        return dt.datetime.fromisoformat(text)
+        return sun_elevation(dt.datetime.fromisoformat(text), lanes.latitude, lanes.longitude)
     except ValueError:
         time.refuse(f"dateTime: expected one such as 2026-11-23T08:30:00+01:00, got {text!r}")
         return None
 
 
 def fog_block(environment: Environment, route: Any, lowest: float) -> dict[str, Any]:
-    """The block ``fog`` of a scenario.
-
-    `route` (n, 2) is the middle of the ego's route, and heights of fog count from `lowest` [m].
-    """
+    """The block ``fog`` of a scenario, by the middle of the ego's route (n, 2) and its lowest height [m]."""
     visibility = math.inf if environment.visibility is None else environment.visibility
     box = environment.box
     if box is None:
@@ -142,7 +115,6 @@ def fog_block(environment: Environment, route: Any, lowest: float) -> dict[str, 
 
 
 def _stretches(route: Any, centre: Any, size: Any) -> list[tuple[float, float]]:
-    """Intervals of a route inside a box [m]."""
     steps = np.diff(route, axis=0)
     ends = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
     along = np.linspace(0.0, ends[-1], max(int(ends[-1] / _STEP) + 1, 2))
@@ -154,9 +126,8 @@ def _stretches(route: Any, centre: Any, size: Any) -> list[tuple[float, float]]:
 
 
 def sun_elevation(moment: dt.datetime, latitude: float | None, longitude: float | None) -> float:
-    """Elevation of the sun's centre above the horizon, without refraction [rad], at a place [rad, east and north].
+    """Elevation of the sun's centre [rad] at a place [rad, east and north], after Spencer (Search 2(5), 1971).
 
-    After Spencer (Fourier series representation of the position of the sun, Search 2(5), 1971), to some minutes of arc.
     A time without a time zone, or without a longitude, is mean solar time; without a latitude, 50° N is assumed.
     """
     hour = moment.hour + moment.minute / 60.0 + moment.second / 3600.0
@@ -179,14 +150,10 @@ def sun_elevation(moment: dt.datetime, latitude: float | None, longitude: float 
 
 
 def clear_sky_illuminance(elevation: float) -> float:
-    """Horizontal illuminance by sun and clear sky [lx], below −18° as there.
-
-    Seidelmann (ed.), Explanatory Supplement to the Astronomical Almanac, 1992, p. 491: cubics of log10 lx in elevation.
-    """
+    """Horizontal illuminance by sun and clear sky [lx] (Seidelmann, Explanatory Supplement, 1992, p. 491)."""
     degrees = min(90.0, max(_BRANCHES[-1][0], math.degrees(elevation)))
     coefficients = next(one for lowest, one in _BRANCHES if degrees >= lowest)
-    logarithm: float = float(polynomial.polyval(degrees / 90.0, coefficients))
-    return math.pow(10.0, logarithm)
+    return math.pow(10.0, float(polynomial.polyval(degrees / 90.0, coefficients)))
 
 
 def through_clouds(illuminance: float, oktas: float) -> float:

@@ -9,9 +9,8 @@ from fogsim.openscenario.positions import Positions, road_of, sense
 from fogsim.openscenario.xml_tree import Node, NodeError
 from fogsim.traffic.road.opendrive_lanes import Spot
 
+# Shapes of dynamics, and the nearest one in FogSim
 SHAPES = {"step": "step", "linear": "linear", "sinusoidal": "sinusoidal", "cubic": "sinusoidal"}
-"""Shapes of dynamics, and the nearest one in FogSim."""
-
 _STEEPEST = {"linear": 1.0, "sinusoidal": 0.5 * math.pi, "cubic": 1.5}  # Greatest rate of a shape, over its mean
 _STAY = 1e5  # Time for which a vehicle stays in the lane that it has changed to [s]
 _LONGEST = 60.0  # Most time that a change of lane takes [s]
@@ -100,11 +99,8 @@ class LateralActions:
     def aside(self, action: Node, actor: str, effect: Effect) -> None:
         """`change_lane` of a vehicle that drives against a lane: from its path to a lane, as they lie at first."""
         (dynamics, to), base = self._parts(action), self.positions.against[actor]
-        is_change, value, (x, y, heading) = (
-            action.tag == "LaneChangeAction",
-            to.number("value"),
-            self.positions.off_lanes[actor],
-        )
+        is_change, value = action.tag == "LaneChangeAction", to.number("value")
+        x, y, heading = self.positions.off_lanes[actor]
         spot = self.spots.get(to.get("entityRef")) if to.tag.startswith("Relative") else base
         if spot is None:
             message = "give a lane, or one by a vehicle that drives along its own"
@@ -129,16 +125,10 @@ class LateralActions:
         self._move(actor, effect, across, lasts, {})
 
     def _parts(self, action: Node) -> tuple[Node, Node]:
-        """Dynamics and target of an action; ValueError unless both are there."""
+        """Dynamics and target of an action; NodeError unless both are there."""
         kind = action.tag.removesuffix("Action")
-        dynamics, target = action.one(f"{action.tag}Dynamics"), action.one(f"{kind}Target")
-        if dynamics is None or target is None:
-            raise ValueError(f"expected {action.tag}Dynamics and a {kind}Target")
         kinds = [f"{which}Target{kind.replace('Change', '')}" for which in ("Absolute", "Relative")]
-        to = target.one(*kinds)
-        if to is None:
-            raise NodeError(target, f"expected an {' or '.join(kinds)}")
-        return dynamics, to
+        return action.need(f"{action.tag}Dynamics"), action.need(f"{kind}Target").need(*kinds)
 
     def _begin(self, actor: str) -> Spot:
         if actor not in self.spots:
@@ -151,7 +141,6 @@ class LateralActions:
         return self.offsets.get(vehicle, begins.offset if begins else 0.0)
 
     def _move(self, actor: str, effect: Effect, offset: float, lasts: float, lanes: Mapping[str, Any]) -> None:
-        """Move a vehicle to an offset in its lane, or in that of another one."""
         effect.lasts = max(effect.lasts, lasts)
         move = {"lanes": 0, "stay_s": _STAY, "offset_m": offset, "duration_s": min(lasts, _LONGEST)}
         effect.add(actor, change_lane={**lanes, **move})

@@ -5,50 +5,34 @@ import itertools
 import math
 from dataclasses import dataclass, field, replace
 
-from fogsim.openscenario.catalogs import Catalogs
 from fogsim.openscenario.elements import REFUSED
 from fogsim.openscenario.entities import Vehicle, Vehicles
-from fogsim.openscenario.xml_tree import Node, documented, handlers
+from fogsim.openscenario.parameters import Catalogs
+from fogsim.openscenario.xml_tree import Node, handlers
 from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, Spot
 
-Point = tuple[float, float, float | None]
-"""x, y [m] and heading [rad] of a place, None for any."""
-
-ALONG = math.cos(0.3)
-"""Cosine of the angle to a lane at which a vehicle still stands along it."""
+Point = tuple[float, float, float | None]  # x, y [m] and heading [rad] of a place, None for any
+ALONG = math.cos(0.3)  # Of the angle to a lane at which a vehicle still stands along it
 
 
 @dataclass
 class Positions:
-    """Finds positions; relative ones refer to the known initial positions `spots` of vehicles, whose ways are `ways`.
-
-    `off_lanes` are x, y [m] and heading [rad] of those that begin on no lane, or turned on one; of these, vehicles that
-    drive `against` a lane have the place that the file names. Those `moving` are elsewhere later, those `rerouted` on
-    another way. `with_oncoming` if vehicles drive on the oncoming lane.
-    """
+    """Finds positions, by the places and ways that vehicles have at first."""
 
     lanes: OpenDriveLanes
     catalogs: Catalogs
     vehicles: Vehicles
-    with_oncoming: bool = False
+    with_oncoming: bool = False  # Vehicles drive on the oncoming lane.
     spots: dict[str, Spot] = field(default_factory=dict)
     ways: dict[str, tuple[str, ...]] = field(default_factory=dict)
-    off_lanes: dict[str, tuple[float, float, float]] = field(default_factory=dict)
-    against: dict[str, Spot] = field(default_factory=dict)
-    moving: set[str] = field(default_factory=set)
-    rerouted: set[str] = field(default_factory=set)
+    off_lanes: dict[str, tuple[float, float, float]] = field(default_factory=dict)  # x, y [m] and heading [rad]
+    against: dict[str, Spot] = field(default_factory=dict)  # Of those off the lanes that drive against one
+    moving: set[str] = field(default_factory=set)  # Vehicles that are elsewhere later
+    rerouted: set[str] = field(default_factory=set)  # Vehicles that get another way
 
     def refers_to(self, position: Node) -> str | None:
         """Entity to which a ``Position`` is relative; None for an absolute one."""
         return next((one.get("entityRef") for one in position.children if one.tag.startswith("Relative")), None)
-
-    def spot(self, position: Node) -> Spot | None:
-        """Place of a ``Position``; None, and a finding, if it cannot be placed, or a vehicle cannot stand so there."""
-        try:
-            return self.on_lanes(position)
-        except ValueError as error:
-            next(iter(position.children), position).refuse(str(error))
-            return None
 
     def on_lanes(self, position: Node, *, is_of_vehicle: bool = True) -> Spot:
         """Place of a ``Position`` on the lanes; ValueError if it has none, or a vehicle cannot stand so there."""
@@ -70,10 +54,8 @@ class Positions:
 
     def along_way(self, position: Node, way: tuple[str, ...]) -> float:
         """How far along a way a ``Position`` is, also inside a junction if it is on a route [m]; ValueError if not."""
-        starts, one = self.lanes.starts(way), position.one("RoutePosition")
-        inner = one.within("InRoutePosition", "FromLaneCoordinates") if one else None
-        reference = one.one("RouteRef") if one and inner else None
-        edges: tuple[str, ...] = ()
+        inner = position.within("RoutePosition", "InRoutePosition", "FromLaneCoordinates")
+        reference, edges = position.within("RoutePosition", "RouteRef"), tuple[str, ...]()
         if inner and reference:
             (spot, edges), further = self.route(reference), inner.number("pathS")
             inner.read.update(inner.attributes)
@@ -81,7 +63,7 @@ class Positions:
             spot, further = self.on_lanes(position, is_of_vehicle=False), 0.0
         if not {spot.lane.edge, *edges} <= {*way}:
             raise ValueError(f"{position.tag}: it is not on the way of its vehicle")
-        return starts[way.index(spot.lane.edge)] + spot.position + further
+        return self.lanes.starts(way)[way.index(spot.lane.edge)] + spot.position + further
 
     def along_ego(self, what: Vehicle | Node) -> float | None:
         """Position along the ego's route of a vehicle's front bumper at first, or a ``Position``; None off it [m]."""
@@ -106,10 +88,10 @@ class Positions:
 
     def _found(self, position: Node) -> tuple[Node, Spot | Point]:
         one = position.one()
-        if one is None or one.tag not in _KINDS:
+        if one is None or one.tag not in POSITIONS:
             message = REFUSED.get(one.tag, "") if one else "expected a position"
-            raise ValueError(f"{message}; positions are {', '.join(_KINDS)}")
-        place: Spot | Point = _KINDS[one.tag](self, one)
+            raise ValueError(f"{message}; positions are {', '.join(POSITIONS)}")
+        place: Spot | Point = POSITIONS[one.tag](self, one)
         return one, place
 
     def _place_of(self, node: Node) -> Spot:
@@ -186,11 +168,8 @@ class Positions:
 
     def route_position(self, node: Node) -> Spot | Point:
         """So far along a route from its first waypoint, on the lane of `laneId`; or where an entity is."""
-        reference, place = node.one("RouteRef"), node.one("InRoutePosition")
-        inner = place.one("FromLaneCoordinates", "FromCurrentEntity") if place else None
-        if reference is None or inner is None:
-            raise ValueError("expected a RouteRef, and an InRoutePosition from lane coordinates or an entity")
-        first, edges = self.route(reference)
+        inner = node.need("InRoutePosition").need("FromLaneCoordinates", "FromCurrentEntity")
+        first, edges = self.route(node.need("RouteRef"))
         if inner.tag == "FromCurrentEntity":
             return self._place_of(inner)
         spot, lane = self.lanes.along(first, inner.number("pathS"), edges), inner.get("laneId")
@@ -201,12 +180,10 @@ class Positions:
 
     def route(self, holder: Node) -> tuple[Spot, tuple[str, ...]]:
         """First waypoint, and edges through all waypoints, of a ``Route`` or a reference to one; ValueError if none."""
-        node = self.catalogs.within(holder, "Route")
-        points = node.all("Waypoint") if node else []
-        spots = [self.spot(position) for point in points for position in point.all("Position")]
-        known = [spot for spot in spots if spot is not None]
-        if node is None or not known or len(known) != len(points):
-            raise ValueError("expected a Route of Waypoints that have a Position")
+        node = self.catalogs.need(holder, "Route")
+        node.need("Waypoint")
+        points = node.all("Waypoint")
+        known = [self.on_lanes(point.need("Position")) for point in points]
         if node.flag("closed", "false"):
             node.refuse("closed: write the waypoints of each lap")
         edges: tuple[str, ...] = (known[0].lane.edge,)
@@ -237,6 +214,4 @@ def road_of(spot: Spot | None) -> str:
     return (spot.lane.origins or ("",))[0].rpartition("_")[0] if spot else ""
 
 
-_KINDS = handlers(Positions, "position")
-POSITIONS = documented(_KINDS)
-"""Types of positions that are read, with the place of each."""
+POSITIONS = handlers(Positions, "position")

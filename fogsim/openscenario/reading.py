@@ -2,7 +2,6 @@
 
 import math
 import re
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,18 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from fogsim.errors import InputError, LeftOutWarning
+from fogsim.errors import InputError
 from fogsim.files.generated_files import write_generated
 from fogsim.files.maps import find_map
 from fogsim.openscenario.actions import Actions
-from fogsim.openscenario.catalogs import Catalogs, to_standard
 from fogsim.openscenario.entities import CLASSES, Vehicle, read_vehicles
 from fogsim.openscenario.environment import fog_block
-from fogsim.openscenario.initial import Beginning, read_beginning
-from fogsim.openscenario.parameters import put_parameters
+from fogsim.openscenario.initial import Beginning
+from fogsim.openscenario.parameters import Catalogs, put_parameters, to_standard
 from fogsim.openscenario.positions import Positions
 from fogsim.openscenario.storyboard import Storyboard
-from fogsim.openscenario.triggers import TimelineEntry, Trigger, Triggers, timeline_entry
+from fogsim.openscenario.triggers import Trigger, Triggers, timeline_entry
 from fogsim.openscenario.xml_tree import Node, read_xml, sumo_name
 from fogsim.traffic.appearance import BODY_PARAMETER
 from fogsim.traffic.road.netconvert import map_net
@@ -31,18 +29,11 @@ from fogsim.traffic.road.opendrive_lanes import read_opendrive_lanes
 from fogsim.traffic.templates.xml_text import element, opening
 from fogsim.units import KMH_PER_MPS
 
-USUAL_DURATION = 120.0
-"""Longest simulated time of a file whose stop trigger has no time [s]."""
-
-NEAR_THE_END = 10.0
-"""Distance to the end of its route at which the ego has arrived [m]."""
-
+USUAL_DURATION = 120.0  # Longest simulated time of a file whose stop trigger has no time [s]
+NEAR_THE_END = 10.0  # Distance to the end of its route at which the ego has arrived [m]
 _STANDS = 0.1  # Speed below which a vehicle has no desired speed to keep [m/s]
-
 _FOR_THE_ROUTE_ALONE = {"lcSpeedGain": 0, "lcKeepRight": 0, "lcCooperative": 0, "lcOpposite": 0}
 """Attributes of drivers who change lane where their route needs it, and for nothing else."""
-
-Key = tuple[str | int, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +41,7 @@ class ScenarioData:
     """Plain data of a scenario, as a YAML file would hold it, and the lines of the elements behind its keys."""
 
     data: dict[str, Any]
-    lines: Mapping[Key, int] = field(default_factory=dict)
+    lines: Mapping[tuple[str | int, ...], int] = field(default_factory=dict)
 
 
 def is_openscenario(path: Path) -> bool:
@@ -63,14 +54,18 @@ def read_openscenario(
 ) -> ScenarioData:
     """Read an OpenSCENARIO XML 1.x file as the data of a scenario file; `values` replace those of its parameters.
 
-    A file whose vehicles drive on the oncoming lane is read again on a network `with_oncoming` lanes.
-    The network and the route file go to the user's cache directory. InputError has a line for each element that FogSim
-    cannot do; MissingDependencyError if netconvert is missing.
+    A file whose vehicles drive on the oncoming lane is read again on a network `with_oncoming` lanes. InputError has a
+    line for each element that FogSim cannot do; MissingDependencyError if netconvert is missing.
     """
     root = read_xml(path)
     if root.tag != "OpenSCENARIO":
         raise InputError(f"{path}:{root.line}: expected <OpenSCENARIO> at its top, got <{root.tag}>")
-    _check_version(root)
+    header = root.one("FileHeader")
+    major = header.get("revMajor") if header else ""
+    if major != "1":
+        hint = "; ASAM's package of 1.0 has a stylesheet that migrates files of 0.9" if major == "0" else ""
+        message = f"expected OpenSCENARIO XML 1.x (FileHeader's revMajor), got {major or 'none'!r}{hint}"
+        raise InputError(f"{path}:{root.line}: {message}")
     for one in (one for block in root.all("ParameterDeclarations") for one in block.children):
         one.attributes["value"] = values.get(one.name, one.attributes.get("value", ""))
     put_parameters(root, {})
@@ -97,15 +92,6 @@ def read_openscenario(
     return read
 
 
-def _check_version(root: Node) -> None:
-    header = root.one("FileHeader")
-    major = header.get("revMajor") if header else ""
-    if major != "1":
-        hint = "; ASAM's package of 1.0 has a stylesheet that migrates files of 0.9" if major == "0" else ""
-        message = f"expected OpenSCENARIO XML 1.x (FileHeader's revMajor), got {major or 'none'!r}{hint}"
-        raise InputError(f"{root.file}:{root.line}: {message}")
-
-
 def _opendrive(root: Node) -> Path:
     root.within("RoadNetwork", "TrafficSignals")
     file = root.within("RoadNetwork", "LogicFile")
@@ -121,7 +107,8 @@ def _opendrive(root: Node) -> Path:
 def _begin(storyboard: Node, story: Storyboard) -> Beginning:
     """Initial state, and the events; InputError without an ego on the road, along whose route positions count."""
     root, positions = story.root, story.actions.positions
-    begin, vehicles = read_beginning(storyboard.one("Init"), story.actions), positions.vehicles
+    begin, vehicles = Beginning(story.actions), positions.vehicles
+    begin.read(storyboard.one("Init"))
     if vehicles.ego not in positions.spots:
         root.refuse(f"no vehicle that could be the ego has a place; there are {len(vehicles)}")
         root.findings.close(root.file)
@@ -140,17 +127,23 @@ def _scenario(storyboard: Node, story: Storyboard, begin: Beginning) -> Scenario
     story.triggers = Triggers(positions, story.state, story.value, end)
     entries = story.timeline()
     stop = story.triggers.trigger(storyboard.one("StopTrigger"))
-    header = root.one("FileHeader")
-    description = header.get("description") if header else ""
-    for one in (root, *positions.catalogs.used):
-        one.check_read()
+    way = [one for edge in route for one in lanes.lanes if one.edge == edge and one.index == 0]
+    fog = fog_block(begin.environment, np.concatenate([one.shape for one in way]), min(one.lowest for one in way))
+    if begin.environment.box and not fog["banks"]:
+        root.remark("the BoundingBox of the fog lies beside the ego's way: the air is clear there")
+    description = root.need("FileHeader").get("description")
+    root.check_read()
     root.findings.close(root.file)
-    _begin_at_once(entries, begin)
+    for _, block in entries:
+        # What is ordered for the very beginning is the initial speed.
+        is_at_once = block["when"] == "time >= 0 s" and "delay_s" not in block
+        for vehicle, done in block["do"].items() if is_at_once else ():
+            if isinstance(done, dict) and done.get("speed", {}).get("shape") == "step":
+                begin.orders.setdefault(vehicle, done["speed"])
     for name, vehicle in positions.vehicles.items():
         if vehicle.body:
             begin.effect.add(name, lamps={"all": "off"})
-    fog, light = _fog(begin, route, root.file), begin.environment.illuminance
-    first = _initial(begin)
+    first, light = _initial(begin), begin.environment.illuminance
     entries += story.triggers.marks
     timeline = [*first, *(block for _, block in entries)]
     data = {
@@ -170,26 +163,6 @@ def _scenario(storyboard: Node, story: Storyboard, begin: Beginning) -> Scenario
     return ScenarioData(data, {("timeline", i): node.line for i, (node, _) in enumerate(entries, start=len(first))})
 
 
-def _fog(begin: Beginning, route: tuple[str, ...], path: Path) -> dict[str, Any]:
-    """Fog along the middle of the ego's route, with a warning if its box lies elsewhere."""
-    lanes = begin.positions.lanes.lanes
-    way = [one for edge in route for one in lanes if one.edge == edge and one.index == 0]
-    fog = fog_block(begin.environment, np.concatenate([one.shape for one in way]), min(one.lowest for one in way))
-    if begin.environment.box is not None and not fog["banks"]:
-        message = f"{path}: the BoundingBox of the fog lies beside the ego's way: the air is clear there"
-        warnings.warn(message, LeftOutWarning, stacklevel=2)
-    return fog
-
-
-def _begin_at_once(entries: list[TimelineEntry], begin: Beginning) -> None:
-    """Move speeds that are ordered for the very beginning from the timeline to the initial state."""
-    for _, block in entries:
-        for vehicle, done in block["do"].items() if block["when"] == "time >= 0 s" and "delay_s" not in block else ():
-            speed = done.get("speed") if isinstance(done, dict) else None
-            if speed is not None and speed.get("shape") == "step":
-                begin.orders.setdefault(vehicle, speed)
-
-
 def _initial(begin: Beginning) -> list[dict[str, Any]]:
     """Entries of the timeline for the initial state: speeds of all but the ego, lamps, and who comes off the lanes."""
     off_lanes = begin.positions.off_lanes
@@ -206,7 +179,6 @@ def _initial(begin: Beginning) -> list[dict[str, Any]]:
 
 
 def _ending(stop: Trigger | None, timeline: list[dict[str, Any]], node: Node) -> dict[str, Any]:
-    """When the run is over."""
     if stop is None or not stop.condition:
         return {"duration_s": USUAL_DURATION}
     if stop.at is not None:

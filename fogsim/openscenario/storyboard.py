@@ -19,9 +19,10 @@ _PARTS = ("Story", "Act", "ManeuverGroup", "Maneuver", "Event", "Action")
 class Entry:
     """An event as entries of the timeline, one for each execution; its trigger is `NEVER` until it is known."""
 
-    names: list[str]
+    group: Node
     node: Node
     actors: list[str]
+    names: list[str] = field(default_factory=list)
     effect: Effect = field(default_factory=Effect)
     trigger: Trigger = NEVER
 
@@ -50,24 +51,25 @@ class Storyboard:
                 actors.refuse("selectTriggeringEntities: name the actors")
             self.actions.vehicles.known(actors.all("EntityRef") if actors else ())
             times = _executions(group)
+            maneuvers = group.all("Maneuver")
             for reference in group.all("CatalogReference"):
-                entry = self.actions.positions.catalogs.entry(reference)
-                group.children += [entry] if entry else []
-            events = [event for maneuver in group.all("Maneuver") for event in maneuver.all("Event")]
+                with reference.refusing():
+                    maneuvers.append(self.actions.positions.catalogs.entry(reference))
+            events = [event for maneuver in maneuvers for event in maneuver.all("Event")]
             for event in events:
-                self._find(event, names, times)
+                self._find(Entry(group, event, names), times)
             if times > 1 and len(events) > 1:
                 group.refuse(f"maximumExecutionCount: {len(events)} events are played once; write 1")
 
-    def _find(self, event: Node, actors: list[str], times: int) -> None:
+    def _find(self, entry: Entry, times: int) -> None:
+        event = entry.node
         event.word("priority", ("override", "overwrite", "parallel"))
-        entry = Entry([], event, actors)
         for _ in range(min(times * _executions(event), _MOST_TIMES)):
             taken = {name for one in self.entries.values() for name in one.names}
             entry.names.append(_free_name(event.get("name"), {*taken, *entry.names}))
         self.entries[id(event)] = entry
         for action in event.all("Action"):
-            self.actions.take(action, actors, entry.effect)
+            self.actions.take(action, entry.actors, entry.effect)
 
     def timeline(self) -> list[TimelineEntry]:
         """Entries of the timeline, each with its element."""
@@ -75,14 +77,13 @@ class Storyboard:
         written: list[TimelineEntry] = []
         for act in self._acts:
             stop = self.triggers.trigger(act.one("StopTrigger"))
-            for entry in (self.entries[id(one)] for one in act.walk() if id(one) in self.entries):
+            for entry in (one for one in self.entries.values() if one.group.above is act):
                 own = self.triggers.trigger(entry.node.one("StartTrigger")) or AT_ONCE
                 entry.trigger = both(self._begins[id(act)], own)
                 written += self._executed(entry, self._until(stop, entry.node))
         return written
 
     def _executed(self, entry: Entry, until: str) -> list[TimelineEntry]:
-        """Entries of the timeline for all executions of an event."""
         written, node, effect = [], entry.node, entry.effect
         for number, name in enumerate(entry.names):
             trigger = entry.trigger
@@ -116,7 +117,7 @@ class Storyboard:
         if stop.at is not None:
             return f"time < {max(stop.at, 0.0):g} s"
         name = f"stop_{len(self.triggers.marks)}"
-        self.triggers.mark(name, stop, node)
+        self.triggers.marks.append(timeline_entry(node, name, stop, {}))
         return f"not happened({name})"
 
     def _act_begins(self, act: Node) -> Trigger:
@@ -125,7 +126,7 @@ class Storyboard:
         if begins.at is not None or not begins.condition:
             return begins
         name = _free_name(f"act_{act.get('name')}", {mark["name"] for _, mark in self.triggers.marks})
-        self.triggers.mark(name, begins, act)
+        self.triggers.marks.append(timeline_entry(act, name, begins, {}))
         return Trigger(f"happened({name})")
 
     def state(self, node: Node) -> Trigger:
@@ -175,13 +176,11 @@ class Storyboard:
         return self._begins[id(act)]
 
     def _over(self, part: Node) -> Trigger:
-        """When all events in an element are over."""
         entries = [self.entries[id(one)] for one in part.walk() if id(one) in self.entries]
         entries = [self._entry(part)] if part.tag == "Action" else entries
         return Trigger(" and ".join(self._played(one, one.names[-1]) for one in entries)) if entries else AT_ONCE
 
     def _played(self, entry: Entry, name: str) -> str:
-        """When an execution of an event is over."""
         effect, phrase = entry.effect, f"happened({name})"
         if effect.has_unknown_end:
             entry.node.refuse("when a trajectory without times or places is over is not known")
@@ -196,7 +195,6 @@ class Storyboard:
         return " and ".join([phrase, *(f"({end})" for end in effect.ends)])
 
     def _entry(self, part: Node) -> Entry:
-        """The entry of an event, or of the event of an action."""
         return next(one for one in self.entries.values() if any(part is inner for inner in one.node.walk()))
 
 

@@ -8,53 +8,41 @@ from typing import Any
 from fogsim.openscenario.entities import Vehicle
 from fogsim.openscenario.parameters import RULES
 from fogsim.openscenario.positions import Positions
-from fogsim.openscenario.xml_tree import Node, NodeError, documented, handlers
+from fogsim.openscenario.xml_tree import Node, NodeError, handlers
 
 _DISTANCES = ("longitudinal", "cartesianDistance", "euclidianDistance")
 _EDGES = ("none", "rising", "falling", "risingOrFalling")
 _INEQUALITIES = ("lessThan", "lessOrEqual", "greaterThan", "greaterOrEqual")
-NEAR = 0.05
-"""Difference up to which speeds are equal [m/s]."""
-
+NEAR = 0.05  # Difference up to which speeds are equal [m/s]
 _STILL = 0.1  # Speed below which a vehicle counts as stopped [m/s]
 
 
 @dataclass(frozen=True, slots=True)
 class Trigger:
-    """When something begins: a condition in FogSim's language ("" for never), and a delay after it [s].
-
-    `at` is the time if the condition is only a time [s], below zero for the start.
-    """
+    """When something begins: a condition in FogSim's language ("" for never), and a delay after it [s]."""
 
     condition: str
     delay: float = 0.0
-    at: float | None = None
+    at: float | None = None  # Time, if the condition is only a time [s], below zero for the start
 
 
 AT_ONCE = Trigger("time >= 0 s", at=-1.0)
 NEVER = Trigger("")
 
 
-TimelineEntry = tuple[Node, dict[str, Any]]
-"""An entry of the timeline, with the element that it is for."""
-
-_Test = tuple[str, ...]
-"""A condition as its whole text, or as the signal, operator and value of a comparison."""
+TimelineEntry = tuple[Node, dict[str, Any]]  # With the element that it is for
+_Test = tuple[str, ...]  # The whole text of a condition, or signal, operator and value of a comparison
 
 
 @dataclass
 class Triggers:
-    """Reads triggers.
-
-    `states` gives the trigger of a storyboard state condition, `values` of one on a parameter or variable; `end` is
-    where the ego's road ends [m]; `marks` are timeline entries without action, with their elements.
-    """
+    """Reads triggers, with the help of readers of conditions on states of the storyboard, and on values."""
 
     positions: Positions
     states: Callable[[Node], Trigger]
     values: Callable[[Node], Trigger]
-    end: float = math.inf
-    marks: list[TimelineEntry] = field(default_factory=list)
+    end: float = math.inf  # Of the ego's road [m]
+    marks: list[TimelineEntry] = field(default_factory=list)  # Without action
 
     def trigger(self, node: Node | None) -> Trigger | None:
         """Trigger of a ``StartTrigger`` or ``StopTrigger``; None without one, or for one without groups."""
@@ -79,17 +67,16 @@ class Triggers:
 
     def _read(self, node: Node) -> Trigger:
         delay, edge = node.number("delay", 0.0), node.word("conditionEdge", _EDGES, "none")
-        by_value, by_entity = node.one("ByValueCondition"), node.one("ByEntityCondition")
-        test, read = by_value.one() if by_value else None, NEVER
+        by_value, read = node.one("ByValueCondition"), NEVER
+        test = by_value.one() if by_value else None
         with node.refusing():
             if test:
                 read = self._by_value(test, edge, delay)
-            elif by_entity:
+            else:
+                by_entity = node.need("ByEntityCondition")
                 # Who is at the end of the road stays there.
                 end = by_entity.within("EntityCondition", "EndOfRoadCondition")
                 read = Trigger(self._by_entities(by_entity, edge), delay + (end.number("duration") if end else 0.0))
-            else:
-                raise ValueError("expected a ByValueCondition or a ByEntityCondition")
         return read
 
     def _by_value(self, node: Node, edge: str, delay: float) -> Trigger:
@@ -110,19 +97,15 @@ class Triggers:
         raise NodeError(node, "FogSim has no such condition")
 
     def _by_entities(self, node: Node, edge: str) -> str:
-        triggering, entity = node.one("TriggeringEntities"), node.one("EntityCondition")
-        test = entity.one() if entity else None
-        if triggering is None or test is None:
-            raise NodeError(node, "expected TriggeringEntities and an EntityCondition")
-        if test.tag not in _TESTS:
-            raise NodeError(test, "FogSim has no such condition")
+        triggering, test = node.need("TriggeringEntities"), node.need("EntityCondition").one()
+        if test is None or test.tag not in CONDITIONS:
+            raise NodeError(test or node, "FogSim has no such condition")
         rule, phrase = triggering.word("triggeringEntitiesRule", ("any", "all")), []
+        triggering.need("EntityRef")
         for one in triggering.all("EntityRef"):
             with test.refusing():
                 vehicle = self.positions.vehicles.of(one)
-                phrase.append(self._edged(_TESTS[test.tag](self, test, vehicle), edge, node))
-        if not triggering.one("EntityRef"):
-            triggering.refuse("expected an EntityRef at least")
+                phrase.append(self._edged(CONDITIONS[test.tag](self, test, vehicle), edge, node))
         return (" and " if rule == "all" else " or ").join(_bracketed(one, len(phrase)) for one in phrase)
 
     def _edged(self, test: _Test, edge: str, node: Node) -> str:
@@ -137,12 +120,8 @@ class Triggers:
         # An edge: the condition was different before.
         name = f"before_{len(self.marks)}"
         now, before = (text, f"not ({text})") if is_rising else (f"not ({text})", text)
-        self.mark(name, Trigger(before), node)
+        self.marks.append(timeline_entry(node, name, Trigger(before), {}))
         return f"happened({name}) and ({now})"
-
-    def mark(self, name: str, trigger: Trigger, node: Node) -> None:
-        """Add an entry that records that something has happened."""
-        self.marks.append(timeline_entry(node, name, trigger, {}))
 
     def _compared(self, node: Node, signal: str, unit: str) -> _Test:
         node.word("direction", ("longitudinal",), "longitudinal")
@@ -200,7 +179,6 @@ class Triggers:
         return (f"{gap} > {near} or {gap} < {far}",)
 
     def _is_less(self, node: Node) -> bool:
-        """Whether a distance shall be less than its value."""
         return node.word("rule", _INEQUALITIES).startswith("less")
 
     def _is_along(self, node: Node, default: str = "euclidianDistance") -> bool:
@@ -215,8 +193,7 @@ class Triggers:
             if is_free:
                 node.refuse("freespace: straight distances to a position are of the rear axle; write false")
             return self._compared(node, self._distance_to(node, one), "m")
-        position = node.one("Position")
-        place = None if position is None else self.positions.along_ego(position)
+        place = self.positions.along_ego(node.need("Position"))
         if place is None:
             raise ValueError("its position is not on the ego's route, along which FogSim measures")
         value, signal = node.number("value"), f"{one.called}.position"
@@ -228,17 +205,15 @@ class Triggers:
 
     def reach_position_condition(self, node: Node, one: Vehicle) -> _Test:
         """`distance_to` a position; on the ego's route, ahead of the vehicle, `X.position` from its tolerance on."""
-        position, around = node.one("Position"), node.number("tolerance")
-        place = self.positions.along_ego(position) if position else None
-        begins = self.positions.along_ego(one)
+        around = node.number("tolerance")
+        place, begins = self.positions.along_ego(node.need("Position")), self.positions.along_ego(one)
         if place is not None and begins is not None and begins < place + one.front - around:
             # However far it drives between two looks, it has been there.
             return f"{one.called}.position", ">=", f"{place + one.front - around:.3f} m"
         return self._distance_to(node, one), "<=", f"{around:.9g} m"
 
     def _distance_to(self, node: Node, one: Vehicle) -> str:
-        """Straight distance of a vehicle's rear axle to a position."""
-        position = node.one("Position") or node
+        position = node.need("Position")
         relative = position.one("RelativeObjectPosition")
         if relative and not relative.children and not relative.number("dy", 0.0):
             other = self.positions.vehicles.of(relative)
@@ -253,10 +228,7 @@ class Triggers:
 
     def time_to_collision_condition(self, node: Node, one: Vehicle) -> _Test:
         """`ttc(X, Y, LENGTH)`, likewise; nothing unless they approach."""
-        target = node.within("TimeToCollisionConditionTarget", "EntityRef")
-        if target is None:
-            raise ValueError("times to collision are with an entity")
-        return self._between(node, one, target, "ttc")
+        return self._between(node, one, node.need("TimeToCollisionConditionTarget").need("EntityRef"), "ttc")
 
     def _between(self, node: Node, one: Vehicle, target: Node, signal: str) -> _Test:
         if not self._is_along(node, "longitudinal"):
@@ -273,16 +245,7 @@ class Triggers:
         return (" and ".join(f"{each.called}.collision" for each in both),)
 
 
-_TESTS = handlers(Triggers, "condition")
-CONDITIONS: Mapping[str, str] = {
-    "SimulationTimeCondition": "`time`.",
-    "ParameterCondition": "`happened(EVENT)` that sets it, if that makes a difference; otherwise always or never.",
-    "VariableCondition": "As `ParameterCondition`.",
-    "StoryboardElementStateCondition": "`happened(EVENT)`, for states of beginning, and of being over by the time that "
-    "the actions take.",
-    **documented(_TESTS),
-}
-"""Conditions that are read, and their translation."""
+CONDITIONS = handlers(Triggers, "condition")
 
 
 def at_time(time: float) -> Trigger:

@@ -1,11 +1,10 @@
 """Elements of an XML file: their lines and paths, what was read of them, and what FogSim cannot do of them."""
 
 import contextlib
-import inspect
 import math
 import re
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -14,9 +13,7 @@ from fogsim.errors import InputError, LeftOutWarning, shown, suggest
 from fogsim.files.xml_reader import XmlFile
 from fogsim.openscenario.elements import HARMLESS, REFUSED
 
-MOST_BYTES, MOST_ELEMENTS = 20_000_000, 500_000
-"""Largest file that is read [bytes], and its maximum number of elements."""
-
+MOST_BYTES, MOST_ELEMENTS = 20_000_000, 500_000  # of a file
 _NAMESPACES = ("xmlns", "xml:", "xsi:")
 _UNKNOWN = "FogSim does not know this {} here"
 
@@ -104,11 +101,9 @@ class Node:
         text = self.get(key) or default
         if text in allowed:
             return text
+        fault = f"FogSim has no {shown(text)} here; {suggest(text, allowed)}"
         missing = f"this attribute is missing; expected {' or '.join(allowed)}"
-        self.refuse(
-            f"{key}: {f'FogSim has no {shown(text)} here; {suggest(text, allowed)}' if text else missing}",
-            is_whole=False,
-        )
+        self.refuse(f"{key}: {fault if text else missing}", is_whole=False)
         return allowed[0]
 
     def flag(self, key: str, default: str = "") -> bool:
@@ -128,6 +123,14 @@ class Node:
     def one(self, *tags: str) -> "Node | None":
         """First child element with one of these tags."""
         return next(iter(self.all(*tags)), None)
+
+    def need(self, *tags: str) -> "Node":
+        """First child element with one of these tags; NodeError without one."""
+        found = self.one(*tags)
+        if found is None:
+            inside = ", ".join(dict.fromkeys(child.tag for child in self.children))
+            raise NodeError(self, f"expected {' or '.join(tags)} inside, got {shown(inside) if inside else 'nothing'}")
+        return found
 
     def within(self, *path: str) -> "Node | None":
         """Element at the end of a path of tags."""
@@ -196,11 +199,6 @@ def handlers(reader: type, kind: str) -> dict[str, Callable[..., Any]]:
     """Methods that read elements of a kind, by tag: ``lane_change_action`` reads each ``LaneChangeAction``."""
     named = ((name.split("_"), method) for one in reversed(reader.mro()) for name, method in vars(one).items())
     return {"".join(map(str.capitalize, words)): method for words, method in named if words[-1] == kind}
-
-
-def documented(methods: Mapping[str, Callable[..., Any]]) -> dict[str, str]:
-    """What becomes of elements, by tag, as their methods say it."""
-    return {tag: inspect.getdoc(method) or "" for tag, method in methods.items()}
 
 
 def read_xml(path: Path, findings: Findings | None = None) -> Node:

@@ -92,7 +92,7 @@ def test_a_thing_without_a_size_is_refused(tmp_path: Path) -> None:
     file = write(
         tmp_path, {"Ego": CAR, "Box": '<MiscObject miscObjectCategory="none"/>'}, {"Ego": lane(30), "Box": lane(90)}
     )
-    with pytest.raises(InputError, match=r"MiscObject: a MiscObject needs a BoundingBox with Center and Dimensions"):
+    with pytest.raises(InputError, match=r"MiscObject: expected BoundingBox inside, got"):
         fogsim.load_scenario(file, QUIET)
 
 

@@ -255,7 +255,7 @@ def test_vehicles_come_onto_the_road_and_leave_it(tmp_path: Path) -> None:
 def test_where_a_vehicle_comes_must_be_known(tmp_path: Path, inside: str) -> None:
     events = event("come", _entity("Late", inside), after(2.0))
     file = write(tmp_path, {"Ego": CAR, "Late": CAR}, {"Ego": EGO}, {"Ego": events})
-    with pytest.raises(InputError, match=r"Action.*(give a place on the map|with a Position)"):
+    with pytest.raises(InputError, match=r"Action.*(give a place on the map|expected Position inside)"):
         read_openscenario(file)
 
 
@@ -303,7 +303,7 @@ def test_a_vehicle_arrives_when_the_ego_does(tmp_path: Path, final: str, speed_t
             "closed: write the first",
         ),
         (_offset(_absolute(2.0)), "2 m from the middle is not in its lane, 3.5 m wide"),
-        (_offset("<Whatever/>"), "expected an AbsoluteTargetLaneOffset or RelativeTargetLaneOffset"),
+        (_offset("<Whatever/>"), "expected AbsoluteTargetLaneOffset or RelativeTargetLaneOffset"),
     ],
 )
 def test_what_cannot_be_followed_is_refused(tmp_path: Path, action: str, told: str) -> None:

@@ -226,10 +226,8 @@ class Actions(LateralActions):
     def follow_trajectory_action(self, action: Node, actor: str, effect: Effect) -> None:
         """`path`: a polyline, by its times or at the vehicle's speed, on the lanes or off them."""
         trajectory = self.positions.catalogs.need(action.one("TrajectoryRef") or action, "Trajectory")
-        vertices = trajectory.need("Shape").need("Polyline").all("Vertex")
+        vertices = trajectory.need("Shape").need("Polyline").some("Vertex")
         places = [one.need("Position") for one in vertices]
-        if not vertices:
-            raise ValueError("expected a Trajectory with a Polyline of Vertex elements")
         mode = action.one("TrajectoryFollowingMode") or action
         mode.word("followingMode", ("position", "follow"), "follow")
         has_times = action.within("TimeReference", "None") is None

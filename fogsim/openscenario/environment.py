@@ -126,10 +126,8 @@ def _stretches(route: Any, centre: Any, size: Any) -> list[tuple[float, float]]:
 
 
 def sun_elevation(moment: dt.datetime, latitude: float | None, longitude: float | None) -> float:
-    """Elevation of the sun's centre [rad] at a place [rad, east and north], after Spencer (Search 2(5), 1971).
-
-    A time without a time zone, or without a longitude, is mean solar time; without a latitude, 50° N is assumed.
-    """
+    """Elevation of the sun's centre [rad] at a place [rad, east and north], after Spencer (Search 2(5), 1971)."""
+    # A time without a time zone, or without a longitude, is mean solar time.
     hour = moment.hour + moment.minute / 60.0 + moment.second / 3600.0
     offset = moment.utcoffset()
     if longitude is not None and offset is not None:

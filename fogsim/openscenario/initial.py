@@ -9,7 +9,7 @@ from fogsim.openscenario.actions import DISPLACEMENTS, Actions
 from fogsim.openscenario.entities import Vehicle
 from fogsim.openscenario.environment import Environment, environment_of
 from fogsim.openscenario.lateral import Effect
-from fogsim.openscenario.positions import ALONG
+from fogsim.openscenario.positions import ALONG, POSITIONS
 from fogsim.openscenario.xml_tree import Node
 from fogsim.traffic.road.opendrive_lanes import Spot
 from fogsim.units import KMH_PER_MPS
@@ -31,11 +31,6 @@ class Beginning:
     def __post_init__(self) -> None:
         self.positions, self.vehicles = self.actions.positions, self.actions.vehicles
         self.lanes, self.spots = self.positions.lanes, self.positions.spots
-
-    @property
-    def routed(self) -> set[str]:
-        """Vehicles that have a route, from the beginning or later, for which they change lane."""
-        return {*self.effect.routes, *self.positions.rerouted}
 
     def speed(self, vehicle: str, *asked: str) -> float:
         """Initial speed of a vehicle [m/s]; one that is relative follows from another's."""
@@ -156,7 +151,10 @@ class Beginning:
         if vehicle.name == self.vehicles.ego or not (lane is None or is_turned):
             return None
         if lane is not None and not vehicle.body:
-            self.positions.against[vehicle.name] = self.positions.named(position) or lane
+            # Where the file names a lane, whatever the offset.
+            one = position.need(*POSITIONS)
+            named = (one.get("roadId"), one.get("laneId"), one.number("s")) if one.tag == "LanePosition" else None
+            self.positions.against[vehicle.name] = self.lanes.on_lane(*named) if named else lane
         return x, y, facing or 0.0
 
     def _take_private(self, action: Node, name: str) -> None:

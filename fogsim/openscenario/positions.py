@@ -79,13 +79,6 @@ class Positions:
         # On a closed road, the first time counts.
         return self.lanes.starts(route)[route.index(spot.lane.edge)] + spot.position + further
 
-    def named(self, position: Node) -> Spot | None:
-        """Place in the middle of the lane that a ``LanePosition`` names, whatever its offset."""
-        one = next(iter(position.children), position)
-        if one.tag != "LanePosition":
-            return None
-        return self.lanes.on_lane(one.get("roadId"), one.get("laneId"), one.number("s"))
-
     def _found(self, position: Node) -> tuple[Node, Spot | Point]:
         one = position.one()
         if one is None or one.tag not in POSITIONS:
@@ -181,8 +174,7 @@ class Positions:
     def route(self, holder: Node) -> tuple[Spot, tuple[str, ...]]:
         """First waypoint, and edges through all waypoints, of a ``Route`` or a reference to one; ValueError if none."""
         node = self.catalogs.need(holder, "Route")
-        node.need("Waypoint")
-        points = node.all("Waypoint")
+        points = node.some("Waypoint")
         known = [self.on_lanes(point.need("Position")) for point in points]
         if node.flag("closed", "false"):
             node.refuse("closed: write the waypoints of each lap")

@@ -54,8 +54,7 @@ def read_openscenario(
 ) -> ScenarioData:
     """Read an OpenSCENARIO XML 1.x file as the data of a scenario file; `values` replace those of its parameters.
 
-    A file whose vehicles drive on the oncoming lane is read again on a network `with_oncoming` lanes. InputError has a
-    line for each element that FogSim cannot do; MissingDependencyError if netconvert is missing.
+    InputError has a line for each element that FogSim cannot do; MissingDependencyError if netconvert is missing.
     """
     root = read_xml(path)
     if root.tag != "OpenSCENARIO":
@@ -81,6 +80,7 @@ def read_openscenario(
     story = Storyboard(Actions(positions), root)
     begin = _begin(storyboard, story)
     if positions.with_oncoming and not with_oncoming:
+        # Vehicles drive on the oncoming lane, which this network does not lead to.
         return read_openscenario(path, values, with_oncoming=True)
     read = _scenario(storyboard, story, begin)
     files = write_generated("openscenario", {"road.net.xml": net, "road.rou.xml": _vehicles_text(begin)})
@@ -121,7 +121,7 @@ def _begin(storyboard: Node, story: Storyboard) -> Beginning:
 
 def _scenario(storyboard: Node, story: Storyboard, begin: Beginning) -> ScenarioData:
     root, positions = story.root, begin.positions
-    ego, lanes = positions.vehicles.ego, positions.lanes
+    ego, lanes, routed = positions.vehicles.ego, positions.lanes, {*begin.effect.routes, *positions.rerouted}
     route = positions.ways[ego]
     end = math.inf if lanes.followers.get(route[-1]) else lanes.starts(route)[-1] - NEAR_THE_END
     story.triggers = Triggers(positions, story.state, story.value, end)
@@ -151,7 +151,7 @@ def _scenario(storyboard: Node, story: Storyboard, begin: Beginning) -> Scenario
         "name": re.sub(r"[^A-Za-z0-9_.-]", "_", root.file.stem)[:100],
         "traffic": {
             "ego": ego,
-            "keep_lane": [name for name in positions.vehicles if name not in begin.routed],
+            "keep_lane": [name for name in positions.vehicles if name not in routed],
             "stop_before_end_m": NEAR_THE_END,
         },
         "fog": fog,
@@ -191,6 +191,7 @@ def _ending(stop: Trigger | None, timeline: list[dict[str, Any]], node: Node) ->
 
 def _vehicles_text(begin: Beginning) -> str:
     """Text of the route file: every vehicle is present from the start, with its initial position and speed."""
+    routed = {*begin.effect.routes, *begin.positions.rerouted}
     lines, ways = ['<?xml version="1.0" encoding="UTF-8"?>', "<routes>"], begin.positions.ways
     for name, vehicle in begin.positions.vehicles.items():
         front, speed = begin.fronts.get(name), begin.speed(name)
@@ -207,7 +208,7 @@ def _vehicles_text(begin: Beginning) -> str:
                 "insertionChecks": "none",
             }
         own = _type(vehicle, speed, front.lane.limit if front else math.inf)
-        own |= _FOR_THE_ROUTE_ALONE if name in begin.routed else {}
+        own |= _FOR_THE_ROUTE_ALONE if name in routed else {}
         body = f'    <param key="{BODY_PARAMETER}" value="{vehicle.body}"/>'
         lines += [
             "  " + element("vType", id=f"type.{name}", **own),

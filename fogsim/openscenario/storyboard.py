@@ -11,6 +11,7 @@ from fogsim.openscenario.xml_tree import Node, NodeError
 
 _BEGUN, _OVER = ("startTransition", "runningState"), ("endTransition", "completeState")
 _MOST_TIMES = 100
+_REFERENCE = "CatalogReference"
 _MOTION = {"speed", "follow", "arrive"}
 _PARTS = ("Story", "Act", "ManeuverGroup", "Maneuver", "Event", "Action")
 
@@ -38,28 +39,48 @@ class Storyboard:
     _begins: dict[int, Trigger] = field(default_factory=dict)
     _stories: list[Node] = field(default_factory=list)
     _acts: list[Node] = field(default_factory=list)
+    _never: list[Node] = field(default_factory=list)  # Acts and events that never begin
     _open: list[Node] = field(default_factory=list)
 
     def find_events(self, storyboard: Node) -> None:
         """Find all events and their effects; triggers follow later, since events refer to one another."""
+        for one in (one for block in self.root.all("VariableDeclarations") for one in block.all()):
+            one.get("value")
         self._stories = storyboard.all("Story")
-        self._acts = [act for story in self._stories for act in story.all("Act")]
+        acts = [act for story in self._stories for act in story.all("Act")]
+        for reference in (one for act in acts for group in act.all("ManeuverGroup") for one in group.all(_REFERENCE)):
+            with reference.refusing():
+                self.actions.positions.catalogs.entry(reference)
+        self._acts = [act for act in acts if not self._is_idle(act)]
         for group in (one for act in self._acts for one in act.all("ManeuverGroup")):
-            actors = group.one("Actors")
+            actors, times = group.one("Actors"), _executions(group)
             names = [one.get("entityRef") for one in actors.all("EntityRef")] if actors else []
             if actors and actors.flag("selectTriggeringEntities", "false"):
                 actors.refuse("selectTriggeringEntities: name the actors")
             self.actions.vehicles.known(actors.all("EntityRef") if actors else ())
-            times = _executions(group)
-            maneuvers = group.all("Maneuver")
-            for reference in group.all("CatalogReference"):
-                with reference.refusing():
-                    maneuvers.append(self.actions.positions.catalogs.entry(reference))
-            events = [event for maneuver in maneuvers for event in maneuver.all("Event")]
+            maneuvers = [one for holder in (group, *group.all(_REFERENCE)) for one in holder.all("Maneuver")]
+            events = [one for maneuver in maneuvers for one in maneuver.all("Event") if not self._is_idle(one)]
             for event in events:
                 self._find(Entry(group, event, names), times)
             if times > 1 and len(events) > 1:
                 group.refuse(f"maximumExecutionCount: {len(events)} events are played once; write 1")
+
+    def _is_idle(self, part: Node) -> bool:
+        """Whether an act or event waits for a parameter with another value that nothing sets; it is left out then."""
+        start = part.one("StartTrigger")
+        groups = start.all("ConditionGroup") if start else []
+        if not groups or not all(any(map(self._fails, group.walk())) for group in groups):
+            return False
+        part.remark("it never begins: its parameters have other values", is_whole=True)
+        self._never.append(part)
+        return True
+
+    def _fails(self, node: Node) -> bool:
+        """Whether it is a condition that a parameter does not fit, which nothing sets."""
+        name = node.attributes.get("parameterRef")
+        sets = (one.tag == "ParameterAction" and one.attributes.get("parameterRef") == name for one in self.root.walk())
+        is_fixed = node.tag == "ParameterCondition" and not any(sets)
+        return is_fixed and not all(fits(value, node) for value in self._declared(node))
 
     def _find(self, entry: Entry, times: int) -> None:
         event = entry.node
@@ -141,6 +162,9 @@ class Storyboard:
             raise NodeError(node, f"there {'are several' if found else 'is no'} {kind} {name!r}")
         if any(one is found[0] for one in self._open):
             raise NodeError(node, f"{name} waits for itself")
+        idle = [one for one in self._never if any(found[0] is inner for inner in one.walk())]
+        if idle or (state in _OVER and any(one is inner for one in self._never for inner in found[0].walk())):
+            return Trigger("time < 0 s")
         self._open.append(found[0])
         try:
             return self._begun(found[0]) if state in _BEGUN else self._over(found[0])
@@ -149,13 +173,10 @@ class Storyboard:
 
     def value(self, node: Node) -> Trigger:
         """Trigger for a condition on a parameter or variable, which events may set."""
-        kind = node.tag.removesuffix("Condition")
-        name = node.get(f"{kind.lower()}Ref")
-        blocks = self.root.all(f"{kind}Declarations")
-        values = [one.get("value") for block in blocks for one in block.all() if one.get("name") == name]
+        name = node.get("parameterRef") or node.get("variableRef")
         setters = [entry for entry in self.entries.values() if name in entry.effect.sets]
-        if not values:
-            raise NodeError(node, f"there is no {kind.lower()} {name!r}")
+        if not (values := self._declared(node)):
+            raise NodeError(node, f"there is no {node.tag.removesuffix('Condition').lower()} {name!r}")
         holds = fits(values[0], node)
         if {fits(entry.effect.sets[name], node) for entry in setters} <= {holds}:
             return AT_ONCE if holds else Trigger("time < 0 s")
@@ -163,6 +184,13 @@ class Storyboard:
             node.refuse(f"{len(setters)} events set {name!r}; a condition may wait for one")
         happened = f"happened({setters[0].names[0]})"
         return Trigger(f"not {happened}" if holds else happened)
+
+    def _declared(self, node: Node) -> list[str]:
+        """Declared values of the parameter or variable of a condition."""
+        kind = node.tag.removesuffix("Condition")
+        name = node.attributes.get(f"{kind.lower()}Ref", "").strip()
+        declarations = (one for block in self.root.all(f"{kind}Declarations") for one in block.all())
+        return [one.get("value") for one in declarations if one.get("name") == name]
 
     def _begun(self, part: Node) -> Trigger:
         if part.tag in ("Event", "Action"):
@@ -176,7 +204,8 @@ class Storyboard:
         return self._begins[id(act)]
 
     def _over(self, part: Node) -> Trigger:
-        entries = [self.entries[id(one)] for one in part.walk() if id(one) in self.entries]
+        inside = {id(one) for one in part.walk()}
+        entries = [entry for key, entry in self.entries.items() if key in inside]
         entries = [self._entry(part)] if part.tag == "Action" else entries
         return Trigger(" and ".join(self._played(one, one.names[-1]) for one in entries)) if entries else AT_ONCE
 

@@ -67,8 +67,7 @@ class Triggers:
 
     def _read(self, node: Node) -> Trigger:
         delay, edge = node.number("delay", 0.0), node.word("conditionEdge", _EDGES, "none")
-        by_value, read = node.one("ByValueCondition"), NEVER
-        test = by_value.one() if by_value else None
+        test, read = next((one for kind in node.all("ByValueCondition") for one in kind.all()), None), NEVER
         with node.refusing():
             if test:
                 read = self._by_value(test, edge, delay)
@@ -101,8 +100,7 @@ class Triggers:
         if test is None or test.tag not in CONDITIONS:
             raise NodeError(test or node, "FogSim has no such condition")
         rule, phrase = triggering.word("triggeringEntitiesRule", ("any", "all")), []
-        triggering.need("EntityRef")
-        for one in triggering.all("EntityRef"):
+        for one in triggering.some("EntityRef"):
             with test.refusing():
                 vehicle = self.positions.vehicles.of(one)
                 phrase.append(self._edged(CONDITIONS[test.tag](self, test, vehicle), edge, node))
@@ -174,12 +172,9 @@ class Triggers:
         ahead, behind = (0.0, 0.0) if is_free else (one.front + other.rear, one.rear + other.front)
         gap, value = f"gap({pair})", node.number("value")
         near, far = f"{value - ahead:.9g} m", f"{behind - value:.9g} m"
-        if self._is_less(node):
+        if node.word("rule", _INEQUALITIES)[0] == "l":
             return (f"{gap} < {near} and {gap} > {far}",)
         return (f"{gap} > {near} or {gap} < {far}",)
-
-    def _is_less(self, node: Node) -> bool:
-        return node.word("rule", _INEQUALITIES).startswith("less")
 
     def _is_along(self, node: Node, default: str = "euclidianDistance") -> bool:
         """Whether a distance is along the road, not straight; entities' own axes are taken as along the road."""
@@ -199,7 +194,7 @@ class Triggers:
         value, signal = node.number("value"), f"{one.called}.position"
         near = f"{place - value + (0.0 if is_free else one.front):.3f} m"
         far = f"{place + value + (one.length if is_free else one.front):.3f} m"
-        if self._is_less(node):
+        if node.word("rule", _INEQUALITIES)[0] == "l":
             return (f"{signal} > {near} and {signal} < {far}",)
         return (f"{signal} < {near} or {signal} > {far}",)
 

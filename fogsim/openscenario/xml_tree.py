@@ -132,6 +132,11 @@ class Node:
             raise NodeError(self, f"expected {' or '.join(tags)} inside, got {shown(inside) if inside else 'nothing'}")
         return found
 
+    def some(self, *tags: str) -> list["Node"]:
+        """Child elements with one of these tags; NodeError without one."""
+        self.need(*tags)
+        return self.all(*tags)
+
     def within(self, *path: str) -> "Node | None":
         """Element at the end of a path of tags."""
         node: Node | None = self

@@ -181,6 +181,7 @@ def test_test_runs_have_their_numbers_as_seeds(folder: Path) -> None:
             "hardly any draw is between its limits, 90 and 91",
         ),
         (_stochastic("faster", '<PoissonDistribution expectedValue="1"/>', runs=0), "whole number of 1 … 100,000"),
+        ('<Stochastic numberOfTestRuns="3"/>', "expected StochasticDistribution inside, got nothing"),
         ("", "expected Stochastic or Deterministic inside, got "),
     ],
 )

@@ -395,6 +395,14 @@ def test_who_overtakes_on_the_oncoming_lane_from_the_beginning_cuts_in(
     assert _at(steps, 9.9, "Fast")[1:] == pytest.approx((-1.75, 12.0), abs=0.02)
 
 
+def test_who_drives_against_a_lane_goes_over_to_a_lane_that_is_there(tmp_path: Path) -> None:
+    place = '<LanePosition roadId="7" laneId="1" s="20"><Orientation type="relative" h="3.14159"/></LanePosition>'
+    begin = {"Ego": lane(40), "Fast": f"<Position>{place}</Position>\n{speed(16)}"}
+    events = event("in", _changes_lane(-3, "time", 2.0), after(4.0))
+    with pytest.raises(InputError, match="LaneChangeAction: road '7' has no lane '-3' to drive on; it has -1, 1"):
+        read_openscenario(write(tmp_path, {"Ego": CAR, "Fast": CAR}, begin, {"Fast": events}))
+
+
 def test_a_person_may_stand_far_from_the_road(tmp_path: Path) -> None:
     begin = {"Ego": EGO, "Ann": _world(60, -150)}
     steps = _run(write(tmp_path, {"Ego": CAR, "Ann": PERSON}, begin, stop=after(2.0)))

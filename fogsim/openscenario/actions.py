@@ -10,7 +10,7 @@ from fogsim.openscenario.triggers import NEAR
 from fogsim.openscenario.xml_tree import Node, NodeError, handlers
 from fogsim.units import KMH_PER_MPS
 
-LAMPS = {
+LAMPS = {  # Of each type of light
     "daytimeRunningLights": ("daytime",),
     "lowBeam": ("low_beam",),
     "highBeam": ("high_beam",),
@@ -22,12 +22,10 @@ LAMPS = {
     "indicatorRight": ("indicator_right",),
     "warningLights": ("indicator_left", "indicator_right"),
 }
-"""Lamps of each type of light."""
-
 _UNLIT = ("licensePlateIllumination", "reversingLights", "specialPurposeLights")
 _AT_THE_END = 1.5  # Distance at which the end of a trajectory is reached [m]
+# Where a vehicle is to be, seen from the one to which it keeps a distance
 DISPLACEMENTS = ("any", "leadingReferencedEntity", "trailingReferencedEntity")
-"""Where a vehicle is to be, seen from the one to which it keeps a distance."""
 
 
 class Actions(LateralActions):

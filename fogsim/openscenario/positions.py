@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from fogsim.openscenario.elements import REFUSED
 from fogsim.openscenario.entities import Vehicle, Vehicles
 from fogsim.openscenario.parameters import Catalogs
-from fogsim.openscenario.xml_tree import Node, handlers
+from fogsim.openscenario.xml_tree import Node, NodeError, handlers
 from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, Spot
 
 Point = tuple[float, float, float | None]  # x, y [m] and heading [rad] of a place, None for any
@@ -175,6 +175,8 @@ class Positions:
         """First waypoint, and edges through all waypoints, of a ``Route`` or a reference to one; ValueError if none."""
         node = self.catalogs.need(holder, "Route")
         points = node.some("Waypoint")
+        if any(point.within("Position", "RoutePosition") for point in points):
+            raise NodeError(node, "a waypoint has a place of its own, not one on a route")
         known = [self.on_lanes(point.need("Position")) for point in points]
         if node.flag("closed", "false"):
             node.refuse("closed: write the waypoints of each lap")

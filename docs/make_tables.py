@@ -163,7 +163,7 @@ def metrics() -> list[tuple[str, ...]]:
 def signals() -> list[tuple[str, ...]]:
     """Signals of conditions."""
     return [
-        (f"`{name}`", signal.told_in or signal.kind.value, signal.meaning, ", ".join(sorted(signal.needs)))
+        (f"`{name}`", signal.stated_in or signal.kind.value, signal.meaning, ", ".join(sorted(signal.needs)))
         for name, signal in SIGNALS.items()
     ]
 

@@ -90,7 +90,7 @@ class Announcement(event.Listener):  # type: ignore[misc] # numba is untyped
                 self._tell(f"fogsim: compiled {self._compiled} functions in {self._spent:.0f} s")
 
 
-class Economy(event.Listener):  # type: ignore[misc] # numba is untyped
+class CompileSpeedup(event.Listener):  # type: ignore[misc] # numba is untyped
     """Leaves out what costs time while one of FogSim's kernels is compiled, with all that it calls.
 
     That is the search for garbage, of which compiling makes little among millions of objects, and what numba is spared
@@ -121,10 +121,10 @@ class Economy(event.Listener):  # type: ignore[misc] # numba is untyped
 
 
 event.register("numba:compile", Announcement(logging.getLogger(__package__).warning))
-event.register("numba:compile", Economy())
+event.register("numba:compile", CompileSpeedup())
 
 
-class Beside:
+class CompilerProcess:
     """Another process that compiles kernels of some modules: who finds one of these not compiled waits for it."""
 
     def __init__(self) -> None:
@@ -151,7 +151,7 @@ class Beside:
         return True
 
 
-BESIDE = Beside()
+COMPILER_PROCESS = CompilerProcess()
 """What is compiled beside this process, in another one."""
 
 
@@ -214,7 +214,7 @@ def _look_elsewhere(compiled: Any) -> None:
         found = load(signature, target)
         if found is None and shipped is not None:
             found = shipped.load_overload(signature, target)
-        while found is None and BESIDE.may_bring(module):
+        while found is None and COMPILER_PROCESS.may_bring(module):
             found = load(signature, target)
         return found
 

@@ -89,7 +89,7 @@ def run(
 
 def warn_of_unplayed(scenario: Scenario, last: TrafficStep) -> None:
     """Warn of what was not played in a run that is over, if a longer one would not have played it either."""
-    came_to_end = last.ending in (Ending.ARRIVED, Ending.LEFT_NETWORK, Ending.NOBODY_LEFT)
+    came_to_end = last.ending in (Ending.ARRIVED, Ending.LEFT_NETWORK, Ending.NONE_LEFT)
     if last.unplayed and (came_to_end or last.unplayed.is_final):
         warnings.warn(f"{scenario.name}: not played: {last.unplayed}", UnplayedWarning, stacklevel=3)
 
@@ -113,7 +113,7 @@ class DriversFog:
         """Whether the traffic has been told of the fog."""
         return self._fog is not None
 
-    def is_about(self, fog: FogField) -> bool:
+    def matches(self, fog: FogField) -> bool:
         """Whether drivers have about them what a fog is; clear air needs not be entered.
 
         Parameters
@@ -238,7 +238,7 @@ class ClosedLoop:
         snapshot = self._observe_ego()
         body = snapshot.state.types[snapshot.ego]
         fog = self._fog = self._equipment.start_run(streams, self._traffic.network, body)
-        if not self._drivers_fog.is_about(fog):
+        if not self._drivers_fog.matches(fog):
             self._drivers_fog.enter(fog, self._traffic)
             if self._replays:
                 # The ego's way was not known before. Drivers must have had the fog about them while the road filled.
@@ -255,7 +255,7 @@ class ClosedLoop:
             fog = build.fog_field(self._scenario, planned[0].route, planned[0].structures)
         if fog is not None:
             fog = build.fog_of_run(self._scenario, fog, patch_seed)
-            if not self._drivers_fog.is_about(fog):
+            if not self._drivers_fog.matches(fog):
                 self._drivers_fog.enter(fog, self._traffic)
 
     def _observe_ego(self) -> TrafficSnapshot:

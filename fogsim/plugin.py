@@ -150,7 +150,7 @@ class AttachedSession:
             )
         self._name = scenario.name
         # A scenario for another ego gives fog and camera; whom else it names drives in another simulation.
-        self._tells_unplayed = scenario.traffic.ego == traffic.ego
+        self._reports_unplayed = scenario.traffic.ego == traffic.ego
         self._traffic = traffic
         self._drivers = drivers
         self._seed = seed
@@ -241,7 +241,7 @@ class AttachedSession:
         Every vehicle gets back what was changed about it: top speed, time headway, lane-change mode, the ego's own
         speed, and sight of its leader.
         """
-        tells = self._tells_unplayed and self._started and not self._closed
+        tells = self._reports_unplayed and self._started and not self._closed
         self._end()
         unplayed = self._traffic.unplayed() if tells else NOTHING_UNPLAYED
         if tells and self._last is not None:

@@ -139,7 +139,7 @@ class TrafficRun:
         self._timeline, self._fog_now = Timeline(self._scenario), self._fog
         self._cohort = _CohortWatch(self._scenario.traffic.cohort_s)
         self._drivers_fog.restart()
-        if not self._drivers_fog.is_about(self._fog):
+        if not self._drivers_fog.matches(self._fog):
             self._drivers_fog.enter(self._fog, self._traffic)
         self._reporters.reset(streams.reports)
         self._section_meters.reset()
@@ -208,7 +208,7 @@ class TrafficRun:
             return Ending.COHORT_LEFT
         if index >= self._periods.frames or snapshot.is_ended:
             return Ending.TIME
-        return Ending.NOBODY_LEFT if snapshot.is_over else None
+        return Ending.NONE_LEFT if snapshot.is_over else None
 
     def close(self) -> None:
         """End the simulation; closing twice is allowed."""

@@ -237,5 +237,5 @@ def test_drivers_and_the_camera_are_in_the_patches_of_the_runs_seed() -> None:
     settings = (EARLY, "renderer=none", "estimators=[]", "fog={visibility_m: 60, patches: {correlation_length_m: 50}}")
     with ClosedLoop(fogsim.load_scenario("motorway_fog_bank", settings)) as loop:
         patches = [loop.start(seed).truth.fog.patches for seed in (1, 2, 1)]
-        assert loop._drivers_fog.is_about(loop.start(2).truth.fog)
+        assert loop._drivers_fog.matches(loop.start(2).truth.fog)
     assert patches[0] == patches[2] != patches[1]

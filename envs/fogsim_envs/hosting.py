@@ -51,9 +51,7 @@ def begin(scenario: Scenario, seed: int, timeout: float = TIMEOUT) -> tuple[Simu
         return _begun(HostedLoop(scenario, timeout), seed)
 
 
-def begin_anew(
-    simulation: Simulation, scenario: Scenario, seed: int, timeout: float = TIMEOUT
-) -> tuple[Simulation, Step]:
+def restart(simulation: Simulation, scenario: Scenario, seed: int, timeout: float = TIMEOUT) -> tuple[Simulation, Step]:
     """Start another scenario where a simulation runs, which is over then (`timeout` [s])."""
     if not isinstance(simulation, HostedLoop):
         simulation.close()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from fogsim.cli.compile_beside import compiling_beside
+from fogsim.cli.compiler_process import compiling_in_background
 from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
 from fogsim.cli.progress import SimulationProgress
 from fogsim.cli.scenario_options import (
@@ -108,7 +108,7 @@ def run_command(
 ) -> None:
     """Run a scenario and write manifest.json, steps.parquet, metrics.json, video.mp4 and report.html."""
     settings = with_timeout(settings, method_timeout)
-    with compiling_beside() as compile_for:
+    with compiling_in_background() as compile_for:
         loaded, of_file = chosen_case(scenario, sumocfg, ego, visibility, settings, case, seed)
         compile_for(loaded)
         from fogsim.recording import record_run, record_traffic

@@ -250,7 +250,7 @@ class _Text:
         quoted = self._take(_QUOTED)
         if signal.kind is Kind.NUMBER:
             if quoted or not _NAME.match(self._rest()):
-                raise self._wrong(f"a quantity such as {example_of(signal.told_in)!r} after {relation}")
+                raise self._wrong(f"a quantity such as {example_of(signal.stated_in)!r} after {relation}")
             right = self._reference()
             other = SIGNALS[right.signal]
             if other.kind is not Kind.NUMBER or other.unit != signal.unit:

@@ -42,7 +42,7 @@ class Route:
         if aside[nearest] > FARTHEST_ASIDE:
             return None
         if near is not None:
-            nearest = piece_about(float(near), self._start, at, aside, nearest)
+            nearest = segment_near(float(near), self._start, at, aside, nearest)
         x, y, _ = self._direction[nearest].tolist()
         along = x * math.cos(heading) + y * math.sin(heading)
         return RoutePlace(float(self._start[nearest] + at[nearest]), along)
@@ -75,7 +75,7 @@ def nearest_piece(
 
 
 @kernel
-def piece_about(
+def segment_near(
     near: float, start: NDArray[np.float64], at: NDArray[np.float64], aside: NDArray[np.float64], nearest: int
 ) -> int:
     """Of the pieces about as near as `nearest`, the index of the one closest to position `near` [m] along the polyline.
@@ -90,8 +90,8 @@ def piece_about(
     # Points of one piece are about as near: the nearest of those around this one is meant.
     found = here
     for i in range(len(start)):
-        is_about = aside[i] <= farthest and abs(start[i] - start[here]) <= 2.0 * FARTHEST_ASIDE
-        if is_about and (aside[i] < aside[found] or (aside[i] == aside[found] and i < found)):
+        is_near = aside[i] <= farthest and abs(start[i] - start[here]) <= 2.0 * FARTHEST_ASIDE
+        if is_near and (aside[i] < aside[found] or (aside[i] == aside[found] and i < found)):
             found = i
     return found
 

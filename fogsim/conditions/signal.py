@@ -79,7 +79,7 @@ class Signal:
     needs: frozenset[Need] = frozenset()
 
     @property
-    def told_in(self) -> str:
+    def stated_in(self) -> str:
         """Unit in messages."""
         return self.shown_unit or self.unit
 

@@ -125,7 +125,7 @@ def _shown_units(parts: tuple[Condition, ...]) -> dict[Reference, str]:
         if isinstance(part, Comparison | Edge | Flag):
             right = None if isinstance(part, Flag) else part.right
             written = right.unit if isinstance(right, Quantity) else ""
-            units[part.left] = written or units.get(part.left, "") or SIGNALS[part.left.signal].told_in
+            units[part.left] = written or units.get(part.left, "") or SIGNALS[part.left.signal].stated_in
             if isinstance(right, Reference):
                 units.setdefault(right, units[part.left])
     return units
@@ -142,6 +142,6 @@ def shown_value(signal: Reference, value: Value, unit: str = "") -> str:
     if isinstance(value, bool | str):
         return str(value).lower() if isinstance(value, bool) else value
     kind = SIGNALS[signal.signal]
-    unit = unit or kind.told_in
+    unit = unit or kind.stated_in
     number = value if unit == kind.unit else value / parse_quantity(f"1 {unit}", kind.unit)
     return "inf" if math.isinf(number) else f"{number:.4g} {unit}".strip()

@@ -316,7 +316,7 @@ class EgoEquipment:
         )
         frame, right = self._frame(radiance, second, camera, faults, parts.streams, time)
         speed = float(state.speed[ego])
-        old = self._watch.why_no_news(frame, speed) if self._estimators else ""
+        old = self._watch.stale_reason(frame, speed) if self._estimators else ""
         observation = Observation(
             frame=frame,
             speed=speed,
@@ -430,7 +430,7 @@ class EgoEquipment:
         pair = cast("Pixels", np.concatenate((image, second), axis=1))
         when, both = self._delivery.deliver(Delivered(time, pair), faults)
         left, right = (np.ascontiguousarray(half) for half in np.split(both, 2, axis=1))
-        return Frame(when, left, self._assumed_camera), SecondView(right, self._second.told_baseline)
+        return Frame(when, left, self._assumed_camera), SecondView(right, self._second.stated_baseline)
 
     def surrounding(self, state: TrafficState, ego: int, pose: CameraPose) -> Surrounding:
         """Tell what is around the camera.

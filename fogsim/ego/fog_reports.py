@@ -172,9 +172,9 @@ class FogReports:
         told = k * math.exp(sender.deviation * noise)
         if wrong < sender.wrong:
             told = WRONG[0] * (WRONG[1] / WRONG[0]) ** any_k
-        told_time = time + self._clock_error(name, sender.clock_deviation_s)
+        stated_time = time + self._clock_error(name, sender.clock_deviation_s)
         number = self._beats.number(name)
-        self._let_travel(FogReport(name, number, place, told_time, told, sender.deviation), time, sender)
+        self._let_travel(FogReport(name, number, place, stated_time, told, sender.deviation), time, sender)
 
     def _clock_error(self, name: str, deviation: float) -> float:
         """How far a sender's clock is ahead [s]; in one run always the same."""

@@ -37,7 +37,7 @@ class FrameWatch:
         self._time = -math.inf
         self._pixels: Pixels | None = None
 
-    def why_no_news(self, frame: Frame, speed: float) -> str:
+    def stale_reason(self, frame: Frame, speed: float) -> str:
         """Say why a frame is no news; empty if it is (`speed` [m/s])."""
         before, earlier = self._pixels, self._time
         self._time, self._pixels = max(frame.time, earlier), frame.image

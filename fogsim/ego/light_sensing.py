@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fogsim.atmosphere import optical_depth
-from fogsim.lighting.own_sight import own_sight_distance
+from fogsim.lighting.own_sight import headlamp_sight_distance
 from fogsim.scenario import Scenario
 from fogsim.traffic.drivers.eye_heights import EYE_HEIGHTS
 from fogsim.traffic.drivers.lamp_intensity import beam_intensity, head_lamps_that_burn, intensity_toward
@@ -81,7 +81,7 @@ def lamp_effects(state: TrafficState, ego: int, fog: FogField, extinction_ahead:
     others = _others_ahead(state, ego, FARTHEST_DAZZLED) if head_lamps_that_burn(lamps) else []
     dazzled = [other for other in others if not other.comes or other.angle < 0.5 * math.pi]
     visibility = _stepped(visibility_from_extinction(extinction_ahead))
-    sight = own_sight_distance(Lamp(lamps & int(ALL_LAMPS)), visibility)
+    sight = headlamp_sight_distance(Lamp(lamps & int(ALL_LAMPS)), visibility)
     return LampEffects(sight, _veils(state, ego, dazzled, fog) if dazzled else ())
 
 

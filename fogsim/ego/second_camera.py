@@ -28,7 +28,7 @@ class SecondCamera:
         self._yaw, self._pitch, self._roll = (
             math.radians(angle) for angle in (section.yaw_error_deg, section.pitch_error_deg, section.roll_error_deg)
         )
-        self.told_baseline = section.baseline_m * (1.0 + section.baseline_error_percent / 100.0)
+        self.stated_baseline = section.baseline_m * (1.0 + section.baseline_error_percent / 100.0)
         self._sensor = build.camera_sensor(scenario)
         self._rng = np.random.default_rng(0)
 

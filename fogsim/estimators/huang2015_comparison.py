@@ -15,7 +15,7 @@ from fogsim.vision.light.luminance import linear_luminance
 from fogsim.vision.light.pixel_kernels import Pixels
 from fogsim.vision.lines.horizon import PITCH_DEVIATION, levelled
 from fogsim.vision.region.road_image import MIN_AIRLIGHT, CannotTellError
-from fogsim.vision.vehicle.airlight import airlight_beside, hidden_beside
+from fogsim.vision.vehicle.airlight import hidden_at_side, neighbouring_airlight
 from fogsim.vision.vehicle.contrast_ratio import LOST, TOP, MeanLuminances, mean_luminances
 from fogsim.vision.vehicle.patch import Patch, Placement, pixel_shares, rescale_position, shrink
 from fogsim.vision.vehicle.rear_localisation import WIDTHS, RearBox
@@ -202,8 +202,8 @@ def _sky_above(image: Pixels, camera: Camera, distance: float) -> SkyReading:
     noise = 1.4826 * float(np.median(across)) / math.sqrt(2.0)
     if noise > MOST_NOISE * bright:
         raise CannotTellError("what is above the horizon is no sky")
-    hidden = hidden_beside(camera.focal_length, distance)
-    mean = airlight_beside(luminance, bright, noise, camera.principal_point[0] - side, hidden)
+    hidden = hidden_at_side(camera.focal_length, distance)
+    mean = neighbouring_airlight(luminance, bright, noise, camera.principal_point[0] - side, hidden)
     lost = clipping(pixels[even], camera)
     known = lost if lost.noise > 0.0 or mean < FULL else None
     return SkyReading(mean + lost.loss, max(noise, lost.noise), known, known is None)

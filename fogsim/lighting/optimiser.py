@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from fogsim.lighting.high_beam import HIGH_BEAMS, Seconds, is_dark, settled
-from fogsim.lighting.own_sight import own_sight_distance
+from fogsim.lighting.own_sight import headlamp_sight_distance
 from fogsim.lighting.rules import BY_DAY, CAREFUL, FogLampRules, Quantile
 from fogsim.parameters import Range, checked_parameters
 from fogsim.units import extinction_from_visibility
@@ -79,7 +79,7 @@ class SightOptimiser:
 
     def _worth(self, beam: Lamp, visibility: float, observation: Observation) -> float:
         """Sight by a beam minus the price of its glare [m]."""
-        return own_sight_distance(beam, visibility) - self.price * glare_dealt(beam, visibility, observation)
+        return headlamp_sight_distance(beam, visibility) - self.price * glare_dealt(beam, visibility, observation)
 
 
 def glare_dealt(beam: Lamp, visibility: float, observation: Observation) -> float:

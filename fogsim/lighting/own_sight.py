@@ -35,7 +35,7 @@ _PAVEMENT = Pavement()
 _BEAMS = Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.FRONT_FOG
 
 
-def own_sight_distance(lamps: Lamp, visibility: float, glare: float = 0.0) -> float:
+def headlamp_sight_distance(lamps: Lamp, visibility: float, glare: float = 0.0) -> float:
     """Distance from the eyes at which a small object on the road reaches visibility level 7 [m].
 
     The largest one up to `FARTHEST`: it is looked for from far away on, since with a cut-off the level is not monotone.
@@ -64,7 +64,7 @@ def own_veil(lamps: Lamp, visibility: float, distance: float) -> float:
     Parameters
     ----------
     lamps : Lamp
-        Lit lamps, as of `own_sight_distance`.
+        Lit lamps, as of `headlamp_sight_distance`.
     visibility : float
         Meteorological visibility [m], positive; ``inf`` is clear air.
     distance : float

@@ -91,7 +91,7 @@ class RoadSpeeds:
         Returns `ROAD_COLUMNS`: middle of the stretch [m]; time [s], way [m] and extinction over time [s/m] of the ego,
         and of everybody (n, 7).
         """
-        everybody, nobody = self._everybody(), np.zeros(3)
+        everybody, nobody = self._all_vehicles(), np.zeros(3)
         cells = sorted(self._ego.keys() | everybody.keys())
         rows = [(CELL_LENGTH * (c + 0.5), *self._ego.get(c, nobody), *everybody.get(c, nobody)) for c in cells]
         return np.array(rows).reshape(-1, len(ROAD_COLUMNS))
@@ -106,7 +106,7 @@ class RoadSpeeds:
         met = time > 0.0
         return np.stack((place[met], way[met] / time[met], extinction[met] / time[met], time[met]), axis=1)
 
-    def _everybody(self) -> dict[int, NDArray[np.float64]]:
+    def _all_vehicles(self) -> dict[int, NDArray[np.float64]]:
         """Time, way and extinction over time of all vehicles on the road in its direction, by cell."""
         if len(self._path) < 2 or not self._pending:
             return {}

@@ -133,8 +133,8 @@ class MetricsOfRun(ABC, Generic[AnyStep]):
     ) -> None:
         self.standard = standard
         self._metrics = metrics
-        of_everybody = [metric for metric in metrics.values() if isinstance(metric, TrafficMetric)]
-        self._of_traffic = GatheredMetrics([*of_everybody, *watchers])
+        of_all_vehicles = [metric for metric in metrics.values() if isinstance(metric, TrafficMetric)]
+        self._of_traffic = GatheredMetrics([*of_all_vehicles, *watchers])
         self._last: AnyStep | None = None
 
     def update(self, step: AnyStep) -> None:
@@ -255,8 +255,8 @@ class TrafficRunMetrics(MetricsOfRun[TrafficStep]):
         watchers: Iterable[SpanWatcher] = (),
     ) -> None:
         made = {name: METRICS[name](standard) for name in names}
-        of_everybody = {name: metric for name, metric in made.items() if isinstance(metric, TrafficMetric)}
-        super().__init__(standard, of_everybody, watchers)
+        of_all_vehicles = {name: metric for name, metric in made.items() if isinstance(metric, TrafficMetric)}
+        super().__init__(standard, of_all_vehicles, watchers)
         self._duration, self._steps = 0.0, 0
 
     def _take(self, step: TrafficStep, elapsed: float) -> None:  # noqa: ARG002 - counted whatever is in it

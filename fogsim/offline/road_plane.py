@@ -102,7 +102,7 @@ def _bent(
     return bent, slopes
 
 
-def told_camera(image: Path, horizon_row: float, focal_length: float, mount_height: float) -> Calibration:
+def calibration_from_options(image: Path, horizon_row: float, focal_length: float, mount_height: float) -> Calibration:
     """Minimal calibration for a flat road: a pinhole without roll, its principal point in the image's middle.
 
     The image or video gives the size; horizon row and focal length are in px, mount height above the road in m.

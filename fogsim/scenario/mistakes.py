@@ -12,7 +12,7 @@ from fogsim.scenario.document import Document
 from fogsim.scenario.plain_yaml import KeyPath, dotted
 from fogsim.scenario.section import MISTAKE
 
-MOST_TOLD = 50
+MOST_LISTED = 50
 """Maximum number of mistakes that are listed one by one."""
 
 WORDED = {
@@ -56,10 +56,10 @@ def mistake_lines(
     """One line for each mistake, followed by `further` lines; `beside` are top-level keys outside the schema."""
     found = mistakes_in(model, error, document.data, beside)
     told = [
-        ": ".join((document.where(path), *([dotted(path)] if path else []), text)) for path, text in found[:MOST_TOLD]
+        ": ".join((document.where(path), *([dotted(path)] if path else []), text)) for path, text in found[:MOST_LISTED]
     ]
-    if len(found) > MOST_TOLD:
-        told.append(f"{document.path}: and {len(found) - MOST_TOLD} more mistakes")
+    if len(found) > MOST_LISTED:
+        told.append(f"{document.path}: and {len(found) - MOST_LISTED} more mistakes")
     return "\n".join([*told, *further])
 
 

@@ -215,7 +215,7 @@ class Scenario(Section):
         return self
 
     @model_validator(mode="after")
-    def _can_be_told(self, info: ValidationInfo) -> Self:
+    def _can_be_shown(self, info: ValidationInfo) -> Self:
         check_expectations(self, is_shortened=bool((info.context or {}).get("is_shortened")))
         check_timeline(self)
         return self

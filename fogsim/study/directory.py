@@ -17,7 +17,7 @@ from fogsim.study.profiles import Profiles
 from fogsim.study.run_file import STUDY_RUN, CompleteRun, FailedRun, Value, read_run
 from fogsim.study.table import Row
 
-_MOST_TOLD = 5
+_MOST_LISTED = 5
 
 
 class _Manifest(BaseModel):
@@ -66,10 +66,10 @@ class StudyDirectory:
         kinds = ("versions", "files", "cells")
         changed = [change for kind in kinds for change in _changes(before.get(kind, {}), now[kind])]
         if changed:
-            more = f"; and {len(changed) - _MOST_TOLD} more" if len(changed) > _MOST_TOLD else ""
+            more = f"; and {len(changed) - _MOST_LISTED} more" if len(changed) > _MOST_LISTED else ""
             raise InputError(
                 f"--out {self.path} holds another study, whose results would be mixed with these: "
-                f"{'; '.join(changed[:_MOST_TOLD])}{more}. Choose another directory, or undo the change"
+                f"{'; '.join(changed[:_MOST_LISTED])}{more}. Choose another directory, or undo the change"
             )
 
     def missing(self) -> list[StudyRun]:

@@ -64,7 +64,7 @@ def plot_signals(log: SignalLog, title: str, failures: Sequence[float]) -> str:
 
 
 def _draw(axes: Axes, signal: Reference, log: SignalLog) -> None:
-    unit, values = SIGNALS[signal.signal].told_in, log.values[signal]
+    unit, values = SIGNALS[signal.signal].stated_in, log.values[signal]
     texts = sorted({text for text in map(_text, values) if text is not None})
     if texts:
         # Words have no order: each gets a line.

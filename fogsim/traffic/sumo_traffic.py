@@ -39,9 +39,9 @@ from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo.vehicle_reader import SubscribedReader, VehicleReader
 from fogsim.traffic.sumo_behaviour.ego_choice import EgoChoice
 from fogsim.traffic.sumo_behaviour.ego_driving import EgoDriving
+from fogsim.traffic.sumo_behaviour.lamp_publisher import LampPublisher
 from fogsim.traffic.sumo_behaviour.scripted_actions import ScriptedActions, has_lane
 from fogsim.traffic.sumo_behaviour.speed_control import SpeedControl, SumoDesiredSpeeds
-from fogsim.traffic.sumo_behaviour.told_lamps import ToldLamps
 from fogsim.traffic.sumo_drivers.drivers_perception import DriversPerception, drivers_perception
 from fogsim.traffic.sumo_lanes.courses import Courses
 from fogsim.traffic.sumo_lanes.directions import LaneDirections
@@ -80,7 +80,7 @@ class _Run:
     lane_changes: LaneChangeSmoothing
     speeds: SpeedControl
     driving: EgoDriving
-    lamps: ToldLamps
+    lamps: LampPublisher
     lanes: LaneKeeping
     collisions: CollisionLog
     script: Script
@@ -165,7 +165,7 @@ class SumoTraffic:
             lane_changes=changes,
             speeds=speeds,
             driving=EgoDriving(api, setup.ego, setup.step_length),
-            lamps=ToldLamps(api),
+            lamps=LampPublisher(api),
             lanes=LaneKeeping(api, setup.keep_lane, roster, session),
             collisions=CollisionLog(),
             script=script,
@@ -328,7 +328,7 @@ class SumoTraffic:
         if run.driving.apply(command.control, run.roster.present) and self._setup.ego is not None:
             orders.pop(self._setup.ego, None)
         run.speeds.apply(orders)
-        run.lamps.tell(self._told_lamps(), run.roster.present)
+        run.lamps.publish(self._published_lamps(), run.roster.present)
         run.actions.play(self._elapsed(run), run.roster.present)
         self._update_drivers(run, command)
 
@@ -367,7 +367,7 @@ class SumoTraffic:
 
     def _update_drivers(self, run: _Run, command: Command) -> None:
         if run.perception is not None:
-            run.perception.update(self._told_lamps(), run.script.lamps)
+            run.perception.update(self._published_lamps(), run.script.lamps)
         if run.drivers is not None:
             run.drivers.update(command)
 
@@ -451,7 +451,7 @@ class SumoTraffic:
         ego, own = self._setup.ego, self._command.advice.speed
         return heard if ego is None or math.isinf(own) else {**heard, ego: own}
 
-    def _told_lamps(self) -> Mapping[str, Lamp]:
+    def _published_lamps(self) -> Mapping[str, Lamp]:
         """Lamps that the command lights."""
         own = {} if self._setup.ego is None else {self._setup.ego: self._command.lamps}
         return {**self._command.lamps_of, **own}

@@ -37,7 +37,7 @@ class Ending(StrEnum):
     COHORT_LEFT = "cohort left"
     """Without an ego: all vehicles of the cohort (``traffic.cohort_s``) have left."""
 
-    NOBODY_LEFT = "nobody left"
+    NONE_LEFT = "nobody left"
     """Without an ego: all vehicles have gone, and no more will come."""
 
 

@@ -90,10 +90,10 @@ def test_json_is_all_there_is_on_stdout_and_the_same_each_time(folder: Path) -> 
         assert record["category"] == "dense"
     # The road's lines, which noise moves in each frame, have a say of a fraction of a pixel in where the horizon is.
     horizon_row = np.median([record["horizon_row"] for record in told])
-    assert horizon_row == pytest.approx(told_horizon(2.0), abs=0.25)
+    assert horizon_row == pytest.approx(stated_horizon(2.0), abs=0.25)
 
 
-def told_horizon(pitch_deg: float) -> float:
+def stated_horizon(pitch_deg: float) -> float:
     """Row of the horizon by the calibration, for a pitch [px]."""
     return 120 - 288.45 * float(np.tan(np.radians(pitch_deg)))
 
@@ -104,7 +104,7 @@ def test_the_told_pitch_is_what_places_the_horizon(estimate, folder: Path) -> No
     _, out, _ = estimate("drive", "--camera", "higher.yaml", "--method", "negru2013", "--json")
     rows = [record["horizon_row"] for line in out.splitlines() if (record := json.loads(line))["valid"]]
     assert rows
-    assert min(rows) > 0.5 * (told_horizon(1.0) + told_horizon(2.0))
+    assert min(rows) > 0.5 * (stated_horizon(1.0) + stated_horizon(2.0))
 
 
 def test_stills_have_a_table_with_a_row_each(estimate) -> None:

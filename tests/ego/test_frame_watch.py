@@ -14,26 +14,28 @@ def frame(time: float, seed: int) -> Frame:
 
 def test_new_pictures_with_later_times_are_news() -> None:
     watch = FrameWatch()
-    assert [watch.why_no_news(frame(0.1 * i, i), 20.0) for i in range(4)] == [""] * 4
+    assert [watch.stale_reason(frame(0.1 * i, i), 20.0) for i in range(4)] == [""] * 4
 
 
 def test_a_time_that_does_not_move_on_tells_that_nothing_is_new() -> None:
     watch = FrameWatch()
-    watch.why_no_news(frame(3.0, 0), 20.0)
-    assert "no new frame: the last one is of 3.00 s" in watch.why_no_news(frame(3.0, 1), 20.0)
-    assert watch.why_no_news(frame(3.1, 2), 20.0) == ""
+    watch.stale_reason(frame(3.0, 0), 20.0)
+    assert "no new frame: the last one is of 3.00 s" in watch.stale_reason(frame(3.0, 1), 20.0)
+    assert watch.stale_reason(frame(3.1, 2), 20.0) == ""
     watch.reset()
-    assert watch.why_no_news(frame(0.0, 2), 20.0) == ""
+    assert watch.stale_reason(frame(0.0, 2), 20.0) == ""
 
 
 def test_a_picture_that_stands_still_is_no_news_only_while_the_vehicle_moves() -> None:
     watch = FrameWatch()
     still = frame(0.0, 0)
-    told = [watch.why_no_news(Frame(0.1 * i, still.image.copy(), CAMERA), speed) for i, speed in enumerate([20, 0, 20])]
+    told = [
+        watch.stale_reason(Frame(0.1 * i, still.image.copy(), CAMERA), speed) for i, speed in enumerate([20, 0, 20])
+    ]
     assert [bool(one) for one in told] == [False, False, True]
     one_pixel = still.image.copy()
     one_pixel[7, 9, 1] ^= 1
-    assert watch.why_no_news(Frame(0.4, one_pixel, CAMERA), 20.0) == ""
+    assert watch.stale_reason(Frame(0.4, one_pixel, CAMERA), 20.0) == ""
 
 
 def test_a_late_frame_belongs_with_what_was_measured_when_it_was_taken() -> None:

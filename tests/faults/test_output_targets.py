@@ -231,7 +231,7 @@ def test_a_command_refuses_its_target_before_it_works(
 
     for name in ("fogsim.loop.ClosedLoop", "fogsim.study.pool.ProcessPool.run", "fogsim.offline.guess.guess_camera"):
         monkeypatch.setattr(name, work)
-    monkeypatch.setattr("fogsim.cli.run.compiling_beside", lambda: contextlib.nullcontext(lambda _: None))
+    monkeypatch.setattr("fogsim.cli.run.compiling_in_background", lambda: contextlib.nullcontext(lambda _: None))
     before = {path: path.read_bytes() if path.is_file() else None for path in folder.rglob("*")}
     done = CliRunner().invoke(app, [str(one) for one in arguments])
     told = str(done.exception)

@@ -12,7 +12,7 @@ from fogsim.lighting import LIGHTING_POLICIES, VehicleLightingPolicy
 from fogsim.lighting.high_beam import AlwaysHigh, Gallen2014, settled
 from fogsim.lighting.legal import LAWS, LegalRules
 from fogsim.lighting.optimiser import SightOptimiser, glare_dealt
-from fogsim.lighting.own_sight import FARTHEST, own_sight_distance, own_veil
+from fogsim.lighting.own_sight import FARTHEST, headlamp_sight_distance, own_veil
 from fogsim.values import (
     Belief,
     Lamp,
@@ -119,14 +119,14 @@ def test_an_unknown_country_is_refused_with_those_there_are() -> None:
 
 
 def test_own_sight_falls_with_fog_and_glare_and_high_beams_lose_by_their_veil() -> None:
-    low, high = ([own_sight_distance(beam, v) for v in (50.0, 100.0, 300.0, math.inf)] for beam in (LOW, HIGH))
+    low, high = ([headlamp_sight_distance(beam, v) for v in (50.0, 100.0, 300.0, math.inf)] for beam in (LOW, HIGH))
     assert low == sorted(low)
     assert high == sorted(high)
     assert high[-1] > 1.1 * low[-1]
     assert all(by_high < by_low for by_high, by_low in zip(high[:-1], low[:-1], strict=True))
-    assert own_sight_distance(LOW, 100.0, glare=1.0) < low[1]
-    assert own_sight_distance(Lamp.POSITION, 100.0) == 0.0
-    assert own_sight_distance(LOW, 5.0) == 0.0
+    assert headlamp_sight_distance(LOW, 100.0, glare=1.0) < low[1]
+    assert headlamp_sight_distance(Lamp.POSITION, 100.0) == 0.0
+    assert headlamp_sight_distance(LOW, 5.0) == 0.0
     assert max(high) < FARTHEST
 
 

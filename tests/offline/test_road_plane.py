@@ -12,7 +12,7 @@ from fogsim.errors import InputError
 from fogsim.offline.camera_file import Calibration
 from fogsim.offline.fog_image import fog_file
 from fogsim.offline.fog_video import fog_video
-from fogsim.offline.road_plane import RoadPlane, told_camera
+from fogsim.offline.road_plane import RoadPlane, calibration_from_options
 from fogsim.offline.video_source import VideoFile
 from fogsim.recorders.video import Encoder, encoder_command
 from fogsim.values import Camera, Response
@@ -87,7 +87,7 @@ def test_the_airlight_is_the_skys_and_not_that_of_the_woods_before_it(tmp_path: 
 
 def test_a_told_horizon_is_a_level_camera_with_its_axis_in_the_middle(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "clear.png"), np.zeros((48, 64, 3), np.uint8))
-    camera = told_camera(tmp_path / "clear.png", 18.0, 60.0, 1.4).camera
+    camera = calibration_from_options(tmp_path / "clear.png", 18.0, 60.0, 1.4).camera
     assert camera.horizon_row == pytest.approx(18.0)
     assert (camera.width, camera.height, camera.response) == (64, 48, Response.SRGB)
     for changed, told in (
@@ -96,7 +96,7 @@ def test_a_told_horizon_is_a_level_camera_with_its_axis_in_the_middle(tmp_path: 
         ((18.0, 60.0, math.nan), "--mount-height must be"),
     ):
         with pytest.raises(InputError, match=told):
-            told_camera(tmp_path / "clear.png", *changed)
+            calibration_from_options(tmp_path / "clear.png", *changed)
 
 
 @pytest.mark.parametrize("pitch", [-40.0, 60.0])

@@ -18,7 +18,7 @@ from fogsim.randomness import Seed
 from fogsim.scenario import Scenario, build
 from fogsim.values import Command, Ending, Step
 from fogsim_envs.actions import checked_action, checked_options
-from fogsim_envs.hosting import TIMEOUT, Simulation, Timeout, begin, begin_anew, checked_timeout, refuse_copies
+from fogsim_envs.hosting import TIMEOUT, Simulation, Timeout, begin, checked_timeout, refuse_copies, restart
 from fogsim_envs.infos import flat_numbers
 from fogsim_envs.rendering import RENDER_MODES, StepRenderer, render_modes
 from fogsim_envs.spaces import ImageSize, action_space, command_of
@@ -212,7 +212,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
             step = self._simulation.start(seed)
         else:
             before, self._simulation = self._simulation, None
-            self._simulation, step = begin_anew(before, scenario, seed, self._timeout)
+            self._simulation, step = restart(before, scenario, seed, self._timeout)
         self._running = scenario
         return step
 

@@ -40,10 +40,10 @@ class EpisodeChoice:
         """Refuse a driver or an episode that cannot be."""
         if self.driver is not None:
             check_driver(self.driver)
-        _ = self.told_episode
+        _ = self.stated_episode
 
     @property
-    def told_episode(self) -> Episode | None:
+    def stated_episode(self) -> Episode | None:
         """The episode that is given."""
         if not isinstance(self.episode, Mapping):
             return self.episode
@@ -110,7 +110,7 @@ class EpisodeSource:
         seed = 2 * number + self._split
         own = np.random.default_rng(seed)
         named = self._scenarios[int(own.integers(len(self._scenarios)))]
-        episode = choice.told_episode or self._episode(own, choice.visibility)
+        episode = choice.stated_episode or self._episode(own, choice.visibility)
         if choice.driver is not None:
             episode = Episode(episode.settings, choice.driver, episode.light, episode.script)
         settings = [*episode.settings, *self._overrides]

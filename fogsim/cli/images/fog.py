@@ -132,7 +132,7 @@ def _fog_depth(
 
 def _road(image: Path, camera: Path | None, told: dict[str, float | None]) -> "RoadPlane":
     from fogsim.offline.camera_file import load_calibration
-    from fogsim.offline.road_plane import RoadPlane, told_camera
+    from fogsim.offline.road_plane import RoadPlane, calibration_from_options
 
     given = {option: value for option, value in told.items() if value is not None}
     if camera is not None:
@@ -145,7 +145,9 @@ def _road(image: Path, camera: Path | None, told: dict[str, float | None]) -> "R
             raise InputError(
                 f"--road-plane needs --camera camera.yaml, or {', '.join(told)}; lacking: {', '.join(lacking)}"
             )
-        calibration = told_camera(image, given["--horizon-row"], given["--focal-length"], given["--mount-height"])
+        calibration = calibration_from_options(
+            image, given["--horizon-row"], given["--focal-length"], given["--mount-height"]
+        )
     print_remarks("assumed", calibration.remarks)
     return RoadPlane(calibration)
 

@@ -67,7 +67,7 @@ def restore_command(
             last = one
             progress.advance(task)
     _tell(out, wish, told, last)
-    _tell_lacking(lacking, isinstance(given, ImageFiles))
+    _report_missing(lacking, isinstance(given, ImageFiles))
 
 
 def _tell(out: Path, wish: "RestorationWish", told: "Counter[str]", last: "Restored") -> None:
@@ -85,7 +85,7 @@ def _tell(out: Path, wish: "RestorationWish", told: "Counter[str]", last: "Resto
         print_remarks("held", (f"in {told['held']} images had no estimate; the last one was used",))
 
 
-def _tell_lacking(lacking: "list[Restored]", files: bool) -> None:
+def _report_missing(lacking: "list[Restored]", files: bool) -> None:
     """Say which images were not restored; frames of a video have stayed as they were."""
     if not lacking:
         return

@@ -6,7 +6,7 @@ from types import MappingProxyType
 from fogsim.errors import suggest
 from fogsim.scenario.roads.files import road_layout, traffic_files
 from fogsim.scenario.schema import Scenario
-from fogsim.scenario.timeline import doings_of
+from fogsim.scenario.timeline import operations
 from fogsim.scenario.timeline.schema import DepartAction, VehicleActions
 from fogsim.traffic.road.configuration import configured_files
 from fogsim.traffic.road.net_edges import read_net_edges
@@ -25,7 +25,7 @@ _NUMBERS = {"right": 0, "left": -1}
 
 def entering_vehicles(scenario: Scenario) -> Entries:
     """Vehicles that a timeline brings onto the road with a way of their own."""
-    doings = [pair for entry in scenario.timeline for pair in doings_of(entry)]
+    doings = [pair for entry in scenario.timeline for pair in operations(entry)]
     wanted = {
         (vehicle, doing.depart): None
         for vehicle, doing in doings

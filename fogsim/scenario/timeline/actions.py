@@ -80,7 +80,7 @@ def actions_of(entry: TimelineEntry, now: Situation, reference: float) -> Action
     fog: list[ChangeFog] = []
     lights: list[ChangeLight] = []
     faults: list[Fault] = []
-    for subject, doing in doings_of(entry):
+    for subject, doing in operations(entry):
         match doing:
             case VehicleActions():
                 moves = _of_vehicle(subject, doing, now)
@@ -100,7 +100,7 @@ def actions_of(entry: TimelineEntry, now: Situation, reference: float) -> Action
     return Actions(tuple(traffic), tuple(fog), tuple(lights), tuple(faults))
 
 
-def doings_of(entry: TimelineEntry) -> Iterator[tuple[str, Doing]]:
+def operations(entry: TimelineEntry) -> Iterator[tuple[str, Doing]]:
     """Subjects of an entry, each with one thing that it does; those of several several times."""
     for subject, written in entry.do.items():
         yield from ((subject, doing) for doing in (written if isinstance(written, tuple) else (written,)))
@@ -114,7 +114,7 @@ def entry_name(entry: TimelineEntry, number: int) -> str:
 def told(entry: TimelineEntry) -> str:
     """What an entry does in a few words: ``slow: brake; fog: visibility_m``."""
     words = []
-    for subject, doing in doings_of(entry):
+    for subject, doing in operations(entry):
         given = [key for key in type(doing).model_fields if key in doing.model_fields_set]
         fault = getattr(doing, "fault", "")
         words.append(f"{subject}: {fault or ' and '.join(key for key in given if key not in ('over_s', 'for_s'))}")
@@ -124,7 +124,7 @@ def told(entry: TimelineEntry) -> str:
 def vehicles_of(entry: TimelineEntry) -> tuple[str, ...]:
     """Vehicles that an entry makes do something, or follow, as it names them; each once."""
     named = []
-    for subject, doing in doings_of(entry):
+    for subject, doing in operations(entry):
         if isinstance(doing, VehicleActions):
             others = [
                 doing.follow.vehicle if doing.follow else None,
@@ -195,7 +195,7 @@ def _departure(vehicle: str, action: DepartAction, now: Situation) -> list[Traff
 
 def departing_vehicles(entries: Sequence[TimelineEntry]) -> frozenset[str]:
     """Vehicles that a timeline brings onto the road."""
-    doings = [pair for entry in entries for pair in doings_of(entry)]
+    doings = [pair for entry in entries for pair in operations(entry)]
     return frozenset(subject for subject, doing in doings if isinstance(doing, VehicleActions) and doing.depart)
 
 
@@ -288,7 +288,7 @@ def fog_reference(entries: Sequence[TimelineEntry], extinction: float) -> float:
     wanted = [
         extinction_from_visibility(doing.visibility_m)
         for entry in entries
-        for _, doing in doings_of(entry)
+        for _, doing in operations(entry)
         if isinstance(doing, FogActions) and doing.visibility_m is not None
     ]
     return extinction if extinction > 0.0 else max(wanted, default=0.0)
@@ -296,7 +296,7 @@ def fog_reference(entries: Sequence[TimelineEntry], extinction: float) -> float:
 
 def light_range(entries: Sequence[TimelineEntry], illuminance: float) -> tuple[float, float]:
     """Lowest and highest horizontal illuminance that there may be in a run [lx] (`illuminance` [lx])."""
-    doings = [doing for entry in entries for _, doing in doings_of(entry)]
+    doings = [doing for entry in entries for _, doing in operations(entry)]
     levels = [illuminance, *(doing.illuminance_lx for doing in doings if isinstance(doing, LightActions))]
     return min(levels), max(levels)
 
@@ -307,7 +307,7 @@ def scripted_fog(entries: Sequence[TimelineEntry], fog: FogField) -> FogField:
     Returns with the densities that it may come to; where the air is clear, fog of density 0 in its place.
     """
     reference = fog_reference(entries, fog.extinction)
-    changes = [doing for entry in entries for _, doing in doings_of(entry) if isinstance(doing, FogActions)]
+    changes = [doing for entry in entries for _, doing in operations(entry) if isinstance(doing, FogActions)]
     if not changes:
         return fog
     densities = tuple(_density(change, reference) for change in changes)

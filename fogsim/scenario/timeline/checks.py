@@ -10,7 +10,7 @@ from fogsim.scenario.document import Document
 from fogsim.scenario.expect.checks import run_content
 from fogsim.scenario.expect.conditions import refuse
 from fogsim.scenario.plain_yaml import KeyPath
-from fogsim.scenario.timeline.actions import departing_vehicles, doings_of, entry_name, vehicles_of
+from fogsim.scenario.timeline.actions import departing_vehicles, entry_name, operations, vehicles_of
 from fogsim.scenario.timeline.lamps import lamp_mistake
 from fogsim.scenario.timeline.schema import (
     Doing,
@@ -68,7 +68,7 @@ def _mistakes(scenario: "Scenario") -> Iterator[tuple[KeyPath, str]]:
             yield from (((number, "when"), told) for told in condition_mistakes(entry.when, content))
         if not scenario.traffic.has_ego and EGO in vehicles_of(entry):
             yield (number, "do"), "it tells of the ego, and traffic.ego is none"
-        for subject, doing in doings_of(entry):
+        for subject, doing in operations(entry):
             told = (
                 _mistake(doing, scenario)
                 or _person_mistake(subject, doing, scenario)
@@ -106,7 +106,7 @@ def _kind(subject: str, scenario: "Scenario") -> str | None:
     if subject in scenario.actors:
         return scenario.actors[subject].type
     for entry in scenario.timeline:
-        for name, doing in doings_of(entry):
+        for name, doing in operations(entry):
             if name == subject and isinstance(doing, VehicleActions) and doing.depart:
                 like = scenario.actors.get(doing.depart.like or "")
                 return doing.depart.type or (None if like is None else like.type)

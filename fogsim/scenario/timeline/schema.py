@@ -212,8 +212,8 @@ class LaneAction(Section):
     def _one_way(self) -> Self:
         if self.duration_s is not None and self.distance_m is not None:
             raise ValueError("takes either duration or distance")
-        is_told = self.lanes is not None or self.to_lane_of is not None
-        if is_told == (self.to is not None):
+        is_stated = self.lanes is not None or self.to_lane_of is not None
+        if is_stated == (self.to is not None):
             raise ValueError(
                 "say where: lanes (to the left, negative to the right), to (number of the lane) or to_lane_of"
             )

@@ -73,7 +73,7 @@ class LibsumoLink:
     def _check_outputs(self) -> None:
         if self._outputs is None:
             return
-        self._outputs.tell_lost()
+        self._outputs.report_lost()
         twice = self._outputs.twice()
         if twice:
             self.end()

@@ -105,7 +105,7 @@ class OutputFolder:
         """A message of SUMO's with the names of files as they were asked for."""
         return message.replace(self._way, self._prefix) if self._way else message
 
-    def tell_lost(self) -> None:
+    def report_lost(self) -> None:
         """Warn of outputs that will not be kept, each once."""
         if self._folder is not None or self._own is None:
             return
@@ -123,9 +123,9 @@ class OutputFolder:
         """Remove what is not kept, and a folder in which nothing is; twice does nothing."""
         try:
             self._take_warnings()
-            self.tell_lost()
+            self.report_lost()
             if self._folder is not None:
-                self._tell_cut_off(self._folder)
+                self._report_cut_off(self._folder)
                 if self._folder.is_dir() and not any(self._folder.iterdir()):
                     self._folder.rmdir()
         finally:
@@ -141,7 +141,7 @@ class OutputFolder:
             self.warnings = tuple(line.removeprefix(_WARNING).strip() for line in lines if line.startswith(_WARNING))
             log.unlink()
 
-    def _tell_cut_off(self, folder: Path) -> None:
+    def _report_cut_off(self, folder: Path) -> None:
         cut = [name for name in _names(folder) if name.endswith(".xml") and not _is_whole(folder / name)]
         if cut:
             warnings.warn(

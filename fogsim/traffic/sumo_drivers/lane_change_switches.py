@@ -44,7 +44,7 @@ class LaneChangeSwitch:
         for vehicle in on:
             self.turn_on(vehicle)
 
-    def begin_anew(self, vehicles: Iterable[str], present: Collection[str]) -> None:
+    def restart(self, vehicles: Iterable[str], present: Collection[str]) -> None:
         """Turn it off for vehicles that have entered or left."""
         for vehicle in self._turned.intersection(vehicles) if self._turned else ():
             if vehicle in present:
@@ -54,4 +54,4 @@ class LaneChangeSwitch:
 
     def release(self, present: Collection[str]) -> None:
         """Turn it off for everybody."""
-        self.begin_anew(tuple(self._turned), present)
+        self.restart(tuple(self._turned), present)

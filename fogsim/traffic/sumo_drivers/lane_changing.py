@@ -92,9 +92,9 @@ class StandingLeaders:
         # SUMO tells of each lane of the edge how many lanes away the best one for the route is.
         return any(best[0] == lane and best[3] == 0 for best in self._vehicles.getBestLanes(driver))
 
-    def begin_anew(self, drivers: Sequence[str], present: set[str]) -> None:
-        """Give some drivers their own behaviour back; see `LaneChangeSwitch.begin_anew`."""
-        self._strategic.begin_anew(drivers, present)
+    def restart(self, drivers: Sequence[str], present: set[str]) -> None:
+        """Give some drivers their own behaviour back; see `LaneChangeSwitch.restart`."""
+        self._strategic.restart(drivers, present)
 
     def release(self, present: set[str]) -> None:
         """Give everybody their own behaviour back; see `LaneChangeSwitch.release`."""
@@ -172,7 +172,7 @@ class LaneChanging:
             return
         due, _, gone = self._due.take()
         self._requests.end(self._roster.present, self._roster.time)
-        self._begin_anew(gone)
+        self._restart(gone)
         self._due.schedule(due, LOOK_PERIOD)
         if due:
             self._standing.update(due, self._roster.present)
@@ -182,15 +182,15 @@ class LaneChanging:
             wishes = self._wishes.update([v for v in free_to_their_eyes if v not in hidden])
             self._change_lanes(due, wishes, own_lamps)
 
-    def _begin_anew(self, drivers: Sequence[str]) -> None:
+    def _restart(self, drivers: Sequence[str]) -> None:
         """Forget drivers that have left, and whom those who have entered may be taken for."""
         if drivers:
             self._vehicle_sight.forget(drivers)
             for driver in drivers:
                 self._certain_until.pop(driver, None)
-            self._standing.begin_anew(drivers, self._roster.present)
+            self._standing.restart(drivers, self._roster.present)
             for switch in (self._overtake_right, *self._unhelpful):
-                switch.begin_anew(drivers, self._roster.present)
+                switch.restart(drivers, self._roster.present)
 
     def _free_to_the_left(self, drivers: Sequence[str], own_lamps: OwnLamps) -> dict[str, None]:
         """Drivers to whom the lane to the left looks free ahead, though there is somebody who is hardly faster."""

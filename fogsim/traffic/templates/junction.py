@@ -49,11 +49,11 @@ class Junction:
     def entry(self, number: int) -> tuple[str, int]:
         """Internal edge with which a way begins, and the number of its lane there."""
         first = number
-        while first and self._run_beside(first - 1, number):
+        while first and self._run_in_background(first - 1, number):
             first -= 1
         return f":{self.name}_{first}", number - first
 
-    def _run_beside(self, number: int, other: int) -> bool:
+    def _run_in_background(self, number: int, other: int) -> bool:
         """Whether two ways are lanes of one internal edge."""
         one, two = self.ways[number].link, self.ways[other].link
         waits = self.waits_at[number] is not None or self.waits_at[other] is not None

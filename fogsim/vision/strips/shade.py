@@ -86,10 +86,10 @@ def divided_road(
     levels = shade_levels(pixels, curves, geometry, priors[0], noise)
     if levels is None:
         return None
-    told_too = (*_seen_or_told(priors[0], told, camera), *priors[1:])
+    stated_too = (*_seen_or_stated(priors[0], told, camera), *priors[1:])
     some, laid = _divided(pixels, curves, geometry, levels, noise, camera, free)
     near = JointFit(levels.extinction, 0.0, levels.airlight, priors[0].shift, levels.lit, 1.0, NOTHING, NOTHING)
-    fit = fit_jointly(some, laid, told_too, near)
+    fit = fit_jointly(some, laid, stated_too, near)
     return None if fit is None or fit.extinction <= 0.0 else DividedRoad(some, laid, fit, levels.share)
 
 
@@ -114,7 +114,7 @@ def shade_levels(
     return fit_levels(pieces, bins, around, prior, noise, True)
 
 
-def _seen_or_told(prior: JointPrior, told: Horizon, camera: Camera) -> tuple[JointPrior, JointPrior]:
+def _seen_or_stated(prior: JointPrior, told: Horizon, camera: Camera) -> tuple[JointPrior, JointPrior]:
     """Prior with the seen horizon, and that with the told one."""
     seen = prior._replace(cost=-2.0 * math.log((1.0 - MISLED) / prior.shift_deviation))
     shift, deviation = told.row - camera.horizon_row, told.standard_deviation

@@ -97,7 +97,7 @@ def _first_levels(pieces: Floats, passed: Floats, airlight: float, ends: int) ->
 
 
 @kernel
-def _told_apart(pieces: Floats, passed: Floats, levels: Levels, grey: float, sums: Floats) -> None:
+def _distinguished(pieces: Floats, passed: Floats, levels: Levels, grey: float, sums: Floats) -> None:
     """Write to `sums` (2, 5) what pieces in sun and in shade say, in Cauchy's norm."""
     sums[:] = 0.0
     for i in range(passed.size):
@@ -197,7 +197,7 @@ def fit_levels(
             continue
         levels = Levels(k, prior.airlight, lit, shaded if divided else lit, np.inf, 0.0, 0.0)
         for _ in range(ROUNDS):
-            _told_apart(seen, passed, levels, grey, sums)
+            _distinguished(seen, passed, levels, grey, sums)
             levels = _fitted(levels, sums, prior, divided)
         levels = _judged(seen, passed, levels, grey)
         if levels.cost < best.cost:

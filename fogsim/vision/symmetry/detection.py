@@ -30,10 +30,10 @@ LEAST_NOISE = 0.08
 LEAST_GRADIENT = 4.0
 """Gradient of an edge over its noise [-]."""
 
-LEAST_SHARE, UNTOLD_SHARE = 0.66, 0.85
+LEAST_SHARE, UNWARNED_SHARE = 0.66, 0.85
 """Share of its outline that a sign must show where the map has one, and anywhere else [-]."""
 
-SURPRISE, UNTOLD_SURPRISE = 9.0, 14.0
+SURPRISE, UNWARNED_SURPRISE = 9.0, 14.0
 """Negative logarithm of the probability that edges which lie at random bear an outline out as well [-]; in one of the
 tiles of a whole picture, for any of them."""
 
@@ -104,7 +104,7 @@ def detect_signs(
     if regions is None:
         searches = list(_tiles(pixels.shape[:2], radii))
         # So many tiles give chance as many occasions.
-        surprise, share = UNTOLD_SURPRISE + math.log(len(searches)), UNTOLD_SHARE
+        surprise, share = UNWARNED_SURPRISE + math.log(len(searches)), UNWARNED_SHARE
     else:
         searches = [(region, SMALLER, LARGER) for region in regions]
         surprise, share = SURPRISE, LEAST_SHARE

@@ -147,7 +147,7 @@ LEAST_SEEN = 0.05
 """Share of a block's pixels that must be of that light for the block to count [-]."""
 
 
-def airlight_beside(light: NDArray[np.float32], about: float, noise: float, axis: float, hidden: float) -> float:
+def neighbouring_airlight(light: NDArray[np.float32], about: float, noise: float, axis: float, hidden: float) -> float:
     """Brightness of the sky where neither trees, however faint, nor the vehicle ahead stand before it.
 
     A bright part of an even sky, and not its brightest pixels: at a range where the fog leaves 2 % of a contrast, an
@@ -181,6 +181,6 @@ def _mean(part: NDArray[np.float32], about: float, noise: float) -> float | None
     return middle
 
 
-def hidden_beside(focal_length: float, depth: float) -> float:
+def hidden_at_side(focal_length: float, depth: float) -> float:
     """How far from the axis a vehicle ahead may hide the sky [px] (`focal_length` [px], `depth` [m])."""
     return HALF_TRUCK * focal_length / depth if math.isfinite(depth) else 0.0

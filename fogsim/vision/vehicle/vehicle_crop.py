@@ -17,7 +17,14 @@ from fogsim.vision.lines.horizon import levelled
 from fogsim.vision.region.road_image import CannotTellError
 from fogsim.vision.strips.airlight_slopes import USUAL_EXTINCTION, RowAirlight, row_airlight
 from fogsim.vision.strips.sky import Sky, sky_above
-from fogsim.vision.vehicle.airlight import RoadFall, airlight_beside, check_road, hidden_beside, road_before, road_fall
+from fogsim.vision.vehicle.airlight import (
+    RoadFall,
+    check_road,
+    hidden_at_side,
+    neighbouring_airlight,
+    road_before,
+    road_fall,
+)
 from fogsim.vision.vehicle.contrast_ratio import RearPicture
 from fogsim.vision.vehicle.rear_localisation import RearBox, localise_rear, search_window
 
@@ -246,9 +253,9 @@ def _daylight(day: _DaytimeFrame, depth: float) -> SkyReading:
     core = np.abs(light - level) <= SKY_CORE * level + 4.0 * sky.noise
     if sky.noise > MOST_NOISE * level or not core.size or float(core.mean()) < SKY_SHARE:
         raise CannotTellError("what is above the horizon is no sky")
-    hidden = hidden_beside(camera.focal_length, depth)
+    hidden = hidden_at_side(camera.focal_length, depth)
     axis = camera.principal_point[0] - camera.width // 6
-    luminance = airlight_beside(light, level, sky.noise, axis, hidden)
+    luminance = neighbouring_airlight(light, level, sky.noise, axis, hidden)
     clear = np.abs(light - luminance) <= 4.0 * max(sky.noise, 1.0)
     if not clear.any():
         raise CannotTellError("nowhere is the sky as bright as it is beside the vehicle")

@@ -3,7 +3,7 @@ import pytest
 
 from fogsim.values import Camera, Response
 from fogsim.vision.region.road_image import CannotTellError
-from fogsim.vision.vehicle.airlight import airlight_beside, check_road, hidden_beside, road_before, road_fall
+from fogsim.vision.vehicle.airlight import check_road, hidden_at_side, neighbouring_airlight, road_before, road_fall
 
 NOISE = 2.0
 CAMERA = Camera(688, 515, 700.0, (343.5, 257.0), 1.3, np.radians(1.0), response=Response.LINEAR)
@@ -15,32 +15,32 @@ def sky(light=180.0, seed=0):
 
 @pytest.mark.parametrize("about", [179.0, 180.0, 181.5])
 def test_the_light_of_an_even_sky_whatever_it_was_thought_to_be(about):
-    errors = [airlight_beside(sky(seed=s), about, NOISE, 300.0, 30.0) / 180.0 - 1 for s in range(10)]
+    errors = [neighbouring_airlight(sky(seed=s), about, NOISE, 300.0, 30.0) / 180.0 - 1 for s in range(10)]
     assert np.abs(errors).max() < 5e-4
 
 
 def test_trees_however_faint_are_no_sky():
     light = sky()
     light[:, :400] -= 1.0  # in dense fog
-    assert airlight_beside(light, 180.0, NOISE, 300.0, 30.0) == pytest.approx(180.0, rel=5e-4)
+    assert neighbouring_airlight(light, 180.0, NOISE, 300.0, 30.0) == pytest.approx(180.0, rel=5e-4)
     light[:, :400] -= 60.0 * (np.random.default_rng(1).random((60, 400)) < 0.8)  # in thin fog
-    assert airlight_beside(light, 180.0, NOISE, 300.0, 30.0) == pytest.approx(180.0, rel=1e-3)
+    assert neighbouring_airlight(light, 180.0, NOISE, 300.0, 30.0) == pytest.approx(180.0, rel=1e-3)
 
 
 def test_branches_with_a_little_sky_between_them_everywhere():
     light = sky()
     light[np.random.default_rng(1).random(light.shape) < 0.8] -= 60.0
-    assert airlight_beside(light, 180.0, NOISE, 300.0, 30.0) == pytest.approx(180.0, rel=1e-3)
+    assert neighbouring_airlight(light, 180.0, NOISE, 300.0, 30.0) == pytest.approx(180.0, rel=1e-3)
 
 
 def test_a_high_vehicle_before_the_axis_is_no_sky():
     light = sky()
     light[:, 270:330] += 5.0
-    assert airlight_beside(light, 180.0, NOISE, 300.0, 30.0) == pytest.approx(180.0, rel=5e-4)
+    assert neighbouring_airlight(light, 180.0, NOISE, 300.0, 30.0) == pytest.approx(180.0, rel=5e-4)
 
 
 def test_nothing_of_that_light_leaves_what_it_was_thought_to_be():
-    assert airlight_beside(sky(90.0), 180.0, NOISE, 300.0, 30.0) == 180.0
+    assert neighbouring_airlight(sky(90.0), 180.0, NOISE, 300.0, 30.0) == 180.0
 
 
 @pytest.mark.parametrize("extinction", [0.003, 0.03, 0.1])
@@ -107,5 +107,5 @@ def test_a_road_brighter_than_the_sky_is_refused_and_none_is_not():
 
 
 def test_what_a_vehicle_may_hide_is_as_wide_as_it_is_near():
-    assert hidden_beside(700.0, 20.0) == pytest.approx(2.0 * hidden_beside(700.0, 40.0))
-    assert hidden_beside(700.0, np.inf) == 0.0
+    assert hidden_at_side(700.0, 20.0) == pytest.approx(2.0 * hidden_at_side(700.0, 40.0))
+    assert hidden_at_side(700.0, np.inf) == 0.0

@@ -8,25 +8,25 @@ from pathlib import Path
 
 import pytest
 
-from fogsim.jit import Beside, processors
+from fogsim.jit import CompilerProcess, processors
 
 START = """
 import os, subprocess, sys
 import fogsim
-from fogsim.cli import compile_beside
+from fogsim.cli import compiler_process
 
 started = []
 class Told(subprocess.Popen):
     def __init__(self, *arguments, **options):
         super().__init__(*arguments, **options)
         started.append(self)
-compile_beside.subprocess.Popen = Told
+compiler_process.subprocess.Popen = Told
 settings = ["estimators=[huang2015_lead]", "camera.width=160", "camera.height=120"]
 scenario = fogsim.load_scenario("motorway_fog_bank", settings)
 """
 
 READ = """
-with compile_beside.compiling_beside() as compile_for:
+with compiler_process.compiling_in_background() as compile_for:
     compile_for(scenario)
     from fogsim.cli.compile import fuse_estimates, read_foggy_road
     from fogsim.fusion.grid_filter import _folded
@@ -40,7 +40,7 @@ print(len(started), all(one.poll() is not None for one in started))
 
 FAIL = """
 try:
-    with compile_beside.compiling_beside() as compile_for:
+    with compiler_process.compiling_in_background() as compile_for:
         compile_for(scenario)
         raise KeyboardInterrupt
 except KeyboardInterrupt:
@@ -49,20 +49,20 @@ except KeyboardInterrupt:
 
 UNTOLD = """
 try:
-    with compile_beside.compiling_beside():
+    with compiler_process.compiling_in_background():
         raise ValueError("a mistake in the scenario")
 except ValueError:
     print(len(started), started[0].poll() is not None)
 """
 
 NO_METHODS = """
-with compile_beside.compiling_beside() as compile_for:
+with compiler_process.compiling_in_background() as compile_for:
     compile_for(fogsim.load_scenario("motorway_fog_bank", ["renderer=none", "estimators=[]"]))
     print(len(started), started[0].poll() is not None)
 """
 
 DEAD = """
-with compile_beside.compiling_beside() as compile_for:
+with compiler_process.compiling_in_background() as compile_for:
     started[0].kill()
     started[0].wait()
     compile_for(scenario)
@@ -73,14 +73,14 @@ with compile_beside.compiling_beside() as compile_for:
 NO_ROOM = """
 def refuse(*_, **__):
     raise BlockingIOError(11, "Resource temporarily unavailable")
-compile_beside.subprocess.Popen = refuse
-with compile_beside.compiling_beside() as compile_for:
+compiler_process.subprocess.Popen = refuse
+with compiler_process.compiling_in_background() as compile_for:
     compile_for(scenario)
     print("alone")
 """
 
 DIE = """
-compile_beside.compiling_beside().__enter__()(scenario)
+compiler_process.compiling_in_background().__enter__()(scenario)
 print(started[0].pid, flush=True)
 os._exit(1)
 """
@@ -137,7 +137,7 @@ def test_a_killed_run_leaves_no_process(tmp_path: Path) -> None:
 
 def test_one_looks_again_while_the_other_process_runs_and_once_when_it_has_ended() -> None:
     over = iter((False, False, True))
-    beside = Beside()
+    beside = CompilerProcess()
     assert not beside.may_bring("fogsim.vision.light")
     with beside.compiles(lambda: next(over), ("fogsim.vision.",)):
         assert not beside.may_bring("fogsim.render.cpu")

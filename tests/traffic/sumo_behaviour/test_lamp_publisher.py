@@ -7,14 +7,14 @@ from typing import Any
 import pytest
 
 import fogsim
-from fogsim.traffic.sumo_behaviour.told_lamps import ToldLamps
+from fogsim.traffic.sumo_behaviour.lamp_publisher import LampPublisher
 from fogsim.values import Lamp
 
 
 def test_lamps_are_told_when_they_change_and_the_ego_is_there() -> None:
     told: list[tuple[str, ...]] = []
     api: Any = SimpleNamespace(vehicle=SimpleNamespace(setParameter=lambda *what: told.append(what)))
-    lamps = ToldLamps(api)
+    lamps = LampPublisher(api)
     for lit, present in (
         (Lamp.LOW_BEAM, {"other"}),
         (Lamp.LOW_BEAM, {"ego"}),
@@ -22,20 +22,20 @@ def test_lamps_are_told_when_they_change_and_the_ego_is_there() -> None:
         (Lamp.LOW_BEAM | Lamp.FRONT_FOG, {"ego", "other"}),
         (Lamp.NONE, {"ego"}),
     ):
-        lamps.tell({"ego": lit, "gone": Lamp.NONE}, present)
+        lamps.publish({"ego": lit, "gone": Lamp.NONE}, present)
     assert [what[2] for what in told] == ["low_beam", "low_beam+front_fog", ""]
     assert {what[:2] for what in told} == {("ego", "fogsim-lamps")}
 
 
 def test_sumo_itself_has_them(monkeypatch: pytest.MonkeyPatch) -> None:
     found = []
-    tell = ToldLamps.tell
+    publish = LampPublisher.publish
 
-    def spied(self: ToldLamps, lamps: Mapping[str, Lamp], present: set[str]) -> None:
-        tell(self, lamps, present)
+    def spied(self: LampPublisher, lamps: Mapping[str, Lamp], present: set[str]) -> None:
+        publish(self, lamps, present)
         found.append(self._api.vehicle.getParameter("ego", "fogsim-lamps"))
 
-    monkeypatch.setattr(ToldLamps, "tell", spied)
+    monkeypatch.setattr(LampPublisher, "publish", spied)
     settings = [
         "duration_s=1",
         "expect={}",

@@ -25,7 +25,7 @@ _ENDS_WITHIN = 5.0
 
 
 @contextmanager
-def compiling_beside() -> Iterator[Callable[["Scenario"], None]]:
+def compiling_in_background() -> Iterator[Callable[["Scenario"], None]]:
     """Start the second process, if its kernels are not cached yet; yield a function that passes it a scenario.
 
     It is started before a scenario is loaded, so that its imports are done when the scenario arrives.
@@ -34,7 +34,7 @@ def compiling_beside() -> Iterator[Callable[["Scenario"], None]]:
     if process is None:
         yield lambda _: None
         return
-    from fogsim.jit import BESIDE
+    from fogsim.jit import COMPILER_PROCESS
 
     with ExitStack() as stack:
         stack.callback(_end, process)
@@ -45,7 +45,7 @@ def compiling_beside() -> Iterator[Callable[["Scenario"], None]]:
                 # It has nothing to do in this run, however long the run is.
                 _end(process)
                 return
-            stack.enter_context(BESIDE.compiles(lambda: process.poll() is not None, PACKAGES))
+            stack.enter_context(COMPILER_PROCESS.compiles(lambda: process.poll() is not None, PACKAGES))
             _send(process, {"size": (scenario.camera.width, scenario.camera.height), **methods})
 
         yield tell

@@ -10,7 +10,7 @@ LAMPS_PARAMETER = "fogsim-lamps"
 """Parameter of a vehicle that names its lit lamps, joined by "+"."""
 
 
-class ToldLamps:
+class LampPublisher:
     """Tells SUMO vehicles' lamps whenever they change, for sumo-gui's parameter window, outputs and other clients.
 
     A parameter says it and not SUMO's own signals of the vehicle: who sets those takes braking and turning out of
@@ -21,7 +21,7 @@ class ToldLamps:
         self._api = api
         self._told: dict[str, Lamp] = {}
 
-    def tell(self, lamps: Mapping[str, Lamp], present: set[str]) -> None:
+    def publish(self, lamps: Mapping[str, Lamp], present: set[str]) -> None:
         """Tell the lamps that are other ones than before."""
         for vehicle, lit in lamps.items():
             if lit != self._told.get(vehicle) and vehicle in present:

@@ -26,7 +26,7 @@ from fogsim.lighting import LIGHTING_POLICIES
 from fogsim.lighting.legal import LAWS
 from fogsim.metrics import metric_definitions
 from fogsim.openscenario.actions import ACTIONS, LAMPS
-from fogsim.openscenario.elements import HARMLESS, HONOURED, REFUSED
+from fogsim.openscenario.elements import HARMLESS, REFUSED
 from fogsim.openscenario.entities import CLASSES
 from fogsim.openscenario.positions import POSITIONS
 from fogsim.openscenario.triggers import CONDITIONS
@@ -263,18 +263,33 @@ def compliances() -> list[tuple[str, ...]]:
     return [(f"`{name}`", *(f"{value:g}" for value in astuple(how))) for name, how in COMPLIANCES.items()]
 
 
+VALUES = {
+    "SimulationTimeCondition": "`time`.",
+    "ParameterCondition": "`happened(EVENT)` that sets it, if that makes a difference; otherwise always or never.",
+    "VariableCondition": "As `ParameterCondition`.",
+    "StoryboardElementStateCondition": "`happened(EVENT)`, for states of beginning, and of being over by the time that "
+    "the actions take.",
+}
+"""Conditions of OpenSCENARIO files by value, and what becomes of them."""
+
+
 def openscenario_elements() -> list[tuple[str, ...]]:
     """Elements of OpenSCENARIO files that are read."""
     kinds = {f"vehicleCategory {kind}": f"SUMO's class `{name}`." for kind, name in CLASSES.items()}
     lamps = {f"vehicleLightType {kind}": ", ".join(f"`{one}`" for one in named) for kind, named in LAMPS.items()}
-    tables = (POSITIONS, ACTIONS, CONDITIONS, kinds, lamps)
-    return [(f"`{element}`", told) for table in tables for element, told in table.items()]
+    read = {tag: inspect.getdoc(method) or "" for tag, method in {**POSITIONS, **ACTIONS, **CONDITIONS}.items()}
+    return [(f"`{element}`", told) for table in (read, VALUES, kinds, lamps) for element, told in table.items()]
 
 
 def openscenario_honoured() -> list[tuple[str, ...]]:
     """Elements of OpenSCENARIO files that are honoured, with their attributes that are."""
-    rows = [(f"`{name}`", ", ".join(f"`{one}`" for one in told)) for name, told in sorted(HONOURED.items()) if told]
-    return [*rows, (", ".join(f"`{name}`" for name, told in sorted(HONOURED.items()) if not told), "none")]
+    decided, honoured = {*HARMLESS, *REFUSED}, {}
+    for line in (HERE.parent / "tests" / "data" / "openscenario_1_3.txt").read_text(encoding="utf-8").splitlines():
+        name, *keys = line.split()
+        if name not in {"#", *decided}:
+            honoured[name] = ", ".join(f"`{key}`" for key in sorted(keys) if f"{name}@{key}" not in decided)
+    rows = [(f"`{name}`", keys) for name, keys in sorted(honoured.items()) if keys]
+    return [*rows, (", ".join(f"`{name}`" for name, keys in sorted(honoured.items()) if not keys), "none")]
 
 
 def openscenario_reasons(decided: Mapping[str, str]) -> list[tuple[str, ...]]:

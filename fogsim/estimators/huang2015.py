@@ -15,7 +15,7 @@ from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import Observation
-from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation
+from fogsim.vision.lines.horizon import PITCH_DEVIATION, SCALE_DEVIATION, PitchDeviation, ScaleDeviation
 
 MEASUREMENTS = 200
 """Measurements that are remembered."""
@@ -41,6 +41,8 @@ class Measurement:
         Driven since the start [m].
     track : int
         Which vehicle ahead it is from; 0 for the road.
+    common : float
+        Standard deviation of ln k that all frames have in common [-].
     """
 
     extinction: float
@@ -48,6 +50,7 @@ class Measurement:
     time: float
     way: float
     track: int
+    common: float = 0.0
 
 
 def decay(measurement: Measurement, time: float, way: float, time_scale: float, way_scale: float) -> float:
@@ -110,6 +113,8 @@ class Huang2015:
         Width of the vehicle for ranges from the camera, where it is known [m].
     pitch_deviation : float
         Standard deviation of the true pitch about the assumed one [rad].
+    scale_deviation : float
+        Relative standard deviation of focal length × mount height, with which distances on the road go [-].
     """
 
     method = "huang2015"
@@ -126,9 +131,12 @@ class Huang2015:
         range_from: Literal["sensor", "camera"] = "sensor",
         vehicle_width: Annotated[float, Range(0.5, 4.0, "m")] | None = None,
         pitch_deviation: PitchDeviation = PITCH_DEVIATION,
+        scale_deviation: ScaleDeviation = SCALE_DEVIATION,
     ) -> None:
         self._check = ObservationCheck(camera)
-        self._rough = Huang2015Rough(camera, as_published=as_published, pitch_deviation=pitch_deviation)
+        self._rough = Huang2015Rough(
+            camera, as_published=as_published, pitch_deviation=pitch_deviation, scale_deviation=scale_deviation
+        )
         self._lead = Huang2015Lead(
             camera,
             as_published=as_published,
@@ -187,7 +195,8 @@ class Huang2015:
         if not known:
             return Estimate.invalid(self.method, str(rough.diagnostics.get("reason", "nothing seen")), **diagnostics)
         extinction, deviation = _published(known) if self._as_published else _combined(known)
-        return Estimate(self.method, extinction, deviation, diagnostics=diagnostics)
+        common = math.fsum(m.common * weight for m, weight in known) / math.fsum(weight for _, weight in known)
+        return Estimate(self.method, extinction, deviation, diagnostics=diagnostics, common_deviation=common)
 
     def _advance(self, observation: Observation) -> None:
         time, speed = observation.time, observation.speed
@@ -207,8 +216,8 @@ class Huang2015:
             # What a vehicle says is refined with every picture: one measurement a vehicle.
             kept = [m for m in self._measurements if m.track != track]
             self._measurements = deque(kept, maxlen=MEASUREMENTS)
-        found = Measurement(estimate.extinction, estimate.standard_deviation, self._time or 0.0, self._way, track)
-        self._measurements.append(found)
+        own = (estimate.extinction, estimate.standard_deviation, self._time or 0.0, self._way)
+        self._measurements.append(Measurement(*own, track, estimate.common_deviation))
 
 
 def _published(known: list[tuple[Measurement, float]]) -> tuple[float, float]:

@@ -24,8 +24,9 @@ from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
+from fogsim.vision.day.confirmation import without_far_objects
 from fogsim.vision.light.pixel_kernels import Pixels
-from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation
+from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation, calibrated_horizon
 from fogsim.vision.region.road_image import CannotTellError
 from fogsim.vision.vehicle.camera_range import CameraRange, registered_deviation
 
@@ -110,6 +111,7 @@ class Huang2015Lead:
         self._blur = blur
         self._camera, self._check = camera, ObservationCheck(camera)
         self._as_published = as_published
+        self._horizon = calibrated_horizon(camera, pitch_deviation)
         by_camera = range_from == "camera"
         self._setback = 0.0 if by_camera else setback
         self._camera_range = CameraRange(camera, vehicle_width, pitch_deviation) if by_camera else None
@@ -168,7 +170,8 @@ class Huang2015Lead:
         except CannotTellError as reason:
             self._miss()
             return Estimate.invalid(self.method, str(reason))
-        return self._estimate()
+        own = self._estimate()
+        return own if self._as_published else without_far_objects(own, image, self._camera, self._horizon)
 
     def _range(self, image: Pixels, lead: LeadMeasurement | None) -> tuple[LeadMeasurement, float | None]:
         """Range of the vehicle ahead, and its standard deviation if it is from the camera [m]."""

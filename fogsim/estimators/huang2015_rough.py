@@ -21,7 +21,15 @@ from fogsim.parameters import checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
-from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation, calibrated_horizon
+from fogsim.vision.day.confirmation import Confirmation
+from fogsim.vision.day.day_fit import free_road
+from fogsim.vision.lines.horizon import (
+    PITCH_DEVIATION,
+    SCALE_DEVIATION,
+    PitchDeviation,
+    ScaleDeviation,
+    calibrated_horizon,
+)
 from fogsim.vision.region.curve_checks import check_law, detection_limit, fog_or_clear, is_clear, seen_up_to
 from fogsim.vision.region.law import extinction_deviation
 from fogsim.vision.region.profile import RoadCurve
@@ -58,6 +66,8 @@ class Huang2015Rough:
         Which of the repairs are made.
     pitch_deviation : float
         Standard deviation of the true pitch about the assumed one [rad].
+    scale_deviation : float
+        Relative standard deviation of focal length × mount height, with which distances on the road go [-].
 
     Raises
     ------
@@ -74,14 +84,17 @@ class Huang2015Rough:
         as_published: bool = False,
         repairs: Literal["all", "none"] | Sequence[Huang2015Repair] = "all",
         pitch_deviation: PitchDeviation = PITCH_DEVIATION,
+        scale_deviation: ScaleDeviation = SCALE_DEVIATION,
     ) -> None:
         self._camera, self._check = camera, ObservationCheck(camera)
         self._repairs = chosen(Huang2015Repair, repairs, as_published=as_published)
-        self._pitch_deviation = pitch_deviation
+        self._assumed = calibrated_horizon(camera, pitch_deviation)
+        self._confirmation = Confirmation(camera, self._assumed, scale_deviation)
 
     def reset(self) -> None:
-        """Let time begin anew: every frame stands alone."""
+        """Let time start again."""
         self._check.reset()
+        self._confirmation.reset()
 
     def update(self, observation: Observation) -> Estimate:
         """Estimate the fog from one image.
@@ -104,14 +117,17 @@ class Huang2015Rough:
         """
         image = self._check.kernel_image(observation)
         try:
-            return self._read(image, observation.lead)
+            own = self._read(image, observation.lead)
         except CannotTellError as reason:
             return Estimate.invalid(self.method, str(reason), horizon_row=self._camera.horizon_row)
+        if Huang2015Repair.CONFIRMED not in self._repairs:
+            return own
+        return self._confirmation.of(own, image, free_road(observation.lead), observation.time)
 
     def _read(self, image: NDArray[np.uint8] | NDArray[np.uint16], lead: LeadMeasurement | None) -> Estimate:
-        assumed = calibrated_horizon(self._camera, self._pitch_deviation)
-        road = road_image(image, self._camera, assumed, linear=Huang2015Repair.LINEAR_LUMINANCE in self._repairs)
-        medians = grown_medians(road, self._camera, assumed, self._repairs, lead)
+        linear = Huang2015Repair.LINEAR_LUMINANCE in self._repairs
+        road = road_image(image, self._camera, self._assumed, linear=linear)
+        medians = grown_medians(road, self._camera, self._assumed, self._repairs, lead)
         curve, apart = medians.curve, medians.horizon.standard_deviation
         if Huang2015Repair.GROWTH_BY_FOG in self._repairs:
             top = seen_up_to(curve)

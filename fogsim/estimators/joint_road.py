@@ -10,7 +10,8 @@ from fogsim.estimators.image_check import ObservationCheck
 from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import DenserFog, Estimate, OpticalDepths
-from fogsim.values.observation import LeadMeasurement, Observation
+from fogsim.values.observation import Observation
+from fogsim.vision.day.day_fit import free_road
 from fogsim.vision.day.second_opinion import SecondOpinion
 from fogsim.vision.light.daylight import lit_by_lamps
 from fogsim.vision.light.luminance import linear_pixels
@@ -18,8 +19,10 @@ from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.lines.horizon import (
     MIN_ROWS,
     PITCH_DEVIATION,
+    SCALE_DEVIATION,
     Horizon,
     PitchDeviation,
+    ScaleDeviation,
     calibrated_horizon,
     levelled,
     weighted_mean,
@@ -51,9 +54,6 @@ from fogsim.vision.uneven.uneven_fit import UnevenFit, even_fog, fit_uneven
 
 MIN_AIRLIGHT = 6.0
 """Sky darker than this is no day [linear grey levels]."""
-
-SCALE_DEVIATION = 0.054
-"""Usual relative deviation of distances on the road: 5 % by the height and 2 % by the focal length of a camera [-]."""
 
 MIN_USED = 0.4
 """Least share of the own lane's bins, as far as it is free, that must fit [-]."""
@@ -87,9 +87,6 @@ layer."""
 
 MOST_OBSTACLES = 2
 """How often what stands in the own lane is looked for anew, each time nearer."""
-
-RANGE_MARGIN = 0.5
-"""By how much a lead vehicle's foot may be nearer than its range says [m]."""
 
 
 @checked_parameters
@@ -152,7 +149,7 @@ class JointRoad:
         camera: Camera,
         *,
         pitch_deviation: PitchDeviation = PITCH_DEVIATION,
-        scale_deviation: Annotated[float, Range(0.0, 1.0)] = SCALE_DEVIATION,
+        scale_deviation: ScaleDeviation = SCALE_DEVIATION,
         frames: Annotated[int, Range(1, 10_000)] = 1,
         even_airlight: bool = False,
     ) -> None:
@@ -210,7 +207,7 @@ class JointRoad:
         if why := lit_by_lamps(level, self._camera, observation.lead):
             return Estimate.invalid(self.method, why, **found)
         horizon, course = self._seen_course(pixels)
-        free = _free_road(observation.lead)
+        free = free_road(observation.lead)
         if sky is None:
             own = Estimate.invalid(self.method, "no sky is seen above the road", **found)
         else:
@@ -439,10 +436,3 @@ def _obstacle(fit: JointFit, geometry: StripGeometry) -> float:
         return math.inf
     road = fit.used[0] & (geometry.distance < float(geometry.distance[np.argmax(fit.hidden)]))
     return float(geometry.distance[road].max()) if road.any() else math.inf
-
-
-def _free_road(lead: LeadMeasurement | None) -> float:
-    """Depth up to which the own lane is free of the tracked vehicle [m]."""
-    if lead is None or not math.isfinite(lead.distance):
-        return math.inf
-    return max(lead.distance - RANGE_MARGIN, 1.0)

@@ -15,7 +15,8 @@ from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
-from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation
+from fogsim.vision.day.confirmation import without_far_objects
+from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation, calibrated_horizon
 from fogsim.vision.region.road_image import CannotTellError
 from fogsim.vision.strips.airlight_slopes import USUAL_EXTINCTION
 from fogsim.vision.vehicle.airlight import RoadFall
@@ -119,6 +120,7 @@ class LeadContrast:
         frames: Annotated[int, Range(MIN_SAMPLES, 10_000)] = 64,
     ) -> None:
         self._camera, self._setback = camera, setback
+        self._horizon = calibrated_horizon(camera, pitch_deviation)
         self._check = ObservationCheck(camera)
         self._range_deviation, self._pitch_deviation = range_deviation, pitch_deviation
         self._window, self._frames = window, int(frames)
@@ -177,7 +179,7 @@ class LeadContrast:
         except CannotTellError as error:
             reason = str(error)
             self._miss(observation.time)
-        return self._estimate(reason, road, found)
+        return without_far_objects(self._estimate(reason, road, found), image, self._camera, self._horizon)
 
     def _miss(self, time: float) -> None:
         if self._track.is_lost(time):

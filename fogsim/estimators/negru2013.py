@@ -16,16 +16,26 @@ from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation
+from fogsim.vision.day.confirmation import Confirmation
+from fogsim.vision.day.day_fit import free_road
 from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.light.medians import median
 from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.lines.deriche import CannyDeriche
 from fogsim.vision.lines.edges import Edges
 from fogsim.vision.lines.gradient_lines import consensus_vanishing_point
-from fogsim.vision.lines.horizon import PITCH_DEVIATION, Horizon, PitchDeviation, calibrated_horizon, weighted_mean
+from fogsim.vision.lines.horizon import (
+    PITCH_DEVIATION,
+    SCALE_DEVIATION,
+    Horizon,
+    PitchDeviation,
+    ScaleDeviation,
+    calibrated_horizon,
+    weighted_mean,
+)
 from fogsim.vision.lines.road_lines import road_vanishing_point
 from fogsim.vision.lines.vanishing_point import VanishingPoint
-from fogsim.vision.region.curve_checks import SURE_OF_FOG, check_law, detection_limit, fog_or_clear, seen_up_to
+from fogsim.vision.region.curve_checks import check_law, detection_limit, fog_or_clear, seen_up_to
 from fogsim.vision.region.inflection import (
     FogModel,
     Parameters,
@@ -34,10 +44,10 @@ from fogsim.vision.region.inflection import (
     printed_inflection,
     printed_parameters,
 )
-from fogsim.vision.region.law import extinction_deviation, law_fit
+from fogsim.vision.region.law import extinction_deviation
 from fogsim.vision.region.profile import RoadCurve, band_profile
 from fogsim.vision.region.region_kernels import GrowthLimits
-from fogsim.vision.region.road_image import MIN_CONTRAST, MIN_ROWS, SATURATED, CannotTellError, RoadImage, road_image
+from fogsim.vision.region.road_image import MIN_ROWS, CannotTellError, RoadImage, road_image
 from fogsim.vision.region.road_region import constant_limits
 from fogsim.vision.region.subpixel_inflection import subpixel_inflections
 from fogsim.vision.strips.strip_curves import lowest_road_row
@@ -45,19 +55,11 @@ from fogsim.vision.strips.strip_curves import lowest_road_row
 GROWTH_SHARE = 0.8
 """ρ of the published region growing [-]; the paper takes its limits from Hautière et al. (2006), without values."""
 
-MAX_ASIDE = 0.1
-"""Share of the image's width by which a clear road may lie beside the vanishing column [-]."""
-
 MIDDLE, LEAST_MIDDLE = 0.3, 200.0
 """How far to either side of the vanishing column a band is sought, a share of the image's width and at least [px]."""
 
-MAX_ABOVE = 0.05
-"""Share of the image's height that a clear road's region may reach above the assumed horizon [-]."""
-
-NEAR_HORIZON = 4.0  # [px] a region that ends this close below the horizon has seen the whole road
 REACH = math.radians(4.0)  # [rad] about the assumed vanishing point, within which lines of the road may pass
 ALBEDO_DEVIATION = 0.015  # [-] of k by slow changes of the road's reflectance, which one row's inflection does not show
-MAX_RESIDUAL = 0.12  # [-] of the fitted contrast: more is no curve of Koschmieder's
 HALF_PAVED, OTHER_GROUND = 4.0, 0.2
 """How far to either side the ground is as the road is [m], and relative deviation of k where the band leaves it at
 twice the inflection's height below the horizon or lower: another albedo begins there [-]."""
@@ -113,17 +115,16 @@ class Negru2013Repair(Repair):
         "a vehicle ahead joins the region or ends it",
         "the band lies beside the tracked vehicle",
     )
-    REFUSALS = (
-        "refusals",
-        "the point of least error is the inflection, whatever its model; without one, or without a band, there is no"
-        " fog, so that a wall and a traffic jam are clear air",
-        "no estimate where the model is not one of fog over this road (its airlight is not the sky's, its contrast is"
-        " small, the curve fits badly), or where the road is hidden or ends below the horizon",
-    )
     SINGLE_FRAMES = (
         "single_frames",
         "of the last N frames the best counts, which holds on to old fog (hundreds of frames for the horizon)",
         "each frame stands alone with its deviation; averaging is the fusion's",
+    )
+    CONFIRMED = (
+        "confirmed",
+        "the curve of the road alone is fog or clear air, whatever else the image shows, and the camera is exact",
+        "the day model of road and sky must show fog, or contrast far away, as well; the interval spans both models,"
+        " and what height, focal length and response leave open",
     )
 
 
@@ -141,8 +142,8 @@ class Negru2013:
     (they give A = 162 where the truth is 200, and mostly choose a wrong row). What the corrected form (the default)
     does otherwise is listed in `Negru2013Repair`, and can be switched one by one.
 
-    A region that reaches the horizon without an inflection gives k = 0 with the detection limit as its deviation. An
-    image that shows no road by day gives an invalid estimate with the reason in its diagnostics, in either form.
+    A region without an inflection gives k = 0 with the detection limit as its deviation. An image that shows no road by
+    day gives an invalid estimate with the reason in its diagnostics, in either form.
     Daytime only, flat road, road darker than the airlight.
 
     Parameters
@@ -164,6 +165,8 @@ class Negru2013:
         Frames of the temporal schemes, where frames do not stand alone.
     pitch_deviation : float
         Standard deviation of the true pitch about the assumed one [rad].
+    scale_deviation : float
+        Relative standard deviation of focal length × mount height, with which distances on the road go [-].
 
     Raises
     ------
@@ -185,11 +188,13 @@ class Negru2013:
         horizon_frames: Annotated[int, Range(1, 100_000)] = 500,
         inflection_frames: Annotated[int, Range(1, 10_000)] = 5,
         pitch_deviation: PitchDeviation = PITCH_DEVIATION,
+        scale_deviation: ScaleDeviation = SCALE_DEVIATION,
     ) -> None:
         self._check = ObservationCheck(camera)
         self._camera, self._assumed = camera, calibrated_horizon(camera, pitch_deviation)
         made = chosen(Negru2013Repair, repairs, as_published=as_published, published=(Negru2013Repair.SIGNS,))
         self._repairs = made - {Negru2013Repair.SIGNS} if printed_signs else made
+        self._confirmation = Confirmation(camera, self._assumed, scale_deviation)
         self._growth = growth
         self._looks_for_lines = vanishing_point
         alone = Negru2013Repair.SINGLE_FRAMES in self._repairs
@@ -200,6 +205,7 @@ class Negru2013:
     def reset(self) -> None:
         """Forget the vanishing points and inflections of earlier frames."""
         self._check.reset()
+        self._confirmation.reset()
         self._points.clear()
         self._models.clear()
 
@@ -225,9 +231,12 @@ class Negru2013:
         image = self._check.kernel_image(observation)
         diagnostics: dict[str, object] = {"horizon_row": self._camera.horizon_row}
         try:
-            return self._read(image, observation.lead, diagnostics)
+            own = self._read(image, observation.lead, diagnostics)
         except CannotTellError as reason:
             return Estimate.invalid(self.method, str(reason), **diagnostics)
+        if Negru2013Repair.CONFIRMED not in self._repairs:
+            return own
+        return self._confirmation.of(own, image, free_road(observation.lead), observation.time)
 
     def _read(
         self,
@@ -245,8 +254,6 @@ class Negru2013:
         try:
             band = road_band(road, edges, self._limits(road, edges, slope), self._camera, widest=not ahead, lead=hiding)
         except CannotTellError:
-            if self._refuses:
-                raise
             return self._no_fog(0.0, horizon, diagnostics)
         diagnostics["band"] = (band.left, band.right, band.top + road.first_row, band.bottom + road.first_row)
         here = replace(band, left=band.left - road.first_column, right=band.right - road.first_column)
@@ -260,8 +267,6 @@ class Negru2013:
         whole = Negru2013Repair.SUBPIXEL_INFLECTION not in self._repairs
         model = self._whole_row(curve, seen) if whole else self._between_rows(curve, seen, paved)
         if model is None:
-            if self._refuses:
-                self._check_clear_view(seen)
             return self._no_fog(float(curve.below_horizon[0]), horizon, diagnostics)
         self._models.append(model)
         model = min(self._models, key=lambda m: m.residual / max(m.airlight - m.road, 1e-9))
@@ -290,10 +295,10 @@ class Negru2013:
         return replace(road, luminance=luminance, road=median(luminance[-1])), pixels
 
     def _whole_row(self, curve: RoadCurve, seen: SeenBand) -> FogModel | None:
-        """Fog from the row of the inflection; None where there is no credible one."""
+        """Fog from the row of the inflection; None where there is none."""
         inflection = best_inflection if Negru2013Repair.SIGNS in self._repairs else printed_inflection
         model = inflection(curve)
-        if model is None or (self._refuses and not _is_credible(model, curve, seen.road)):
+        if model is None:
             return None
         by_horizon = model.horizon_sensitivity * seen.horizon.standard_deviation
         deviation = math.hypot(model.standard_deviation, by_horizon, ALBEDO_DEVIATION * model.extinction)
@@ -312,11 +317,10 @@ class Negru2013:
         deviation = extinction_deviation(curve, extinction, self._extinctions, seen.horizon.standard_deviation)
         beside = min(max(2.0 * paved / (extinction * curve.row_distance) - 1.0, 0.0), 1.0)
         deviation = math.hypot(deviation, OTHER_GROUND * beside * extinction)
-        if self._refuses and extinction < SURE_OF_FOG * deviation:
-            fog_or_clear(extinction, deviation)
+        if not fog_or_clear(extinction, deviation)[0] > 0.0:
             return None
         try:
-            airlight, dark = self._checked_law(curve, extinction, seen.road)
+            airlight, dark = check_law(curve, extinction, seen.road)
         except CannotTellError:
             # What hides the road is the better reason.
             seen_up_to(curve)
@@ -324,17 +328,6 @@ class Negru2013:
         _, square = subpixel_inflections(curve, curve.luminance[:, None], self._parameters)
         per_row = -2.0 / curve.row_distance
         return FogModel(extinction, dark, airlight, deviation, per_row, math.sqrt(float(square[0])))
-
-    def _checked_law(self, curve: RoadCurve, extinction: float, road: RoadImage) -> tuple[float, float]:
-        """Airlight and road of an extinction; refused, if refusals are made, where the curve follows no such law."""
-        if self._refuses:
-            return check_law(curve, extinction, road)
-        fit = law_fit(curve, extinction)
-        return fit.airlight, fit.road
-
-    @property
-    def _refuses(self) -> bool:
-        return Negru2013Repair.REFUSALS in self._repairs
 
     @property
     def _parameters(self) -> Parameters:
@@ -377,35 +370,3 @@ class Negru2013:
         if best is None or not 1.0 <= best.row <= self._camera.height - 1 - MIN_ROWS:
             return self._assumed, straight_ahead
         return best.horizon, best.column
-
-    def _check_clear_view(self, seen: SeenBand) -> None:
-        """Refuse to say "no fog" of anything but the road itself, seen up to the horizon where it vanishes.
-
-        Beside a vehicle close ahead, a dark flank or verge can look like a road without fog.
-        """
-        road, band, top = seen.road, seen.band, float(seen.below_horizon[0])
-        if top > NEAR_HORIZON:
-            raise CannotTellError("the road's region ends below the horizon, and no inflection lies in it")
-        if median(seen.profile[:3]) > road.road + 0.5 * road.contrast:
-            raise CannotTellError("the road fades into the airlight, but not as Koschmieder's law has it")
-        aside = abs(0.5 * (band.left + band.right) - self._camera.principal_point[0])
-        if aside > MAX_ASIDE * self._camera.width:
-            raise CannotTellError("the road ahead is hidden: a dark surface is seen only beside it")
-        if -top > MAX_ABOVE * self._camera.height:
-            raise CannotTellError("what is seen of the road goes on above the horizon: it is no road")
-
-
-def _is_credible(model: FogModel, curve: RoadCurve, road: RoadImage) -> bool:
-    """Whether a model is one of fog over this road and its inflection was seen.
-
-    The airlight is what is seen at the horizon: where that is much brighter than the model says, the model has fitted
-    a road that brightens with distance, and no fog.
-    """
-    drop = model.airlight - model.road
-    inflection = 0.5 * model.extinction * curve.row_distance
-    seen = curve.below_horizon[0] + 1.0 <= inflection <= curve.below_horizon[-1]
-    contrast = drop >= MIN_CONTRAST and model.residual <= MAX_RESIDUAL * drop
-    # A saturated sky is at least as bright as it looks.
-    excess = model.airlight - road.airlight
-    airlight = excess >= -0.3 * road.contrast and (excess <= 0.3 * road.contrast or road.airlight >= SATURATED)
-    return bool(seen and contrast and airlight)

@@ -3,7 +3,7 @@
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -17,7 +17,15 @@ from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate, FogCategory, fog_category
 from fogsim.values.observation import Observation
-from fogsim.vision.lines.horizon import PITCH_DEVIATION, PitchDeviation
+from fogsim.vision.day.confirmation import Confirmation
+from fogsim.vision.day.day_fit import free_road
+from fogsim.vision.lines.horizon import (
+    PITCH_DEVIATION,
+    SCALE_DEVIATION,
+    PitchDeviation,
+    ScaleDeviation,
+    calibrated_horizon,
+)
 from fogsim.vision.region.road_image import CannotTellError
 
 FRAMES = 3
@@ -104,6 +112,8 @@ class Zhu2015:
         ρ < 1 of eq. 10, as published [-].
     pitch_deviation : float
         Standard deviation of the true pitch about the assumed one [rad].
+    scale_deviation : float
+        Relative standard deviation of focal length × mount height, with which distances on the road go [-].
 
     Raises
     ------
@@ -122,11 +132,13 @@ class Zhu2015:
         growth: Annotated[float, Range(0.0, 255.0)] = GROWTH,
         growth_share: Annotated[float, Range(0.0, 1.0)] = GROWTH_SHARE,
         pitch_deviation: PitchDeviation = PITCH_DEVIATION,
+        scale_deviation: ScaleDeviation = SCALE_DEVIATION,
     ) -> None:
         self._camera, self._check = camera, ObservationCheck(camera)
         self._repairs = chosen(Zhu2015Repair, repairs, as_published=as_published)
         self._growth = (growth, growth_share)
         self._pitch_deviation = pitch_deviation
+        self._confirmation = Confirmation(camera, calibrated_horizon(camera, pitch_deviation), scale_deviation)
         self._readings: deque[_Reading] = deque(maxlen=FRAMES)
         self._classes: deque[FogCategory] = deque(maxlen=FRAMES)
         self._state: FogCategory | None = None
@@ -134,6 +146,7 @@ class Zhu2015:
     def reset(self) -> None:
         """Forget all frames and the state."""
         self._check.reset()
+        self._confirmation.reset()
         self._readings.clear()
         self._classes.clear()
         self._state = None
@@ -171,7 +184,10 @@ class Zhu2015:
         extinction, deviation = self._averaged()
         inflection = road.horizon.row + 0.5 * extinction * self._camera.row_distance
         diagnostics |= {"inflection_row": inflection, "frames": len(self._readings)}
-        return self._classified(Estimate(self.method, extinction, deviation), diagnostics)
+        own = Estimate(self.method, extinction, deviation, diagnostics=diagnostics)
+        if Zhu2015Repair.CONFIRMED in self._repairs:
+            own = self._confirmation.of(own, image, free_road(observation.lead), observation.time)
+        return self._classified(own) if own.valid else own
 
     def _reading(self, road: SeenRoad) -> _Reading:
         per_row = 2.0 / self._camera.row_distance
@@ -189,10 +205,9 @@ class Zhu2015:
         # The same camera over the same road: what errs does so alike in all frames.
         return extinction, float(np.median([reading.deviation for reading in self._readings]))
 
-    def _classified(self, estimate: Estimate, diagnostics: dict[str, object]) -> Estimate:
+    def _classified(self, estimate: Estimate) -> Estimate:
         found = zhu_category(estimate.visibility)
         self._classes.append(found)
         if len(self._classes) == FRAMES and len(set(self._classes)) == 1:
             self._state = found
-        diagnostics |= {"class": found, "state": self._state}
-        return Estimate(self.method, estimate.extinction, estimate.standard_deviation, diagnostics=diagnostics)
+        return replace(estimate, diagnostics={**estimate.diagnostics, "class": found, "state": self._state})

@@ -108,6 +108,12 @@ class Zhu2015Repair(Repair):
         "a vehicle ahead joins the region or ends it",
         "what the tracked vehicle hides is left out, and the road beside it looked at",
     )
+    CONFIRMED = (
+        "confirmed",
+        "the curve of the road alone is fog or clear air, whatever else the image shows, and the camera is exact",
+        "the day model of road and sky must show fog, or contrast far away, as well; the interval spans both models,"
+        " and what height, focal length and response leave open",
+    )
 
 
 @dataclass(frozen=True, slots=True)

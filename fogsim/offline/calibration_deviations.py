@@ -7,9 +7,9 @@ from fogsim.values import Estimate
 from fogsim.values.estimate import OpticalDepths
 from fogsim.vision.lines.horizon import PITCH_DEVIATION
 
-ON_THE_ROAD = ("negru2013", "zhu2015", "huang2015", "huang2015_rough", "night_road")
+ON_THE_ROAD = ("night_road",)
 """Methods that take distances from the calibration of the road plane, so that their extinction goes with the inverse of
-focal length × mount height, and do not know how uncertain that is."""
+focal length × mount height, and have no parameter `scale_deviation`."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,6 @@
 
 import itertools
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -10,22 +9,14 @@ from typing import Any
 import numpy as np
 
 from fogsim.errors import InputError, shown, suggest
-from fogsim.openscenario.findings import Findings
-from fogsim.openscenario.parameters import declared
-from fogsim.openscenario.xml_tree import Node, read_xml
+from fogsim.openscenario.parameters import Parameters, declared
+from fogsim.openscenario.xml_tree import Findings, Node, NodeError, read_xml
 from fogsim.randomness import named_generator
 
-MOST_CASES = 100_000
-"""Maximum number of cases of a file."""
-
-_DRAWN = (
-    *("ProbabilityDistributionSet", "Histogram", "UniformDistribution"),
-    *("NormalDistribution", "LogNormalDistribution", "PoissonDistribution"),
-)
+MOST_CASES = 100_000  # of a file
+_SHAPES = ("Uniform", "Normal", "LogNormal", "Poisson")
+_DRAWN = ("ProbabilityDistributionSet", "Histogram", *(f"{shape}Distribution" for shape in _SHAPES))
 _MOST_ROUNDS = 1_000  # Draws for all test runs before limits that hardly any draw meets are refused
-
-Assignment = Mapping[str, str]
-"""Values of parameters by name, as the file has them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,57 +24,49 @@ class ParameterCases:
     """Values of the parameters of the file `base` in each case; `are_drawn` if the cases are random test runs."""
 
     base: Path
-    cases: tuple[Assignment, ...]
+    cases: tuple[Parameters, ...]
     are_drawn: bool
 
 
 def read_parameter_cases(path: Path) -> ParameterCases | None:
-    """Cases of a file with a ``ParameterValueDistribution``, all with the same parameters; None for any other file.
-
-    InputError if a distribution cannot be read, or the file that it refers to is missing or lacks its parameters.
-    """
+    """Cases of a file with a ``ParameterValueDistribution``, all with the same parameters; None for any other file."""
     whole = read_xml(path).one("ParameterValueDistribution")
     if whole is None:
         return None
-    findings = Findings()
     base, root = _base(whole)
-    fixed, drawn = whole.one("Deterministic"), whole.one("Stochastic")
-    if fixed is None and drawn is None:
-        findings.refuse(whole, "there are no cases; expected Deterministic or Stochastic")
-    cases = _grid(fixed or whole, findings) if drawn is None else _test_runs(drawn, findings)
-    findings.look_for_unread(whole)
+    cases: list[Parameters] = []
+    are_drawn = whole.one("Stochastic") is not None
+    with whole.refusing():
+        cases = (_test_runs if are_drawn else _grid)(whole.need("Stochastic", "Deterministic"))
+    whole.check_read()
     declarations = [one for block in root.all("ParameterDeclarations") for one in block.children]
-    known = {one.attributes.get("name", ""): one.attributes.get("value", "") for one in declarations}
+    known = {one.name: one.attributes.get("value", "") for one in declarations}
     names = dict.fromkeys(name for case in cases for name in case)
     for name in names:
         if name not in known:
-            findings.refuse(whole, f"{base} declares no parameter {shown(name)}; {suggest(name, known)}")
-    findings.close(path)
+            whole.refuse(f"{base} declares no parameter {shown(name)}; {suggest(name, known)}")
+    whole.findings.close(path)
     # Where a set leaves a parameter out, it has the value of its declaration.
-    filled: list[Assignment] = [{name: case.get(name, known[name]) for name in names} for case in cases]
-    if drawn is None and any(one.children for one in declarations):
-        filled = _allowed(filled, replace(root, children=root.all("ParameterDeclarations")), whole, findings)
-        findings.close(path)
-    return ParameterCases(base, tuple(filled), drawn is not None)
+    filled: list[Parameters] = [{name: case.get(name, known[name]) for name in names} for case in cases]
+    if not are_drawn and any(one.children for one in declarations):
+        filled = _allowed(filled, replace(root, children=root.all("ParameterDeclarations")), whole)
+        whole.findings.close(path)
+    return ParameterCases(base, tuple(filled), are_drawn)
 
 
-def _allowed(cases: list[Assignment], declaring: Node, whole: Node, findings: Findings) -> list[Assignment]:
-    """Cases that keep the constraints of all declarations."""
-    allowed, broken = [], [""]
+def _allowed(cases: list[Parameters], declaring: Node, whole: Node) -> list[Parameters]:
+    allowed, broken = [], ""
     for case in cases:
-        declared(declaring.copy(), {}, trial := Findings(), case)
+        declared(declaring.copy(trial := Findings()), {}, case)
         allowed += [] if trial.refused else [case]
-        broken = trial.refused or broken
+        broken = next(iter(trial.refused), broken)
     if len(allowed) < len(cases):
-        message = (
-            f"{len(cases) - len(allowed):,} of {len(cases):,} cases break a ConstraintGroup and are none; {broken[0]}"
-        )
-        (findings.remark if allowed else findings.refuse)(whole, message)
+        number = f"{len(cases) - len(allowed):,} of {len(cases):,}"
+        (whole.remark if allowed else whole.refuse)(f"{number} cases break a ConstraintGroup and are none; {broken}")
     return allowed
 
 
 def _base(whole: Node) -> tuple[Path, Node]:
-    """The file that is varied, and its root."""
     file = whole.one("ScenarioFile")
     path = whole.file.parent / (file.get("filepath").replace("\\", "/") if file else "")
     if file is None or not path.is_file():
@@ -96,109 +79,97 @@ def _base(whole: Node) -> tuple[Path, Node]:
     return path, root
 
 
-def _grid(block: Node, findings: Findings) -> list[Assignment]:
+def _grid(block: Node) -> list[Parameters]:
     """All combinations of deterministic distributions, the last one fastest; those that are the same once."""
-    axes: list[list[Assignment]] = []
+    axes: list[list[Parameters]] = []
     for one in block.all("DeterministicSingleParameterDistribution", "DeterministicMultiParameterDistribution"):
         name, sets = one.get("parameterName"), one.one("ValueSetDistribution")
         listed = [each.all("ParameterAssignment") for each in (sets.all("ParameterValueSet") if sets else ())]
-        together: list[Assignment] = [
-            {each.get("parameterRef"): each.get("value") for each in values} for values in listed
-        ]
-        axes.append(together or [{name: value} for value in _values(one, findings)])
-        if not axes[-1]:
-            findings.refuse(one, "expected a DistributionSet, DistributionRange or ValueSetDistribution with values")
-        if {name for case in axes[-1] for name in case} & {name for axis in axes[:-1] for c in axis for name in c}:
-            findings.refuse(one, "an earlier distribution has the same parameter")
+        axis: list[Parameters] = [{each.get("parameterRef"): each.get("value") for each in row} for row in listed]
+        with one.refusing():
+            axes.append(axis or [{name: value} for value in _values(one)])
+            if {name for case in axes[-1] for name in case} & {name for axis in axes[:-1] for c in axis for name in c}:
+                raise ValueError("an earlier distribution has the same parameter")
     number = math.prod(map(len, axes))
     if number > MOST_CASES:
-        findings.refuse(block, f"{number:,} cases; at most {MOST_CASES:,} are allowed")
-        return []
+        raise NodeError(block, f"{number:,} cases; at most {MOST_CASES:,} are allowed")
     merged = [{k: v for part in cell for k, v in part.items()} for cell in itertools.product(*axes)]
     return [dict(items) for items in dict.fromkeys(tuple(case.items()) for case in merged)]
 
 
-def _values(node: Node, findings: Findings) -> list[str]:
+def _values(node: Node) -> list[str]:
     listed, ranged = node.one("DistributionSet"), node.one("DistributionRange")
-    if listed is not None:
+    if listed and listed.children:
         return [one.get("value") for one in listed.all("Element")]
     if ranged is None:
-        return []
-    (low, high), step = _limits(ranged, findings), findings.number(ranged, "stepWidth")
+        raise ValueError("expected a DistributionSet, DistributionRange or ValueSetDistribution with values")
+    (low, high), step = _limits(ranged), ranged.number("stepWidth")
     number = math.floor((high - low) / step + 1e-9) + 1 if step > 0.0 and math.isfinite(high - low) else 0
     if not 0 < number <= MOST_CASES:
-        findings.refuse(ranged, f"expected a stepWidth above 0 with 1 … {MOST_CASES:,} values from lowerLimit on")
-        return []
+        raise NodeError(ranged, f"expected a stepWidth above 0 with 1 … {MOST_CASES:,} values from lowerLimit on")
     return [f"{low + i * step:.9g}" for i in range(number)]
 
 
-def _limits(node: Node, findings: Findings) -> tuple[float, float]:
+def _limits(node: Node) -> tuple[float, float]:
     """Lower and upper limit of a node's ``Range``, infinite without one."""
     limits = node.one("Range")
     if limits is None:
         return -math.inf, math.inf
-    low, high = (findings.number(limits, key) for key in ("lowerLimit", "upperLimit"))
+    low, high = limits.number("lowerLimit"), limits.number("upperLimit")
     if low > high:
-        findings.refuse(limits, f"expected a lowerLimit of at most the upperLimit, got {low:g} and {high:g}")
+        raise NodeError(limits, f"expected a lowerLimit of at most the upperLimit, got {low:g} and {high:g}")
     return low, high
 
 
-def _test_runs(block: Node, findings: Findings) -> list[Assignment]:
+def _test_runs(block: Node) -> list[Parameters]:
     """Random test runs; with the same seed a parameter has the same values, whatever else is drawn."""
-    number, seed = findings.number(block, "numberOfTestRuns"), findings.number(block, "randomSeed", 0.0)
+    number, seed = block.number("numberOfTestRuns"), block.number("randomSeed", 0.0)
     if not (number.is_integer() and 1 <= number <= MOST_CASES):
-        findings.refuse(block, f"numberOfTestRuns: expected a whole number of 1 … {MOST_CASES:,}, got {number:g}")
-        return []
+        raise NodeError(block, f"numberOfTestRuns: expected a whole number of 1 … {MOST_CASES:,}, got {number:g}")
     columns: dict[str, list[str]] = {}
-    for one in block.all("StochasticDistribution"):
-        name, kind = one.get("parameterName"), one.one(*_DRAWN)
-        if name in columns or kind is None:
-            message = (
-                "an earlier distribution has the same parameter" if kind else f"expected one of {', '.join(_DRAWN)}"
-            )
-            findings.refuse(one, message)
-            continue
+    for one in block.some("StochasticDistribution"):
+        name = one.get("parameterName")
         generator = named_generator(int(np.float64(seed).view(np.uint64)), name)
-        try:
-            columns[name] = _drawn(kind, generator, int(number), findings)
-        except (ValueError, ArithmeticError) as error:
-            findings.refuse(kind, f"its numbers make no distribution: {error}")
-    rows = zip(*columns.values(), strict=True)
-    return [] if findings.refused else [dict(zip(columns, row, strict=True)) for row in rows]
+        with one.refusing():
+            kind = one.need(*_DRAWN)
+            if name in columns:
+                raise ValueError("an earlier distribution has the same parameter")
+            try:
+                columns[name] = _drawn(kind, generator, int(number))
+            except (ValueError, ArithmeticError) as error:
+                node = getattr(error, "node", kind)
+                raise NodeError(node, f"its numbers make no distribution: {error}") from error
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
-def _drawn(node: Node, generator: np.random.Generator, number: int, findings: Findings) -> list[str]:
+def _drawn(node: Node, generator: np.random.Generator, number: int) -> list[str]:
     """Values drawn from a distribution; ValueError if its numbers make none."""
-    if node.tag == "ProbabilityDistributionSet":
-        return [one.get("value") for one in _weighted(node.all("Element"), generator, number, findings)]
-    if node.tag == "Histogram":
-        ends = [_limits(one, findings) for one in _weighted(node.all("Bin"), generator, number, findings)]
-        return [f"{generator.uniform(low, high):.6g}" for low, high in ends]
-    (low, high), found = _limits(node, findings), np.empty(0)
+    if node.tag in ("ProbabilityDistributionSet", "Histogram"):
+        # Elements by their weights
+        parts = node.all("Element", "Bin")
+        weights = [one.number("weight") for one in parts]
+        drawn = generator.choice(len(parts), number, p=np.array(weights) / (sum(weights) or 1.0))
+        if node.tag != "Histogram":
+            return [parts[i].get("value") for i in drawn]
+        return [f"{generator.uniform(*_limits(parts[i])):.6g}" for i in drawn]
+    (low, high), found = _limits(node), np.empty(0)
     for _ in range(_MOST_ROUNDS):
-        drawn = _unlimited(node, generator, number, findings)
+        drawn = _unlimited(node, generator, number)
         found = np.concatenate([found, drawn[(low <= drawn) & (drawn <= high)]])
         if len(found) >= number:
             return [f"{value:.6g}" for value in found[:number]]
     raise ValueError(f"hardly any draw is between its limits, {low:g} and {high:g}")
 
 
-def _unlimited(node: Node, generator: np.random.Generator, number: int, findings: Findings) -> Any:
+def _unlimited(node: Node, generator: np.random.Generator, number: int) -> Any:
     if node.tag == "UniformDistribution":
-        return generator.uniform(*_limits(node, findings), number)
-    mean = findings.number(node, "expectedValue")
+        return generator.uniform(*_limits(node), number)
+    mean = node.number("expectedValue")
     if node.tag == "PoissonDistribution":
         return generator.poisson(mean, number)
-    variance = findings.number(node, "variance")
+    variance = node.number("variance")
     if node.tag == "NormalDistribution":
         return generator.normal(mean, math.sqrt(variance), number)
     # Expected value and variance are those of the parameter, not of its logarithm.
     of_log = math.log1p(variance / mean**2)
     return generator.lognormal(math.log(mean) - 0.5 * of_log, math.sqrt(of_log), number)
-
-
-def _weighted(parts: list[Node], generator: np.random.Generator, number: int, findings: Findings) -> list[Node]:
-    """Elements drawn by their weights."""
-    weights = [findings.number(one, "weight") for one in parts]
-    shares = np.array(weights) / (sum(weights) or 1.0)
-    return [parts[i] for i in generator.choice(len(parts), number, p=shares)]

@@ -1,7 +1,7 @@
-"""What becomes of each element and attribute of OpenSCENARIO XML 1.3: honoured, harmless or refused.
+"""Elements and attributes of OpenSCENARIO XML 1.3 that are harmless or refused; all others are honoured.
 
-Names are ``Element`` or ``Element@attribute``; an element's decision covers what it holds, unless it is honoured.
-`Findings.look_for_unread` refuses what has no decision, and what is honoured but was not read where it stands.
+Names are ``Element`` or ``Element@attribute``; an element's decision covers what it holds. `Node.check_read` refuses
+what the format does not have, and what is honoured but was not read where it stands.
 """
 
 from collections.abc import Mapping
@@ -10,69 +10,6 @@ from collections.abc import Mapping
 def _by_name(reasons: Mapping[str, str]) -> dict[str, str]:
     return {name: reason for names, reason in reasons.items() for name in names.split()}
 
-
-_HONOURED = """
-OpenSCENARIO FileHeader@description,revMajor ParameterDeclarations ParameterDeclaration@name,value ConstraintGroup
-ValueConstraint@rule,value ParameterAssignments ParameterAssignment@parameterRef,value
-CatalogLocations VehicleCatalog ControllerCatalog EnvironmentCatalog ManeuverCatalog Directory@path
-Catalog@name CatalogReference@catalogName,entryName
-RoadNetwork LogicFile@filepath TrafficSignals
-Entities ScenarioObject@name Vehicle@name,vehicleCategory Performance@maxAcceleration,maxDeceleration,maxSpeed
-BoundingBox Center@x,y,z Dimensions@height,length,width Trailer TrailerRef@entityRef
-Storyboard Init Actions Private@entityRef Story@name Act@name ManeuverGroup@maximumExecutionCount,name
-Actors@selectTriggeringEntities EntityRef@entityRef Maneuver@name Event@maximumExecutionCount,name,priority Action@name
-EntityAction@entityRef AddEntityAction DeleteEntityAction
-GlobalAction PrivateAction TeleportAction Position LongitudinalAction LateralAction AppearanceAction
-EnvironmentAction Environment@name TimeOfDay@dateTime Weather@cloudState,fractionalCloudCover Fog@visualRange
-Sun@elevation,illuminance,intensity Precipitation@intensity,precipitationIntensity,precipitationType
-RoadCondition@frictionScaleFactor,wetness
-SpeedAction SpeedActionDynamics@dynamicsDimension,dynamicsShape,value SpeedActionTarget AbsoluteTargetSpeed@value
-RelativeTargetSpeed@continuous,entityRef,speedTargetValueType,value
-LongitudinalDistanceAction@continuous,coordinateSystem,displacement,distance,entityRef,freespace,timeGap
-LaneOffsetAction@continuous LaneOffsetActionDynamics@dynamicsShape,maxLateralAcc LaneOffsetTarget
-AbsoluteTargetLaneOffset@value RelativeTargetLaneOffset@entityRef,value
-SpeedProfileAction@entityRef,followingMode SpeedProfileEntry@speed,time
-SynchronizeAction@masterEntityRef,targetToleranceMaster TargetPosition TargetPositionMaster FinalSpeed
-AbsoluteSpeed@value RelativeSpeedToMaster@speedTargetValueType,value
-FollowTrajectoryAction Trajectory@closed,name TrajectoryRef TrajectoryFollowingMode@followingMode Shape Polyline
-Vertex@time TimeReference None Timing@domainAbsoluteRelative,offset,scale TrajectoryCatalog
-ParameterAction@parameterRef VariableAction@variableRef SetAction@value VariableDeclarations
-VariableDeclaration@name,value
-ParameterCondition@parameterRef,rule,value VariableCondition@rule,value,variableRef
-LaneChangeAction@targetLaneOffset LaneChangeActionDynamics@dynamicsDimension,dynamicsShape,value LaneChangeTarget
-AbsoluteTargetLane@value RelativeTargetLane@entityRef,value
-LightStateAction@transitionTime LightType VehicleLight@vehicleLightType LightState@mode
-ControllerAction OverrideControllerValueAction Throttle@active Brake@active Clutch@active ParkingBrake@active
-SteeringWheel@active Gear@active
-WorldPosition@h,x,y LanePosition@laneId,offset,roadId,s RoadPosition@roadId,s,t Orientation@h,type
-RelativeLanePosition@dLane,ds,dsLane,entityRef,offset RelativeWorldPosition@dx,dy,entityRef
-RelativeObjectPosition@dx,dy,entityRef RelativeRoadPosition@ds,dt,entityRef
-StartTrigger StopTrigger ConditionGroup Condition@conditionEdge,delay ByValueCondition ByEntityCondition EntityCondition
-TriggeringEntities@triggeringEntitiesRule SimulationTimeCondition@rule,value
-StoryboardElementStateCondition@state,storyboardElementRef,storyboardElementType
-SpeedCondition@direction,rule,value AccelerationCondition@direction,rule,value StandStillCondition@duration
-RelativeSpeedCondition@direction,entityRef,rule,value TraveledDistanceCondition@value
-RelativeDistanceCondition@coordinateSystem,entityRef,freespace,relativeDistanceType,rule,value
-DistanceCondition@alongRoute,coordinateSystem,freespace,relativeDistanceType,rule,value ReachPositionCondition@tolerance
-TimeHeadwayCondition@coordinateSystem,entityRef,freespace,relativeDistanceType,rule,value
-TimeToCollisionCondition@coordinateSystem,freespace,relativeDistanceType,rule,value TimeToCollisionConditionTarget
-CollisionCondition ByType@type EndOfRoadCondition@duration
-RoutingAction AssignRouteAction AcquirePositionAction Route@closed,name Waypoint@routeStrategy RouteCatalog RouteRef
-RoutePosition InRoutePosition FromCurrentEntity@entityRef FromLaneCoordinates@laneId,laneOffset,pathS
-Pedestrian@name,pedestrianCategory MiscObject@miscObjectCategory,name PedestrianCatalog MiscObjectCatalog
-ParameterValueDistribution ScenarioFile@filepath Deterministic DeterministicMultiParameterDistribution
-DeterministicSingleParameterDistribution@parameterName DistributionRange@stepWidth DistributionSet
-Element@value,weight ValueSetDistribution ParameterValueSet Range@lowerLimit,upperLimit
-Stochastic@numberOfTestRuns,randomSeed StochasticDistribution@parameterName NormalDistribution@expectedValue,variance
-LogNormalDistribution@expectedValue,variance UniformDistribution PoissonDistribution@expectedValue Histogram
-Bin@weight ProbabilityDistributionSet
-"""
-
-HONOURED: Mapping[str, tuple[str, ...]] = {
-    name: tuple(filter(None, attributes.split(",")))
-    for name, _, attributes in (word.partition("@") for word in _HONOURED.split())
-}
-"""Elements that are read, with their attributes that are."""
 
 HARMLESS: Mapping[str, str] = _by_name(
     {

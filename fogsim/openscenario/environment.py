@@ -6,44 +6,35 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.polynomial import polynomial
 
-from fogsim.openscenario.catalogs import Catalogs
-from fogsim.openscenario.daylight import clear_sky_illuminance, sun_elevation, through_clouds
-from fogsim.openscenario.findings import Findings
+from fogsim.openscenario.parameters import Catalogs
 from fogsim.openscenario.xml_tree import Node
 from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes
 
 _CLOUDS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
-_OLD_CLOUDS = {"free": 0.0, "cloudy": 4.0, "overcast": 8.0, "rainy": 8.0, "skyOff": 0.0}
-"""Oktas of the words for the sky in OpenSCENARIO 1.0."""
-
+_OLD_CLOUDS = {"free": 0.0, "cloudy": 4.0, "overcast": 8.0, "rainy": 8.0, "skyOff": 0.0}  # In 1.0
+USUAL_LATITUDE = math.radians(50.0)  # If a map gives none [rad]
+_BRANCHES = (  # Lowest elevation [deg] and coefficients of each piece of `clear_sky_illuminance`
+    (20.0, (3.74, 3.97, -4.07, 1.47)),
+    (5.0, (3.05, 13.28, -45.98, 64.33)),
+    (-0.8, (2.88, 22.26, -207.64, 1034.30)),
+    (-5.0, (2.88, 21.81, -258.11, -858.36)),
+    (-12.0, (2.70, 12.17, -431.69, -1899.83)),
+    (-18.0, (13.84, 262.72, 1447.42, 2797.93)),
+)
 BRIGHTEST = 200_000.0
 _DARKEST = 0.001  # Of a clear day, under any clouds
 _STEP = 1.0  # along a route, in the search for the start of a box [m]
 _EDGE = 1.0  # of a box of fog, whose border is sharp [m]
 
 
-@dataclass(frozen=True, slots=True)
-class Box:
-    """A box of fog [m, rad]."""
-
-    centre: tuple[float, float, float]
-    length: float
-    width: float
-    height: float
-
-    def covers(self, points: Any) -> Any:
-        """Which of the points (n, 2) are inside."""
-        away = np.abs(np.asarray(points) - np.array(self.centre[:2]))
-        return (away[:, 0] <= 0.5 * self.length) & (away[:, 1] <= 0.5 * self.width)
+Box = tuple[tuple[float, ...], tuple[float, ...]]  # Centre, and length, width and height [m]
 
 
 @dataclass(frozen=True, slots=True)
 class Environment:
-    """Fog and light of an environment: V_met [m], extent and illuminance of the ground [lx], None if not given.
-
-    A `box` of None is fog everywhere.
-    """
+    """Fog, everywhere or in a box, by its V_met [m], and illuminance of the ground [lx]; None if not given."""
 
     visibility: float | None = None
     box: Box | None = None
@@ -52,126 +43,117 @@ class Environment:
 
 def environment_of(action: Node, catalogs: Catalogs, lanes: OpenDriveLanes) -> Environment:
     """Fog and light of an ``EnvironmentAction``; the map may give its geographic position."""
-    findings, reference = catalogs.findings, action.one("CatalogReference")
-    node = catalogs.entry(reference) if reference else action.one("Environment")
-    if node is None:
-        return Environment()
-    weather = node.one("Weather")
+    node = catalogs.need(action, "Environment")
+    weather, road = node.one("Weather"), node.one("RoadCondition")
     fog = weather.one("Fog") if weather else None
-    box = fog.one("BoundingBox") if fog else None
-    read = Environment(
-        None if fog is None else _visibility(fog, findings),
-        None if box is None else _box(box, findings),
-        _illuminance(node, weather, lanes, findings),
-    )
-    if weather is not None:
-        _check_precipitation(weather, findings)
-    condition = node.one("RoadCondition")
-    if condition and (
-        findings.number(condition, "frictionScaleFactor", 1.0) != 1.0 or condition.get("wetness", "dry") != "dry"
-    ):
-        findings.refuse(
-            condition, "roads are dry: write frictionScaleFactor=1; advice.parameters.friction is for advice"
-        )
-    if reference:
-        findings.look_for_unread(node)
-    return read
+    extent, box, visibility = fog.one("BoundingBox") if fog else None, None, None
+    if fog and (visibility := fog.number("visualRange", is_finite=False)) < 1.0:
+        fog.refuse(f"visualRange: expected 1 m or more, got {visibility:g}")
+    if extent:
+        centre, size = extent.need("Center"), extent.need("Dimensions")
+        box = tuple(map(centre.number, "xyz")), tuple(map(size.number, ("length", "width", "height")))
+    for one in weather.all("Precipitation") if weather else ():
+        falls = one.number("precipitationIntensity", one.number("intensity", 0.0))
+        if one.get("precipitationType") != "dry" and falls > 0.0:
+            one.refuse("rain and snow are not drawn: write precipitationType=dry, or an intensity of 0")
+    if road and (road.number("frictionScaleFactor", 1.0) != 1.0 or road.get("wetness", "dry") != "dry"):
+        road.refuse("roads are dry: write frictionScaleFactor=1; advice.parameters.friction is for advice")
+    return Environment(visibility, box, _illuminance(node, weather, lanes))
 
 
-def _visibility(fog: Node, findings: Findings) -> float:
-    visibility = findings.number(fog, "visualRange", is_finite=False)
-    if visibility < 1.0:
-        findings.refuse(fog, f"visualRange: expected 1 m or more, got {visibility:g}")
-        return math.inf
-    return visibility
-
-
-def _box(node: Node, findings: Findings) -> Box:
-    centre, size = node.one("Center"), node.one("Dimensions")
-    if centre is None or size is None:
-        findings.refuse(node, "a box needs a Center and Dimensions")
-        return Box((0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
-    x, y, z = (findings.number(centre, key) for key in "xyz")
-    length, width, height = (findings.number(size, key) for key in ("length", "width", "height"))
-    return Box((x, y, z), length, width, height)
-
-
-def _illuminance(node: Node, weather: Node | None, lanes: OpenDriveLanes, findings: Findings) -> float | None:
-    clouds = _oktas(weather, findings) if weather else None
+def _illuminance(node: Node, weather: Node | None, lanes: OpenDriveLanes) -> float | None:
+    clouds = _oktas(weather) if weather else 0.0
     sun, time = (weather.one("Sun") if weather else None), node.one("TimeOfDay")
-    given = [key for key in ("illuminance", "intensity") if sun and sun.get(key)]
-    moment = None if time is None else _moment(time, findings)
-    elevation = findings.number(sun, "elevation") if sun and sun.get("elevation") else None
-    if elevation is None and moment is not None:
-        elevation = sun_elevation(moment, lanes.latitude, lanes.longitude)
+    given = next((key for key in ("illuminance", "intensity") if sun and sun.get(key)), None)
+    elevation = _elevation(time, lanes) if time else None
+    if sun and sun.get("elevation"):
+        elevation = sun.number("elevation")
     clear = None if elevation is None else clear_sky_illuminance(elevation)
-    if sun and given:
-        lux = findings.number(sun, given[0])
-        if elevation and clear and 0.0 < lux < _DARKEST * clear and elevation > 0.0:
-            message = f"{given[0]}: {lux:g} lx would be night at a sun of {math.degrees(elevation):.0f}°"
-            if given[0] == "intensity" and lux <= 1.0:
-                findings.remark(sun, f"{message}; read as the share of the sky without clouds")
-                return through_clouds(clear, 8.0 * (1.0 - lux))
-            findings.refuse(sun, f"{message}; expected some {clear:.0f} lx")
-        return min(max(lux, 0.0), BRIGHTEST)
-    return None if clear is None else through_clouds(clear, clouds or 0.0)
+    if sun is None or given is None:
+        return None if clear is None else through_clouds(clear, clouds)
+    lux = sun.number(given)
+    if elevation and clear and 0.0 < lux < _DARKEST * clear and elevation > 0.0:
+        message = f"{given}: {lux:g} lx would be night at a sun of {math.degrees(elevation):.0f}°"
+        if given == "intensity" and lux <= 1.0:
+            sun.remark(f"{message}; read as the share of the sky without clouds")
+            return through_clouds(clear, 8.0 * (1.0 - lux))
+        sun.refuse(f"{message}; expected some {clear:.0f} lx")
+    return min(max(lux, 0.0), BRIGHTEST)
 
 
-def _oktas(weather: Node, findings: Findings) -> float | None:
+def _oktas(weather: Node) -> float:
     word, old = weather.get("fractionalCloudCover"), weather.get("cloudState")
     if word.removesuffix("Oktas") in _CLOUDS:
         return min(float(_CLOUDS.index(word.removesuffix("Oktas"))), 8.0)
-    if old in _OLD_CLOUDS:
-        return _OLD_CLOUDS[old]
-    if word or old:
-        findings.refuse(weather, f"unknown cloud cover {word or old!r}")
-    return None
+    if old not in _OLD_CLOUDS and (word or old):
+        weather.refuse(f"unknown cloud cover {word or old!r}")
+    return _OLD_CLOUDS.get(old, 0.0)
 
 
-def _moment(time: Node, findings: Findings) -> dt.datetime | None:
+def _elevation(time: Node, lanes: OpenDriveLanes) -> float | None:
     text = time.get("dateTime")
     try:
-        return dt.datetime.fromisoformat(text)
+        return sun_elevation(dt.datetime.fromisoformat(text), lanes.latitude, lanes.longitude)
     except ValueError:
-        findings.refuse(time, f"dateTime: expected one such as 2026-11-23T08:30:00+01:00, got {text!r}")
+        time.refuse(f"dateTime: expected one such as 2026-11-23T08:30:00+01:00, got {text!r}")
         return None
 
 
-def _check_precipitation(weather: Node, findings: Findings) -> None:
-    for one in weather.all("Precipitation"):
-        falls = findings.number(one, "precipitationIntensity", findings.number(one, "intensity", 0.0))
-        if one.get("precipitationType") != "dry" and falls > 0.0:
-            findings.refuse(one, "rain and snow are not drawn: write precipitationType=dry, or an intensity of 0")
-
-
 def fog_block(environment: Environment, route: Any, lowest: float) -> dict[str, Any]:
-    """The block ``fog`` of a scenario.
-
-    `route` (n, 2) is the middle of the ego's route, and heights of fog count from `lowest` [m].
-    """
+    """The block ``fog`` of a scenario, by the middle of the ego's route (n, 2) and its lowest height [m]."""
     visibility = math.inf if environment.visibility is None else environment.visibility
     box = environment.box
     if box is None:
         return {"visibility_m": visibility}
     banks = [
         {"start_m": begin, "end_m": end, "visibility_m": visibility, "edge_m": min(_EDGE, end - begin)}
-        for begin, end in _stretches(np.asarray(route, dtype=np.float64), box)
+        for begin, end in _stretches(np.asarray(route, dtype=np.float64), *np.array(box)[:, :2])
     ]
-    low, high = (box.centre[2] + side * box.height - lowest for side in (-0.5, 0.5))
-    return {
-        "outside_visibility_m": math.inf,
-        "banks": banks,
-        "top_m": high,
-        **({"base_m": low} if low > 0.0 else {}),
-    }
+    low, high = (box[0][2] + side * box[1][2] - lowest for side in (-0.5, 0.5))
+    base = {"base_m": low} if low > 0.0 else {}
+    return {"outside_visibility_m": math.inf, "banks": banks, "top_m": high, **base}
 
 
-def _stretches(route: Any, box: Box) -> list[tuple[float, float]]:
-    """Intervals of a route inside a box [m]."""
+def _stretches(route: Any, centre: Any, size: Any) -> list[tuple[float, float]]:
     steps = np.diff(route, axis=0)
     ends = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
     along = np.linspace(0.0, ends[-1], max(int(ends[-1] / _STEP) + 1, 2))
     points = np.column_stack([np.interp(along, ends, route[:, axis]) for axis in (0, 1)])
-    inside = np.concatenate([[False], box.covers(points), [False]]).astype(int)
+    covered = (np.abs(points - centre) <= 0.5 * size).all(axis=1)
+    inside = np.concatenate([[False], covered, [False]]).astype(int)
     begins, stops = np.flatnonzero(np.diff(inside) == 1), np.flatnonzero(np.diff(inside) == -1) - 1
     return [(float(along[a]), float(along[b])) for a, b in zip(begins, stops, strict=True) if b > a]
+
+
+def sun_elevation(moment: dt.datetime, latitude: float | None, longitude: float | None) -> float:
+    """Elevation of the sun's centre [rad] at a place [rad, east and north], after Spencer (Search 2(5), 1971)."""
+    # A time without a time zone, or without a longitude, is mean solar time.
+    hour = moment.hour + moment.minute / 60.0 + moment.second / 3600.0
+    offset = moment.utcoffset()
+    if longitude is not None and offset is not None:
+        hour += math.degrees(longitude) / 15.0 - offset.total_seconds() / 3600.0
+    day = 2.0 * math.pi * (moment.timetuple().tm_yday - 1 + (hour - 12.0) / 24.0) / 365.0
+    terms = [trig(n * day) for n in (1, 2, 3) for trig in (math.cos, math.sin)]
+    declination = 0.006918 + math.fsum(
+        c * t for c, t in zip((-0.399912, 0.070257, -0.006758, 0.000907, -0.002697, 0.001480), terms, strict=True)
+    )
+    equation = 229.18 * (
+        0.000075 + math.fsum(c * t for c, t in zip((0.001868, -0.032077, -0.014615, -0.040849), terms[:4], strict=True))
+    )
+    solar = hour + (equation / 60.0 if longitude is not None else 0.0)
+    angle = math.pi * (solar - 12.0) / 12.0
+    north = USUAL_LATITUDE if latitude is None else latitude
+    height = math.sin(north) * math.sin(declination) + math.cos(north) * math.cos(declination) * math.cos(angle)
+    return math.asin(min(max(height, -1.0), 1.0))
+
+
+def clear_sky_illuminance(elevation: float) -> float:
+    """Horizontal illuminance by sun and clear sky [lx] (Seidelmann, Explanatory Supplement, 1992, p. 491)."""
+    degrees = min(90.0, max(_BRANCHES[-1][0], math.degrees(elevation)))
+    coefficients = next(one for lowest, one in _BRANCHES if degrees >= lowest)
+    return math.pow(10.0, float(polynomial.polyval(degrees / 90.0, coefficients)))
+
+
+def through_clouds(illuminance: float, oktas: float) -> float:
+    """Horizontal illuminance [lx] under 0 … 8 oktas (Kasten & Czeplak, Solar Energy 24, 1980: 1 − 0.75 (N/8)^3.4)."""
+    return illuminance * (1.0 - 0.75 * math.pow(min(oktas, 8.0) / 8.0, 3.4))

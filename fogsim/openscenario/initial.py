@@ -1,15 +1,15 @@
 """The initial state: positions, speeds and lamps of vehicles, fog and light."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from fogsim.openscenario.actions import DISPLACEMENTS, Actions
-from fogsim.openscenario.effects import Effect
-from fogsim.openscenario.entities import Vehicle, ego_of
+from fogsim.openscenario.entities import Vehicle
 from fogsim.openscenario.environment import Environment, environment_of
-from fogsim.openscenario.positions import ALONG, Positions
+from fogsim.openscenario.lateral import Effect
+from fogsim.openscenario.positions import ALONG, POSITIONS
 from fogsim.openscenario.xml_tree import Node
 from fogsim.traffic.road.opendrive_lanes import Spot
 from fogsim.units import KMH_PER_MPS
@@ -19,27 +19,18 @@ _STRAIGHT = 1000.0  # Way of those off the lanes in the direction in which they 
 
 @dataclass
 class Beginning:
-    """Initial state: reference points and ordered speeds of vehicles, fog and light, and further effects.
+    """Initial state: places of front bumpers, ordered speeds of vehicles, fog and light, and further effects."""
 
-    `names` are the vehicles by their names in the timeline, `ways` their edges, `off_lanes` the places of those on no
-    lane, `fronts` the places of front bumpers, and `distances` the actions that place one at a distance to another.
-    """
-
-    spots: dict[str, Spot]
-    names: Mapping[str, str]
-    ways: dict[str, tuple[str, ...]]
-    off_lanes: dict[str, tuple[float, float, float]]
-    rerouted: set[str]
+    actions: Actions
     fronts: dict[str, Spot] = field(default_factory=dict)
     orders: dict[str, Mapping[str, Any]] = field(default_factory=dict)
     environment: Environment = field(default_factory=Environment)
     effect: Effect = field(default_factory=Effect)
-    distances: list[tuple[str, Node]] = field(default_factory=list)
+    _distances: list[tuple[str, Node]] = field(default_factory=list)
 
-    @property
-    def routed(self) -> set[str]:
-        """Vehicles that have a route, from the beginning or later, for which they change lane."""
-        return {*self.effect.routes, *self.rerouted}
+    def __post_init__(self) -> None:
+        self.positions, self.vehicles = self.actions.positions, self.actions.vehicles
+        self.lanes, self.spots = self.positions.lanes, self.positions.spots
 
     def speed(self, vehicle: str, *asked: str) -> float:
         """Initial speed of a vehicle [m/s]; one that is relative follows from another's."""
@@ -48,188 +39,165 @@ class Beginning:
             return 0.0
         if "to_kmh" in order:
             return float(order["to_kmh"]) / KMH_PER_MPS
-        other = self.speed(self.names[order["like"]], *asked, vehicle)
+        other = self.speed(self._of_name(order["like"]), *asked, vehicle)
         return max(other * float(order.get("factor", 1.0)) + float(order.get("plus_kmh", 0.0)) / KMH_PER_MPS, 0.0)
 
+    def _of_name(self, named: str) -> str:
+        return self.vehicles.ego if named == "ego" else named
 
-def read_beginning(init: Node | None, vehicles: Mapping[str, Vehicle], actions: Actions) -> Beginning:
-    """Initial state from the element ``Init``."""
-    positions = actions.positions
-    names = {actions.called(name).strip('"'): name for name in vehicles}
-    begin = Beginning(positions.entities, names, positions.ways, positions.off_lanes, positions.rerouted)
-    blocks = init.all("Actions") if init else []
-    for block in blocks:
-        for action in block.all("GlobalAction"):
-            _take_global(action, begin, actions)
-    private = [one for block in blocks for one in block.all("Private")]
-    added = {one.get("entityRef"): one for block in blocks for one in _entity_actions(block, "AddEntityAction")}
-    _place(_positions(private, added, vehicles, actions), vehicles, actions)
-    for one in private:
-        for action in one.all("PrivateAction"):
-            _take_private(action, one.get("entityRef"), begin, actions)
-    _move_by_distances(begin, actions)
-    absent = {one.get("entityRef") for block in blocks for one in _entity_actions(block, "DeleteEntityAction")}
-    for name in absent:
-        begin.spots.pop(name, None)
-    if init and init.above:
-        absent |= {one.get("entityRef") for one in _entity_actions(init.above, "AddEntityAction")} - {*added}
-    for name, vehicle in vehicles.items():
-        if name not in absent or name == ego_of(dict(vehicles)):
-            _begin(name, vehicle, begin, vehicles, actions)
-    return begin
+    def read(self, init: Node | None) -> None:
+        """Read the element ``Init``."""
+        blocks = init.all("Actions") if init else []
+        for action in (one for block in blocks for one in block.all("GlobalAction")):
+            self._take_global(action)
+        private = self.vehicles.known(one for block in blocks for one in block.all("Private"))
+        added = {one.get("entityRef"): one for block in blocks for one in _entity_actions(block, "AddEntityAction")}
+        self._place(self._wanted(private, added))
+        for one in private:
+            for action in one.all("PrivateAction"):
+                self._take_private(action, one.get("entityRef"))
+        for name, action in self._distances:
+            with action.refusing():
+                self.spots[name] = self._at_distance(action, name)
+        absent = {one.get("entityRef") for block in blocks for one in _entity_actions(block, "DeleteEntityAction")}
+        for name in absent:
+            self.spots.pop(name, None)
+        if init and init.above:
+            absent |= {one.get("entityRef") for one in _entity_actions(init.above, "AddEntityAction")} - {*added}
+        for name, vehicle in self.vehicles.items():
+            if name not in absent or name == self.vehicles.ego:
+                self._begin(vehicle)
+
+    def _begin(self, vehicle: Vehicle) -> None:
+        """Find where a vehicle's front bumper begins, and its way, or its path off the lanes."""
+        name = vehicle.name
+        if name in self.positions.off_lanes or (name not in self.spots and "path" in self.effect.do.get(name, {})):
+            self._place_off_lanes(vehicle)
+        elif name in self.spots:
+            try:
+                front = self.fronts[name] = self._front(vehicle)
+                self.positions.ways[name] = self.lanes.route(front.lane.edge, self.effect.routes.get(name, ()))
+            except ValueError as error:
+                vehicle.node.refuse(f"{name} cannot begin where it is to: {error}")
+                del self.spots[name]
+        elif not vehicle.node.findings.refused:
+            vehicle.node.refuse(f"{name} has no place: Init needs a TeleportAction of it")
+
+    def _place_off_lanes(self, vehicle: Vehicle) -> None:
+        """Let one begin off the lanes, or turned on one; without a path it moves on, a vehicle along its lane."""
+        x, y, heading = self.positions.off_lanes.setdefault(vehicle.name, (math.inf, 0.0, 0.0))
+        speed, degrees = self.speed(vehicle.name), math.degrees(heading)
+        far = _STRAIGHT if speed or vehicle.body else 0.0
+        ends = [[x + way * math.cos(heading), y + way * math.sin(heading), degrees] for way in (0.0, far)]
+        lane = None if vehicle.body else self.lanes.nearest(x, y)
+        path = {"points": self.lanes.backwards(lane) if lane else ends, "ahead_m": vehicle.front, "stays": True}
+        done = self.effect.do.setdefault(vehicle.name, {})
+        done["path"] = {**done.get("path", path), "speed_kmh": speed * KMH_PER_MPS}
+
+    def _front(self, vehicle: Vehicle) -> Spot:
+        """Place of a front bumper; ValueError if it is on no road or, where all is as written, in another vehicle."""
+        wanted = self.effect.routes.get(vehicle.name, ())
+        front = self.lanes.along(self.spots[vehicle.name], vehicle.front, wanted)
+        for other, there in self.fronts.items() if not vehicle.node.findings.refused else ():
+            is_same = (there.lane.edge, there.lane.index) == (front.lane.edge, front.lane.index)
+            if is_same and -self.vehicles[other].length < front.position - there.position < vehicle.length:
+                raise ValueError(f"{other} is there")
+        return front
+
+    def _take_global(self, action: Node) -> None:
+        for one in action.all():
+            if one.tag == "EntityAction":
+                # `read` sees to it.
+                one.all("AddEntityAction", "DeleteEntityAction")
+                self.vehicles.known([one])
+            elif one.tag == "EnvironmentAction":
+                with one.refusing():
+                    self.environment = environment_of(one, self.positions.catalogs, self.lanes)
+            else:
+                self.actions.take(action, [], self.effect)
+
+    def _wanted(self, private: list[Node], added: Mapping[str, Node]) -> dict[str, Node]:
+        """Positions of vehicles at the beginning."""
+        holders = [(name, one.all("AddEntityAction")) for name, one in added.items() if name in self.vehicles]
+        for one in private:
+            places = [t for action in one.all("PrivateAction") for t in action.all("TeleportAction")]
+            # Who only follows a trajectory begins at its first vertex.
+            vertices = [vertex for vertex in one.walk() if vertex.tag == "Vertex"]
+            holders.append((one.get("entityRef"), places or vertices[:1]))
+        return {name: position for name, inside in holders for one in inside for position in one.all("Position")}
+
+    def _place(self, wanted: dict[str, Node]) -> None:
+        """Place vehicles; those relative to another one last."""
+        refers_to = self.positions.refers_to
+        while wanted:
+            ready = [name for name, position in wanted.items() if refers_to(position) not in wanted] or list(wanted)
+            for name, position in ((name, wanted.pop(name)) for name in ready):
+                if (point := self._off_lanes(position, self.vehicles[name])) is not None:
+                    self.positions.off_lanes[name] = point
+                    continue
+                with next(iter(position.children), position).refusing():
+                    self.spots[name] = self.positions.on_lanes(position)
+
+    def _off_lanes(self, position: Node, vehicle: Vehicle) -> tuple[float, float, float] | None:
+        """x, y [m] and heading [rad] of one on no lane, of a body turned on one, or of a vehicle against one."""
+        try:
+            x, y, heading, along = self.positions.point(position)
+            lane = self.lanes.nearest(x, y)
+        except ValueError:
+            return None
+        facing = along if heading is None else heading
+        along_lane = 1.0 if lane is None or facing is None else math.cos(facing - lane.world[2])
+        is_turned = along_lane < (ALONG if vehicle.body else -ALONG)
+        if vehicle.name == self.vehicles.ego or not (lane is None or is_turned):
+            return None
+        if lane is not None and not vehicle.body:
+            # Where the file names a lane, whatever the offset.
+            one = position.need(*POSITIONS)
+            named = (one.get("roadId"), one.get("laneId"), one.number("s")) if one.tag == "LanePosition" else None
+            self.positions.against[vehicle.name] = self.lanes.on_lane(*named) if named else lane
+        return x, y, facing or 0.0
+
+    def _take_private(self, action: Node, name: str) -> None:
+        if action.one("TeleportAction"):
+            return
+        distance = action.within("LongitudinalAction", "LongitudinalDistanceAction")
+        if distance and distance.one("DynamicConstraints") is None:
+            # Without limits to its motion it is there at once.
+            self._distances.append((name, distance))
+            if not distance.flag("continuous"):
+                return
+        self.actions.take(action, [name], effect := Effect(is_at_start=True))
+        self.effect.routes.update(effect.routes)
+        done = effect.do.get(name, {})
+        speed, leader = done.pop("speed", None), self._of_name(done.get("follow", {}).get("vehicle", ""))
+        if speed is not None:
+            # At the start there is no earlier speed to change from.
+            self.orders[name] = speed
+            if speed.get("continuous"):
+                self.effect.add(name, speed={**speed, "shape": "step"})
+        if leader in self.vehicles and not _is_ahead(self.spots.get(leader), self.spots.get(name)):
+            action.refuse(f"FogSim keeps a distance to a vehicle ahead; {leader} is not ahead of {name}")
+        if done:
+            self.effect.add(name, **done)
+
+    def _at_distance(self, action: Node, name: str) -> Spot:
+        """Place at a distance to another vehicle, on the lane on which the vehicle is; ValueError if there is none."""
+        (headway, distance, is_between_bumpers), reference = self.actions.gap(action), action.get("entityRef")
+        own, other = self.spots.get(name), self.spots.get(reference)
+        if own is None or other is None:
+            raise ValueError(f"{name} or {reference} has no place")
+        where = action.word("displacement", DISPLACEMENTS, "any")
+        is_ahead = _is_ahead(own, other) if where == "any" else where == DISPLACEMENTS[1]
+        ahead, behind = (name, reference) if is_ahead else (reference, name)
+        away = headway * self.speed(behind) + distance
+        if is_between_bumpers:
+            away += self.vehicles[behind].front + self.vehicles[ahead].rear
+        spot = self.lanes.along(other, away if is_ahead else -away)
+        return self.lanes.beside(spot, own.lane.index - other.lane.index).shifted(own.offset)
 
 
 def _entity_actions(node: Node, kind: str) -> list[Node]:
-    """All elements within that add an entity, or delete one."""
     return [one for one in node.walk() if one.tag == "EntityAction" and any(c.tag == kind for c in one.children)]
-
-
-def _begin(name: str, vehicle: Vehicle, begin: Beginning, vehicles: Mapping[str, Vehicle], actions: Actions) -> None:
-    """Find where a vehicle's front bumper begins, and its way, or its path off the lanes."""
-    if name in begin.off_lanes or (name not in begin.spots and "path" in begin.effect.do.get(name, {})):
-        _place_off_lanes(name, vehicle, begin, actions.positions)
-    elif name in begin.spots:
-        try:
-            begin.fronts[name] = _front(name, begin, vehicles, actions)
-            wanted = begin.effect.routes.get(name, ())
-            begin.ways[name] = actions.positions.lanes.route(begin.fronts[name].lane.edge, wanted)
-        except ValueError as error:
-            actions.findings.refuse(vehicle.node, f"{name} cannot begin where it is to: {error}")
-            del begin.spots[name]
-    elif not actions.findings.refused:
-        actions.findings.refuse(vehicle.node, f"{name} has no place: Init needs a TeleportAction of it")
-
-
-def _place_off_lanes(name: str, vehicle: Vehicle, begin: Beginning, positions: Positions) -> None:
-    """Let one begin off the lanes, or turned on one; without a path it moves straight on, a vehicle along its lane."""
-    (x, y, heading), speed = begin.off_lanes.setdefault(name, (math.inf, 0.0, 0.0)), begin.speed(name)
-    far, degrees = _STRAIGHT if speed or vehicle.body else 0.0, math.degrees(heading)
-    ends = [[x + way * math.cos(heading), y + way * math.sin(heading), degrees] for way in (0.0, far)]
-    lane = None if vehicle.body else positions.lanes.nearest(x, y)
-    path = {"points": positions.lanes.backwards(lane) if lane else ends, "ahead_m": vehicle.front, "stays": True}
-    done = begin.effect.do.setdefault(name, {})
-    done["path"] = {**done.get("path", path), "speed_kmh": speed * KMH_PER_MPS}
-
-
-def _front(name: str, begin: Beginning, vehicles: Mapping[str, Vehicle], actions: Actions) -> Spot:
-    """Place of a front bumper; ValueError if it is on no road or, all places being as written, in another vehicle."""
-    wanted, vehicle = begin.effect.routes.get(name, ()), vehicles[name]
-    front = actions.positions.lanes.along(begin.spots[name], vehicle.front, wanted)
-    for other, there in begin.fronts.items() if not actions.findings.refused else ():
-        is_same = (there.lane.edge, there.lane.index) == (front.lane.edge, front.lane.index)
-        if is_same and -vehicles[other].length < front.position - there.position < vehicle.length:
-            raise ValueError(f"{other} is there")
-    return front
-
-
-def _take_global(action: Node, begin: Beginning, actions: Actions) -> None:
-    for one in action.all():
-        if one.tag == "EntityAction":
-            # `read_beginning` has seen to it.
-            one.all("AddEntityAction", "DeleteEntityAction")
-        elif one.tag == "EnvironmentAction":
-            begin.environment = environment_of(one, actions.catalogs, actions.positions.lanes)
-        else:
-            actions.take(action, [], begin.effect)
-
-
-def _positions(
-    private: list[Node], added: Mapping[str, Node], vehicles: Mapping[str, Vehicle], actions: Actions
-) -> dict[str, Node]:
-    """Positions at which vehicles are added, or put, at the beginning."""
-    holders = [(name, one.all("AddEntityAction")) for name, one in added.items() if name in vehicles]
-    for one in private:
-        name = one.get("entityRef")
-        if name in vehicles:
-            places = [t for action in one.all("PrivateAction") for t in action.all("TeleportAction")]
-            # Who only follows a trajectory begins at its first vertex.
-            holders.append((name, places or [vertex for vertex in one.walk() if vertex.tag == "Vertex"][:1]))
-        else:
-            actions.findings.refuse(one, f"there is no vehicle {name!r}")
-    return {name: position for name, inside in holders for one in inside for position in one.all("Position")}
-
-
-def _place(wanted: dict[str, Node], vehicles: Mapping[str, Vehicle], actions: Actions) -> None:
-    """Place vehicles; those relative to another one last."""
-    positions = actions.positions
-    while wanted:
-        ready = [n for n, position in wanted.items() if positions.refers_to(position) not in wanted] or list(wanted)
-        for name in ready:
-            position = wanted.pop(name)
-            if (point := _off_lanes(position, vehicles[name], vehicles, positions)) is not None:
-                positions.off_lanes[name] = point
-            elif (spot := positions.spot(position)) is not None:
-                positions.entities[name] = spot
-
-
-def _off_lanes(
-    position: Node, vehicle: Vehicle, vehicles: Mapping[str, Vehicle], positions: Positions
-) -> tuple[float, float, float] | None:
-    """x, y [m] and heading [rad] of one on no lane, of a body turned on one, or of a vehicle against one; else None."""
-    try:
-        x, y, heading, along = positions.point(position)
-        lane = positions.lanes.nearest(x, y)
-    except ValueError:
-        return None
-    facing = along if heading is None else heading
-    along_lane = 1.0 if lane is None or facing is None else math.cos(facing - lane.world[2])
-    is_turned = along_lane < (ALONG if vehicle.body else -ALONG)
-    if vehicle.name == ego_of(dict(vehicles)) or not (lane is None or is_turned):
-        return None
-    if lane is not None and not vehicle.body:
-        positions.against[vehicle.name] = positions.named(position) or lane
-    return x, y, facing or 0.0
-
-
-def _take_private(action: Node, name: str, begin: Beginning, actions: Actions) -> None:
-    if action.one("TeleportAction"):
-        return
-    distance = action.within("LongitudinalAction", "LongitudinalDistanceAction")
-    if distance and distance.one("DynamicConstraints") is None and name in actions.vehicles:
-        # Without limits to its motion it is there at once.
-        begin.distances.append((name, distance))
-        if not actions.findings.flag(distance, "continuous"):
-            return
-    effect = Effect(is_at_start=True)
-    actions.take(action, [name], effect)
-    begin.effect.routes.update(effect.routes)
-    done = effect.do.get(name, {})
-    speed, leader = done.pop("speed", None), begin.names.get(done.get("follow", {}).get("vehicle", ""))
-    if speed is not None:
-        # At the start there is no earlier speed to change from.
-        begin.orders[name] = speed
-        if speed.get("continuous"):
-            begin.effect.add(name, speed={**speed, "shape": "step"})
-    if leader is not None and not _is_ahead(begin.spots.get(leader), begin.spots.get(name)):
-        actions.findings.refuse(action, f"FogSim keeps a distance to a vehicle ahead; {leader} is not ahead of {name}")
-    if done:
-        begin.effect.add(name, **done)
-
-
-def _move_by_distances(begin: Beginning, actions: Actions) -> None:
-    """Put those at a distance to another vehicle there."""
-    for name, action in begin.distances:
-        try:
-            begin.spots[name] = _at_distance(action, name, begin, actions)
-        except ValueError as error:
-            actions.findings.refuse(action, str(error))
-
-
-def _at_distance(action: Node, name: str, begin: Beginning, actions: Actions) -> Spot:
-    """Place at a distance to another vehicle, on the lane on which the vehicle is; ValueError if there is none."""
-    headway, distance, is_between_bumpers = actions.gap(action)
-    own, other, reference = begin.spots.get(name), begin.spots.get(action.get("entityRef")), action.get("entityRef")
-    if own is None or other is None:
-        raise ValueError(f"{name} or {reference} has no place")
-    where = actions.findings.word(action, "displacement", DISPLACEMENTS, "any")
-    is_ahead = _is_ahead(own, other) if where == "any" else where == DISPLACEMENTS[1]
-    ahead, behind = (name, reference) if is_ahead else (reference, name)
-    away = headway * begin.speed(behind) + distance
-    if is_between_bumpers:
-        away += actions.vehicles[behind].front + actions.vehicles[ahead].rear
-    lanes = actions.positions.lanes
-    spot = lanes.along(other, away if is_ahead else -away)
-    return lanes.beside(spot, own.lane.index - other.lane.index).shifted(own.offset)
 
 
 def _is_ahead(one: Spot | None, other: Spot | None) -> bool:
@@ -238,26 +206,3 @@ def _is_ahead(one: Spot | None, other: Spot | None) -> bool:
         return True
     (x, y, _), (from_x, from_y, heading) = one.world, other.world
     return (x - from_x) * math.cos(heading) + (y - from_y) * math.sin(heading) > 0.0
-
-
-Along = Callable[[str | Node], float | None]
-
-
-def along_route(route: tuple[str, ...], begin: Beginning, vehicles: Mapping[str, Vehicle], actions: Actions) -> Along:
-    """Position along the ego's route: of a vehicle's front bumper at the beginning, or of a position."""
-    # On a closed road, the first time counts.
-    starts = dict(reversed([*zip(route, actions.positions.lanes.starts(route), strict=False)]))
-
-    def position(what: str | Node) -> float | None:
-        if isinstance(what, str):
-            spot, further = begin.spots.get(what), vehicles[what].front
-        else:
-            try:
-                spot, further = actions.positions.on_lanes(what, is_of_vehicle=False), 0.0
-            except ValueError:
-                return None
-        if spot is None or spot.lane.edge not in starts:
-            return None
-        return starts[spot.lane.edge] + spot.position + further
-
-    return position

@@ -1,72 +1,49 @@
-"""Values of a file's parameters in place of ``$name`` and ``${expression}``."""
+"""Values of parameters in place of ``$name`` and ``${expression}``, in a file and in the entries of its catalogs."""
 
 import ast
+import contextlib
 import math
 import operator
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
 
-from fogsim.errors import nearest
-from fogsim.openscenario.findings import Findings
-from fogsim.openscenario.xml_tree import Node
+from fogsim.errors import InputError, nearest, shown, suggest
+from fogsim.openscenario.xml_tree import Node, NodeError, read_xml
 
 _NAME = re.compile(r"\$([A-Za-z_][A-Za-z0-9_.]*)")
 _EXPRESSION = re.compile(r"\$\{([^{}]*)\}")
 _LONGEST = 500
-_FREE_TEXT = ("name", "description", "author", "license")
-"""Attributes in which a ``$`` without meaning does no harm."""
+_FREE_TEXT = ("name", "description", "author", "license")  # A ``$`` without meaning does no harm there.
 
-_UNARY: Mapping[type[ast.AST], Callable[[float], float]] = {
-    ast.USub: operator.neg,
-    ast.UAdd: operator.pos,
-    ast.Not: operator.not_,
-}
-_BINARY: Mapping[type[ast.AST], Callable[[float, float], float]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
+_ORDERS = (operator.gt, operator.ge, operator.lt, operator.le, operator.eq, operator.ne)
+_ARITHMETIC = (operator.neg, operator.pos, operator.not_, operator.add, operator.sub, operator.mul, operator.truediv)
+_OPERATORS: Mapping[type[ast.AST], Callable[..., float]] = {
+    **dict(zip((ast.Gt, ast.GtE, ast.Lt, ast.LtE, ast.Eq, ast.NotEq), _ORDERS, strict=True)),
+    **dict(zip((ast.USub, ast.UAdd, ast.Not, ast.Add, ast.Sub, ast.Mult, ast.Div), _ARITHMETIC, strict=True)),
     ast.Mod: operator.mod,
 }
-_COMPARISONS: Mapping[type[ast.AST], Callable[[float, float], bool]] = {
-    ast.Lt: operator.lt,
-    ast.LtE: operator.le,
-    ast.Gt: operator.gt,
-    ast.GtE: operator.ge,
-    ast.Eq: operator.eq,
-    ast.NotEq: operator.ne,
-}
 _FUNCTIONS: Mapping[str, Callable[..., float]] = {
-    "round": round,
-    "floor": math.floor,
-    "ceil": math.ceil,
-    "sqrt": math.sqrt,
-    "abs": abs,
-    "pow": pow,
+    **{one.__name__: one for one in (round, math.floor, math.ceil, math.sqrt, abs, math.pow)},
     "sign": lambda x: float((x > 0) - (x < 0)),
     "min": min,
     "max": max,
 }
-_CONSTANTS = {"pi": repr(math.pi), "true": "True", "false": "False"}
-_CONSTANT = re.compile(r"\b(pi|true|false)\b")
+_CONSTANTS = {"pi": math.pi, "true": True, "false": False}
 
-RULES = {
-    "greaterThan": ">",
-    "greaterOrEqual": ">=",
-    "lessThan": "<",
-    "lessOrEqual": "<=",
-    "equalTo": "==",
-    "notEqualTo": "!=",
-}
-"""Operators of rules."""
+_RULES = ("greaterThan", "greaterOrEqual", "lessThan", "lessOrEqual", "equalTo", "notEqualTo")
+RULES = dict(zip(_RULES, (">", ">=", "<", "<=", "==", "!="), strict=True))
+_HOLDS = dict(zip(_RULES, _ORDERS, strict=True))
 
-_HOLDS = dict(zip(RULES, (operator.gt, operator.ge, operator.lt, operator.le, operator.eq, operator.ne), strict=True))
+_LOCATED = ("Vehicle", "Pedestrian", "MiscObject", "Environment", "Controller", "Maneuver", "Route", "Trajectory")
+_MIRRORED = {"y", "dy", "h"}  # Of positions and orientations
+_CRITERION = "criteria_"
 
-Parameters = Mapping[str, str]
-"""Values of parameters by name."""
+Parameters = Mapping[str, str]  # Values by name
 
 
-def put_parameters(node: Node, known: Parameters, findings: Findings) -> None:
+def put_parameters(node: Node, known: Parameters) -> None:
     """Replace parameters by values in an element and its children, which may declare more."""
     for key, text in node.attributes.items():
         if "$" not in text or (node.tag, key) == ("ParameterDeclaration", "name"):
@@ -75,44 +52,41 @@ def put_parameters(node: Node, known: Parameters, findings: Findings) -> None:
             node.attributes[key] = evaluated(text, known)
         except ValueError as error:
             if key not in _FREE_TEXT:
-                findings.refuse(node, f"{key}: {error}")
-    inside = declared(node, known, findings)
+                node.refuse(f"{key}: {error}")
+    inside = declared(node, known)
     for child in node.children:
         if child.tag != "ParameterDeclarations":
-            put_parameters(child, inside, findings)
+            put_parameters(child, inside)
 
 
-def declared(node: Node, known: Parameters, findings: Findings, given: Parameters | None = None) -> Parameters:
-    """Parameters known in an element: those around it, and those that it declares, each by those before it.
-
-    Values that are `given` take the place of those in the declarations.
-    """
+def declared(node: Node, known: Parameters, given: Parameters | None = None) -> Parameters:
+    """Parameters known in an element: those around it, and those that it declares, each by those before, or given."""
     inside = dict(known)
-    for block in (child for child in node.children if child.tag == "ParameterDeclarations"):
-        for one in block.all("ParameterDeclaration"):
-            name = one.get("name")
-            if name.startswith("$"):
-                findings.remark(one, f"a declaration has its name without $; read as {name[1:]!r}")
-            one.attributes["value"] = (given or {}).get(name.removeprefix("$"), one.get("value"))
-            put_parameters(one, inside, findings)
-            inside[name.removeprefix("$")] = one.get("value")
-            _check_constraints(one, findings)
+    blocks = [child for child in node.children if child.tag == "ParameterDeclarations"]
+    for one in (one for block in blocks for one in block.all("ParameterDeclaration")):
+        name = one.get("name").removeprefix("$")
+        if one.name.strip() != name:
+            one.remark(f"a declaration has its name without $; read as {name!r}")
+        one.attributes["value"] = (given or {}).get(name, one.get("value"))
+        put_parameters(one, inside)
+        inside[name] = one.get("value")
+        _check_constraints(one)
     return inside
 
 
-def _check_constraints(declaration: Node, findings: Findings) -> None:
+def _check_constraints(declaration: Node) -> None:
     """Refuse a value that fits none of its groups of constraints; it fits a group by fitting all of it."""
     groups = [group.all("ValueConstraint") for group in declaration.all("ConstraintGroup")]
     value = declaration.get("value")
-    broken = [next((one for one in group if not fits(value, one, findings)), None) for group in groups]
+    broken = [next((one for one in group if not fits(value, one)), None) for group in groups]
     if broken and all(broken):
         message = " or ".join(f"{one.get('rule')} {one.get('value')}" for one in broken if one)
-        findings.refuse(declaration, f"value: its ConstraintGroup wants {message}, got {value!r}")
+        declaration.refuse(f"value: its ConstraintGroup wants {message}, got {value!r}")
 
 
-def fits(value: str, constraint: Node, findings: Findings) -> bool:
+def fits(value: str, constraint: Node) -> bool:
     """Whether a value fits the `rule` and `value` of a constraint or condition."""
-    rule, limit = findings.word(constraint, "rule", tuple(RULES)), constraint.get("value")
+    rule, limit = constraint.word("rule", tuple(RULES)), constraint.get("value")
     try:
         return bool(_HOLDS[rule](float(value), float(limit)))
     except ValueError:
@@ -136,19 +110,19 @@ def _parameter(name: str, known: Parameters) -> str:
 def _result(expression: str, known: Parameters) -> str:
     if len(expression) > _LONGEST:
         raise ValueError(f"an expression has at most {_LONGEST} characters")
-    plain = _NAME.sub(lambda match: f" {_as_number(_parameter(match[1], known))} ", expression)
+    plain = _NAME.sub(lambda match: f" {_as_number(_parameter(match[1], known))} ", expression).strip()
     try:
-        value = _value(ast.parse(_CONSTANT.sub(lambda match: _CONSTANTS[match[0]], plain).strip(), mode="eval").body)
+        value = _value(ast.parse(plain, mode="eval").body)
+        if isinstance(value, bool):
+            return str(value).lower()
+        return repr(int(value)) if float(value).is_integer() and abs(value) < 1e15 else repr(float(value))
     except (SyntaxError, ArithmeticError, TypeError, RecursionError) as error:
         raise ValueError(f"cannot evaluate ${{{expression}}}: {error}") from None
-    if isinstance(value, bool):
-        return str(value).lower()
-    return repr(int(value)) if float(value).is_integer() and abs(value) < 1e15 else repr(float(value))
 
 
 def _as_number(text: str) -> str:
     if text in ("true", "false"):
-        return text.capitalize()
+        return text
     try:
         return repr(float(text))
     except ValueError:
@@ -159,15 +133,85 @@ def _value(node: ast.expr) -> float:
     match node:
         case ast.Constant(bool() | int() | float() as number):
             return number
-        case ast.UnaryOp(op, operand) if type(op) in _UNARY:
-            return _UNARY[type(op)](_value(operand))
-        case ast.BinOp(left, op, right) if type(op) in _BINARY:
-            return _BINARY[type(op)](_value(left), _value(right))
+        case ast.Name(name) if name in _CONSTANTS:
+            return _CONSTANTS[name]
+        case ast.UnaryOp(op, operand) if type(op) in _OPERATORS:
+            return _OPERATORS[type(op)](_value(operand))
+        case ast.BinOp(left, op, right) | ast.Compare(left, [op], [right]) if type(op) in _OPERATORS:
+            return _OPERATORS[type(op)](_value(left), _value(right))
         case ast.BoolOp(op, values):
-            found = [bool(_value(one)) for one in values]
-            return all(found) if isinstance(op, ast.And) else any(found)
-        case ast.Compare(left, [op], [right]) if type(op) in _COMPARISONS:
-            return _COMPARISONS[type(op)](_value(left), _value(right))
+            return (all if isinstance(op, ast.And) else any)([bool(_value(one)) for one in values])
         case ast.Call(ast.Name(name), arguments, []) if name in _FUNCTIONS:
-            return _FUNCTIONS[name](*(_value(one) for one in arguments))
+            return _FUNCTIONS[name](*map(_value, arguments))
     raise ValueError(f"an expression may hold numbers, parameters, + - * / %, comparisons and {', '.join(_FUNCTIONS)}")
+
+
+@dataclass
+class Catalogs:
+    """The catalogs that a file names, relative to its folder."""
+
+    root: Node
+    _read: dict[Path, list[Node]] = field(default_factory=dict)
+    _places: list[Path] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        locations = self.root.one("CatalogLocations")
+        for kind in locations.all(*(f"{kind}Catalog" for kind in _LOCATED)) if locations else ():
+            self._places += [self.root.file.parent / place.get("path") for place in kind.all("Directory")]
+
+    def entry(self, reference: Node) -> Node:
+        """The element of a ``CatalogReference``, with its parameters, below it from then on; NodeError if missing."""
+        catalog, name = reference.get("catalogName"), reference.get("entryName")
+        assigned = (one for block in reference.all("ParameterAssignments") for one in block.all("ParameterAssignment"))
+        given = {one.get("parameterRef").removeprefix("$"): one.get("value") for one in assigned}
+        names: list[str] = []
+        for found in self._entries(catalog):
+            if found.name == name:
+                reference.children.append(whole := found.copy())
+                own = declared(whole, {}, given)
+                whole.children = [child for child in whole.children if child.tag != "ParameterDeclarations"]
+                put_parameters(whole, {**own, **given})
+                whole.is_read = True
+                return whole
+            names.append(found.name)
+        message = suggest(name, names) if names else f"there is no catalog {shown(catalog)} in the CatalogLocations"
+        raise NodeError(reference, f"unknown entry {shown(name)} of {catalog}; {message}")
+
+    def need(self, holder: Node, *tags: str) -> Node:
+        """The child element with one of these tags, or the entry of a catalog in its place; NodeError without one."""
+        found = holder.need(*tags, "CatalogReference")
+        return self.entry(found) if found.tag == "CatalogReference" else found
+
+    def _entries(self, catalog: str) -> Iterator[Node]:
+        folders = (sorted(path.glob("*.xosc")) if path.is_dir() else [path] for path in self._places)
+        for file in (file for files in folders for file in files if file.is_file()):
+            if file not in self._read:
+                self._read[file] = []
+                try:
+                    root = read_xml(file, self.root.findings)
+                    to_standard(root)
+                    self._read[file] = root.children
+                except InputError as error:
+                    self.root.findings.refused.setdefault(str(error))
+            for one in self._read[file]:
+                # A copied catalog may still have its old name inside.
+                if one.tag == "Catalog" and catalog in (one.attributes.get("name"), file.stem):
+                    yield from one.children
+
+
+def to_standard(root: Node) -> None:
+    """Give a file that begins its description with ``CARLA:`` the format's axes, and leave out criteria."""
+    headers = (node.attributes.get("description", "") for node in root.children if node.tag == "FileHeader")
+    nodes = list(root.walk()) if any(text.startswith("CARLA:") for text in headers) else []
+    for node in (one for one in nodes if one.tag.endswith(("Position", "Orientation"))):
+        # What is no number is found where it is read.
+        with contextlib.suppress(ValueError):
+            for key in node.attributes.keys() & _MIRRORED:
+                node.attributes[key] = repr(-float(node.attributes[key]))
+    for node in (one for one in nodes if one.tag == "StopTrigger"):
+        for group in node.children:
+            criteria = [one for one in group.children if one.name.startswith(_CRITERION)]
+            for one in criteria:
+                one.remark("a criterion of ScenarioRunner; FogSim's are expectations")
+            group.children = [one for one in group.children if one not in criteria]
+        node.children = [group for group in node.children if group.children]

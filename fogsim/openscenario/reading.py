@@ -2,7 +2,6 @@
 
 import math
 import re
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,34 +10,30 @@ from typing import Any
 
 import numpy as np
 
-from fogsim.errors import InputError, LeftOutWarning
+from fogsim.errors import InputError
 from fogsim.files.generated_files import write_generated
 from fogsim.files.maps import find_map
 from fogsim.openscenario.actions import Actions
-from fogsim.openscenario.carla import to_standard
-from fogsim.openscenario.catalogs import Catalogs
-from fogsim.openscenario.entities import Vehicle, ego_of, read_vehicles
+from fogsim.openscenario.entities import CLASSES, Vehicle, read_vehicles
 from fogsim.openscenario.environment import fog_block
-from fogsim.openscenario.findings import Findings
-from fogsim.openscenario.initial import Beginning, along_route, read_beginning
-from fogsim.openscenario.parameters import put_parameters
+from fogsim.openscenario.initial import Beginning
+from fogsim.openscenario.parameters import Catalogs, put_parameters, to_standard
 from fogsim.openscenario.positions import Positions
 from fogsim.openscenario.storyboard import Storyboard
-from fogsim.openscenario.triggers import Trigger, Triggers
-from fogsim.openscenario.vehicles_file import STANDS, vehicles_text
+from fogsim.openscenario.triggers import Trigger, Triggers, timeline_entry
 from fogsim.openscenario.xml_tree import Node, read_xml, sumo_name
+from fogsim.traffic.appearance import BODY_PARAMETER
 from fogsim.traffic.road.netconvert import map_net
 from fogsim.traffic.road.opendrive import is_opendrive
-from fogsim.traffic.road.opendrive_lanes import OpenDriveLanes, read_opendrive_lanes
+from fogsim.traffic.road.opendrive_lanes import read_opendrive_lanes
+from fogsim.traffic.templates.xml_text import element, opening
 from fogsim.units import KMH_PER_MPS
 
-USUAL_DURATION = 120.0
-"""Longest simulated time of a file whose stop trigger has no time [s]."""
-
-NEAR_THE_END = 10.0
-"""Distance to the end of its route at which the ego has arrived [m]."""
-
-Key = tuple[str | int, ...]
+USUAL_DURATION = 120.0  # Longest simulated time of a file whose stop trigger has no time [s]
+NEAR_THE_END = 10.0  # Distance to the end of its route at which the ego has arrived [m]
+_STANDS = 0.1  # Speed below which a vehicle has no desired speed to keep [m/s]
+_FOR_THE_ROUTE_ALONE = {"lcSpeedGain": 0, "lcKeepRight": 0, "lcCooperative": 0, "lcOpposite": 0}
+"""Attributes of drivers who change lane where their route needs it, and for nothing else."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +41,7 @@ class ScenarioData:
     """Plain data of a scenario, as a YAML file would hold it, and the lines of the elements behind its keys."""
 
     data: dict[str, Any]
-    lines: Mapping[Key, int] = field(default_factory=dict)
+    lines: Mapping[tuple[str | int, ...], int] = field(default_factory=dict)
 
 
 def is_openscenario(path: Path) -> bool:
@@ -59,177 +54,185 @@ def read_openscenario(
 ) -> ScenarioData:
     """Read an OpenSCENARIO XML 1.x file as the data of a scenario file; `values` replace those of its parameters.
 
-    A file whose vehicles drive on the oncoming lane is read again on a network `with_oncoming` lanes.
-    The network and the route file go to the user's cache directory. InputError has a line for each element that FogSim
-    cannot do; MissingDependencyError if netconvert is missing.
+    InputError has a line for each element that FogSim cannot do; MissingDependencyError if netconvert is missing.
     """
-    root, findings = read_xml(path), Findings()
+    root = read_xml(path)
     if root.tag != "OpenSCENARIO":
         raise InputError(f"{path}:{root.line}: expected <OpenSCENARIO> at its top, got <{root.tag}>")
-    _check_version(root)
-    for block in root.all("ParameterDeclarations"):
-        for one in block.children:
-            one.attributes["value"] = values.get(one.attributes.get("name", ""), one.attributes.get("value", ""))
-    put_parameters(root, {}, findings)
-    to_standard(root, findings)
-    catalogs = Catalogs(path.parent, root.one("CatalogLocations"), findings)
-    entities, storyboard = root.one("Entities"), root.one("Storyboard")
-    if entities is None or storyboard is None:
-        raise InputError(f"{path}: expected Entities and a Storyboard; catalogs and parameter files cannot be run")
-    opendrive = _opendrive(root, path)
-    net = map_net(opendrive, with_oncoming=with_oncoming)
-    lanes = read_opendrive_lanes(net, opendrive)
-    vehicles = read_vehicles(entities, catalogs)
-    reader = _Reader(path, root, findings, lanes, vehicles, storyboard, with_oncoming)
-    return reader.scenario(catalogs, net, opendrive) or read_openscenario(path, values, with_oncoming=True)
-
-
-def _check_version(root: Node) -> None:
     header = root.one("FileHeader")
     major = header.get("revMajor") if header else ""
     if major != "1":
         hint = "; ASAM's package of 1.0 has a stylesheet that migrates files of 0.9" if major == "0" else ""
         message = f"expected OpenSCENARIO XML 1.x (FileHeader's revMajor), got {major or 'none'!r}{hint}"
-        raise InputError(f"{root.file}:{root.line}: {message}")
+        raise InputError(f"{path}:{root.line}: {message}")
+    for one in (one for block in root.all("ParameterDeclarations") for one in block.children):
+        one.attributes["value"] = values.get(one.name, one.attributes.get("value", ""))
+    put_parameters(root, {})
+    to_standard(root)
+    catalogs = Catalogs(root)
+    entities, storyboard = root.one("Entities"), root.one("Storyboard")
+    if entities is None or storyboard is None:
+        raise InputError(f"{path}: expected Entities and a Storyboard; catalogs and parameter files cannot be run")
+    opendrive = _opendrive(root)
+    net = map_net(opendrive, with_oncoming=with_oncoming)
+    lanes = read_opendrive_lanes(net, opendrive)
+    positions = Positions(lanes, catalogs, read_vehicles(entities, catalogs))
+    story = Storyboard(Actions(positions), root)
+    begin = _begin(storyboard, story)
+    if positions.with_oncoming and not with_oncoming:
+        # Vehicles drive on the oncoming lane, which this network does not lead to.
+        return read_openscenario(path, values, with_oncoming=True)
+    read = _scenario(storyboard, story, begin)
+    files = write_generated("openscenario", {"road.net.xml": net, "road.rou.xml": _vehicles_text(begin)})
+    read.data["traffic"] |= {
+        "net": str(files / "road.net.xml"),
+        "routes": [str(files / "road.rou.xml")],
+        "additional": [str(opendrive.resolve())] if is_opendrive(opendrive) else [],
+    }
+    return read
 
 
-def _opendrive(root: Node, path: Path) -> Path:
-    for network in root.all("RoadNetwork"):
-        network.all("TrafficSignals")
+def _opendrive(root: Node) -> Path:
+    root.within("RoadNetwork", "TrafficSignals")
     file = root.within("RoadNetwork", "LogicFile")
     if file is None:
-        raise InputError(f"{path}: RoadNetwork: a LogicFile (OpenDRIVE, .xodr) is needed, for vehicles drive on roads")
+        message = "a LogicFile (OpenDRIVE, .xodr) is needed, for vehicles drive on roads"
+        raise InputError(f"{root.file}: RoadNetwork: {message}")
     try:
-        return find_map(file.get("filepath"), path.parent)
+        return find_map(file.get("filepath"), root.file.parent)
     except InputError as error:
         raise InputError(f"{file.where}: {error}") from error
 
 
-@dataclass
-class _Reader:
-    path: Path
-    root: Node
-    findings: Findings
-    lanes: OpenDriveLanes
-    vehicles: Mapping[str, Vehicle]
-    storyboard: Node
-    with_oncoming: bool
-
-    def scenario(self, catalogs: Catalogs, net: str, opendrive: Path) -> ScenarioData | None:
-        """None if vehicles drive on the oncoming lane, and the network has no way to it."""
-        ego = ego_of(dict(self.vehicles))
-        positions = Positions(self.lanes, catalogs)
-        story = Storyboard(
-            catalogs, Actions(self.vehicles, catalogs, positions, lambda name: _called(name, ego)), self.root
-        )
-        actions = story.actions
-        begin = read_beginning(self.storyboard.one("Init"), self.vehicles, actions)
-        if ego not in begin.spots:
-            # Without a route, no position along it can be measured.
-            self.findings.refuse(
-                self.root, f"no vehicle that could be the ego has a place; there are {len(self.vehicles)}"
-            )
-            self.findings.close(self.path)
-        groups = [one for one in self.storyboard.walk() if one.tag == "Actors"]
-        actors = {sumo_name(one.attributes.get("entityRef", "")) for group in groups for one in group.children}
-        positions.moving |= {ego, *actors, *(name for name in self.vehicles if begin.speed(name))}
-        story.find_events(self.storyboard)
-        if positions.with_oncoming and not self.with_oncoming:
-            return None
-        route = begin.ways[ego]
-        along = along_route(route, begin, self.vehicles, actions)
-        end = math.inf if self.lanes.followers.get(route[-1]) else self.lanes.starts(route)[-1] - NEAR_THE_END
-        story.triggers = triggers = Triggers(self.vehicles, ego, positions, along, story.state, story.value, end)
-        entries = story.timeline()
-        stop = triggers.trigger(self.storyboard.one("StopTrigger"))
-        header = self.root.one("FileHeader")
-        description = header.get("description") if header else ""
-        self.findings.look_for_unread(self.root)
-        self.findings.close(self.path)
-        begin_at_once(entries, begin)
-        for name, vehicle in self.vehicles.items():
-            if vehicle.body:
-                begin.effect.add(name, lamps={"all": "off"})
-        data = {"description": description, **self._data(ego, begin, route)}
-        if begin.environment.box is not None and not data["fog"]["banks"]:
-            message = f"{self.path}: the BoundingBox of the fog lies beside the ego's way: the air is clear there"
-            warnings.warn(message, LeftOutWarning, stacklevel=2)
-        lines: dict[Key, int] = {}
-        first = _initial(begin, ego)
-        timeline = [*first, *(block for _, block in entries)]
-        for place, (node, _) in enumerate(entries, start=len(first)):
-            lines["timeline", place] = node.line
-        for mark in triggers.marks:
-            lines["timeline", len(timeline)] = mark.node.line
-            timeline.append(_mark(mark.name, mark.trigger))
-        data["timeline"] = timeline
-        data |= _ending(stop, data["timeline"])
-        data["expect"] = {entry.names[0]: {"happened": entry.names[0]} for entry in story.entries.values()}
-        files = write_generated(
-            "openscenario", {"road.net.xml": net, "road.rou.xml": vehicles_text(self.vehicles, begin)}
-        )
-        data["traffic"] |= {
-            "net": str(files / "road.net.xml"),
-            "routes": [str(files / "road.rou.xml")],
-            "additional": [str(opendrive.resolve())] if is_opendrive(opendrive) else [],
-        }
-        return ScenarioData(data, lines)
-
-    def _data(self, ego: str, begin: Beginning, route: tuple[str, ...]) -> dict[str, Any]:
-        way = [one for edge in route for one in self.lanes.lanes if one.edge == edge and one.index == 0]
-        light = begin.environment.illuminance
-        return {
-            "name": re.sub(r"[^A-Za-z0-9_.-]", "_", self.path.stem)[:100],
-            "traffic": {
-                "ego": ego,
-                "keep_lane": [name for name in self.vehicles if name not in begin.routed],
-                "stop_before_end_m": NEAR_THE_END,
-            },
-            "fog": fog_block(
-                begin.environment, np.concatenate([one.shape for one in way]), min(one.lowest for one in way)
-            ),
-            **({} if light is None else {"light": {"illuminance_lx": float(f"{light:.4g}")}}),
-        }
+def _begin(storyboard: Node, story: Storyboard) -> Beginning:
+    """Initial state, and the events; InputError without an ego on the road, along whose route positions count."""
+    root, positions = story.root, story.actions.positions
+    begin, vehicles = Beginning(story.actions), positions.vehicles
+    begin.read(storyboard.one("Init"))
+    if vehicles.ego not in positions.spots:
+        root.refuse(f"no vehicle that could be the ego has a place; there are {len(vehicles)}")
+        root.findings.close(root.file)
+    groups = [one for one in storyboard.walk() if one.tag == "Actors"]
+    actors = {sumo_name(one.attributes.get("entityRef", "")) for group in groups for one in group.children}
+    positions.moving |= {vehicles.ego, *actors, *(name for name in vehicles if begin.speed(name))}
+    story.find_events(storyboard)
+    return begin
 
 
-def _called(name: str, ego: str) -> str:
-    return "ego" if name == ego else name
-
-
-def begin_at_once(entries: list[tuple[Node, dict[str, Any]]], begin: Beginning) -> None:
-    """Move speeds that are ordered for the very beginning from the timeline to the initial state."""
+def _scenario(storyboard: Node, story: Storyboard, begin: Beginning) -> ScenarioData:
+    root, positions = story.root, begin.positions
+    ego, lanes, routed = positions.vehicles.ego, positions.lanes, {*begin.effect.routes, *positions.rerouted}
+    route = positions.ways[ego]
+    end = math.inf if lanes.followers.get(route[-1]) else lanes.starts(route)[-1] - NEAR_THE_END
+    story.triggers = Triggers(positions, story.state, story.value, end)
+    entries = story.timeline()
+    stop = story.triggers.trigger(storyboard.one("StopTrigger"))
+    way = [one for edge in route for one in lanes.lanes if one.edge == edge and one.index == 0]
+    fog = fog_block(begin.environment, np.concatenate([one.shape for one in way]), min(one.lowest for one in way))
+    if begin.environment.box and not fog["banks"]:
+        root.remark("the BoundingBox of the fog lies beside the ego's way: the air is clear there")
+    description = root.need("FileHeader").get("description")
+    root.check_read()
+    root.findings.close(root.file)
     for _, block in entries:
-        for vehicle, done in block["do"].items() if block["when"] == "time >= 0 s" and "delay_s" not in block else ():
-            speed = done.get("speed") if isinstance(done, dict) else None
-            if speed is not None and speed.get("shape") == "step":
-                begin.orders.setdefault(vehicle, speed)
+        # What is ordered for the very beginning is the initial speed.
+        is_at_once = block["when"] == "time >= 0 s" and "delay_s" not in block
+        for vehicle, done in block["do"].items() if is_at_once else ():
+            if isinstance(done, dict) and done.get("speed", {}).get("shape") == "step":
+                begin.orders.setdefault(vehicle, done["speed"])
+    for name, vehicle in positions.vehicles.items():
+        if vehicle.body:
+            begin.effect.add(name, lamps={"all": "off"})
+    first, light = _initial(begin), begin.environment.illuminance
+    entries += story.triggers.marks
+    timeline = [*first, *(block for _, block in entries)]
+    data = {
+        "description": description,
+        "name": re.sub(r"[^A-Za-z0-9_.-]", "_", root.file.stem)[:100],
+        "traffic": {
+            "ego": ego,
+            "keep_lane": [name for name in positions.vehicles if name not in routed],
+            "stop_before_end_m": NEAR_THE_END,
+        },
+        "fog": fog,
+        **({} if light is None else {"light": {"illuminance_lx": float(f"{light:.4g}")}}),
+        "timeline": timeline,
+        **_ending(stop, timeline, storyboard),
+        "expect": {entry.names[0]: {"happened": entry.names[0]} for entry in story.entries.values()},
+    }
+    return ScenarioData(data, {("timeline", i): node.line for i, (node, _) in enumerate(entries, start=len(first))})
 
 
-def _initial(begin: Beginning, ego: str) -> list[dict[str, Any]]:
+def _initial(begin: Beginning) -> list[dict[str, Any]]:
     """Entries of the timeline for the initial state: speeds of all but the ego, lamps, and who comes off the lanes."""
-    for name in begin.spots:
+    off_lanes = begin.positions.off_lanes
+    for name in begin.positions.spots:
         speed = begin.speed(name)
         moves = begin.effect.do.get(name, {}).keys() & {"speed", "follow"}
-        if not moves and (name != ego or speed <= STANDS):
+        if not moves and (name != begin.positions.vehicles.ego or speed <= _STANDS):
             begin.effect.add(name, speed={"to_kmh": speed * KMH_PER_MPS, "shape": "step"})
-    there = {name: done for name, done in begin.effect.do.items() if name not in begin.off_lanes}
-    comes = {name: {"path": begin.effect.do[name].pop("path")} for name in begin.off_lanes}
-    later = {name: done for name in begin.off_lanes if (done := begin.effect.do[name])}
+    there = {name: done for name, done in begin.effect.do.items() if name not in off_lanes}
+    comes = {name: {"path": begin.effect.do[name].pop("path")} for name in off_lanes}
+    later = {name: done for name in off_lanes if (done := begin.effect.do[name])}
     parts = {"Init": there, "Init_off_the_lanes": comes, "Init_once_there": later}
     return [{"name": name, "when": "time >= 0 s", "do": done} for name, done in parts.items() if done]
 
 
-def _mark(name: str, trigger: Trigger) -> dict[str, Any]:
-    return {"name": name, "when": trigger.condition, **({"delay_s": trigger.delay} if trigger.delay else {}), "do": {}}
-
-
-def _ending(stop: Trigger | None, timeline: list[dict[str, Any]]) -> dict[str, Any]:
-    """When the run is over."""
+def _ending(stop: Trigger | None, timeline: list[dict[str, Any]], node: Node) -> dict[str, Any]:
     if stop is None or not stop.condition:
         return {"duration_s": USUAL_DURATION}
     if stop.at is not None:
         return {"duration_s": max(stop.at, 0.1)}
     if not stop.delay:
         return {"duration_s": USUAL_DURATION, "end_when": stop.condition}
-    timeline.append(_mark("stop", stop))
+    timeline.append(timeline_entry(node, "stop", stop, {})[1])
     return {"duration_s": USUAL_DURATION, "end_when": "happened(stop)"}
+
+
+def _vehicles_text(begin: Beginning) -> str:
+    """Text of the route file: every vehicle is present from the start, with its initial position and speed."""
+    routed = {*begin.effect.routes, *begin.positions.rerouted}
+    lines, ways = ['<?xml version="1.0" encoding="UTF-8"?>', "<routes>"], begin.positions.ways
+    for name, vehicle in begin.positions.vehicles.items():
+        front, speed = begin.fronts.get(name), begin.speed(name)
+        # Who begins off the lanes comes when its path begins.
+        place: dict[str, object] = {"depart": "triggered", "departSpeed": f"{speed:.4f}"}
+        if front is not None:
+            place = {
+                "depart": "0",
+                "departLane": front.lane.index,
+                "departPos": f"{front.position:.3f}",
+                "departPosLat": f"{front.offset:.3f}",
+                "departSpeed": f"{speed:.4f}",
+                # Exactly where the file has it, however near to the next vehicle.
+                "insertionChecks": "none",
+            }
+        own = _type(vehicle, speed, front.lane.limit if front else math.inf)
+        own |= _FOR_THE_ROUTE_ALONE if name in routed else {}
+        body = f'    <param key="{BODY_PARAMETER}" value="{vehicle.body}"/>'
+        lines += [
+            "  " + element("vType", id=f"type.{name}", **own),
+            "  " + element("route", id=f"route.{name}", edges=" ".join(ways.get(name) or next(iter(ways.values())))),
+            "  " + opening("vehicle", id=name, type=f"type.{name}", route=f"route.{name}", **place),
+            *([body] if vehicle.body else ()),
+            "  </vehicle>",
+        ]
+    return "\n".join([*lines, "</routes>", ""])
+
+
+def _type(vehicle: Vehicle, speed: float, limit: float) -> dict[str, object]:
+    """Attributes of a separate type; its driver's desired speed is the initial one."""
+    return {
+        # Persons and obstacles are on lanes of vehicles as well as on footways.
+        "vClass": "ignoring" if vehicle.body else CLASSES[vehicle.category],
+        "length": f"{vehicle.length:g}",
+        "width": f"{vehicle.width:g}",
+        "height": f"{vehicle.height:g}",
+        "maxSpeed": f"{vehicle.top_speed:g}",
+        "accel": f"{vehicle.acceleration:g}",
+        "decel": f"{vehicle.deceleration:g}",
+        "emergencyDecel": f"{vehicle.deceleration:g}",
+        "speedFactor": f"{speed / limit if speed > _STANDS and math.isfinite(limit) else 1.0:.6f}",
+        "speedDev": "0",
+        "sigma": "0",
+    }

@@ -1,133 +1,90 @@
 """Triggers as conditions of FogSim's language."""
 
-import inspect
 import math
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from fogsim.openscenario.entities import Vehicle
-from fogsim.openscenario.findings import Findings
 from fogsim.openscenario.parameters import RULES
 from fogsim.openscenario.positions import Positions
-from fogsim.openscenario.xml_tree import Node
+from fogsim.openscenario.xml_tree import Node, NodeError, handlers
 
 _DISTANCES = ("longitudinal", "cartesianDistance", "euclidianDistance")
 _EDGES = ("none", "rising", "falling", "risingOrFalling")
-_WORD = re.compile(r"[A-Za-z_][\w:#@\-]*")
-NEAR = 0.05
-"""Difference up to which speeds are equal [m/s]."""
-
+_INEQUALITIES = ("lessThan", "lessOrEqual", "greaterThan", "greaterOrEqual")
+NEAR = 0.05  # Difference up to which speeds are equal [m/s]
 _STILL = 0.1  # Speed below which a vehicle counts as stopped [m/s]
 
 
 @dataclass(frozen=True, slots=True)
 class Trigger:
-    """When something begins: a condition in FogSim's language ("" for never), and a delay after it [s].
-
-    `at` is the time if the condition is only a time [s], below zero for the start. `stays` if it stays true.
-    """
+    """When something begins: a condition in FogSim's language ("" for never), and a delay after it [s]."""
 
     condition: str
     delay: float = 0.0
-    at: float | None = None
-    stays: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Mark:
-    """A timeline entry without action that records that something has happened, for an element."""
-
-    name: str
-    trigger: Trigger
-    node: Node
+    at: float | None = None  # Time, if the condition is only a time [s], below zero for the start
 
 
 AT_ONCE = Trigger("time >= 0 s", at=-1.0)
 NEVER = Trigger("")
 
 
-@dataclass(frozen=True, slots=True)
-class _Test:
-    """A condition: its text, and the comparison if it is one."""
-
-    text: str
-    signal: str = ""
-    rule: str = ""
-    value: str = ""
-    at: float | None = None
+TimelineEntry = tuple[Node, dict[str, Any]]  # With the element that it is for
+_Test = tuple[str, ...]  # The whole text of a condition, or signal, operator and value of a comparison
 
 
 @dataclass
 class Triggers:
-    """Reads triggers.
+    """Reads triggers, with the help of readers of conditions on states of the storyboard, and on values."""
 
-    `along` is the position of an entity or position along the ego's route [m], None off the route; `states` gives the
-    trigger of a storyboard state condition, `values` of one on a parameter or variable; `end` is where the ego's road
-    ends [m]; `marks` become timeline entries without action.
-    """
-
-    vehicles: Mapping[str, Vehicle]
-    ego: str
     positions: Positions
-    along: Callable[[str | Node], float | None]
     states: Callable[[Node], Trigger]
     values: Callable[[Node], Trigger]
-    end: float = math.inf
-    marks: list[Mark] = field(default_factory=list)
-
-    @property
-    def findings(self) -> Findings:
-        """Receives what conditions cannot express."""
-        return self.positions.findings
+    end: float = math.inf  # Of the ego's road [m]
+    marks: list[TimelineEntry] = field(default_factory=list)  # Without action
 
     def trigger(self, node: Node | None) -> Trigger | None:
         """Trigger of a ``StartTrigger`` or ``StopTrigger``; None without one, or for one without groups."""
         groups = [self._group(group) for group in node.all("ConditionGroup")] if node else []
         times = [group.at for group in groups if group.at is not None]
-        if node is None or len(times) == len(groups):
+        if len(times) == len(groups):
             return at_time(min(times)) if times else None
-        if len({group.delay for group in groups}) > 1:
-            groups = [_delayed(group) for group in groups]
+        groups = _of_one_delay(groups)
         phrase = groups[0].condition if len(groups) == 1 else " or ".join(f"({group.condition})" for group in groups)
         return Trigger(phrase, groups[0].delay)
 
     def _group(self, group: Node) -> Trigger:
-        read = [self._condition(one) for one in group.all("Condition")]
+        read = [self._read(one) for one in group.all("Condition")]
         latest = max((trigger.at for trigger in read if trigger.at is not None), default=-1.0)
-        others = [trigger for trigger in read if trigger.at is None]
+        others = _of_one_delay([trigger for trigger in read if trigger.at is None])
         if not others:
             return at_time(latest)
-        if len({trigger.delay for trigger in others}) > 1:
-            others = [_delayed(one) for one in others]
         delay = others[0].delay
         phrase = [f"time >= {latest - delay:g} s"] if latest > delay else []
         parts = list(dict.fromkeys(one.condition for one in others))
         return Trigger(" and ".join([*phrase, *(_bracketed(one, len(parts) + len(phrase)) for one in parts)]), delay)
 
-    def _condition(self, node: Node) -> Trigger:
-        delay = self.findings.number(node, "delay", 0.0)
-        edge = self.findings.word(node, "conditionEdge", _EDGES, "none")
-        for kind in node.all("ByValueCondition"):
-            for one in kind.all():
-                return self._by_value(one, edge, delay)
-        for kind in node.all("ByEntityCondition"):
-            # Who is at the end of the road stays there.
-            ends = [one for each in kind.all("EntityCondition") for one in each.all("EndOfRoadCondition")]
-            stays = sum(self.findings.number(one, "duration") for one in ends)
-            return Trigger(self._by_entities(kind, edge), delay + stays)
-        self.findings.refuse(node, "expected a ByValueCondition or a ByEntityCondition")
-        return NEVER
+    def _read(self, node: Node) -> Trigger:
+        delay, edge = node.number("delay", 0.0), node.word("conditionEdge", _EDGES, "none")
+        test, read = next((one for kind in node.all("ByValueCondition") for one in kind.all()), None), NEVER
+        with node.refusing():
+            if test:
+                read = self._by_value(test, edge, delay)
+            else:
+                by_entity = node.need("ByEntityCondition")
+                # Who is at the end of the road stays there.
+                end = by_entity.within("EntityCondition", "EndOfRoadCondition")
+                read = Trigger(self._by_entities(by_entity, edge), delay + (end.number("duration") if end else 0.0))
+        return read
 
     def _by_value(self, node: Node, edge: str, delay: float) -> Trigger:
         if edge == "falling" and node.get("rule") not in ("lessThan", "lessOrEqual"):
-            self.findings.refuse(node, "conditionEdge: what has begun does not end again; write rising")
+            node.refuse("conditionEdge: what has begun does not end again; write rising")
         if node.tag == "SimulationTimeCondition":
-            value = self.findings.number(node, "value")
-            rule = self.findings.word(node, "rule", tuple(rule for rule in RULES if rule != "notEqualTo"))
+            value, rule = node.number("value"), node.word("rule", tuple(rule for rule in RULES if rule != "notEqualTo"))
             if rule in ("lessThan", "lessOrEqual"):
-                test = _Test(f"time {RULES[rule]} {value:g} s", "time", RULES[rule], f"{value:g} s")
-                return Trigger(self._edged(test, edge, node), delay)
+                return Trigger(self._edged(("time", RULES[rule], f"{value:g} s"), edge, node), delay)
             return Trigger(f"time >= {value + delay:g} s", at=value + delay)
         if node.tag == "StoryboardElementStateCondition":
             found = self.states(node)
@@ -136,253 +93,154 @@ class Triggers:
             return replace(found, delay=found.delay + delay)
         if node.tag in ("ParameterCondition", "VariableCondition"):
             return replace(self.values(node), delay=delay)
-        self.findings.refuse(node, "FogSim has no such condition")
-        return NEVER
+        raise NodeError(node, "FogSim has no such condition")
 
     def _by_entities(self, node: Node, edge: str) -> str:
-        triggering = node.one("TriggeringEntities")
-        test = next((one for kind in node.all("EntityCondition") for one in kind.all()), None)
-        if triggering is None or test is None:
-            self.findings.refuse(node, "expected TriggeringEntities and an EntityCondition")
-            return ""
-        rule = self.findings.word(triggering, "triggeringEntitiesRule", ("any", "all"))
-        names = [one.get("entityRef") for one in triggering.all("EntityRef")]
-        if not names:
-            self.findings.refuse(triggering, "expected an EntityRef at least")
-        if test.tag not in _TESTS:
-            self.findings.refuse(test, "FogSim has no such condition")
-            return ""
-        tests = [_TESTS[test.tag](self, test, name) for name in names if self._is_known(triggering, name)]
-        phrase = [self._edged(one, edge, node) for one in tests if one is not None]
+        triggering, test = node.need("TriggeringEntities"), node.need("EntityCondition").one()
+        if test is None or test.tag not in CONDITIONS:
+            raise NodeError(test or node, "FogSim has no such condition")
+        rule, phrase = triggering.word("triggeringEntitiesRule", ("any", "all")), []
+        for one in triggering.some("EntityRef"):
+            with test.refusing():
+                vehicle = self.positions.vehicles.of(one)
+                phrase.append(self._edged(CONDITIONS[test.tag](self, test, vehicle), edge, node))
         return (" and " if rule == "all" else " or ").join(_bracketed(one, len(phrase)) for one in phrase)
 
     def _edged(self, test: _Test, edge: str, node: Node) -> str:
-        if edge == "none" or not test.text:
-            return test.text
+        text, is_rising = " ".join(test), edge == "rising"
+        if edge == "none":
+            return text
         if edge == "risingOrFalling":
             return f"({self._edged(test, 'rising', node)}) or ({self._edged(test, 'falling', node)})"
-        is_rising = edge == "rising"
-        if test.signal and test.rule in ("<", "<=", ">", ">="):
-            how = "rises above" if (test.rule[0] == ">") == is_rising else "falls below"
-            return f"{test.signal} {how} {test.value}"
+        if len(test) > 1:
+            signal, rule, value = test
+            return f"{signal} {'rises above' if (rule[0] == '>') == is_rising else 'falls below'} {value}"
         # An edge: the condition was different before.
         name = f"before_{len(self.marks)}"
-        now, before = (test.text, f"not ({test.text})") if is_rising else (f"not ({test.text})", test.text)
-        self.mark(name, Trigger(before), node)
+        now, before = (text, f"not ({text})") if is_rising else (f"not ({text})", text)
+        self.marks.append(timeline_entry(node, name, Trigger(before), {}))
         return f"happened({name}) and ({now})"
 
-    def mark(self, name: str, trigger: Trigger, node: Node) -> None:
-        """Add a mark."""
-        self.marks.append(Mark(name, trigger, node))
+    def _compared(self, node: Node, signal: str, unit: str) -> _Test:
+        node.word("direction", ("longitudinal",), "longitudinal")
+        value, rule = node.number("value"), RULES[node.word("rule", tuple(RULES))]
+        if rule not in ("==", "!="):
+            return signal, rule, f"{value:.9g} {unit}"
+        if unit != "m/s":
+            raise ValueError("rule: places and times are never exactly equal; take less or greater")
+        about = f"{signal} > {value - NEAR:.9g} {unit} and {signal} < {value + NEAR:.9g} {unit}"
+        return (about if rule == "==" else f"not ({about})",)
 
-    def _is_known(self, node: Node, name: str) -> bool:
-        if name not in self.vehicles:
-            self.findings.refuse(node, f"there is no vehicle {name!r}")
-        return name in self.vehicles
-
-    def called(self, vehicle: str) -> str:
-        """A vehicle as conditions name it."""
-        return "ego" if vehicle == self.ego else vehicle if _WORD.fullmatch(vehicle) else f'"{vehicle}"'
-
-    def _compared(self, node: Node, signal: str, unit: str, shift: float = 0.0) -> _Test:
-        value = self.findings.number(node, "value") + shift
-        rule = RULES[self.findings.word(node, "rule", tuple(RULES))]
-        if rule in ("==", "!=") and unit == "m/s":
-            about = f"{signal} > {value - NEAR:.9g} {unit} and {signal} < {value + NEAR:.9g} {unit}"
-            return _Test(about if rule == "==" else f"not ({about})")
-        if rule in ("==", "!="):
-            self.findings.refuse(node, "rule: places and times are never exactly equal; take less or greater")
-        return _Test(f"{signal} {rule} {value:.9g} {unit}", signal, rule, f"{value:.9g} {unit}")
-
-    def _along(self, node: Node, signal: str, unit: str) -> _Test:
-        self.findings.word(node, "direction", ("longitudinal",), "longitudinal")
-        return self._compared(node, signal, unit)
-
-    def _is_less(self, node: Node) -> bool:
-        """Whether a distance shall be less than its value."""
-        return self.findings.word(node, "rule", ("lessThan", "lessOrEqual", "greaterThan", "greaterOrEqual"))[0] == "l"
-
-    def _speed(self, node: Node, name: str) -> _Test:
+    def speed_condition(self, node: Node, one: Vehicle) -> _Test:
         """`X.speed`."""
-        return self._along(node, f"{self.called(name)}.speed", "m/s")
+        return self._compared(node, f"{one.called}.speed", "m/s")
 
-    def _acceleration(self, node: Node, name: str) -> _Test:
+    def acceleration_condition(self, node: Node, one: Vehicle) -> _Test:
         """`X.acceleration`."""
-        return self._along(node, f"{self.called(name)}.acceleration", "m/s²")
+        return self._compared(node, f"{one.called}.acceleration", "m/s²")
 
-    def _relative_speed(self, node: Node, name: str) -> _Test | None:
+    def relative_speed_condition(self, node: Node, one: Vehicle) -> _Test:
         """`speed_difference(X, Y)`."""
-        other = node.get("entityRef")
-        if not self._is_known(node, other):
-            return None
-        return self._along(node, f"speed_difference({self.called(name)}, {self.called(other)})", "m/s")
+        other = self.positions.vehicles.of(node)
+        return self._compared(node, f"speed_difference({one.called}, {other.called})", "m/s")
 
-    def _stands(self, node: Node, name: str) -> _Test:
+    def stand_still_condition(self, node: Node, one: Vehicle) -> _Test:
         """`X.speed < 0.1 m/s for` its duration."""
-        duration = self.findings.number(node, "duration")
-        still = f"{self.called(name)}.speed < {_STILL} m/s"
-        return _Test(f"{still} for {duration:g} s" if duration > 0.0 else still)
+        duration = node.number("duration")
+        return (f"{one.called}.speed < {_STILL} m/s" + (f" for {duration:g} s" if duration > 0.0 else ""),)
 
-    def _traveled(self, node: Node, name: str) -> _Test | None:
+    def traveled_distance_condition(self, node: Node, one: Vehicle) -> _Test:
         """`X.position`, from where the vehicle begins; it must begin on the ego's route."""
-        return self._at_or_beyond(node, name, self.along(name))
+        begin = self.positions.along_ego(one)
+        if begin is None:
+            raise ValueError(f"{one.name} does not begin on the ego's route, along which FogSim measures")
+        return f"{one.called}.position", ">=", f"{begin + node.number('value'):.3f} m"
 
-    def _ends(self, node: Node, name: str) -> _Test | None:
+    def end_of_road_condition(self, node: Node, one: Vehicle) -> _Test:
         """`X.position` at the end of the ego's road, or of its route."""
         if not math.isfinite(self.end):
-            self.findings.refuse(node, "the ego's road has no end")
-        return _Test(f"{self.called(name)}.position >= {self.end:.3f} m")
+            node.refuse("the ego's road has no end")
+        return (f"{one.called}.position >= {self.end:.3f} m",)
 
-    def _at_or_beyond(self, node: Node, name: str, begin: float | None) -> _Test | None:
-        if begin is None:
-            self.findings.refuse(node, f"{name} does not begin on the ego's route, along which FogSim measures")
-            return None
-        value = f"{begin + self.findings.number(node, 'value'):.3f} m"
-        signal = f"{self.called(name)}.position"
-        return _Test(f"{signal} >= {value}", signal, ">=", value)
-
-    def _relative_distance(self, node: Node, name: str) -> _Test | None:
+    def relative_distance_condition(self, node: Node, one: Vehicle) -> _Test:
         """`gap(X, Y)`, ahead or behind; straight `clearance(X, Y)`; without `freespace` between rear axles."""
-        other = node.get("entityRef")
-        if not self._is_known(node, other):
-            return None
-        if self._is_along(node):
-            return self._along_the_road(node, name, other)
-        pair = f"{self.called(name)}, {self.called(other)}"
-        if self.findings.flag(node, "freespace"):
-            return self._compared(node, f"clearance({pair})", "m")
-        rear = f"{self.vehicles[name].front:g} m, {self.vehicles[other].front:g} m"
-        return self._compared(node, f"distance({pair}, {rear})", "m")
+        other, is_along, is_free = self.positions.vehicles.of(node), self._is_along(node), node.flag("freespace")
+        pair = f"{one.called}, {other.called}"
+        if not is_along:
+            straight = f"clearance({pair})" if is_free else f"distance({pair}, {one.front:g} m, {other.front:g} m)"
+            return self._compared(node, straight, "m")
+        ahead, behind = (0.0, 0.0) if is_free else (one.front + other.rear, one.rear + other.front)
+        gap, value = f"gap({pair})", node.number("value")
+        near, far = f"{value - ahead:.9g} m", f"{behind - value:.9g} m"
+        if node.word("rule", _INEQUALITIES)[0] == "l":
+            return (f"{gap} < {near} and {gap} > {far}",)
+        return (f"{gap} > {near} or {gap} < {far}",)
 
     def _is_along(self, node: Node, default: str = "euclidianDistance") -> bool:
         """Whether a distance is along the road, not straight; entities' own axes are taken as along the road."""
-        self.findings.word(node, "coordinateSystem", ("entity", "lane", "road"), "entity")
-        return self.findings.word(node, "relativeDistanceType", _DISTANCES, default) == "longitudinal"
+        node.word("coordinateSystem", ("entity", "lane", "road"), "entity")
+        return node.word("relativeDistanceType", _DISTANCES, default) == "longitudinal"
 
-    def _along_the_road(self, node: Node, name: str, other: str) -> _Test:
-        one, far = self.vehicles[name], self.vehicles[other]
-        free = self.findings.flag(node, "freespace")
-        ahead = 0.0 if free else one.front + far.rear
-        behind = 0.0 if free else one.rear + far.front
-        value = self.findings.number(node, "value")
-        gap, near = f"gap({self.called(name)}, {self.called(other)})", (value - ahead, behind - value)
-        if self._is_less(node):
-            return _Test(f"{gap} < {near[0]:.9g} m and {gap} > {near[1]:.9g} m")
-        return _Test(f"{gap} > {near[0]:.9g} m or {gap} < {near[1]:.9g} m")
-
-    def _distance(self, node: Node, name: str) -> _Test | None:
+    def distance_condition(self, node: Node, one: Vehicle) -> _Test:
         """`distance_to` a position; along the road `X.position` about it; without `freespace` of the rear axle."""
-        is_along, is_free = self._is_along(node), self.findings.flag(node, "freespace")
-        if not (is_along or self.findings.flag(node, "alongRoute", "false")):
+        is_along, is_free = self._is_along(node), node.flag("freespace")
+        if not (is_along or node.flag("alongRoute", "false")):
             if is_free:
-                self.findings.refuse(
-                    node, "freespace: straight distances to a position are of the rear axle; write false"
-                )
-            signal = self._distance_to(node, name)
-            return None if signal is None else self._compared(node, signal, "m")
-        place, free, vehicle = self._place_along(node), is_free, self.vehicles[name]
+                node.refuse("freespace: straight distances to a position are of the rear axle; write false")
+            return self._compared(node, self._distance_to(node, one), "m")
+        place = self.positions.along_ego(node.need("Position"))
         if place is None:
-            return None
-        value, signal = self.findings.number(node, "value"), f"{self.called(name)}.position"
-        near = place - value + (0.0 if free else vehicle.front)
-        far = place + value + (vehicle.length if free else vehicle.front)
-        if self._is_less(node):
-            return _Test(f"{signal} > {near:.3f} m and {signal} < {far:.3f} m")
-        return _Test(f"{signal} < {near:.3f} m or {signal} > {far:.3f} m")
+            raise ValueError("its position is not on the ego's route, along which FogSim measures")
+        value, signal = node.number("value"), f"{one.called}.position"
+        near = f"{place - value + (0.0 if is_free else one.front):.3f} m"
+        far = f"{place + value + (one.length if is_free else one.front):.3f} m"
+        if node.word("rule", _INEQUALITIES)[0] == "l":
+            return (f"{signal} > {near} and {signal} < {far}",)
+        return (f"{signal} < {near} or {signal} > {far}",)
 
-    def _reaches(self, node: Node, name: str) -> _Test | None:
+    def reach_position_condition(self, node: Node, one: Vehicle) -> _Test:
         """`distance_to` a position; on the ego's route, ahead of the vehicle, `X.position` from its tolerance on."""
-        position, around = node.one("Position"), self.findings.number(node, "tolerance")
-        place, begins = None if position is None else self.along(position), self.along(name)
-        if place is not None and begins is not None:
-            near = place + self.vehicles[name].front - around
-            if begins < near:
-                # However far it drives between two looks, it has been there.
-                signal = f"{self.called(name)}.position"
-                return _Test(f"{signal} >= {near:.3f} m", signal, ">=", f"{near:.3f} m")
-        reached = self._distance_to(node, name)
-        return None if reached is None else _Test(f"{reached} <= {around:.9g} m", reached, "<=", f"{around:.9g} m")
+        around = node.number("tolerance")
+        place, begins = self.positions.along_ego(node.need("Position")), self.positions.along_ego(one)
+        if place is not None and begins is not None and begins < place + one.front - around:
+            # However far it drives between two looks, it has been there.
+            return f"{one.called}.position", ">=", f"{place + one.front - around:.3f} m"
+        return self._distance_to(node, one), "<=", f"{around:.9g} m"
 
-    def _distance_to(self, node: Node, name: str) -> str | None:
-        """Straight distance of a vehicle's rear axle to a position."""
-        position = node.one("Position")
-        relative = position.one("RelativeObjectPosition") if position else None
-        if relative and not relative.children and not self.findings.number(relative, "dy", 0.0):
-            other = relative.get("entityRef")
-            if not self._is_known(relative, other):
-                return None
-            behind = self.vehicles[other].front - self.findings.number(relative, "dx", 0.0)
-            return f"distance({self.called(name)}, {self.called(other)}, {self.vehicles[name].front:g} m, {behind:g} m)"
-        try:
-            x, y, *_ = self.positions.point(position if position else node)
-        except ValueError as error:
-            self.findings.refuse(node, str(error))
-            return None
-        return f"distance_to({self.called(name)}, {self.vehicles[name].front:g} m, {x:.3f} m, {y:.3f} m)"
+    def _distance_to(self, node: Node, one: Vehicle) -> str:
+        position = node.need("Position")
+        relative = position.one("RelativeObjectPosition")
+        if relative and not relative.children and not relative.number("dy", 0.0):
+            other = self.positions.vehicles.of(relative)
+            behind = other.front - relative.number("dx", 0.0)
+            return f"distance({one.called}, {other.called}, {one.front:g} m, {behind:g} m)"
+        x, y, *_ = self.positions.point(position)
+        return f"distance_to({one.called}, {one.front:g} m, {x:.3f} m, {y:.3f} m)"
 
-    def _place_along(self, node: Node) -> float | None:
-        position = node.one("Position")
-        place = None if position is None else self.along(position)
-        if place is None:
-            self.findings.refuse(node, "its position is not on the ego's route, along which FogSim measures")
-        return place
-
-    def _headway(self, node: Node, name: str) -> _Test | None:
+    def time_headway_condition(self, node: Node, one: Vehicle) -> _Test:
         """`headway(X, Y, LENGTH)`, without `freespace` from rear axle to rear axle; nothing unless Y is ahead."""
-        return self._between(node, name, node.get("entityRef"), "headway")
+        return self._between(node, one, node, "headway")
 
-    def _time_to_collision(self, node: Node, name: str) -> _Test | None:
+    def time_to_collision_condition(self, node: Node, one: Vehicle) -> _Test:
         """`ttc(X, Y, LENGTH)`, likewise; nothing unless they approach."""
-        target = node.within("TimeToCollisionConditionTarget", "EntityRef")
-        if target is None:
-            self.findings.refuse(node, "times to collision are with an entity")
-            return None
-        return self._between(node, name, target.get("entityRef"), "ttc")
+        return self._between(node, one, node.need("TimeToCollisionConditionTarget").need("EntityRef"), "ttc")
 
-    def _between(self, node: Node, name: str, other: str, signal: str) -> _Test | None:
+    def _between(self, node: Node, one: Vehicle, target: Node, signal: str) -> _Test:
         if not self._is_along(node, "longitudinal"):
-            self.findings.refuse(node, "relativeDistanceType: times are of distances along the road (longitudinal)")
-        if not self._is_known(node, other):
-            return None
-        further = (
-            0.0 if self.findings.flag(node, "freespace") else self.vehicles[name].front + self.vehicles[other].rear
-        )
-        return self._compared(node, f"{signal}({self.called(name)}, {self.called(other)}, {further:g} m)", "s")
+            node.refuse("relativeDistanceType: times are of distances along the road (longitudinal)")
+        other = self.positions.vehicles.of(target)
+        further = 0.0 if node.flag("freespace") else one.front + other.rear
+        return self._compared(node, f"{signal}({one.called}, {other.called}, {further:g} m)", "s")
 
-    def _collides(self, node: Node, name: str) -> _Test:
+    def collision_condition(self, node: Node, one: Vehicle) -> _Test:
         """`X.collision`, with anybody or a vehicle: `X.collision and Y.collision`."""
         for kind in node.all("ByType"):
-            self.findings.word(kind, "type", ("vehicle",))
-        phrase = [self.called(name)]
-        for other in node.all("EntityRef"):
-            phrase += [self.called(other.get("entityRef"))] if self._is_known(other, other.get("entityRef")) else []
-        return _Test(" and ".join(f"{one}.collision" for one in phrase))
+            kind.word("type", ("vehicle",))
+        both = (one, *map(self.positions.vehicles.of, node.all("EntityRef")))
+        return (" and ".join(f"{each.called}.collision" for each in both),)
 
 
-_TESTS: Mapping[str, Callable[[Triggers, Node, str], _Test | None]] = {
-    "SpeedCondition": Triggers._speed,
-    "AccelerationCondition": Triggers._acceleration,
-    "RelativeSpeedCondition": Triggers._relative_speed,
-    "StandStillCondition": Triggers._stands,
-    "TraveledDistanceCondition": Triggers._traveled,
-    "EndOfRoadCondition": Triggers._ends,
-    "RelativeDistanceCondition": Triggers._relative_distance,
-    "DistanceCondition": Triggers._distance,
-    "ReachPositionCondition": Triggers._reaches,
-    "TimeHeadwayCondition": Triggers._headway,
-    "TimeToCollisionCondition": Triggers._time_to_collision,
-    "CollisionCondition": Triggers._collides,
-}
-
-CONDITIONS: Mapping[str, str] = {
-    "SimulationTimeCondition": "`time`.",
-    "ParameterCondition": "`happened(EVENT)` that sets it, if that makes a difference; otherwise always or never.",
-    "VariableCondition": "As `ParameterCondition`.",
-    "StoryboardElementStateCondition": "`happened(EVENT)`, for states of beginning, and of being over by the time that "
-    "the actions take.",
-    **{tag: inspect.getdoc(test) or "" for tag, test in _TESTS.items()},
-}
-"""Conditions that are read, and their translation."""
+CONDITIONS = handlers(Triggers, "condition")
 
 
 def at_time(time: float) -> Trigger:
@@ -401,11 +259,20 @@ def both(first: Trigger, then: Trigger) -> Trigger:
     return Trigger(f"{_bracketed(first.condition, 2)} and {_bracketed(then.condition, 2)}", then.delay)
 
 
-def _delayed(trigger: Trigger) -> Trigger:
-    """A trigger with its delay in its condition."""
-    if not trigger.delay or not trigger.condition:
-        return trigger
-    return Trigger(f"({trigger.condition}) delayed {trigger.delay:g} s", stays=trigger.stays)
+def timeline_entry(node: Node, name: str, trigger: Trigger, do: Mapping[str, Any], until: str = "") -> TimelineEntry:
+    """An entry of the timeline for an element."""
+    when = f"({trigger.condition}) and {until}" if until else trigger.condition
+    return node, {"name": name, "when": when, **({"delay_s": trigger.delay} if trigger.delay else {}), "do": do}
+
+
+def _of_one_delay(triggers: list[Trigger]) -> list[Trigger]:
+    """Triggers with their delays in their conditions if these differ."""
+    if len({one.delay for one in triggers}) <= 1:
+        return triggers
+    return [
+        Trigger(f"({one.condition}) delayed {one.delay:g} s") if one.delay and one.condition else one
+        for one in triggers
+    ]
 
 
 def _bracketed(condition: str, count: int) -> str:

@@ -1,14 +1,21 @@
-"""Elements of an XML file with their lines and paths, and a record of what was read."""
+"""Elements of an XML file: their lines and paths, what was read of them, and what FogSim cannot do of them."""
 
+import contextlib
+import math
 import re
-from collections.abc import Iterator
+import warnings
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
+from fogsim.errors import InputError, LeftOutWarning, shown, suggest
 from fogsim.files.xml_reader import XmlFile
+from fogsim.openscenario.elements import HARMLESS, REFUSED
 
-MOST_BYTES, MOST_ELEMENTS = 20_000_000, 500_000
-"""Largest file that is read [bytes], and its maximum number of elements."""
+MOST_BYTES, MOST_ELEMENTS = 20_000_000, 500_000  # of a file
+_NAMESPACES = ("xmlns", "xml:", "xsi:")
+_UNKNOWN = "FogSim does not know this {} here"
 
 
 def sumo_name(name: str) -> str:
@@ -16,19 +23,41 @@ def sumo_name(name: str) -> str:
     return re.sub(r"[^\w.:#@\-]", lambda found: f"%{ord(found[0]):02X}", name)
 
 
+@dataclass
+class Findings:
+    """Lines about what FogSim cannot do of a file and its catalogs, and about what it leaves out; each once."""
+
+    refused: dict[str, None] = field(default_factory=dict)
+    remarks: dict[str, None] = field(default_factory=dict)
+
+    def close(self, path: Path) -> None:
+        """Report all findings; InputError if FogSim cannot do something."""
+        if self.refused:
+            raise InputError("\n".join(self.refused))
+        if self.remarks:
+            message = "\n".join(f"  {line.removeprefix(f'{path}:')}" for line in self.remarks)
+            warnings.warn(f"{path}: left out, or read otherwise than written:\n{message}", LeftOutWarning, stacklevel=2)
+
+
+class NodeError(ValueError):
+    """What FogSim cannot do, at an element."""
+
+    def __init__(self, node: "Node", message: str) -> None:
+        super().__init__(message)
+        self.node = node
+
+
 @dataclass(slots=True)
 class Node:
-    """An element, with its file and line; `label` is its tag with its name in brackets.
-
-    `is_read` and `read` record whether the element and which of its attributes were used; a name always is, in `label`.
-    """
+    """An element; `is_read` and `read` record whether it and which of its attributes were used (names always are)."""
 
     tag: str
     attributes: dict[str, str]
     file: Path
     line: int
-    label: str = ""
+    label: str = ""  # Its tag with its name in brackets
     above: "Node | None" = field(default=None, repr=False, compare=False)
+    findings: Findings = field(default_factory=Findings, repr=False, compare=False)
     children: list["Node"] = field(default_factory=list)
     is_read: bool = False
     read: set[str] = field(default_factory=lambda: {"name"})
@@ -43,6 +72,11 @@ class Node:
         """File, line and path."""
         return f"{self.file}:{self.line}: {self.path}"
 
+    @property
+    def name(self) -> str:
+        """Name of the element, "" without one."""
+        return self.attributes.get("name", "")
+
     def get(self, key: str, default: str = "") -> str:
         """Value of an attribute; references to entities are as SUMO names these."""
         self.is_read = True
@@ -50,17 +84,58 @@ class Node:
         value = self.attributes.get(key, default).strip()
         return sumo_name(value) if key in ("entityRef", "masterEntityRef") else value
 
+    def number(self, key: str, default: float | None = None, *, is_finite: bool = True) -> float:
+        """Number of an attribute; an invalid one, or a missing one without default, becomes a finding."""
+        text = self.get(key)
+        if not text and default is not None:
+            return default
+        with contextlib.suppress(ValueError):
+            value = float(text)
+            if not (math.isnan(value) or (is_finite and math.isinf(value))):
+                return value
+        self.refuse(f"expected a number for {key}, got {shown(text or 'nothing')}", is_whole=False)
+        return 0.0
+
+    def word(self, key: str, allowed: tuple[str, ...], default: str = "") -> str:
+        """Word of an attribute; one that is not allowed becomes a finding."""
+        text = self.get(key) or default
+        if text in allowed:
+            return text
+        fault = f"FogSim has no {shown(text)} here; {suggest(text, allowed)}"
+        missing = f"this attribute is missing; expected {' or '.join(allowed)}"
+        self.refuse(f"{key}: {fault if text else missing}", is_whole=False)
+        return allowed[0]
+
+    def flag(self, key: str, default: str = "") -> bool:
+        """Truth value of an attribute, in large or small letters, or as 1 or 0; any other becomes a finding."""
+        text = {"1": "true", "0": "false"}.get(self.get(key), self.get(key).lower()) or default
+        if text not in ("true", "false"):
+            self.refuse(f"{key}: expected true or false, got {shown(text or 'nothing')}", is_whole=False)
+        return text == "true"
+
     def all(self, *tags: str) -> list["Node"]:
         """Child elements with one of these tags, or all."""
-        self.is_read = True
         found = [child for child in self.children if child.tag in tags or not tags]
-        for child in found:
-            child.is_read = True
+        for one in (self, *found):
+            one.is_read = True
         return found
 
     def one(self, *tags: str) -> "Node | None":
         """First child element with one of these tags."""
         return next(iter(self.all(*tags)), None)
+
+    def need(self, *tags: str) -> "Node":
+        """First child element with one of these tags; NodeError without one."""
+        found = self.one(*tags)
+        if found is None:
+            inside = ", ".join(dict.fromkeys(child.tag for child in self.children))
+            raise NodeError(self, f"expected {' or '.join(tags)} inside, got {shown(inside) if inside else 'nothing'}")
+        return found
+
+    def some(self, *tags: str) -> list["Node"]:
+        """Child elements with one of these tags; NodeError without one."""
+        self.need(*tags)
+        return self.all(*tags)
 
     def within(self, *path: str) -> "Node | None":
         """Element at the end of a path of tags."""
@@ -69,10 +144,14 @@ class Node:
             node = None if node is None else node.one(tag)
         return node
 
-    def copy(self) -> "Node":
-        """An independent copy of it and all its descendants, with the same parent."""
-        children = [child.copy() for child in self.children]
-        return replace(self, attributes=dict(self.attributes), children=children, read=set(self.read))
+    def copy(self, findings: Findings | None = None) -> "Node":
+        """An independent copy of it and all its descendants, with the same parent; what it finds goes to `findings`."""
+        to = findings or self.findings
+        new = replace(self, attributes=dict(self.attributes), read=set(self.read), findings=to)
+        new.children = [child.copy(to) for child in self.children]
+        for child in new.children:
+            child.above = new
+        return new
 
     def walk(self) -> Iterator["Node"]:
         """The element and all its descendants."""
@@ -80,32 +159,75 @@ class Node:
         for child in self.children:
             yield from child.walk()
 
+    def refuse(self, message: str, *, is_whole: bool = True) -> None:
+        """Record what FogSim cannot do, of the element as a whole or of something about it."""
+        self.findings.refused.setdefault(f"{self.where}: {message}")
+        self.see(is_whole=is_whole)
 
-def read_xml(path: Path) -> Node:
+    def remark(self, message: str, *, is_whole: bool = False) -> None:
+        """Record how the element is read, where a user might expect something else, or that it is left out whole."""
+        self.findings.remarks.setdefault(f"{self.where}: {message}")
+        self.see(is_whole=is_whole)
+
+    def see(self, *, is_whole: bool = True) -> None:
+        """Mark the element and its descendants as read, so that it is reported once."""
+        for one in self.walk() if is_whole else ():
+            one.is_read = True
+            one.read.update(one.attributes)
+
+    @contextlib.contextmanager
+    def refusing(self) -> Iterator[None]:
+        """Refuse the element, or the one that the error names, for a ValueError."""
+        try:
+            yield
+        except ValueError as error:
+            getattr(error, "node", self).refuse(str(error))
+            self.see()
+
+    def check_read(self) -> None:
+        """Refuse elements and attributes that were not read, unless they are harmless."""
+        if self.tag in HARMLESS:
+            return
+        if not self.is_read:
+            self.refuse(REFUSED.get(self.tag, _UNKNOWN.format("element")))
+            return
+        for key in sorted(self.attributes.keys() - self.read):
+            name = f"{self.tag}@{key}"
+            if name not in HARMLESS and not key.startswith(_NAMESPACES):
+                message = REFUSED.get(name, _UNKNOWN.format("attribute"))
+                self.refuse(f"{key}={shown(self.attributes[key])}: {message}", is_whole=False)
+        for child in self.children:
+            child.check_read()
+
+
+def handlers(reader: type, kind: str) -> dict[str, Callable[..., Any]]:
+    """Methods that read elements of a kind, by tag: ``lane_change_action`` reads each ``LaneChangeAction``."""
+    named = ((name.split("_"), method) for one in reversed(reader.mro()) for name, method in vars(one).items())
+    return {"".join(map(str.capitalize, words)): method for words, method in named if words[-1] == kind}
+
+
+def read_xml(path: Path, findings: Findings | None = None) -> Node:
     """Read a file; nothing outside it is loaded, and document types raise InputError."""
-    builder = _Builder(path)
+    builder = _Builder(path, findings or Findings())
     builder.file.read_all(builder, MOST_BYTES, MOST_ELEMENTS)
-    return builder.root
+    return builder.root.children[0]
 
 
 class _Builder:
     is_done = False
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, findings: Findings) -> None:
         self.file = XmlFile(path)
-        self.root = Node("", {}, path, 1)
-        self._path = path
-        self._open: list[Node] = []
+        self.root = Node("", {}, path, 1, findings=findings)
+        self._open = [self.root]
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
-        above = self._open[-1] if self._open else None
+        above = self._open[-1]
         name = attributes.get("name") or attributes.get("entityRef")
-        node = Node(tag, attributes, self._path, self.file.line, f"{tag}[{name}]" if name else tag, above)
-        if above is None:
-            self.root = node
-        else:
-            above.children.append(node)
-        self._open.append(node)
+        label = f"{tag}[{name}]" if name else tag
+        parent = above if above.tag else None
+        above.children.append(Node(tag, attributes, above.file, self.file.line, label, parent, above.findings))
+        self._open.append(above.children[-1])
 
     def end(self, _: str) -> None:
         self._open.pop()

@@ -51,7 +51,7 @@ def test_old_and_distant_measurements_fade(render, road):
     later = Frame(8.0, render(road.but(visibility=240.0)), road.camera)
     second = estimator.update(Observation(later, speed=25.0))
     assert first.visibility == pytest.approx(60.0, rel=0.1)
-    assert 150.0 < second.visibility < 240.0
+    assert 120.0 < second.visibility < 240.0
     assert second.standard_deviation > second.diagnostics["rough"].standard_deviation
     assert second.diagnostics["measurements"] == 2
     blind = estimator.update(Observation(Frame(9.0, np.zeros((480, 640), np.uint8), road.camera), speed=25.0))

@@ -85,7 +85,7 @@ def test_a_verge_beside_the_lane_is_no_road(render, road, visibility):
 
 
 def test_a_wood_along_the_horizon_is_not_taken_for_the_sky(render, road):
-    image = render(road.but(visibility=1e6))
+    image = render(road.but(visibility=1e6, terrain=70.0))
     horizon = int(road.camera.horizon_row)
     image[horizon - 45 : horizon] = 20
     found = estimate(image, road.camera)

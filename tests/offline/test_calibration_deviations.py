@@ -15,7 +15,7 @@ DEVIATIONS = CalibrationDeviations(focal_length=0.03, mount_height=0.04)
 
 def test_relative_deviations_add_in_quadrature_to_those_of_methods_on_the_road() -> None:
     depths = OpticalDepths((50.0,), (1.0,), (0.1,))
-    estimate = Estimate("negru2013", 0.02, 0.001, optical_depths=depths)
+    estimate = Estimate("night_road", 0.02, 0.001, optical_depths=depths)
     widened = DEVIATIONS.widened(estimate)
     assert widened.extinction == 0.02
     # 5 % of k, next to its own 5 %, which counts a little more on an uncertain scale.

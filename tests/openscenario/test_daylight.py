@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from fogsim.openscenario.daylight import clear_sky_illuminance, sun_elevation, through_clouds
+from fogsim.openscenario.environment import clear_sky_illuminance, sun_elevation, through_clouds
 
 EQUINOX_NOON = dt.datetime(2026, 3, 20, 12, 0)
 

@@ -167,7 +167,7 @@ def test_test_runs_have_their_numbers_as_seeds(folder: Path) -> None:
         (f"<Deterministic>{_single('faster', '<DistributionSet/>')}</Deterministic>", "with values"),
         (
             _stochastic("faster", '<UserDefinedDistribution type="mine">x</UserDefinedDistribution>'),
-            "expected one of ProbabilityDistributionSet, Histogram",
+            "expected ProbabilityDistributionSet or Histogram or",
         ),
         (_stochastic("faster", '<NormalDistribution expectedValue="1" variance="-1"/>'), "make no distribution"),
         (_stochastic("faster", '<LogNormalDistribution expectedValue="0" variance="1"/>'), "make no distribution"),
@@ -181,7 +181,8 @@ def test_test_runs_have_their_numbers_as_seeds(folder: Path) -> None:
             "hardly any draw is between its limits, 90 and 91",
         ),
         (_stochastic("faster", '<PoissonDistribution expectedValue="1"/>', runs=0), "whole number of 1 … 100,000"),
-        ("", "no cases"),
+        ('<Stochastic numberOfTestRuns="3"/>', "expected StochasticDistribution inside, got nothing"),
+        ("", "expected Stochastic or Deterministic inside, got "),
     ],
 )
 def test_what_is_no_distribution_is_told(folder: Path, definition: str, told: str) -> None:

@@ -10,7 +10,7 @@ from fogsim.errors import InputError
 from fogsim.openscenario import read_openscenario
 from fogsim.values import Step
 from fogsim.values.scene import Instance
-from tests.openscenario.writing import CAR, after, box, lane, speed, write
+from tests.openscenario.writing import CAR, after, box, event, lane, speed, write
 
 QUIET = ["renderer=none", "estimators=[]"]
 CARGO = box("MiscObject", "obstacle", 1.0, 1.5, 1.0)
@@ -92,8 +92,47 @@ def test_a_thing_without_a_size_is_refused(tmp_path: Path) -> None:
     file = write(
         tmp_path, {"Ego": CAR, "Box": '<MiscObject miscObjectCategory="none"/>'}, {"Ego": lane(30), "Box": lane(90)}
     )
-    with pytest.raises(InputError, match=r"MiscObject: a MiscObject needs a BoundingBox with Center and Dimensions"):
+    with pytest.raises(InputError, match=r"MiscObject: expected BoundingBox inside, got"):
         fogsim.load_scenario(file, QUIET)
+
+
+def _over(name: str) -> str:
+    return (
+        '<ConditionGroup><Condition name="s" delay="0" conditionEdge="none"><ByValueCondition>'
+        '<StoryboardElementStateCondition storyboardElementType="event" '
+        f'storyboardElementRef="{name}" state="completeState"/></ByValueCondition></Condition></ConditionGroup>'
+    )
+
+
+def _like(other: str) -> str:
+    relative = f'<RelativeTargetSpeed entityRef="{other}" value="1" speedTargetValueType="factor"/>'
+    return speed(5).replace('<AbsoluteTargetSpeed value="5"/>', relative)
+
+
+@pytest.mark.parametrize(
+    ("begin", "actor", "action"),
+    [
+        ({"Ghost": lane(90)}, "Ego", speed(5)),
+        ({"Ego": f"{lane(30)}\n{_like('Ghost')}"}, "Ego", speed(5)),
+        ({}, "Ghost", speed(5)),
+        ({}, "Ego", _like("Ghost")),
+    ],
+)
+def test_who_is_no_entity_is_named(tmp_path: Path, begin: dict[str, str], actor: str, action: str) -> None:
+    file = write(tmp_path, {"Ego": CAR}, {"Ego": lane(30), **begin}, {actor: event("e", action, after(1))})
+    with pytest.raises(InputError) as refused:
+        read_openscenario(file)
+    (line,) = str(refused.value).splitlines()
+    assert line.endswith("[Ghost]: there is no vehicle 'Ghost'")
+
+
+def test_a_story_waits_for_a_vehicle_with_a_blank_in_its_name(tmp_path: Path) -> None:
+    slower = speed(2).replace("step", "linear").replace('"time"', '"rate"').replace('value="0"', 'value="4"', 1)
+    events = event("slow", slower, after(1)) + event("then", speed(5), _over("slow"))
+    begin = {"Ego": lane(30), "slow lorry": f"{lane(90)}\n{speed(10)}"}
+    steps = _run(write(tmp_path, {"Ego": CAR, "slow lorry": CAR}, begin, {"slow lorry": events}))
+    begun = {one.name: one.time for step in steps for one in step.begun if not one.is_over}
+    assert begun["then"] - begun["slow"] == pytest.approx(2.0, abs=0.21)
 
 
 @pytest.mark.parametrize(("ahead", "is_free"), [(4.7, True), (4.5, False), (0.0, False), (-4.5, False), (-4.7, True)])

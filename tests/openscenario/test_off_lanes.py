@@ -255,7 +255,7 @@ def test_vehicles_come_onto_the_road_and_leave_it(tmp_path: Path) -> None:
 def test_where_a_vehicle_comes_must_be_known(tmp_path: Path, inside: str) -> None:
     events = event("come", _entity("Late", inside), after(2.0))
     file = write(tmp_path, {"Ego": CAR, "Late": CAR}, {"Ego": EGO}, {"Ego": events})
-    with pytest.raises(InputError, match=r"Action.*(give a place on the map|with a Position)"):
+    with pytest.raises(InputError, match=r"Action.*(give a place on the map|expected Position inside)"):
         read_openscenario(file)
 
 
@@ -303,7 +303,7 @@ def test_a_vehicle_arrives_when_the_ego_does(tmp_path: Path, final: str, speed_t
             "closed: write the first",
         ),
         (_offset(_absolute(2.0)), "2 m from the middle is not in its lane, 3.5 m wide"),
-        (_offset("<Whatever/>"), "expected LaneOffsetActionDynamics and a LaneOffsetTarget"),
+        (_offset("<Whatever/>"), "expected AbsoluteTargetLaneOffset or RelativeTargetLaneOffset"),
     ],
 )
 def test_what_cannot_be_followed_is_refused(tmp_path: Path, action: str, told: str) -> None:
@@ -393,6 +393,14 @@ def test_who_overtakes_on_the_oncoming_lane_from_the_beginning_cuts_in(
     begun = {one.name: one.time for step in steps for one in step.begun if not one.is_over}
     assert begun["slow"] - begun["in"] == pytest.approx(lasts, abs=0.21)
     assert _at(steps, 9.9, "Fast")[1:] == pytest.approx((-1.75, 12.0), abs=0.02)
+
+
+def test_who_drives_against_a_lane_goes_over_to_a_lane_that_is_there(tmp_path: Path) -> None:
+    place = '<LanePosition roadId="7" laneId="1" s="20"><Orientation type="relative" h="3.14159"/></LanePosition>'
+    begin = {"Ego": lane(40), "Fast": f"<Position>{place}</Position>\n{speed(16)}"}
+    events = event("in", _changes_lane(-3, "time", 2.0), after(4.0))
+    with pytest.raises(InputError, match="LaneChangeAction: road '7' has no lane '-3' to drive on; it has -1, 1"):
+        read_openscenario(write(tmp_path, {"Ego": CAR, "Fast": CAR}, begin, {"Fast": events}))
 
 
 def test_a_person_may_stand_far_from_the_road(tmp_path: Path) -> None:

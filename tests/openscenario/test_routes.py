@@ -99,8 +99,9 @@ def test_positions_on_a_route_and_conditions_count_the_junction(tmp_path: Path) 
         (_routing(_route(_on(1, 20), _on(1, 10))), "a waypoint lies behind the one before"),
         (_routing(_route(_on(1, 20), _on(3, 10), strategy="random")), "routeStrategy: FogSim has no 'random' here"),
         (_routing(_route(_on(1, 20), _on(3, 10), closed="true")), "closed: write the waypoints of each lap"),
-        (_routing("<Route/>"), "expected a Route of Waypoints"),
-        (_routing("<TrajectoryRef/>", "FollowTrajectoryAction"), "expected a Trajectory with a Polyline"),
+        (_routing("<Route/>"), "expected Waypoint inside"),
+        (_routing(_route(_on(1, 20), _on_route(NORTH, 10.0))), "a waypoint has a place of its own, not one on a route"),
+        (_routing("<TrajectoryRef/>", "FollowTrajectoryAction"), "expected Trajectory or CatalogReference inside"),
         (_routing(FROM_CATALOG), "there is no catalog 'Ways'"),
     ],
 )

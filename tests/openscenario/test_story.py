@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import fogsim
-from fogsim.errors import InputError
+from fogsim.errors import InputError, LeftOutWarning
 from fogsim.openscenario import read_openscenario
 from fogsim.values import Ending, Step
 from tests.openscenario.writing import CAR, after, event, lane, speed, write
@@ -213,6 +213,54 @@ def test_events_are_played_as_often_as_they_may(tmp_path: Path) -> None:
     assert np.diff(begun) == pytest.approx([1.0, 1.0], abs=0.21)
     assert _at(steps, 9.9, "Ego")[2] == pytest.approx(7.0, abs=0.05)
     assert read_openscenario(file).data["expect"] == {"slower": {"happened": "slower"}}
+
+
+DECLARED = (
+    '<ParameterDeclarations><ParameterDeclaration name="brakes" parameterType="boolean" value="false"/>'
+    '</ParameterDeclarations><VariableDeclarations><VariableDeclaration name="seen" variableType="int" value="0"/>'
+    "</VariableDeclarations>"
+)
+KEEPS = (
+    '<PrivateAction><LongitudinalAction><LongitudinalDistanceAction entityRef="Ego" distance="9" freespace="true" '
+    'continuous="false"/></LongitudinalAction></PrivateAction>'
+)
+"""An action that FogSim cannot do in a story."""
+SETS = '<GlobalAction><ParameterAction parameterRef="brakes"><SetAction value="true"/></ParameterAction></GlobalAction>'
+
+
+def _waits_for(value: str) -> str:
+    condition = f'<ParameterCondition parameterRef="brakes" rule="equalTo" value="{value}"/>'
+    inner = f"<ByValueCondition>{condition}</ByValueCondition>"
+    return f'<ConditionGroup><Condition name="c" delay="0" conditionEdge="none">{inner}</Condition></ConditionGroup>'
+
+
+@pytest.mark.parametrize("whole_act", [True, False])
+@pytest.mark.parametrize(
+    ("value", "action", "is_idle"), [("true", KEEPS, True), ("false", KEEPS, False), ("true", SETS, False)]
+)
+def test_what_waits_for_a_value_that_nothing_sets_is_left_out(
+    tmp_path: Path, whole_act: bool, value: str, action: str, is_idle: bool
+) -> None:
+    own, of_act = (after(1), _waits_for(value)) if whole_act else (_waits_for(value), after(0))
+    idle, begin = event("idle", action, own), {"Ego": lane(30), "Lead": lane(90)}
+    file = write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Lead": idle})
+    text = file.read_text(encoding="utf-8").replace("<CatalogLocations>", f"{DECLARED}<CatalogLocations>")
+    act = f"<StartTrigger>{after(0)}</StartTrigger></Act>"
+    waits = event("waits", speed(5), _group(_state("event", "idle", "completeState"))).replace("waits action", "w")
+    group = '<ManeuverGroup name="other" maximumExecutionCount="1"><Actors selectTriggeringEntities="false"><EntityRef '
+    group += f'entityRef="Lead"/></Actors><Maneuver name="n">{waits}</Maneuver></ManeuverGroup>'
+    second = f'<Act name="second">{group}{act}'
+    file.write_text(text.replace(act, act.replace(after(0), of_act) + second), encoding="utf-8")
+    if is_idle:
+        with pytest.warns(LeftOutWarning, match="it never begins: its parameters have other values"):
+            data = read_openscenario(file).data
+        assert data["expect"] == {"waits": {"happened": "waits"}}
+        assert data["timeline"][-1]["when"] == "time < 0 s"
+    elif action == KEEPS:
+        with pytest.raises(InputError, match=r"LongitudinalDistanceAction.*: continuous: while a vehicle drives"):
+            read_openscenario(file)
+    else:
+        assert {*read_openscenario(file).data["expect"]} == {"idle", "waits"}
 
 
 @pytest.mark.parametrize("count", ["0", "1.5", "101"])

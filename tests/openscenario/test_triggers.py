@@ -221,6 +221,15 @@ def test_expressions() -> None:
         ("${-pow(2, 3) % 5}", "2"),
     ):
         assert evaluated(text, known) == value
-    for text in ("$sped", "${__import__('os')}", "${$name + 1}", "${1 +}", "${(1).real}", "${'a' * 9}"):
-        with pytest.raises(ValueError, match=r"parameter|expression|evaluate"):
+    for text in (
+        "$sped",
+        "${__import__('os')}",
+        "${$name + 1}",
+        "${1 +}",
+        "${(1).real}",
+        "${'a' * 9}",
+        "${pow(-8, 0.5)}",
+        f"${{{'9' * 400}}}",
+    ):
+        with pytest.raises(ValueError, match=r"parameter|expression|evaluate|domain"):
             evaluated(text, known)

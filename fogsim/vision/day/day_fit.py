@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
+from fogsim.values.observation import LeadMeasurement
+from fogsim.vision.day.bin_kernels import RowBins
 from fogsim.vision.day.evidence_kernels import evidence_grid
 from fogsim.vision.day.hypotheses import CUT_CHANCE, LIGHTS, SURFACES, lights_chances
 from fogsim.vision.day.response_curves import curves_of
@@ -50,8 +52,9 @@ UNLIKELY = -1e4
 """Logarithm of the chance of what was not tried."""
 
 
-VEHICLE = 1.8
-"""Height up to which a vehicle ahead may hide the sky [m]."""
+VEHICLE, RANGE_MARGIN = 1.8, 0.5
+"""Height up to which a vehicle ahead may hide the sky, and by how much its foot may be nearer than its range says
+[m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +77,8 @@ class DayFit:
         How much brighter the far road is than the near one, over the sky [-].
     response_deviation : float
         Standard deviation of ln k among responses [-].
+    obstacle : float
+        Depth at which something hides the road, if something does [m].
     doubt : float
         How much contrast across the road speaks against the extinction that another method claims, in logarithms of
         chances [-].
@@ -89,6 +94,7 @@ class DayFit:
     brightest: float
     contrast: float
     response_deviation: float
+    obstacle: float
     doubt: float = 0.0
 
     def quantile(self, share: float) -> float:
@@ -110,6 +116,13 @@ class DayFit:
             That one [m].
         """
         return float(self.chance[self.log_visibility < math.log(visibility)].sum())
+
+
+def free_road(lead: LeadMeasurement | None) -> float:
+    """Depth up to which the own lane is free of the tracked vehicle [m]."""
+    if lead is None or not math.isfinite(lead.distance):
+        return math.inf
+    return max(lead.distance - RANGE_MARGIN, 1.0)
 
 
 def fit_day(
@@ -139,13 +152,20 @@ def fit_day(
     """
     pixels = image if image.ndim == 3 else image[:, :, None]
     bins = row_bins(camera, horizon.standard_deviation, round(horizon.row))
-    rows = read_rows(pixels, bins, camera, horizon.row)
     if math.isfinite(free):
-        rows = _without_vehicle(rows, camera, horizon.row, free)
+        bins = _without_vehicle(bins, camera, horizon.row, free)
+    rows = read_rows(pixels, bins, camera, horizon.row)
     fit = replace(_weighed(rows, camera, horizon, earlier), doubt=_doubt(rows, camera, horizon, claimed))
     if earlier is None:
         return fit
     return replace(fit, responses=earlier.responses, response_deviation=earlier.response_deviation)
+
+
+def fit_free_road(image: NDArray[Any], camera: Camera, horizon: Horizon, free: float) -> DayFit:
+    """Fit the road before what hides it, where something more likely does: see `fit_day`."""
+    fit = fit_day(image, camera, horizon, free)
+    is_hidden = float(fit.surfaces[SURFACES.hidden != math.inf].sum()) > 0.5
+    return fit_day(image, camera, horizon, fit.obstacle) if is_hidden and fit.obstacle < free else fit
 
 
 def _weighed(rows: RowData, camera: Camera, horizon: Horizon, earlier: DayFit | None) -> DayFit:
@@ -203,6 +223,7 @@ def _weighed(rows: RowData, camera: Camera, horizon: Horizon, earlier: DayFit | 
         clipped=float(np.mean(sky <= 0.0)) if sky.size else 0.0,
         brightest=float(rows.level[0]),
         response_deviation=_apart(np.log(cells[chosen][:, 1]), chance, pairs[:, 0]),
+        obstacle=grid.obstacle,
         contrast=float(rows.light[0, rows.cuts[0] :].max() - rows.light[0, -1]) / float(rows.level[0]),
     )
 
@@ -271,8 +292,8 @@ class _Grid:
         self._rows, self._shift = rows, shift
         self._lens = _lens_of(camera)
         self._surfaces = np.column_stack([SURFACES.albedo, SURFACES.hidden])
-        step = camera.focal_length * camera.mount_height / max(_step(rows) - horizon, 1.0)
-        self._surfaces[np.isnan(self._surfaces)] = step
+        self.obstacle = camera.focal_length * camera.mount_height / max(_step(rows) - horizon, 1.0)
+        self._surfaces[np.isnan(self._surfaces)] = self.obstacle
 
     def evidence(self, cells: Floats, tried: Ints, lights: Ints) -> Floats:
         """(c, t, m) float64: see `evidence_grid`; under all lights there also are roads that end sooner."""
@@ -285,13 +306,11 @@ class _Grid:
         return np.where(np.isfinite(out), out, UNLIKELY)
 
 
-def _without_vehicle(rows: RowData, camera: Camera, horizon: float, free: float) -> RowData:
+def _without_vehicle(bins: RowBins, camera: Camera, horizon: float, free: float) -> RowBins:
     """Leave out rows that the vehicle ahead may hide."""
     above = max(VEHICLE - camera.mount_height, 0.0) * camera.focal_length / free
-    hidden = (rows.last > horizon - above) & (rows.first < horizon + camera.row_distance / free)
-    contrast = rows.contrast.copy()
-    contrast[0, hidden] = 0.0
-    return rows._replace(noise=np.where(hidden, 0.0, rows.noise), contrast=contrast)
+    seen = (bins.last <= horizon - above) | (bins.first >= horizon + camera.row_distance / free)
+    return RowBins(*(part[seen] for part in bins))
 
 
 def _step(rows: RowData) -> float:

@@ -30,6 +30,16 @@ show that it stands farther away [-]."""
 LEAST_ROWS = 3
 """Rows of ground that show that."""
 
+MOST_FAR = 0.2
+"""Share of the image's width in which things show that fog would hide, from which on there is no such fog [-]."""
+
+STANDS_OUT = "what stands at the horizon is darker than fog would leave it"
+
+
+def stands_out(level: NDArray[Any], camera: Camera, horizon: Horizon, extinction: float) -> bool:
+    """Whether much is seen that fog of an extinction would hide; see `share_of_far_objects`."""
+    return share_of_far_objects(level, camera, horizon, extinction) > MOST_FAR
+
 
 def share_of_far_objects(level: NDArray[Any], camera: Camera, horizon: Horizon, extinction: float) -> float:
     """Share of the image's width in which something is seen that fog of an extinction would hide [-].

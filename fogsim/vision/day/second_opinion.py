@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate
 from fogsim.vision.day.day_fit import DayFit, fit_day
-from fogsim.vision.day.far_objects import share_of_far_objects
-from fogsim.vision.day.verdict import WIDEST, DayVerdict, agree, verdict_of
+from fogsim.vision.day.far_objects import STANDS_OUT, stands_out
+from fogsim.vision.day.verdict import DISAGREE, WIDEST, DayVerdict, agree, verdict_of
 from fogsim.vision.lines.horizon import Horizon
 
 ALIKE = 0.1
@@ -23,9 +23,6 @@ does not count against the day model's answer, and against its silence [-]."""
 
 MOST_DOUBT = 18.0
 """Doubt by contrast across the road from which on an estimate is given up [-]."""
-
-MOST_FAR = 0.2
-"""Share of the image's width in which things show that fog would hide, from which on an estimate is given up [-]."""
 
 PERIOD = 10.0
 """Time after which an estimate that has been agreed with is looked at again [s]."""
@@ -50,6 +47,7 @@ class SecondOpinion:
         """Forget all earlier frames."""
         self._agreed, self._response = -math.inf, 0.0
         self._fit: DayFit | None = None
+        self._clear: tuple[float, float] | None = None
 
     def on(
         self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float, time: float, is_straight: bool
@@ -71,19 +69,25 @@ class SecondOpinion:
         is_straight : bool
             Whether the road neither bends nor sags, as the day model has it.
         """
-        if own.valid and self._agreed < time < self._agreed + PERIOD:
-            return _with_calibration(own, self._scale, self._response)
-        if own.valid and not is_straight:
-            chosen, self._response = own, 0.0
-        else:
-            chosen = self._with_day_model(own, level, horizon, free, time)
-        if chosen.valid and share_of_far_objects(level, self._camera, horizon, _ends(chosen)[0]) > MOST_FAR:
-            chosen = _none(own, "what stands at the horizon is darker than fog would leave it")
-        if chosen is own and own.valid:
-            self._agreed = time
-        else:
+        is_recent = self._agreed < time < self._agreed + PERIOD
+        if own.valid and is_recent and (self._clear is None or agree(own.visibility_interval, self._clear)):
+            return self._kept(own)
+        self._response, self._clear = 0.0, None
+        is_asked = not own.valid or is_straight
+        chosen = self._with_day_model(own, level, horizon, free, time) if is_asked else own
+        if chosen.valid and stands_out(level, self._camera, horizon, _ends(chosen)[0]):
+            chosen = refused(own, STANDS_OUT)
+        if chosen is not own or not own.valid:
             self._agreed, self._fit = -math.inf, None
-        return _with_calibration(own, self._scale, self._response) if chosen is own and own.valid else chosen
+            return chosen
+        self._agreed = time
+        return self._kept(own)
+
+    def _kept(self, own: Estimate) -> Estimate:
+        """Return an estimate with what height, focal length and response leave open; open upward if no fog shows."""
+        if self._clear is not None:
+            own = replace(own, standard_deviation=max(own.standard_deviation, own.extinction / NORMAL_90_PERCENT))
+        return _with_calibration(own, self._scale, self._response)
 
     def _with_day_model(
         self, own: Estimate, level: NDArray[Any], horizon: Horizon, free: float, time: float
@@ -93,6 +97,10 @@ class SecondOpinion:
         fit = fit_day(np.ascontiguousarray(level), self._camera, horizon, free, max(_ends(own)[0], 0.0), self._fit)
         self._fit = self._fit or fit
         verdict = verdict_of(fit, self._scale)
+        if own.valid and math.isfinite(free) and verdict.doubt <= MOST_DOUBT:
+            # Before what stands in the lane it sees less.
+            return own
+        self._clear = None if verdict.shows_fog else verdict.interval
         self._response = verdict.response_deviation if verdict.is_sure and verdict.is_even else 0.0
         chosen = _chosen(own, verdict)
         if chosen is own or not chosen.valid:
@@ -104,7 +112,10 @@ def _chosen(own: Estimate, verdict: DayVerdict) -> Estimate:
     if not own.valid:
         return _of_day(own, verdict)
     if verdict.doubt > MOST_DOUBT:
-        return _none(own, "contrast survives where the fog that the road's brightness shows would leave none")
+        return refused(own, "contrast survives where the fog that the road's brightness shows would leave none")
+    if not verdict.shows_fog and math.isfinite(own.visibility_interval[1]):
+        agreed = agree(own.visibility_interval, verdict.interval)
+        return own if agreed else refused(own, verdict.reason or DISAGREE)
     if verdict.reason:
         return _of_day(own, verdict) if verdict.outside > MOSTLY else own
     return _weighed(own, verdict) if verdict.is_sure else own
@@ -123,7 +134,7 @@ def _weighed(own: Estimate, verdict: DayVerdict) -> Estimate:
         return _of_day(own, verdict)
     if keeps:
         return own
-    return _none(own, "how the road fades and how its image brightens disagree")
+    return refused(own, DISAGREE)
 
 
 def _are_alike(own: Estimate, verdict: DayVerdict) -> bool:
@@ -149,7 +160,7 @@ def _of_day(own: Estimate, verdict: DayVerdict) -> Estimate:
     """Return the day model's answer, or why there is none."""
     if verdict.reason or not verdict.is_sure:
         reason = verdict.reason or str(own.diagnostics.get("reason", ""))
-        return _none(own, reason)
+        return refused(own, reason)
     return Estimate(
         own.method,
         verdict.extinction,
@@ -159,7 +170,8 @@ def _of_day(own: Estimate, verdict: DayVerdict) -> Estimate:
     )
 
 
-def _none(own: Estimate, reason: str) -> Estimate:
+def refused(own: Estimate, reason: str) -> Estimate:
+    """Return the statement that an estimate does not count, and why."""
     return Estimate.invalid(own.method, reason, **_found(own))
 
 

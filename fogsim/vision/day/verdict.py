@@ -44,6 +44,8 @@ DARK = 6.0 / 255.0
 MOSTLY_CLIPPED = 0.5
 """Share of the sky's bins beyond which clipping is a reason [-]."""
 
+DISAGREE = "how the road fades and how its image brightens disagree"
+
 
 @dataclass(frozen=True, slots=True)
 class DayVerdict:
@@ -53,10 +55,14 @@ class DayVerdict:
     ----------
     extinction, deviation : float
         k and half the width of its 90 % interval over 1.645 [1/m].
+    median : float
+        Of the posterior of k [1/m].
     interval : (float, float)
         Ends of the visibility [m].
     reason : str
         Why it is no answer; empty if it is.
+    shows_fog : bool
+        Whether there surely is fog on a road, however dense.
     is_sure : bool
         Whether it counts against another method: a road under a sky, neither hidden nor in shade.
     is_even : bool
@@ -70,13 +76,20 @@ class DayVerdict:
 
     extinction: float
     deviation: float
+    median: float
     interval: tuple[float, float]
     reason: str
+    shows_fog: bool
     is_sure: bool
     is_even: bool
     outside: float
     doubt: float
     response_deviation: float
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether it says that the air is clear."""
+        return not self.reason and math.isinf(self.interval[1])
 
     @property
     def most(self) -> float:
@@ -125,8 +138,10 @@ def verdict_of(fit: DayFit, scale_deviation: float) -> DayVerdict:
     return DayVerdict(
         extinction=0.5 * (dense + thin),
         deviation=0.5 * (dense - thin) / NORMAL_90_PERCENT,
+        median=extinction_from_visibility(middle),
         interval=(low, math.inf if is_clear else high),
         reason="" if answers and is_road else _reason(fit, is_road, sky),
+        shows_fog=shows and is_road,
         is_sure=is_sure,
         is_even=is_even,
         outside=outside if is_sure and is_even else 0.0,

@@ -77,7 +77,7 @@ def lit_by_lamps(level: Pixels, camera: Camera, lead: LeadMeasurement | None = N
     hidden = overhead.size == 0 or (lead is not None and lead.distance < HIDES_ABOVE)
     above = quantile(sky if hidden else overhead, BRIGHT_SHARE)
     if median(lane) > min(above, quantile(sky, BRIGHT_SHARE)):
-        return "the road is brighter than the sky, so lamps light it: this is a daytime method"
+        return "the road is brighter than the sky: lamps or direct sun light it, and it does not show the fog"
     shining = float(np.count_nonzero(sky >= LAMP)) >= LAMPS_SHARE * sky.size and median(sky) < DARK_SKY
     if shining and _has_beam(lane, _row_medians(road, view.left), _row_medians(road, view.right)):
         return "lamps light the sky and the road: this is a daytime method"

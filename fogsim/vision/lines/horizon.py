@@ -20,6 +20,12 @@ PITCH_DEVIATION = math.radians(0.1)
 PitchDeviation = Annotated[float, Range(1e-6, 0.2, "rad")]
 """Standard deviation of the pitch that methods assume [rad]."""
 
+SCALE_DEVIATION = 0.054
+"""Usual relative deviation of distances on the road: 5 % by the height and 2 % by the focal length of a camera [-]."""
+
+ScaleDeviation = Annotated[float, Range(0.0, 1.0)]
+"""Relative standard deviation of focal length × mount height, with which distances on the road go [-]."""
+
 
 @dataclass(frozen=True, slots=True)
 class Horizon:

@@ -57,7 +57,7 @@ def check_road(road: NDArray[np.float32], sky: float) -> None:
     Takes `road` (rows, cols).
     """
     if road.size and float(np.median(road)) > BRIGHT_ROAD * sky:
-        raise CannotTellError("the road is brighter than the sky: this is a daytime method")
+        raise CannotTellError("the road is brighter than the sky: lamps or direct sun light it")
 
 
 @dataclass(frozen=True, slots=True)

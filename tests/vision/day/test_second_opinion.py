@@ -15,7 +15,7 @@ from fogsim.vision.lines.horizon import Horizon
 CAMERA = Camera(64, 48, 60.0, (31.5, 23.5), 1.3)
 SCALE = 0.05
 OWN = Estimate("joint_road", 0.03, 0.0015, diagnostics={"road": 50.0})
-AGREES = DayVerdict(0.031, 0.002, (88.0, 108.0), "", True, True, 0.0, 0.0, 0.0)
+AGREES = DayVerdict(0.031, 0.002, 0.031, (88.0, 108.0), "", True, True, True, 0.0, 0.0, 0.0)
 DENSER = replace(AGREES, extinction=0.06, deviation=0.003, interval=(46.0, 54.0))
 FAR = replace(AGREES, extinction=0.003, deviation=0.0002, interval=(900.0, 1100.0))
 SILENT = replace(AGREES, reason="dark")
@@ -84,3 +84,28 @@ def test_contrast_beyond_its_fog_ends_an_estimate(said):
 
 def test_a_bent_road_is_the_joint_fits(said):
     assert said(OWN, DENSER, is_straight=False)[1] == 0
+
+
+CLEAR = replace(AGREES, interval=(1500.0, math.inf), shows_fog=False)
+
+
+def test_an_answer_without_fog_in_the_day_model_has_no_upper_end(said):
+    found, _ = said(replace(OWN, extinction=0.001, standard_deviation=1e-4), CLEAR)
+    assert found.valid
+    assert found.extinction == 0.001
+    assert found.visibility_interval[1] == math.inf
+    assert not said(OWN, CLEAR)[0].valid
+
+
+def test_fog_that_begins_in_a_clear_drive_is_compared_at_once(said, monkeypatch):
+    thin, looks = replace(OWN, extinction=0.001, standard_deviation=1e-4), []
+    monkeypatch.setattr(second_opinion, "fit_day", lambda *arguments: looks.append(arguments))
+    monkeypatch.setattr(second_opinion, "verdict_of", lambda *_: CLEAR if len(looks) < 2 else AGREES)
+    second, image = SecondOpinion(CAMERA, SCALE), np.zeros((48, 64), np.uint8)
+    found = [
+        second.on(own, image, Horizon(23.5, 1.0), math.inf, time, True)
+        for time, own in ((0.0, thin), (0.1, thin), (0.2, OWN))
+    ]
+    assert len(looks) == 2
+    assert found[1].visibility_interval[1] == math.inf
+    assert found[2].visibility_interval[1] < 150.0

@@ -1,0 +1,148 @@
+"""What an estimate by the road's brightness alone needs from the rest of its image before it counts."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.units import extinction_from_visibility
+from fogsim.values.camera import Camera
+from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate
+from fogsim.vision.day.day_fit import fit_free_road
+from fogsim.vision.day.far_objects import STANDS_OUT, stands_out
+from fogsim.vision.day.second_opinion import refused
+from fogsim.vision.day.verdict import CLEAR, DISAGREE, WIDEST, DayVerdict, agree, verdict_of
+from fogsim.vision.lines.horizon import Horizon, levelled
+
+PERIOD, SOON = 10.0, 1.0
+"""Times after which an image is compared again: one that confirmed an estimate, and one that did not [s]."""
+
+MODEL_DEVIATION = 0.15
+"""Relative deviation of k by light and surfaces that methods of the road's brightness do not know, next to how far they
+are from the day model; chosen on pool 0 of `benchmarks/camera_kinds.py` [-]."""
+
+NOT_CLEAR = "nothing that fog would hide is seen far away: the air may be clear or not"
+
+
+@dataclass(frozen=True, slots=True)
+class _Outcome:
+    """How the estimate of an image compares.
+
+    Attributes
+    ----------
+    time : float
+        Of the image [s].
+    seen : (float, float)
+        Interval of the estimate [m].
+    reason : str
+        Why it does not count; empty if it does.
+    relative, absolute : float
+        What the day model leaves open besides: of k over k [-], and of k where the air is clear [1/m].
+    """
+
+    time: float = -math.inf
+    seen: tuple[float, float] = (0.0, math.inf)
+    reason: str = ""
+    relative: float = 0.0
+    absolute: float = 0.0
+
+
+class Confirmation:
+    """Confirms estimates of a method by the day model, in a drive from time to time.
+
+    Fog must show in the day model as well, and nothing may stand out at the horizon that it would hide. Clear air needs
+    a road that keeps its contrast, or something that stands out. The interval then spans those of both, so that it has
+    what height, focal length, response, sky and surface leave open.
+
+    Parameters
+    ----------
+    camera : Camera
+        The assumed calibration.
+    horizon : Horizon
+        Where it has the horizon.
+    scale_deviation : float
+        Standard deviation of ln k by its height and focal length [-].
+    """
+
+    def __init__(self, camera: Camera, horizon: Horizon, scale_deviation: float) -> None:
+        self._camera, self._horizon, self._scale = camera, horizon, scale_deviation
+        self._last = _Outcome()
+
+    def reset(self) -> None:
+        """Forget all earlier frames."""
+        self._last = _Outcome()
+
+    def of(self, own: Estimate, image: NDArray[Any], free: float, time: float) -> Estimate:
+        """Return an estimate with a wider interval, or why it does not count.
+
+        Parameters
+        ----------
+        own : Estimate
+            Of the method, valid or not.
+        image : (rows, cols) or (rows, cols, 3) uint8 or uint16
+            The image.
+        free : float
+            Depth up to which the own lane is free [m].
+        time : float
+            Of the image [s].
+        """
+        if not own.valid:
+            return own
+        common = math.hypot(own.common_deviation, self._scale)
+        own = replace(own, standard_deviation=math.hypot(own.standard_deviation, self._scale * own.extinction))
+        last = self._last
+        is_recent = 0.0 < time - last.time < (SOON if last.reason else PERIOD)
+        if not is_recent or not agree(last.seen, own.visibility_interval):
+            last = self._last = self._compared(own, levelled(image, self._camera), free, time)
+        if last.reason:
+            return refused(own, last.reason)
+        deviation = math.hypot(own.standard_deviation, last.relative * own.extinction, last.absolute)
+        return replace(own, standard_deviation=deviation, common_deviation=math.hypot(common, last.relative))
+
+    def _compared(self, own: Estimate, level: NDArray[Any], free: float, time: float) -> _Outcome:
+        half, limit = NORMAL_90_PERCENT * own.standard_deviation, extinction_from_visibility(CLEAR)
+        fit = fit_free_road(np.ascontiguousarray(level), self._camera, self._horizon, free)
+        day = verdict_of(fit, self._scale)
+        # Thin fog may be none, where clear air shows.
+        is_open = not day.shows_fog and (own.extinction <= half or own.extinction + half <= limit)
+        if day.shows_fog:
+            reason = STANDS_OUT if self._stands_out(level, own.extinction - half) else _contradiction(own, day)
+        elif is_open:
+            reason = "" if day.is_clear or self._stands_out(level, limit) else NOT_CLEAR
+        else:
+            reason = day.reason or DISAGREE
+        least, most = (0.0, day.most if day.is_clear else limit) if is_open else (day.least, day.most)
+        more = _beyond(half, max(own.extinction - least, most - own.extinction))
+        if day.shows_fog:
+            # Behind a vehicle it sees less than the method, and is off by as much as it is unsure.
+            unsure = day.deviation if math.isfinite(free) else 0.0
+            off = math.sqrt(max((day.median - own.extinction) ** 2 - unsure**2, 0.0))
+            more = min(more, math.hypot(off, MODEL_DEVIATION * own.extinction))
+        relative, absolute = (more / own.extinction, 0.0) if own.extinction > 0.0 else (0.0, more)
+        return _Outcome(time, own.visibility_interval, reason, relative, absolute)
+
+    def _stands_out(self, level: NDArray[Any], extinction: float) -> bool:
+        return stands_out(level, self._camera, self._horizon, extinction)
+
+
+def without_far_objects(own: Estimate, image: NDArray[Any], camera: Camera, horizon: Horizon) -> Estimate:
+    """Return an estimate by the vehicle ahead, or why it does not count."""
+    least = own.extinction - NORMAL_90_PERCENT * own.standard_deviation
+    if not own.valid or not least > 0.0 or not stands_out(levelled(image, camera), camera, horizon, least):
+        return own
+    return refused(own, STANDS_OUT)
+
+
+def _beyond(half: float, wider: float) -> float:
+    """Deviation that adds to that of an interval, of half a width, so that it is as wide as another one [1/m]."""
+    return math.sqrt(max(wider**2 - half**2, 0.0)) / NORMAL_90_PERCENT
+
+
+def _contradiction(own: Estimate, day: DayVerdict) -> str:
+    """Say that the day model shows other fog; empty if it confirms an estimate."""
+    half = NORMAL_90_PERCENT * own.standard_deviation
+    thin, dense = min(own.extinction - half, day.least), max(own.extinction + half, day.most)
+    spans = not day.reason and dense <= WIDEST * thin
+    return "" if spans or agree(own.visibility_interval, day.interval) else DISAGREE

@@ -207,6 +207,9 @@ def test_night_may_fall_while_a_run_lasts(tmp_path: Path) -> None:
     file.write_text(text.replace('entryName="saloon"', 'entryName="coach"', 1), encoding="utf-8")
     with pytest.raises(InputError, match="unknown entry 'coach' of Vehicles; known: saloon, lorry"):
         read_openscenario(file)
+    file.write_text(text.replace('parameterRef="top_speed"', 'parameterRef="topspeed"', 1), encoding="utf-8")
+    with pytest.raises(InputError, match="'saloon' has no parameter 'topspeed'; did you mean 'top_speed'"):
+        read_openscenario(file)
 
 
 def test_expressions() -> None:

@@ -24,8 +24,7 @@ LAMPS = {  # Of each type of light
 }
 _UNLIT = ("licensePlateIllumination", "reversingLights", "specialPurposeLights")
 _AT_THE_END = 1.5  # Distance at which the end of a trajectory is reached [m]
-# Where a vehicle is to be, seen from the one to which it keeps a distance
-DISPLACEMENTS = ("any", "leadingReferencedEntity", "trailingReferencedEntity")
+DISPLACEMENTS = ("any", "leadingReferencedEntity", "trailingReferencedEntity")  # By the one at a distance
 
 
 class Actions(LateralActions):
@@ -114,7 +113,8 @@ class Actions(LateralActions):
             effect.ends.append(f"{own} > {final - NEAR:.9g} m/s and {own} < {final + NEAR:.9g} m/s")
         effect.is_endless |= "continuous" in speed
         # At a rate of 0 a speed stays as it is.
-        effect.add(actor, speed=self.held(actor) if speed.get("rate_mps2") == 0.0 else speed)
+        held = {"like": self.vehicles[actor].named, "shape": "step"}
+        effect.add(actor, speed=held if speed.get("rate_mps2") == 0.0 else speed)
 
     def speed_profile_action(self, action: Node, actor: str, effect: Effect) -> None:
         """`speed` by its `profile`; without a time as fast as `DynamicConstraints` or the vehicle allow."""
@@ -146,10 +146,6 @@ class Actions(LateralActions):
         share = {"factor": value} if how == "factor" else {"plus_kmh": value * KMH_PER_MPS}
         follows = {"continuous": True} if to.flag("continuous", "false") else {}
         return {"like": self.vehicles.of(to).named, **share, **follows}
-
-    def held(self, actor: str) -> dict[str, Any]:
-        """The order to keep the speed of that moment."""
-        return {"like": self.vehicles[actor].named, "shape": "step"}
 
     def _pace(self, dynamics: Node, effect: Effect) -> dict[str, Any]:
         shape, by, value = self.dynamics(dynamics) or ("step", "", 0.0)
@@ -230,7 +226,9 @@ class Actions(LateralActions):
         mode.word("followingMode", ("position", "follow"), "follow")
         has_times = action.within("TimeReference", "None") is None
         timing = action.within("TimeReference", "Timing") if has_times else None
-        origin, points = self._own_points(places, actor, effect) or ("map", [self._point(place) for place in places])
+        there = (self.positions.point(place) for place in places)
+        on_map = ([x, y] if heading is None else [x, y, math.degrees(heading)] for x, y, heading, _ in there)
+        origin, points = self._own_points(places, actor, effect) or ("map", list(on_map))
         if any(len(one) == 2 for one in points) and len(points) > 1:
             points = [one[:2] for one in points]
         vehicle = self.vehicles[actor]
@@ -252,10 +250,6 @@ class Actions(LateralActions):
         if trajectory.flag("closed"):
             raise ValueError("closed: write the first vertex again as the last one, and false")
         effect.add(actor, path=path)
-
-    def _point(self, place: Node) -> list[float]:
-        x, y, heading, _ = self.positions.point(place)
-        return [x, y] if heading is None else [x, y, math.degrees(heading)]
 
     def _own_points(self, places: list[Node], actor: str, effect: Effect) -> tuple[str, list[list[float]]] | None:
         """Points from the place that the actor itself has when it begins, and along which axes; None if not all are."""

@@ -52,7 +52,7 @@ class Beginning:
             self._take_global(action)
         private = self.vehicles.known(one for block in blocks for one in block.all("Private"))
         added = {one.get("entityRef"): one for block in blocks for one in _entity_actions(block, "AddEntityAction")}
-        self._place(self._wanted(private, added))
+        self._place(private, added)
         for one in private:
             for action in one.all("PrivateAction"):
                 self._take_private(action, one.get("entityRef"))
@@ -116,18 +116,15 @@ class Beginning:
             else:
                 self.actions.take(action, [], self.effect)
 
-    def _wanted(self, private: list[Node], added: Mapping[str, Node]) -> dict[str, Node]:
-        """Positions of vehicles at the beginning."""
+    def _place(self, private: list[Node], added: Mapping[str, Node]) -> None:
+        """Place vehicles where they are added, or put, at the beginning; those relative to another one last."""
         holders = [(name, one.all("AddEntityAction")) for name, one in added.items() if name in self.vehicles]
         for one in private:
             places = [t for action in one.all("PrivateAction") for t in action.all("TeleportAction")]
             # Who only follows a trajectory begins at its first vertex.
             vertices = [vertex for vertex in one.walk() if vertex.tag == "Vertex"]
             holders.append((one.get("entityRef"), places or vertices[:1]))
-        return {name: position for name, inside in holders for one in inside for position in one.all("Position")}
-
-    def _place(self, wanted: dict[str, Node]) -> None:
-        """Place vehicles; those relative to another one last."""
+        wanted = {name: position for name, inside in holders for one in inside for position in one.all("Position")}
         refers_to = self.positions.refers_to
         while wanted:
             ready = [name for name, position in wanted.items() if refers_to(position) not in wanted] or list(wanted)

@@ -13,8 +13,8 @@ from fogsim.traffic.road.opendrive_lanes import Spot
 SHAPES = {"step": "step", "linear": "linear", "sinusoidal": "sinusoidal", "cubic": "sinusoidal"}
 _STEEPEST = {"linear": 1.0, "sinusoidal": 0.5 * math.pi, "cubic": 1.5}  # Greatest rate of a shape, over its mean
 _STAY = 1e5  # Time for which a vehicle stays in the lane that it has changed to [s]
-_LONGEST = 60.0  # Most time that a change of lane takes [s]
-_LEAST = 0.05  # Lateral acceleration of a move within a lane [m/s²]
+_TINY = 1e-9  # Lateral acceleration that is none [m/s²]
+_LONGEST = 60.0  # Most time that a move across takes [s]
 
 
 @dataclass
@@ -74,7 +74,7 @@ class LateralActions:
         lanes = self._lanes(to, actor, begins)
         if by == "rate":
             value = _STEEPEST[shape] * self._across(to, lanes, begins) / (value or 1.0)
-        pace = {"distance_m": value} if by == "distance" else {"duration_s": min(value, _LONGEST)}
+        pace = {"distance_m": value} if by == "distance" else {"duration_s": _allowed(value)}
         effect.lasts = max(effect.lasts, pace.get("duration_s", 0.0))
         effect.ends_itself = by == "distance"
         offset = sense(begins) * action.number("targetLaneOffset", 0.0)
@@ -142,14 +142,14 @@ class LateralActions:
 
     def _move(self, actor: str, effect: Effect, offset: float, lasts: float, lanes: Mapping[str, Any]) -> None:
         effect.lasts = max(effect.lasts, lasts)
-        move = {"lanes": 0, "stay_s": _STAY, "offset_m": offset, "duration_s": min(lasts, _LONGEST)}
+        move = {"lanes": 0, "stay_s": _STAY, "offset_m": offset, "duration_s": _allowed(lasts)}
         effect.add(actor, change_lane={**lanes, **move})
 
     def _offset_time(self, dynamics: Node, across: float) -> float:
         """Time that so wide a move [m] takes along half a wave of a cosine at `maxLateralAcc` at most [s]."""
         shape = dynamics.word("dynamicsShape", tuple(SHAPES))
         most = dynamics.number("maxLateralAcc", math.inf, is_finite=False)
-        return 0.0 if shape == "step" else math.pi * math.sqrt(0.5 * across / max(most, _LEAST))
+        return 0.0 if shape == "step" or not across else math.pi * math.sqrt(0.5 * across / max(most, _TINY))
 
     def _across(self, to: Node, lanes: Mapping[str, Any], begins: Spot) -> float:
         """Way across of a change of lane, by the lanes on which the vehicles begin [m]."""
@@ -189,3 +189,9 @@ class LateralActions:
         road = road_of(spot)
         there = {name for one in self.positions.lanes.lanes for name in one.origins if name.startswith(f"{road}_")}
         return there == {f"{road}_1", f"{road}_-1"}
+
+
+def _allowed(time: float) -> float:
+    if time > _LONGEST:
+        raise ValueError(f"a move across takes {_LONGEST:g} s at most, but this one would take {time:.4g} s")
+    return time

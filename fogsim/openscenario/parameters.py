@@ -25,10 +25,8 @@ _OPERATORS: Mapping[type[ast.AST], Callable[..., float]] = {
     ast.Mod: operator.mod,
 }
 _FUNCTIONS: Mapping[str, Callable[..., float]] = {
-    **{one.__name__: one for one in (round, math.floor, math.ceil, math.sqrt, abs, math.pow)},
+    **{one.__name__: one for one in (round, math.floor, math.ceil, math.sqrt, abs, math.pow, min, max)},
     "sign": lambda x: float((x > 0) - (x < 0)),
-    "min": min,
-    "max": max,
 }
 _CONSTANTS = {"pi": math.pi, "true": True, "false": False}
 
@@ -169,6 +167,9 @@ class Catalogs:
             if found.name == name:
                 reference.children.append(whole := found.copy())
                 own = declared(whole, {}, given)
+                texts = " ".join(text for one in whole.walk() for text in one.attributes.values())
+                for key in (key for key in given if key not in own and f"${key}" not in texts):
+                    reference.refuse(f"{shown(name)} has no parameter {shown(key)}; {suggest(key, own)}")
                 whole.children = [child for child in whole.children if child.tag != "ParameterDeclarations"]
                 put_parameters(whole, {**own, **given})
                 whole.is_read = True

@@ -130,7 +130,7 @@ def _scenario(storyboard: Node, story: Storyboard, begin: Beginning) -> Scenario
     way = [one for edge in route for one in lanes.lanes if one.edge == edge and one.index == 0]
     fog = fog_block(begin.environment, np.concatenate([one.shape for one in way]), min(one.lowest for one in way))
     if begin.environment.box and not fog["banks"]:
-        root.remark("the BoundingBox of the fog lies beside the ego's way: the air is clear there")
+        root.remark("the BoundingBox of the fog lies next to the ego's route: the air is clear there")
     description = root.need("FileHeader").get("description")
     root.check_read()
     root.findings.close(root.file)

@@ -83,13 +83,12 @@ class Storyboard:
         return is_fixed and not all(fits(value, node) for value in self._declared(node))
 
     def _find(self, entry: Entry, times: int) -> None:
-        event = entry.node
-        event.word("priority", ("override", "overwrite", "parallel"))
-        for _ in range(min(times * _executions(event), _MOST_TIMES)):
+        entry.node.word("priority", ("override", "overwrite", "parallel"))
+        for _ in range(min(times * _executions(entry.node), _MOST_TIMES)):
             taken = {name for one in self.entries.values() for name in one.names}
-            entry.names.append(_free_name(event.get("name"), {*taken, *entry.names}))
-        self.entries[id(event)] = entry
-        for action in event.all("Action"):
+            entry.names.append(_free_name(entry.node.get("name"), {*taken, *entry.names}))
+        self.entries[id(entry.node)] = entry
+        for action in entry.node.all("Action"):
             self.actions.take(action, entry.actors, entry.effect)
 
     def timeline(self) -> list[TimelineEntry]:
@@ -128,7 +127,8 @@ class Storyboard:
         if entry.node.get("priority") == "parallel" or not trigger.condition or not begun:
             return []
         when = Trigger(f"({trigger.condition}) and not happened({name}) and ({' or '.join(begun)})", trigger.delay)
-        held = {one: {"speed": self.actions.held(one)} for one in actors}
+        known = self.actions.vehicles
+        held = {one: {"speed": {"like": known[one].named, "shape": "step"}} for one in actors if one in known}
         return [timeline_entry(entry.node, f"{name}_ends_others", when, held, until)]
 
     def _until(self, stop: Trigger | None, node: Node) -> str:

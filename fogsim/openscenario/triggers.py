@@ -72,7 +72,7 @@ class Triggers:
             if test:
                 read = self._by_value(test, edge, delay)
             else:
-                by_entity = node.need("ByEntityCondition")
+                by_entity = node.need("ByEntityCondition", "ByValueCondition")
                 # Who is at the end of the road stays there.
                 end = by_entity.within("EntityCondition", "EndOfRoadCondition")
                 read = Trigger(self._by_entities(by_entity, edge), delay + (end.number("duration") if end else 0.0))

@@ -15,7 +15,6 @@ from fogsim.openscenario.elements import HARMLESS, REFUSED
 
 MOST_BYTES, MOST_ELEMENTS = 20_000_000, 500_000  # of a file
 _NAMESPACES = ("xmlns", "xml:", "xsi:")
-_UNKNOWN = "FogSim does not know this {} here"
 
 
 def sumo_name(name: str) -> str:
@@ -189,12 +188,12 @@ class Node:
         if self.tag in HARMLESS:
             return
         if not self.is_read:
-            self.refuse(REFUSED.get(self.tag, _UNKNOWN.format("element")))
+            self.refuse(REFUSED.get(self.tag, "FogSim does not know this element here"))
             return
         for key in sorted(self.attributes.keys() - self.read):
             name = f"{self.tag}@{key}"
             if name not in HARMLESS and not key.startswith(_NAMESPACES):
-                message = REFUSED.get(name, _UNKNOWN.format("attribute"))
+                message = REFUSED.get(name, "FogSim does not know this attribute here")
                 self.refuse(f"{key}={shown(self.attributes[key])}: {message}", is_whole=False)
         for child in self.children:
             child.check_read()

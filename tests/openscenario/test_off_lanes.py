@@ -303,6 +303,7 @@ def test_a_vehicle_arrives_when_the_ego_does(tmp_path: Path, final: str, speed_t
             "closed: write the first",
         ),
         (_offset(_absolute(2.0)), "2 m from the middle is not in its lane, 3.5 m wide"),
+        (_offset(_absolute(0.5), 1e-5), "a move across takes 60 s at most, but this one would take"),
         (_offset("<Whatever/>"), "expected AbsoluteTargetLaneOffset or RelativeTargetLaneOffset"),
     ],
 )

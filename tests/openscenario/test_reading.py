@@ -82,7 +82,7 @@ def test_a_box_of_fog_beside_the_way_is_told(changed: Callable[..., Path]) -> No
     file = changed(
         "slow_lead.xosc", (controller, ""), ('<Center x="400" y="0" z="0"/>', '<Center x="400" y="500" z="0"/>')
     )
-    with pytest.warns(LeftOutWarning, match="beside the ego's way"):
+    with pytest.warns(LeftOutWarning, match="next to the ego's route"):
         assert load_scenario(file, QUIET).fog.banks == ()
 
 

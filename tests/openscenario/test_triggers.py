@@ -209,6 +209,14 @@ def test_night_may_fall_while_a_run_lasts(tmp_path: Path) -> None:
         read_openscenario(file)
 
 
+def test_what_is_assigned_to_an_entry_is_one_of_its_parameters(tmp_path: Path) -> None:
+    shutil.copytree(DATA, tmp_path, dirs_exist_ok=True)
+    text = (file := tmp_path / "everything.xosc").read_text(encoding="utf-8")
+    file.write_text(text.replace('parameterRef="top_speed"', 'parameterRef="topspeed"', 1), encoding="utf-8")
+    with pytest.raises(InputError, match="'saloon' has no parameter 'topspeed'; did you mean 'top_speed'"):
+        read_openscenario(file)
+
+
 def test_expressions() -> None:
     known = {"speed": "72", "is_wet": "true", "name": "lorry"}
     for text, value in (

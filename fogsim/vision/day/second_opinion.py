@@ -100,7 +100,8 @@ class SecondOpinion:
         if own.valid and math.isfinite(free) and verdict.doubt <= MOST_DOUBT:
             # Before what stands in the lane it sees less.
             return own
-        self._clear = None if verdict.shows_fog else verdict.interval
+        shows_none = math.isinf(verdict.interval[1]) and agree(own.visibility_interval, verdict.interval)
+        self._clear = verdict.interval if shows_none else None
         self._response = verdict.response_deviation if verdict.is_sure and verdict.is_even else 0.0
         chosen = _chosen(own, verdict)
         if chosen is own or not chosen.valid:
@@ -113,9 +114,6 @@ def _chosen(own: Estimate, verdict: DayVerdict) -> Estimate:
         return _of_day(own, verdict)
     if verdict.doubt > MOST_DOUBT:
         return refused(own, "contrast survives where the fog that the road's brightness shows would leave none")
-    if not verdict.shows_fog and math.isfinite(own.visibility_interval[1]):
-        agreed = agree(own.visibility_interval, verdict.interval)
-        return own if agreed else refused(own, verdict.reason or DISAGREE)
     if verdict.reason:
         return _of_day(own, verdict) if verdict.outside > MOSTLY else own
     return _weighed(own, verdict) if verdict.is_sure else own

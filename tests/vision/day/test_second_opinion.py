@@ -89,12 +89,11 @@ def test_a_bent_road_is_the_joint_fits(said):
 CLEAR = replace(AGREES, interval=(1500.0, math.inf), shows_fog=False)
 
 
-def test_an_answer_without_fog_in_the_day_model_has_no_upper_end(said):
+def test_an_answer_that_agrees_with_clear_air_has_no_upper_end(said):
     found, _ = said(replace(OWN, extinction=0.001, standard_deviation=1e-4), CLEAR)
     assert found.valid
     assert found.extinction == 0.001
     assert found.visibility_interval[1] == math.inf
-    assert not said(OWN, CLEAR)[0].valid
 
 
 def test_fog_that_begins_in_a_clear_drive_is_compared_at_once(said, monkeypatch):

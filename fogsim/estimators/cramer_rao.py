@@ -66,25 +66,14 @@ class FoggyRoad:
 
 @dataclass(frozen=True, slots=True)
 class _Rows:
-    """Rows of road in a picture, from the horizon down.
+    """Rows of road in a picture, from the horizon down."""
 
-    Attributes
-    ----------
-    slant : (n,) float64
-        Length of the ray to the road [m].
-    slant_slope : (n,) float64
-        Its change with the pitch [m/rad].
-    near, far : (n,) float64
-        Where each row begins and ends along the road [m].
-    pixels : (n,) float64
-        How many show one lane.
-    """
-
-    slant: Floats
-    slant_slope: Floats
+    slant: Floats  # (n,): Length of the ray to the road [m]
+    slant_slope: Floats  # (n,): Its change with the pitch [m/rad]
+    # near, far (n,): where each row begins and ends along the road [m]
     near: Floats
     far: Floats
-    pixels: Floats
+    pixels: Floats  # (n,): How many show one lane
 
 
 @checked_parameters

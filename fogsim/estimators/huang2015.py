@@ -29,41 +29,21 @@ LEAST_EXTINCTION = OPTICAL_DEPTH_AT_VISIBILITY / 10_000.0
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """One estimate, when and where.
+    """One estimate, when and where."""
 
-    Attributes
-    ----------
-    extinction, deviation : float
-        k and its standard deviation [1/m].
-    time : float
-        [s].
-    way : float
-        Driven since the start [m].
-    track : int
-        Which vehicle ahead it is from; 0 for the road.
-    common : float
-        Standard deviation of ln k that all frames have in common [-].
-    """
-
+    # extinction, deviation: k and its standard deviation [1/m]
     extinction: float
     deviation: float
-    time: float
-    way: float
-    track: int
-    common: float = 0.0
+    time: float  # [s]
+    way: float  # Driven since the start [m]
+    track: int  # Which vehicle ahead it is from; 0 for the road
+    common: float = 0.0  # Standard deviation of ln k that all frames have in common [-]
 
 
 def decay(measurement: Measurement, time: float, way: float, time_scale: float, way_scale: float) -> float:
     """Weight of a measurement later and farther on, e^(−d_s/t_s) e^(−d_t/t_t) (section 5.2) [-].
 
-    Parameters
-    ----------
-    measurement : Measurement
-        What was measured then and there.
-    time, way : float
-        Now [s] and here [m].
-    time_scale, way_scale : float
-        t_t [s] and t_s [m].
+    Takes `time`, `way` [s], [m], `time_scale`, `way_scale` [s], [m].
     """
     return math.exp(-abs(time - measurement.time) / time_scale - abs(way - measurement.way) / way_scale)
 
@@ -72,11 +52,6 @@ def mixture(values: Sequence[float], weights: Sequence[float], within: Sequence[
     """Mean and standard deviation of a mixture of normal distributions.
 
     Eqs. 5.1 and 5.2 with the square that 5.2 lacks, weighted, and with the components' own variances.
-
-    Parameters
-    ----------
-    values, weights, within : sequence of float
-        Mean, weight and standard deviation of each component.
     """
     total = math.fsum(weights)
     mean = math.fsum(w * v for w, v in zip(weights, values, strict=True)) / total

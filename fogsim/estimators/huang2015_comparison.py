@@ -66,72 +66,36 @@ there at heights that no far picture resolves."""
 
 @dataclass(frozen=True, slots=True)
 class RearPatch:
-    """One picture of the vehicle ahead.
+    """One picture of the vehicle ahead."""
 
-    Attributes
-    ----------
-    number : int
-        Number of the measured range.
-    distance : float
-        From the camera to its rear [m].
-    patch : Patch
-        The picture, about the middle of its body.
-    variance : float
-        Of the body's pixels, before the picture was shrunk [linear grey levels²].
-    sky : SkyReading
-        The airlight [linear grey levels].
-    noise : float
-        Deviation of single pixels of the vehicle [linear grey levels].
-    width : float
-        Of the vehicle [px].
-    pitch_deviation : float
-        Rows by which pitch moves the picture between frames [px].
-    metre : float
-        Pixels in a metre at the vehicle [px/m].
-    scale : float
-        Size over that in the frame [-].
-    """
-
-    number: int
-    distance: float
-    patch: Patch
-    variance: float
-    sky: SkyReading
-    noise: float
-    width: float
-    pitch_deviation: float
-    metre: float
-    scale: float = 1.0
+    number: int  # Number of the measured range
+    distance: float  # From the camera to its rear [m]
+    patch: Patch  # The picture, about the middle of its body
+    variance: float  # Of the body's pixels, before the picture was shrunk [linear grey levels²]
+    sky: SkyReading  # The airlight [linear grey levels]
+    noise: float  # Deviation of single pixels of the vehicle [linear grey levels]
+    width: float  # Of the vehicle [px]
+    pitch_deviation: float  # Rows by which pitch moves the picture between frames [px]
+    metre: float  # Pixels in a metre at the vehicle [px/m]
+    scale: float = 1.0  # Size over that in the frame [-]
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """A picture compared with the reference.
+    """A picture compared with the reference."""
 
-    Attributes
-    ----------
-    picture : RearPatch
-        The picture.
-    distance : float
-        From the camera to the vehicle's rear [m].
-    contrast, deviation : float
-        Detail over that of the reference, changes of exposure taken out, and its standard deviation [-].
-    mean, near_mean : float
-        Mean luminance of the picture and of the same pixels of the reference, either over its sky's [-].
-    mean_deviation : float
-        Standard deviation of the mean; ``inf`` if it is not known, as where the sky is saturated [-].
-    regression : Regression
-        Of the picture on the reference.
-    """
-
-    picture: RearPatch
-    distance: float
+    picture: RearPatch  # The picture
+    distance: float  # From the camera to the vehicle's rear [m]
+    # contrast, deviation: detail over that of the reference, changes of exposure taken out, and its standard deviation
+    # [-]
     contrast: float
     deviation: float
+    # mean, near_mean: mean luminance of the picture and of the same pixels of the reference, either over its sky's [-]
     mean: float
     near_mean: float
+    # Standard deviation of the mean; ``inf`` if it is not known, as where the sky is saturated [-]
     mean_deviation: float
-    regression: Regression
+    regression: Regression  # Of the picture on the reference
 
     @property
     def number(self) -> int:
@@ -159,19 +123,7 @@ class Comparison:
 def crop_vehicle(image: Pixels, camera: Camera, distance: float) -> VehicleCrop:
     """Cut out of a frame where a vehicle can be, before the sky in a band above the horizon.
 
-    Parameters
-    ----------
-    image : (rows, cols) or (rows, cols, 3) uint8 or uint16
-        An image of the camera.
-    camera : Camera
-        The assumed calibration.
-    distance : float
-        From the camera to the vehicle's rear [m].
-
-    Raises
-    ------
-    CannotTellError
-        If no vehicle can be seen there, or no sky by day, or lamps light the road.
+    Takes `image` (rows, cols), `distance` [m].
     """
     if not 0.5 < distance < math.inf:
         raise CannotTellError(f"a range of {distance:.1f} m is none of a vehicle ahead")
@@ -212,21 +164,7 @@ def _sky_above(image: Pixels, camera: Camera, distance: float) -> SkyReading:
 def cut_patch(crop: VehicleCrop, window: RearBox, number: int, blur: float) -> RearPatch:
     """Cut the picture of a vehicle out, with room about it for what is not known of its place.
 
-    Parameters
-    ----------
-    crop : VehicleCrop
-        Where it can be.
-    window : RearBox
-        Where it is or is expected [px].
-    number : int
-        Number of the measured range.
-    blur : float
-        Standard deviation of the lens' blur [px].
-
-    Raises
-    ------
-    CannotTellError
-        If it is too small or outside the image.
+    Takes `window` [px], `blur` [px].
     """
     if window.width < LEAST_WIDTH:
         raise CannotTellError("the vehicle ahead is too small in the image")
@@ -255,13 +193,7 @@ def cut_patch(crop: VehicleCrop, window: RearBox, number: int, blur: float) -> R
 
 
 def shrink_broad(picture: RearPatch) -> RearPatch:
-    """The same picture no broader than `BROADEST`.
-
-    Parameters
-    ----------
-    picture : RearPatch
-        As it was cut from the frame.
-    """
+    """The same picture no broader than `BROADEST`."""
     scale = min(BROADEST / picture.width, 1.0)
     return replace(
         picture, patch=shrink(picture.patch, scale), width=picture.width * scale, noise=picture.noise * scale,
@@ -270,15 +202,7 @@ def shrink_broad(picture: RearPatch) -> RearPatch:
 
 
 def placed_at(picture: RearPatch, full: RearPatch, at: Placement) -> RearPatch:
-    """Picture of a vehicle that has been found at a place.
-
-    Parameters
-    ----------
-    picture, full : RearPatch
-        The picture, and as it was cut from the frame.
-    at : Placement
-        Where the vehicle is in the picture.
-    """
+    """Picture of a vehicle that has been found at a place."""
     small = replace(picture.patch, column=at.column, row=at.row)
     sizes = zip(small.luminance.shape, full.patch.luminance.shape, strict=True)
     places = zip((at.row, at.column), sizes, strict=True)
@@ -287,15 +211,7 @@ def placed_at(picture: RearPatch, full: RearPatch, at: Placement) -> RearPatch:
 
 
 def lower(picture: RearPatch, widths: float) -> RearPatch:
-    """The same picture of a vehicle that turned out to stand lower in it.
-
-    Parameters
-    ----------
-    picture : RearPatch
-        The picture.
-    widths : float
-        By how many of its widths it does [-].
-    """
+    """The same picture of a vehicle that turned out to stand lower in it."""
     patch = replace(picture.patch, row=picture.patch.row + widths * picture.width)
     # Of a picture that was shrunk the frame's own pixels are gone, and with them its exact variance.
     variance = _window_variance(patch) if picture.scale == 1.0 else picture.variance
@@ -324,12 +240,7 @@ def expected_placement(
 ) -> PlacementPrior:
     """Where the reference is expected in the next frame: as before, but for pitch, steering and noise of the range [m].
 
-    Parameters
-    ----------
-    reference, picture : RearPatch
-        The two.
-    range_deviation : float
-        Standard deviation of the range [m].
+    Takes `range_deviation` [m].
     """
     nearness = 1.0 / picture.distance + 1.0 / reference.distance
     placement = Placement(picture.patch.column, picture.patch.row, picture.width / reference.width)
@@ -339,32 +250,14 @@ def expected_placement(
 
 
 def known_placement(reference: RearPatch, picture: RearPatch) -> PlacementPrior:
-    """Where the reference is expected in a picture that has been registered before.
-
-    Parameters
-    ----------
-    reference, picture : RearPatch
-        The two.
-    """
+    """Where the reference is expected in a picture that has been registered before."""
     return replace(expected_placement(reference, picture), column_deviation=0.5, row_deviation=0.5)
 
 
 def compare(near: RearPatch, far: RearPatch, prior: PlacementPrior, most: float = math.inf) -> Comparison | None:
     """Compare a picture with the reference.
 
-    Parameters
-    ----------
-    near, far : RearPatch
-        The reference, which shows more, and the picture.
-    prior : PlacementPrior
-        Where the reference is expected in the picture.
-    most : float
-        Largest contrast over the reference's that can be true [-].
-
-    Returns
-    -------
-    Comparison or None
-        None if too few pixels can be compared.
+    Returns None if too few pixels can be compared.
     """
     # A saturated sky does not tell the exposure.
     seen = near.sky.clipping is not None and far.sky.clipping is not None
@@ -445,16 +338,6 @@ def compare_with_itself(reference: RearPatch) -> Comparison:
     """The reference as the first of its comparisons.
 
     Its contrast is 1 by definition, which says nothing of how much of its detail others show; its light does count.
-
-    Parameters
-    ----------
-    reference : RearPatch
-        The picture.
-
-    Raises
-    ------
-    CannotTellError
-        If it shows nothing that could be followed.
     """
     own = compare(reference, reference, known_placement(reference, reference))
     if own is None or not (math.isfinite(own.regression.noise_deviation) or own.shows_light):

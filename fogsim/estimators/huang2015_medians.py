@@ -128,21 +128,11 @@ class Huang2015Repair(Repair):
 
 @dataclass(frozen=True, slots=True)
 class MedianRows:
-    """Medians of the region's rows.
+    """Medians of the region's rows."""
 
-    Attributes
-    ----------
-    curve : RoadCurve
-        The medians from the top down; rows without any have no weight.
-    horizon : Horizon
-        In rows of the whole image.
-    top : float
-        Topmost row that has a median, below the horizon [px].
-    """
-
-    curve: RoadCurve
-    horizon: Horizon
-    top: float
+    curve: RoadCurve  # The medians from the top down; rows without any have no weight
+    horizon: Horizon  # In rows of the whole image
+    top: float  # Topmost row that has a median, below the horizon [px]
 
 
 def grown_medians(
@@ -152,26 +142,7 @@ def grown_medians(
     repairs: AbstractSet[Huang2015Repair],
     lead: LeadMeasurement | None,
 ) -> MedianRows:
-    """Grow the region and take the medians of its rows.
-
-    Parameters
-    ----------
-    road : RoadImage
-        The picture.
-    camera : Camera
-        The assumed calibration.
-    assumed : Horizon
-        The calibration's horizon.
-    repairs : set of Huang2015Repair
-        What is done otherwise than in the thesis.
-    lead : LeadMeasurement or None
-        A tracked vehicle that hides part of the road.
-
-    Raises
-    ------
-    CannotTellError
-        If the region has too few rows.
-    """
+    """Grow the region and take the medians of its rows."""
     blurred = smoothed(road.luminance)
     rows = blurred.shape[0]
     below = np.arange(rows, dtype=np.float64) + (road.first_row - assumed.row)
@@ -228,19 +199,8 @@ def _horizon(
 def first_extinctions(curve: RoadCurve, luminance: Floats, repairs: AbstractSet[Huang2015Repair]) -> Floats:
     """Extinctions by the rows where some curves change most.
 
-    Parameters
-    ----------
-    curve : RoadCurve
-        Rows and weights.
-    luminance : (n, m) float64
-        Luminance of m curves over these rows [linear grey levels].
-    repairs : set of Huang2015Repair
-        Whether rows in a ratio are compared, or 20 rows apart.
-
-    Returns
-    -------
-    (m,) float64
-        k0 [1/m]; NaN or not positive where the largest change is above the horizon.
+    Returns k0 [1/m]; NaN or not positive where the largest change is above the horizon (m,). Takes `luminance` (n, m)
+    [linear grey levels].
     """
     seen = curve.weight > 0.0
     below, light = curve.below_horizon[seen], luminance[seen]
@@ -276,17 +236,7 @@ def optimised_extinctions(
 ) -> Floats:
     """Extinctions about the first ones that fit best, A being the median of the top row (section 4.2.4).
 
-    Parameters
-    ----------
-    curve, luminance, repairs
-        See `first_extinctions`.
-    first : (m,) float64
-        k0 of each curve [1/m].
-
-    Returns
-    -------
-    (m,) float64
-        k [1/m]; NaN where there is no k0.
+    Returns k [1/m]; NaN where there is no k0 (m,). Takes `first` (m,) [1/m].
     """
     known = np.isfinite(first) & (first > 0.0)
     if not known.any():

@@ -59,19 +59,8 @@ def image_confidence(extinction: float, distance: Floats | float, reference: flo
 
     e^(−2k (d − d₀)), of the thing's variance at the reference; the thesis shows it in per cent.
 
-    Parameters
-    ----------
-    extinction : float
-        Extinction coefficient k [1/m].
-    distance : float64 or float
-        Ranges d [m].
-    reference : float
-        Range d₀ at which the confidence is 1 [m].
-
-    Returns
-    -------
-    float64
-        Confidence [-]; more than 1 nearer than the reference.
+    Returns confidence [-]; more than 1 nearer than the reference. Takes `extinction` [1/m], `distance` [m], `reference`
+    [m].
     """
     return np.asarray(np.exp(-2.0 * extinction * (np.asarray(distance, np.float64) - reference)))
 
@@ -79,46 +68,24 @@ def image_confidence(extinction: float, distance: Floats | float, reference: flo
 def variance_ratio_extinction(near_distance: float, near: float, far_distance: float, far: float) -> float:
     """Extinction from two variances of one thing's picture: k = ln(σ₁² / σ₂²) / (2 (d₂ − d₁)) (eq. 4.15) [1/m].
 
-    Parameters
-    ----------
-    near_distance, far_distance : float
-        d₁ and d₂ [m], different.
-    near, far : float
-        σ₁² and σ₂², positive, in one unit.
+    Takes `near_distance`, `far_distance` [m].
     """
     return 0.5 * math.log(near / far) / (far_distance - near_distance)
 
 
 @dataclass(frozen=True, slots=True)
 class RatioTable:
-    """Mean ratios of variances by difference of range (huang2015 table 4.2, after the ± 50 % rule).
+    """Mean ratios of variances by difference of range (huang2015 table 4.2, after the ± 50 % rule)."""
 
-    Attributes
-    ----------
-    difference : (n,) float64
-        Far less near range [m], ascending: means of rows that are a spacing apart.
-    ratio : (n,) float64
-        Far over near variance [-].
-    count : (n,) int64
-        Ratios in each mean.
-    """
-
-    difference: Floats
-    ratio: Floats
-    count: NDArray[np.int64]
+    difference: Floats  # (n,): Far less near range [m], ascending: means of rows that are a spacing apart
+    ratio: Floats  # (n,): Far over near variance [-]
+    count: NDArray[np.int64]  # (n,) int64: Ratios in each mean
 
 
 def ratio_table(distances: Floats, variances: Floats, spacing: float) -> RatioTable:
     """Ratios of every two variances, by their difference of range.
 
-    Parameters
-    ----------
-    distances : (n,) float64
-        Ranges [m].
-    variances : (n,) float64
-        Variances, positive.
-    spacing : float
-        Step of the differences [m].
+    Takes `distances` (n,) [m], `variances` (n,), `spacing` [m].
     """
     apart = distances[None, :] - distances[:, None]
     ratio = variances[None, :] / variances[:, None]
@@ -136,15 +103,7 @@ def ratio_table(distances: Floats, variances: Floats, spacing: float) -> RatioTa
 def published_extinction(table: RatioTable) -> tuple[float, float]:
     """Extinction of least squared error between mean and theoretical ratios, of k from 0 to 0.09 (section 4.3.3).
 
-    Parameters
-    ----------
-    table : RatioTable
-        At least one ratio.
-
-    Returns
-    -------
-    tuple of float
-        k and the standard deviation that the ratios' misfit makes of it [1/m].
+    Returns k and the standard deviation that the ratios' misfit makes of it [1/m].
     """
     tried = np.linspace(0.0, LARGEST_EXTINCTION, GRID)
     model = image_confidence(1.0, tried[:, None] * table.difference)
@@ -157,46 +116,28 @@ def published_extinction(table: RatioTable) -> tuple[float, float]:
 
 @dataclass(frozen=True, slots=True)
 class Regressions:
-    """Regressions of n pictures of a vehicle on the nearest of them; luminances in that of the sky.
+    """Regressions of n pictures of a vehicle on the nearest of them; luminances in that of the sky."""
 
-    Attributes
-    ----------
-    distance : (n,) float64
-        Ranges [m].
-    slope, slope_deviation : (n,) float64
-        Contrast over that of the reference, and its deviation by pixel noise [-].
-    mean, mean_deviation : (n,) float64
-        Mean luminance of each picture and its deviation; ``inf`` where the sky is saturated [-].
-    near_mean : (n,) float64
-        Mean luminance of the same pixels of the reference [-].
-    range_deviation : float or (n,) float64
-        Standard deviation of the ranges [m].
-    """
-
-    distance: Floats
+    distance: Floats  # (n,): Ranges [m]
+    # slope, slope_deviation (n,): contrast over that of the reference, and its deviation by pixel noise [-]
     slope: Floats
     slope_deviation: Floats
+    # mean, mean_deviation (n,): mean luminance of each picture and its deviation; ``inf`` where the sky is saturated
+    # [-]
     mean: Floats
     mean_deviation: Floats
-    near_mean: Floats
-    range_deviation: Floats | float = RANGE_DEVIATION
+    near_mean: Floats  # (n,): Mean luminance of the same pixels of the reference [-]
+    range_deviation: Floats | float = RANGE_DEVIATION  # (n,): Standard deviation of the ranges [m]
 
 
 @dataclass(frozen=True, slots=True)
 class ContrastFit:
-    """Koschmieder's law fitted to regressions.
+    """Koschmieder's law fitted to regressions."""
 
-    Attributes
-    ----------
-    extinction, deviation : float
-        k, which may come out negative, and its standard deviation [1/m].
-    misfit : float
-        Mean square of the standardised residuals; about 1 where the model holds.
-    """
-
+    # extinction, deviation: k, which may come out negative, and its standard deviation [1/m]
     extinction: float
     deviation: float
-    misfit: float
+    misfit: float  # Mean square of the standardised residuals; about 1 where the model holds
 
 
 def fitted_extinction(data: Regressions) -> ContrastFit | None:
@@ -207,15 +148,7 @@ def fitted_extinction(data: Regressions) -> ContrastFit | None:
     share f of the reference's own detail that others do not show, and the drift g of the mean contrast as a thing
     becomes smaller in the picture.
 
-    Parameters
-    ----------
-    data : Regressions
-        At least three.
-
-    Returns
-    -------
-    ContrastFit or None
-        None if there are fewer, of one range, or none of them shows the vehicle.
+    Returns None if there are fewer, of one range, or none of them shows the vehicle.
     """
     apart = data.distance - data.distance.min(initial=math.inf)
     first = _first_guess(data, apart)

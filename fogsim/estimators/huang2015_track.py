@@ -89,34 +89,11 @@ class LeadTrack(TrackedVehicle[Comparison]):
         return None if self.reference is None else self._expected(self._last_distance, self.reference.picture)
 
     def follows(self, distance: float) -> bool:
-        """Whether a range can be that of the same vehicle as before.
-
-        Parameters
-        ----------
-        distance : float
-            From the own front bumper [m].
-        """
+        """Whether a range can be that of the same vehicle as before (`distance` [m])."""
         return self.reference is not None and abs(distance + self._setback - self._last_distance) <= MOST_JUMP
 
     def see(self, image: Pixels, measured: LeadMeasurement, time: float, deviation: float | None = None) -> None:
-        """Look for the vehicle in the next frame.
-
-        Parameters
-        ----------
-        image : (rows, cols) or (rows, cols, 3) uint8 or uint16
-            An image of the camera.
-        measured : LeadMeasurement
-            Range and relative speed by the radar.
-        time : float
-            [s].
-        deviation : float, optional
-            Standard deviation of a range from the camera [m], which registration then refines; a radar's otherwise.
-
-        Raises
-        ------
-        CannotTellError
-            If it is not there to be seen.
-        """
+        """Look for the vehicle in the next frame (`image` (rows, cols), `time` [s], `deviation` [m])."""
         distance = measured.distance + self._setback
         number = self._ranges.add(time, measured)
         crop = crop_vehicle(image, self._camera, distance)

@@ -12,13 +12,7 @@ from fogsim.values.observation import Observation
 
 
 class ObservationCheck:
-    """What every method demands of its observations: the assumed camera's images, in the order of time.
-
-    Parameters
-    ----------
-    camera : Camera
-        The assumed calibration.
-    """
+    """What every method demands of its observations: the assumed camera's images, in the order of time."""
 
     def __init__(self, camera: Camera) -> None:
         self._camera = camera
@@ -29,19 +23,7 @@ class ObservationCheck:
         self._time = -math.inf
 
     def image_of(self, observation: Observation) -> NDArray[np.uint8] | NDArray[np.uint16]:
-        """Image of an observation that can follow the earlier ones.
-
-        Parameters
-        ----------
-        observation : Observation
-            Its frame; a bare image has neither time nor camera.
-
-        Raises
-        ------
-        InputError
-            If the frame's camera is not the assumed one, its time is before that of an earlier frame, or its image is
-            none of the camera (see `checked_image`). What is refused leaves no trace.
-        """
+        """Image of an observation that can follow the earlier ones."""
         frame = observation.frame
         if not isinstance(frame, Frame):
             return checked_image(frame, self._camera)
@@ -62,20 +44,7 @@ class ObservationCheck:
 
 
 def checked_image(image: object, camera: Camera) -> NDArray[np.uint8] | NDArray[np.uint16]:
-    """Return an image unchanged if it can have come from a camera.
-
-    Parameters
-    ----------
-    image : (rows, cols) or (rows, cols, 3) uint8, or uint16 of a camera of 10 or 12 bits
-        The pixels.
-    camera : Camera
-        The assumed calibration.
-
-    Raises
-    ------
-    InputError
-        If it is not an array of the camera's bit depth with two or three axes, or not of the camera's size.
-    """
+    """Return an image unchanged if it can have come from a camera (`image` (rows, cols))."""
     expected, most = np.dtype(np.uint8 if camera.bits == 8 else np.uint16), 2**camera.bits - 1
     if not isinstance(image, np.ndarray):
         raise InputError(f"an image must be a numpy array of {expected}, got {type(image).__name__}")

@@ -60,58 +60,26 @@ DENSEST = 0.1
 
 @dataclass(frozen=True, slots=True)
 class RearDetection:
-    """One picture of the vehicle ahead.
+    """One picture of the vehicle ahead."""
 
-    Attributes
-    ----------
-    number : int
-        Number of the measured range.
-    distance, depth : float
-        Its range as measured, and from the camera to its rear [m].
-    time : float
-        [s].
-    picture : RearPicture
-        The picture.
-    box : RearBox
-        Its place in the image.
-    contrast : ContrastRatio
-        Contrast over that of the reference.
-    clipped : bool
-        Whether the sky may be brighter than it looks.
-    airlight_deviation : float
-        Relative deviation of the airlight before it, where that is not even [-].
-    alike : bool
-        Whether it looks like the reference, and is not only where that is expected.
-    levelled : LevelledRows or None
-        How its rows were taken relative to their own airlight; None where that is even.
-    """
-
-    number: int
+    number: int  # Number of the measured range
+    # distance, depth: its range as measured, and from the camera to its rear [m]
     distance: float
     depth: float
-    time: float
-    picture: RearPicture
-    box: RearBox
-    contrast: ContrastRatio
-    clipped: bool
-    airlight_deviation: float
-    alike: bool
-    levelled: LevelledRows | None
+    time: float  # [s]
+    picture: RearPicture  # The picture
+    box: RearBox  # Its place in the image
+    contrast: ContrastRatio  # Contrast over that of the reference
+    clipped: bool  # Whether the sky may be brighter than it looks
+    airlight_deviation: float  # Relative deviation of the airlight before it, where that is not even [-]
+    alike: bool  # Whether it looks like the reference, and is not only where that is expected
+    levelled: LevelledRows | None  # How its rows were taken relative to their own airlight; None where that is even
 
 
 class ContrastTrack(TrackedVehicle[RearDetection]):
     """Pictures of one vehicle ahead at different ranges; the reference is the nearest.
 
-    Parameters
-    ----------
-    ranges : SmoothedRanges
-        Its measured ranges.
-    pitch_deviation : float
-        Standard deviation of the true pitch about the assumed one [rad].
-    window : float
-        How long a detection counts [s].
-    frames : int
-        How many count at most.
+    Takes `pitch_deviation` [rad], `window` [s].
     """
 
     def __init__(self, ranges: SmoothedRanges, pitch_deviation: float, window: float, frames: int) -> None:
@@ -126,13 +94,7 @@ class ContrastTrack(TrackedVehicle[RearDetection]):
         self._swayed = 0
 
     def is_lost(self, time: float) -> bool:
-        """Count a frame without the vehicle; whether it may be another one from now on.
-
-        Parameters
-        ----------
-        time : float
-            [s]; 0 where frames have none.
-        """
+        """Count a frame without the vehicle; whether it may be another one from now on (`time` [s])."""
         seen = self.detections[-1].time if self.detections else time
         return self.miss() and abs(time - seen) >= (GAP if time else 0.0)
 
@@ -141,23 +103,7 @@ class ContrastTrack(TrackedVehicle[RearDetection]):
     ) -> RearDetection:
         """Find the vehicle in a frame and keep its picture if the range is new.
 
-        Parameters
-        ----------
-        crop : VehicleCrop
-            Where in the frame it is looked for.
-        number, distance : int, float
-            Number of the measured range, and that range [m].
-        time : float
-            [s].
-        surprise : float
-            How far the range is from where the same vehicle can be [m].
-        densest : float
-            Extinction that is not exceeded by what is known so far [1/m].
-
-        Raises
-        ------
-        CannotTellError
-            If it is not there to be seen.
+        Takes `number`, `distance` [m], `time` [s], `surprise` [m], `densest` [1/m].
         """
         self._forget_old(time)
         found = None
@@ -195,10 +141,7 @@ class ContrastTrack(TrackedVehicle[RearDetection]):
     def relevel(self, extinction: float) -> None:
         """Take all pictures relative to their own airlight anew, where that was reckoned with quite another extinction.
 
-        Parameters
-        ----------
-        extinction : float
-            What is known by now [1/m].
+        Takes `extinction` [1/m].
         """
         if self.reference is None or all(_is_near(one.levelled, extinction) for one in self.detections):
             return

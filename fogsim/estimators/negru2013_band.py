@@ -24,24 +24,12 @@ HALF_BODY = 1.1
 
 @dataclass(frozen=True, slots=True)
 class SeenBand:
-    """A band of road and the picture that it is in.
+    """A band of road and the picture that it is in."""
 
-    Attributes
-    ----------
-    road : RoadImage
-        The picture, cut out and linear.
-    horizon : Horizon
-        The horizon above it.
-    band : Band
-        Where the band is: columns of the whole picture, rows of `road`.
-    profile : (n,) float64
-        Median luminance of each of its rows from the top down [linear grey levels].
-    """
-
-    road: RoadImage
-    horizon: Horizon
-    band: Band
-    profile: NDArray[np.float64]
+    road: RoadImage  # The picture, cut out and linear
+    horizon: Horizon  # The horizon above it
+    band: Band  # Where the band is: columns of the whole picture, rows of `road`
+    profile: NDArray[np.float64]  # (n,): Median luminance of each of its rows from the top down [linear grey levels]
 
     @property
     def below_horizon(self) -> NDArray[np.float64]:
@@ -51,15 +39,7 @@ class SeenBand:
 
 
 def fog_slope(road: RoadImage, horizon: Horizon) -> NDArray[np.float32]:
-    """Steepest brightening upward that fog can make of each row [linear grey levels per px].
-
-    Parameters
-    ----------
-    road : RoadImage
-        The picture.
-    horizon : Horizon
-        The horizon above it.
-    """
+    """Steepest brightening upward that fog can make of each row [linear grey levels per px]."""
     below_horizon = np.arange(road.luminance.shape[0], dtype=np.float64) + (road.first_row - horizon.row)
     return np.minimum(steepest_slope(below_horizon, road.airlight), SIMILARITY * road.contrast).astype(np.float32)
 
@@ -79,29 +59,7 @@ def road_band(
     widest: bool = False,
     lead: LeadMeasurement | None = None,
 ) -> Band:
-    """Find the band of road: columns are counted in the whole picture, rows in that of the road.
-
-    Parameters
-    ----------
-    road : RoadImage
-        The picture.
-    edges : Edges
-        Its edges.
-    limits : GrowthLimits
-        What a pixel may differ by to join the region.
-    camera : Camera
-        The assumed calibration.
-    widest : bool
-        Take the widest band wherever it is, as published; else of those of a limited width that nearest to the
-        vanishing point.
-    lead : LeadMeasurement or None
-        A tracked vehicle, which no band crosses.
-
-    Raises
-    ------
-    CannotTellError
-        If no vertical band crosses the road's region.
-    """
+    """Find the band of road: columns are counted in the whole picture, rows in that of the road."""
     blurred = smoothed(road.luminance)
     region = grow_region(blurred, edges.pixels, limits)
     hide_vehicle(region, road, camera, lead, HALF_BODY)
@@ -118,14 +76,7 @@ def road_band(
 def narrowed_curve(seen: SeenBand, axis: float, camera: Camera) -> RoadCurve:
     """Luminance of a band of road by row, as far as it is road: a band before the vehicle narrows upward with it.
 
-    Parameters
-    ----------
-    seen : SeenBand
-        The band.
-    axis : float
-        Column of the vanishing point [px].
-    camera : Camera
-        The assumed calibration.
+    Takes `axis` [px].
     """
     road, band = seen.road, seen.band
     if not band.left <= axis <= band.right:
@@ -141,15 +92,7 @@ def narrowed_curve(seen: SeenBand, axis: float, camera: Camera) -> RoadCurve:
 
 
 def road_curve(seen: SeenBand, camera: Camera) -> RoadCurve:
-    """Luminance of a band of road over the rows below its horizon.
-
-    Parameters
-    ----------
-    seen : SeenBand
-        The band.
-    camera : Camera
-        The assumed calibration.
-    """
+    """Luminance of a band of road over the rows below its horizon."""
     below, band = seen.below_horizon, seen.band
     u0, v0 = camera.principal_point
     across = (0.5 * (band.left + band.right) - u0) / camera.focal_length

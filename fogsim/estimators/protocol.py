@@ -68,11 +68,5 @@ class TakesCalibrations(Protocol):
     """An estimator that needs calibrations where its parameters name no file of them."""
 
     def take_calibrations(self, source: Calibrations) -> None:
-        """Take calibrations from a source when they are first needed.
-
-        Parameters
-        ----------
-        source : Calibrations
-            Makes them.
-        """
+        """Take calibrations from a source when they are first needed."""
         ...

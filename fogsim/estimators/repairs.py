@@ -8,14 +8,9 @@ from fogsim.errors import InputError
 
 
 class Repair(StrEnum):
-    """Base of a method's repairs: a name, and what is wrong in the paper and right with the repair.
+    """Base of a method's repairs: a name, and what is wrong in the paper and right with the repair."""
 
-    Attributes
-    ----------
-    paper, corrected : str
-        What the paper has, and what the repair does instead.
-    """
-
+    # paper, corrected: what the paper has, and what the repair does instead
     paper: str
     corrected: str
 
@@ -32,24 +27,7 @@ R = TypeVar("R", bound=Repair)
 def chosen(
     kind: type[R], repairs: Literal["all", "none"] | Sequence[R], *, as_published: bool, published: Collection[R] = ()
 ) -> frozenset[R]:
-    """Repairs that a method makes.
-
-    Parameters
-    ----------
-    kind : type
-        All that there are.
-    repairs : {'all', 'none'} or sequence of str
-        Those that are asked for.
-    as_published : bool
-        Whether the method is to be as its paper has it.
-    published : collection
-        Repairs that are made even then.
-
-    Raises
-    ------
-    InputError
-        If both are given, which contradict each other.
-    """
+    """Repairs that a method makes."""
     if not as_published:
         return frozenset(kind if repairs == "all" else () if repairs == "none" else map(kind, repairs))
     if repairs not in ("all", "none"):

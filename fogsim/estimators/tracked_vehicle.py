@@ -129,10 +129,7 @@ class TrackedVehicle(ABC, Generic[D]):
 class SmoothedRanges:
     """Ranges as measured, and as they are likely with those before and after and the speeds between.
 
-    Parameters
-    ----------
-    deviation : float
-        Standard deviation of a measured range [m]; 0 leaves them as they are.
+    Takes `deviation` [m].
     """
 
     def __init__(self, deviation: float) -> None:
@@ -143,17 +140,7 @@ class SmoothedRanges:
     def add(self, time: float, measured: LeadMeasurement) -> int:
         """Take a measurement.
 
-        Parameters
-        ----------
-        time : float
-            [s].
-        measured : LeadMeasurement
-            Its range must be finite.
-
-        Returns
-        -------
-        int
-            Its number, by which it is asked for.
+        Returns Its number, by which it is asked for. Takes `time` [s].
         """
         speed = measured.relative_speed if math.isfinite(measured.relative_speed) else 0.0
         self._measured.append((time, measured.distance, speed))
@@ -163,17 +150,7 @@ class SmoothedRanges:
     def smoothed(self, numbers: list[int], measured: Floats) -> Floats:
         """Likely ranges of measurements.
 
-        Parameters
-        ----------
-        numbers : (n,) list of int
-            Their numbers.
-        measured : (n,) float64
-            Their ranges, which those that are too old keep [m].
-
-        Returns
-        -------
-        (n,) float64
-            [m].
+        Returns [m] (n,). Takes `measured` (n,) [m].
         """
         if self._deviation <= 0.0 or len(self._measured) < 3:
             return measured

@@ -39,10 +39,7 @@ zhu2015`, and ρ, which changes nothing there [-]; the paper prints neither."""
 def zhu_category(visibility: float) -> FogCategory:
     """Class of a visibility by zhu2015, table 1: no fog from 1000 m, low from 300 m, moderate from 100 m, else dense.
 
-    Parameters
-    ----------
-    visibility : float
-        Meteorological visibility [m].
+    Takes `visibility` [m].
     """
     category = fog_category(visibility)
     return FogCategory.DENSE if category is FogCategory.VERY_DENSE else category
@@ -51,13 +48,10 @@ def zhu_category(visibility: float) -> FogCategory:
 def weighted_row(rows: NDArray[np.float64]) -> float:
     """Weighted average of rows by how often each occurs (zhu2015 section 3.4).
 
-    The largest and the smallest are dropped, mean and median of the rest are added to it, and every value counts by
-    its frequency; as values come one by one, a value that occurs n times has n² of the say.
+    The largest and the smallest are dropped, mean and median of the rest are added to it, and every value counts by its
+    frequency; as values come one by one, a value that occurs n times has n² of the say.
 
-    Parameters
-    ----------
-    rows : (n,) float64
-        Rows at which regions end [px], at least one.
+    Takes `rows` (n,) [px].
     """
     kept = np.sort(rows)[1:-1] if rows.size > 2 else rows
     data = np.concatenate([kept, [kept.mean(), np.median(kept)]])

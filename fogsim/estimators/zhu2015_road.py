@@ -118,30 +118,14 @@ class Zhu2015Repair(Repair):
 
 @dataclass(frozen=True, slots=True)
 class SeenRoad:
-    """One frame's road.
+    """One frame's road."""
 
-    Attributes
-    ----------
-    image : RoadImage
-        The pixels.
-    horizon : Horizon
-        From the lane lines where they meet, else from the calibration; in rows of the whole image.
-    region : (rows, cols) uint8
-        The grown region.
-    vanishing_point : tuple of float or None
-        Column and row [px].
-    lines : tuple of LaneLine
-        The lane lines that were looked at, in rows of `image`.
-    hidden : float
-        Half of what a tracked vehicle hides of the width of the image [px]; 0 without one.
-    """
-
-    image: RoadImage
-    horizon: Horizon
-    region: NDArray[np.uint8]
-    vanishing_point: tuple[float, float] | None
-    lines: tuple[LaneLine, ...]
-    hidden: float = 0.0
+    image: RoadImage  # The pixels
+    horizon: Horizon  # From the lane lines where they meet, else from the calibration; in rows of the whole image
+    region: NDArray[np.uint8]  # (rows, cols) uint8: The grown region
+    vanishing_point: tuple[float, float] | None  # Column and row [px]
+    lines: tuple[LaneLine, ...]  # The lane lines that were looked at, in rows of `image`
+    hidden: float = 0.0  # Half of what a tracked vehicle hides of the width of the image [px]; 0 without one
 
 
 def seen_road(
@@ -152,28 +136,7 @@ def seen_road(
     repairs: AbstractSet[Zhu2015Repair],
     lead: LeadMeasurement | None,
 ) -> SeenRoad:
-    """Find lines, horizon and road in an image.
-
-    Parameters
-    ----------
-    image : (rows, cols) or (rows, cols, 3) uint8 or uint16
-        An image of the camera.
-    camera : Camera
-        The assumed calibration.
-    pitch_deviation : float
-        Standard deviation of the pitch [rad].
-    growth : tuple of float
-        G_max and ρ as published.
-    repairs : set of Zhu2015Repair
-        What is done otherwise than published.
-    lead : LeadMeasurement or None
-        A tracked vehicle that hides part of the road.
-
-    Raises
-    ------
-    CannotTellError
-        If the image shows no road by day.
-    """
+    """Find lines, horizon and road in an image (`image` (rows, cols), `pitch_deviation` [rad])."""
     assumed = calibrated_horizon(camera, pitch_deviation)
     road = road_image(image, camera, assumed, linear=Zhu2015Repair.LINEAR_LUMINANCE in repairs)
     blurred = smoothed(road.luminance)
@@ -236,18 +199,7 @@ def _sure_lines(
 
 
 def inflection_rows(road: SeenRoad) -> NDArray[np.float64]:
-    """Rows at which the columns of the region end, below the horizon [px]: the published inflection.
-
-    Parameters
-    ----------
-    road : SeenRoad
-        The road.
-
-    Raises
-    ------
-    CannotTellError
-        If there is no region.
-    """
+    """Rows at which the columns of the region end, below the horizon [px]: the published inflection."""
     tops = region_tops(road.region)
     if tops.size == 0:
         raise CannotTellError("no region grows from the bottom row")
@@ -256,39 +208,18 @@ def inflection_rows(road: SeenRoad) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, slots=True)
 class Inflection:
-    """The fog of one frame.
+    """The fog of one frame."""
 
-    Attributes
-    ----------
-    extinction, deviation : float
-        k and its standard deviation [1/m]; k is 0 where no fog shows.
-    airlight, road : float or None
-        A and R that go with it [linear grey levels].
-    """
-
+    # extinction, deviation: k and its standard deviation [1/m]; k is 0 where no fog shows
     extinction: float
     deviation: float
+    # airlight, road: A and R that go with it [linear grey levels]
     airlight: float | None = None
     road: float | None = None
 
 
 def steepest_fog(road: SeenRoad, camera: Camera, repairs: AbstractSet[Zhu2015Repair]) -> Inflection:
-    """Fog of the steepest row of the region's medians.
-
-    Parameters
-    ----------
-    road : SeenRoad
-        The road.
-    camera : Camera
-        The assumed calibration.
-    repairs : set of Zhu2015Repair
-        Whether the region counts as far as it is the own lane.
-
-    Raises
-    ------
-    CannotTellError
-        If the road is hidden, too bright, or follows no Koschmieder's law, or the fog does not show.
-    """
+    """Fog of the steepest row of the region's medians."""
     curve = _curve(road, camera, own_lane=Zhu2015Repair.OWN_LANE in repairs)
     apart = road.horizon.standard_deviation
     if is_clear(curve, road.image):

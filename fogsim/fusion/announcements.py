@@ -49,17 +49,7 @@ class Announcements:
     def update(self, estimates: Sequence[Estimate], time: float) -> DenserFog | None:
         """Take in the estimates of one instant.
 
-        Parameters
-        ----------
-        estimates : sequence of Estimate
-            From any estimators; those that know nothing of distances do not count.
-        time : float
-            The instant [s].
-
-        Returns
-        -------
-        DenserFog or None
-            What most pictures, and of those the last, tell, if it is to be announced.
+        Returns what most pictures, and of those the last, tell, if it is to be announced. Takes `time` [s].
         """
         telling = [one for one in estimates if one.valid and one.optical_depths is not None]
         if telling:

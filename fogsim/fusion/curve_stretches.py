@@ -20,12 +20,7 @@ SHORTEST, SHARED, GRAIN = 15.0, 0.8, 0.02
 def curve_stretches(curve: OpticalDepths, farthest: float) -> Floats:
     """(n, 4) float64: start and end [m], ln of the mean extinction, and its standard deviation [ln 1/m, -].
 
-    Parameters
-    ----------
-    curve : OpticalDepths
-        The curve.
-    farthest : float
-        Distance beyond which nothing is asked [m].
+    Takes `farthest` [m].
     """
     return _cut(np.array(curve.distance), np.array(curve.depth), np.array(curve.standard_deviation), CUTS, farthest)
 

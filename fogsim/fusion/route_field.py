@@ -34,18 +34,10 @@ class RouteField:
     """ln k along the way: a level that nobody knows, and what varies about it with place and time.
 
     What varies has a Matérn covariance over the way, σ² (1 + √3 |Δs| / ℓ) e^(−√3 |Δs| / ℓ), and some grain; it forgets
-    itself over a time T. What is learnt is
-    taken in by assumed-density filtering: the exact moments of one function of the cells, the logarithm of the mean
-    extinction over a stretch, linearised.
+    itself over a time T. What is learnt is taken in by assumed-density filtering: the exact moments of one function of
+    the cells, the logarithm of the mean extinction over a stretch, linearised.
 
-    Parameters
-    ----------
-    deviation : float
-        σ, standard deviation of ln k along the way [-].
-    length : float
-        ℓ, over which it varies [m].
-    steadiness : float
-        T, over which banks drift or dissolve [s].
+    Takes `length` [m], `steadiness` [s].
     """
 
     def __init__(self, deviation: float, length: float, steadiness: float) -> None:
@@ -69,13 +61,7 @@ class RouteField:
         self._place = 0.0
 
     def move_to(self, place: float) -> None:
-        """Let the vehicle be at a place.
-
-        Parameters
-        ----------
-        place : float
-            Distance along the way [m]. One who goes back, or leaps on by more than is kept, knows nothing.
-        """
+        """Let the vehicle be at a place (`place` [m])."""
         cell = math.floor(place / CELL)
         if self._cell is not None and not 0 <= cell - self._cell < COUNT:
             self.reset()
@@ -84,45 +70,24 @@ class RouteField:
         self._cell, self._place = cell, place
 
     def elapse(self, time: float) -> None:
-        """Let a time pass [s].
-
-        Parameters
-        ----------
-        time : float
-            How long.
-        """
+        """Let a time pass [s]."""
         self._covariance += -math.expm1(-2.0 * time / self._steadiness) * self._varying
 
     def variance_of_age(self, age: float) -> float:
-        """By how much a measurement's variance of ln k grows with its age [-].
-
-        Parameters
-        ----------
-        age : float
-            How old it is [s].
-        """
+        """By how much a measurement's variance of ln k grows with its age [-] (`age` [s])."""
         return 2.0 * self._deviation**2 * -math.expm1(-max(age, 0.0) / self._steadiness)
 
     def leap(self, distance: float = 0.0) -> None:
         """Doubt what was believed of a place and of all that lies beyond it: there the edge of a bank is.
 
-        Parameters
-        ----------
-        distance : float
-            How far ahead of the vehicle [m].
+        Takes `distance` [m].
         """
         first = math.floor((distance - self._rear()) / CELL)
         beyond = np.arange(COUNT) >= first
         self._covariance += self._beforehand * beyond[:, None] * beyond
 
     def mean_extinction(self, start: float, end: float) -> tuple[float, float]:
-        """Mean and variance of the logarithm of the mean extinction over a stretch [ln 1/m, -].
-
-        Parameters
-        ----------
-        start, end : float
-            Its ends ahead of the vehicle [m].
-        """
+        """Mean and variance of the logarithm of the mean extinction over a stretch [ln 1/m, -] (`start`, `end` [m])."""
         value, _, variance = self._linearised(start, end)
         return value, variance
 
@@ -136,16 +101,7 @@ class RouteField:
     def learn(self, start: float, end: float, value: float, deviation: float, wrong: float, floor: float) -> float:
         """Take in a measurement of the mean extinction over a stretch, and tell how likely it is a right one [-].
 
-        Parameters
-        ----------
-        start, end : float
-            Ends of the stretch ahead of the vehicle [m].
-        value, deviation : float
-            Logarithm of the mean extinction, and its standard deviation [ln 1/m, -].
-        wrong : float
-            How likely it is that it says nothing [-].
-        floor : float
-            Standard deviation that no number of measurements brings below [-]: their errors are alike.
+        Takes `start`, `end` [m].
         """
         weights = self._weights(start, end)
         return route_field_kernels.learn(self._mean, self._covariance, weights, value, deviation, wrong, floor)
@@ -155,12 +111,7 @@ class RouteField:
 
         Nothing changes where that is believed already: the errors of bounds that are repeated are alike.
 
-        Parameters
-        ----------
-        end : float
-            End of the stretch ahead of the vehicle [m].
-        value, softness : float
-            Logarithm of the most, and the standard deviation of that [ln 1/m, -].
+        Takes `end` [m].
         """
         before, shared, variance = self._linearised(0.0, end)
         if variance <= 0.0 or before + BELIEVED * math.sqrt(variance) < value:

@@ -23,12 +23,7 @@ WEIGHED = 41
 def mean_extinction(mean: Floats, weights: Floats) -> tuple[float, Floats]:
     """Logarithm of the mean extinction over a stretch, and its derivative by each cell's ln k.
 
-    Parameters
-    ----------
-    mean : (n,) float64
-        ln k of the cells.
-    weights : (n,) float64
-        Share of the stretch that lies in each; their sum is 1.
+    Takes `mean` (n,), `weights` (n,).
     """
     largest, total = mean[0], 0.0
     for i in range(mean.size):
@@ -46,14 +41,7 @@ def mean_extinction(mean: Floats, weights: Floats) -> tuple[float, Floats]:
 def condition(mean: Floats, covariance: Floats, toward: Floats, moved: float, narrowed: float) -> None:
     """Take in what is learnt of one linear function of the cells, in place.
 
-    Parameters
-    ----------
-    mean, covariance : (n,) and (n, n) float64
-        Of the cells; written to.
-    toward : (n,) float64
-        Covariance of the cells with that function, over its variance.
-    moved, narrowed : float
-        By how much its mean grows, and by how much its variance falls.
+    Takes `mean`, `covariance` (n, n), `toward` (n,).
     """
     for i in range(mean.size):
         mean[i] += moved * toward[i]
@@ -65,12 +53,7 @@ def condition(mean: Floats, covariance: Floats, toward: Floats, moved: float, na
 def spread_with(covariance: Floats, gradient: Floats) -> tuple[Floats, float]:
     """Covariance of all cells with a linear function of them, and its variance.
 
-    Parameters
-    ----------
-    covariance : (n, n) float64
-        Of the cells; symmetric.
-    gradient : (n,) float64
-        The function.
+    Takes `covariance` (n, n), `gradient` (n,).
     """
     shared, variance = np.zeros(gradient.size), 0.0
     for j in range(gradient.size):
@@ -86,12 +69,7 @@ def spread_with(covariance: Floats, gradient: Floats) -> tuple[Floats, float]:
 def marginals(covariance: Floats, rear: float, cell: float) -> tuple[Floats, Floats]:
     """Where the middle of each cell is ahead of the vehicle [m], and the standard deviation of its ln k [-].
 
-    Parameters
-    ----------
-    covariance : (n, n) float64
-        Of the cells.
-    rear, cell : float
-        Where the hindmost begins ahead of the vehicle, and the length of one [m].
+    Takes `covariance` (n, n), `rear`, `cell` [m].
     """
     middles, deviations = np.empty(len(covariance)), np.empty(len(covariance))
     for i in range(len(covariance)):
@@ -104,14 +82,7 @@ def marginals(covariance: Floats, rear: float, cell: float) -> tuple[Floats, Flo
 def stretch_weights(count: int, cell: float, rear: float, start: float, end: float) -> Floats:
     """Share of a stretch that lies in each cell; of one beyond all cells or without length, in the nearest.
 
-    Parameters
-    ----------
-    count : int
-        How many cells.
-    cell, rear : float
-        Length of one [m], and where the hindmost begins ahead of the vehicle [m], below 0.
-    start, end : float
-        Ends of the stretch ahead of the vehicle [m].
+    Takes `cell`, `rear` [m], `start`, `end` [m].
     """
     weights, total = np.zeros(count), 0.0
     for i in range(count):
@@ -131,12 +102,7 @@ def linearised(mean: Floats, covariance: Floats, weights: Floats) -> tuple[float
 
     A mean of exponentials is above the exponential of a mean: to second order by half of what the cells differ.
 
-    Parameters
-    ----------
-    mean, covariance : (n,) and (n, n) float64
-        Of the cells.
-    weights : (n,) float64
-        Share of the stretch that lies in each.
+    Takes `mean`, `covariance` (n, n), `weights` (n,).
     """
     value, gradient = mean_extinction(mean, weights)
     shared, variance = spread_with(covariance, gradient)
@@ -158,18 +124,7 @@ def learn(
 ) -> float:
     """Take in a measurement of the mean extinction over a stretch, in place, and tell how likely it is a right one.
 
-    Parameters
-    ----------
-    mean, covariance : (n,) and (n, n) float64
-        Of the cells; written to.
-    weights : (n,) float64
-        Share of the stretch that lies in each.
-    value, deviation : float
-        Logarithm of the mean extinction, and its standard deviation [ln 1/m, -].
-    wrong : float
-        How likely a measurement says nothing, beforehand [-].
-    floor : float
-        Standard deviation that no number of measurements brings below [-]: their errors are alike.
+    Takes `mean`, `covariance` (n, n), `weights` (n,).
     """
     before, shared, variance = linearised(mean, covariance, weights)
     total, apart = variance + max(deviation, floor) ** 2, value - before
@@ -187,14 +142,7 @@ def learn(
 def shares_in_cells(samples: Floats, first: float, step: float, count: int) -> Floats:
     """Probability of each of evenly spaced cells by samples, spread evenly between one and the next.
 
-    Parameters
-    ----------
-    samples : (n,) float64
-        Ascending.
-    first, step : float
-        Middle of the first cell, and from one to the next.
-    count : int
-        How many; what lies beyond either end counts to the cell there.
+    Takes `samples` (n,).
     """
     out, before, j = np.zeros(count), 0.0, 0
     for i in range(count):
@@ -215,17 +163,7 @@ def shares_in_cells(samples: Floats, first: float, step: float, count: int) -> F
 
 @kernel
 def roll(mean: Floats, covariance: Floats, weights: Floats, level: float, rest: float) -> None:
-    """Leave the hindmost cell and enter the next one ahead, in place.
-
-    Parameters
-    ----------
-    mean, covariance : (n,) and (n, n) float64
-        Of the cells; written to.
-    weights : (n,) float64
-        How the next cell's ln k goes by those of the cells before it, beforehand.
-    level, rest : float
-        Its mean beforehand, and its variance when those are known.
-    """
+    """Leave the hindmost cell and enter the next one ahead, in place (`mean`, `covariance` (n, n), `weights` (n,))."""
     count = mean.size
     shared, variance = spread_with(covariance, weights)
     value = level
@@ -247,14 +185,7 @@ def extend_factor(covariance: Floats, upper: Floats, row: int) -> None:
 
     What rounding makes negative counts as 0.
 
-    Parameters
-    ----------
-    covariance : (n, n) float64
-        Positive semidefinite.
-    upper : (n, n) float64
-        U up to that column; written to.
-    row : int
-        Which column, and row of the covariance.
+    Takes `covariance` (n, n), `upper` (n, n).
     """
     left = covariance[row].copy()
     for j in range(row):
@@ -269,18 +200,7 @@ def extend_factor(covariance: Floats, upper: Floats, row: int) -> None:
 def sighted_extinctions(mean: Floats, covariance: Floats, normals: Floats, ends: Floats, depth: float) -> Floats:
     """Samples of the mean extinction from the vehicle to where a depth is reached, as logarithms.
 
-    Parameters
-    ----------
-    mean : (n,) float64
-        ln k of the cells ahead.
-    covariance : (n, n) float64
-        Theirs.
-    normals : (n, pairs) float64
-        Standard normal numbers; the second sample of each pair has them with the other sign.
-    ends : (n,) float64
-        Where each cell ends ahead of the vehicle [m].
-    depth : float
-        The optical depth [-].
+    Takes `mean` (n,), `covariance` (n, n), `normals` (n, pairs), `ends` (n,) [m].
     """
     pairs = normals.shape[1]
     reached, found, apart = np.zeros(2 * pairs), np.zeros(2 * pairs), np.empty(pairs)
@@ -311,15 +231,7 @@ def sighted_extinctions(mean: Floats, covariance: Floats, normals: Floats, ends:
 
 @kernel
 def moments_at_most(before: float, variance: float, value: float, softness: float) -> tuple[float, float]:
-    """By how much a normal distribution's mean moves when it is likely below a value, and the variance that it keeps.
-
-    Parameters
-    ----------
-    before, variance : float
-        Of the distribution.
-    value, softness : float
-        The most, and the standard deviation of that.
-    """
+    """Shift of the mean of a normal distribution that is likely below a value, and the variance that it keeps."""
     total = first = second = 0.0
     for i in range(WEIGHED):
         apart = math.sqrt(variance) * (8.0 * i / (WEIGHED - 1) - 4.0)

@@ -67,39 +67,12 @@ def front_fog_beam() -> Beam:
 
 
 def scaled_beam(beam: Beam, factor: float) -> Beam:
-    """The same beam, brighter or dimmer.
-
-    Parameters
-    ----------
-    beam : Beam
-        Any.
-    factor : float
-        What intensities are multiplied by, not negative.
-
-    Raises
-    ------
-    InputError
-        If the factor is negative or not finite.
-    """
+    """The same beam, brighter or dimmer."""
     return checked_beam(Beam(beam.azimuth, beam.elevation, beam.intensity * factor), f"beam times {factor!r}")
 
 
 def read_beam(text: str, name: str) -> Beam:
-    """Beam from a table.
-
-    Parameters
-    ----------
-    text : str
-        Comma-separated: a first row of degrees right of the axis, then rows that begin with degrees above the
-        horizontal, then candela. Lines that begin with # are comments.
-    name : str
-        What error messages call the table.
-
-    Raises
-    ------
-    InputError
-        If a cell is empty or no number, rows differ in length, directions do not ascend or an intensity is negative.
-    """
+    """Beam from a table."""
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     if len(lines) < 3:
         raise InputError(f"{name}: a beam table needs a row of azimuths and two or more rows of intensities")
@@ -126,15 +99,7 @@ def _packaged(name: str) -> Beam:
 
 
 def luminous_flux(beam: Beam, right: tuple[float, float], up: tuple[float, float]) -> float:
-    """Flux through a window of directions [lm].
-
-    Parameters
-    ----------
-    beam : Beam
-        The lamp.
-    right, up : tuple of float
-        Ends of the window to the right and above the horizontal [rad].
-    """
+    """Flux through a window of directions [lm] (`right`, `up` [rad])."""
     azimuth, elevation = _middles(*right, 900), _middles(*up, 240)
     solid_angle = np.cos(elevation) * (right[1] - right[0]) * (up[1] - up[0]) / (len(azimuth) * len(elevation))
     return float(np.sum(luminous_intensity(beam, azimuth, elevation[:, None]) * solid_angle[:, None]))

@@ -16,44 +16,18 @@ Metres = Annotated[float, Range(0.0, 1e6, "m")]
 
 
 def is_dark(observation: Observation) -> bool:
-    """Whether the light sensor tells of less light than UNECE R48 lights the dipped beams below; not without one.
-
-    Parameters
-    ----------
-    observation : Observation
-        What the vehicle's sensors tell.
-    """
+    """Whether the light sensor tells of less light than UNECE R48 lights the dipped beams below; not without one."""
     return observation.light is not None and observation.light.illuminance < DAY_ILLUMINANCE
 
 
 def would_dazzle(observation: Observation, near_lead: float) -> bool:
-    """Whether high beams might dazzle somebody, as far as the vehicle knows.
-
-    Parameters
-    ----------
-    observation : Observation
-        What its sensors tell. Without a light sensor nobody knows what comes.
-    near_lead : float
-        Distance up to which who drives ahead is dazzled in the mirrors [m].
-    """
+    """Whether high beams might dazzle somebody, as far as the vehicle knows (`near_lead` [m])."""
     light, lead = observation.light, observation.lead
     return light is None or light.oncoming or light.preceding or (lead is not None and lead.distance < near_lead)
 
 
 def settled(wanted: Lamp, time: float, previous: LampChoice, dwell: float) -> LampChoice:
-    """Lamps that follow a wish once it has lasted; high beams are left at once.
-
-    Parameters
-    ----------
-    wanted : Lamp
-        Lamps that would be best now.
-    time : float
-        Instant [s].
-    previous : LampChoice
-        Lamps lit now, and what else was asked for.
-    dwell : float
-        How long other lamps must have been wanted without a break [s].
-    """
+    """Lamps that follow a wish once it has lasted; high beams are left at once (`time` [s], `dwell` [s])."""
     if wanted == previous.lamps:
         return LampChoice(wanted)
     if Lamp.HIGH_BEAM in previous.lamps and Lamp.HIGH_BEAM not in wanted:

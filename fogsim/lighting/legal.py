@@ -17,27 +17,13 @@ Country = Literal["germany", "france", "united_kingdom", "unece"]
 
 @dataclass(frozen=True, slots=True)
 class LightingLaw:
-    """Visibilities at which a country's rules take effect, and where they are written.
+    """Visibilities at which a country's rules take effect, and where they are written."""
 
-    Attributes
-    ----------
-    rear_fog_below : float
-        Visibility in fog below which rear fog lamps may be lit [m].
-    front_fog_below : float
-        The same of front fog lamps [m].
-    high_beam_from : float
-        Visibility from which on high beams may be lit in the dark [m].
-    near_lead : float
-        Distance up to which who drives ahead must not be dazzled [m].
-    sources : mapping from str to str
-        Where each rule is written, by the attribute that it sets.
-    """
-
-    rear_fog_below: float
-    front_fog_below: float
-    high_beam_from: float
-    near_lead: float
-    sources: Mapping[str, str]
+    rear_fog_below: float  # Visibility in fog below which rear fog lamps may be lit [m]
+    front_fog_below: float  # The same of front fog lamps [m]
+    high_beam_from: float  # Visibility from which on high beams may be lit in the dark [m]
+    near_lead: float  # Distance up to which who drives ahead must not be dazzled [m]
+    sources: Mapping[str, str]  # Where each rule is written, by the attribute that it sets
 
 
 _LEAD = "no distance is written; UNECE R48's 100 m"

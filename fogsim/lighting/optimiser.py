@@ -83,17 +83,7 @@ class SightOptimiser:
 
 
 def glare_dealt(beam: Lamp, visibility: float, observation: Observation) -> float:
-    """Veil that a beam would lay over the eyes of those whom the vehicle knows of [cd/m²].
-
-    Parameters
-    ----------
-    beam : Lamp
-        Low or high beam.
-    visibility : float
-        Meteorological visibility [m].
-    observation : Observation
-        What the vehicle's sensors tell; without a light sensor somebody is taken to come.
-    """
+    """Veil that a beam would lay over the eyes of those whom the vehicle knows of [cd/m²] (`visibility` [m])."""
     light, lead, k = observation.light, observation.lead, extinction_from_visibility(visibility)
     toward, into_mirrors = _TOWARD[beam]
     veil = 0.0

@@ -40,19 +40,8 @@ def headlamp_sight_distance(lamps: Lamp, visibility: float, glare: float = 0.0) 
 
     The largest one up to `FARTHEST`: it is looked for from far away on, since with a cut-off the level is not monotone.
 
-    Parameters
-    ----------
-    lamps : Lamp
-        Lit lamps; of these low beam, high beam and front fog lamps count.
-    visibility : float
-        Meteorological visibility [m], positive; ``inf`` is clear air.
-    glare : float
-        Veil inside the eye from others' lamps [cd/m²]; see `fogsim.values.eye.disability_glare`.
-
-    Returns
-    -------
-    float
-        0 where it is seen nowhere, `FARTHEST` where it is seen from there on.
+    Returns 0 where it is seen nowhere, `FARTHEST` where it is seen from there on. Takes `visibility` [m], `glare`
+    [cd/m²].
     """
     beams = int(lamps & _BEAMS)
     return _sight_distance(beams, extinction_from_visibility(visibility), glare) if beams else 0.0
@@ -61,14 +50,7 @@ def headlamp_sight_distance(lamps: Lamp, visibility: float, glare: float = 0.0) 
 def own_veil(lamps: Lamp, visibility: float, distance: float) -> float:
     """Veil that the own lamps make of the fog between a car driver's eyes and the road straight ahead [cd/m²].
 
-    Parameters
-    ----------
-    lamps : Lamp
-        Lit lamps, as of `headlamp_sight_distance`.
-    visibility : float
-        Meteorological visibility [m], positive; ``inf`` is clear air.
-    distance : float
-        How far ahead of the eyes the road is looked at [m], `NEAREST` to `FARTHEST`.
+    Takes `visibility` [m], `distance` [m].
     """
     return float(np.interp(distance, _DISTANCES, _veil(int(lamps & _BEAMS), extinction_from_visibility(visibility))))
 

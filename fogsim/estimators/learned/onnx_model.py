@@ -38,27 +38,13 @@ OUTPUT = "one output, float32 of shape (1, 2): ln k, with k in 1/m, and its stan
 
 @dataclass(frozen=True, slots=True)
 class OnnxModel:
-    """A checked model.
+    """A checked model."""
 
-    Attributes
-    ----------
-    path : Path
-        Its file.
-    size : tuple of int
-        Rows and columns of the frames that it reads [px].
-    channels_first : bool
-        Whether its input is (1, 3, H, W).
-    factor : float
-        Factor for its deviations by its calibration; 1 without one.
-    session : onnxruntime.InferenceSession
-        What computes it.
-    """
-
-    path: Path
-    size: tuple[int, int]
-    channels_first: bool
-    factor: float
-    session: Any
+    path: Path  # Its file
+    size: tuple[int, int]  # Rows and columns of the frames that it reads [px]
+    channels_first: bool  # Whether its input is (1, 3, H, W)
+    factor: float  # Factor for its deviations by its calibration; 1 without one
+    session: Any  # What computes it
 
     def outputs(self, pixels: NDArray[np.float32], options: Any = None) -> list[Any]:
         """Outputs for an image of (H, W, 3) with values 0 … 1, not checked; `options` are a run's of onnxruntime."""

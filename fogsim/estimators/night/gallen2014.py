@@ -39,10 +39,7 @@ SOFTNESS = 0.3
 def fog_class(visibility: float) -> int:
     """The paper's class of fog: 3, dense, below 100 m; 2, fog; 1, light fog, above 300 m (table I).
 
-    Parameters
-    ----------
-    visibility : float
-        Meteorological visibility [m].
+    Takes `visibility` [m].
     """
     return 3 if visibility < DENSE else 2 if visibility <= LIGHT else 1
 

@@ -30,42 +30,22 @@ WINDOW = 25
 
 @dataclass(frozen=True, slots=True)
 class HaloThreshold:
-    """Values of pictures below which there is fog, measured for one camera.
+    """Values of pictures below which there is fog, measured for one camera."""
 
-    Attributes
-    ----------
-    width, height : int
-        Size of the camera's pictures [px].
-    focal_length : float
-        Its focal length [px].
-    response : str
-        Its response.
-    black_level : float
-        Its black level [-].
-    steepness, sharpness : float
-        Of the mean Br50, and of the largest sharpness [levels of 255 a pixel].
-    mean_errors, largest_errors : float
-        Share of pictures of clear nights or of fog, whichever is larger, that either gets wrong of those it was chosen
-        on [-].
-    pictures : int
-        How many pictures with a halo they were chosen on.
-
-    Raises
-    ------
-    InputError
-        If the numbers do not fit.
-    """
-
+    # width, height: size of the camera's pictures [px]
     width: int
     height: int
-    focal_length: float
-    response: str
-    black_level: float
+    focal_length: float  # Its focal length [px]
+    response: str  # Its response
+    black_level: float  # Its black level [-]
+    # steepness, sharpness: of the mean Br50, and of the largest sharpness [levels of 255 a pixel]
     steepness: float
     sharpness: float
+    # mean_errors, largest_errors: share of pictures of clear nights or of fog, whichever is larger, that either gets
+    # wrong of those it was chosen on [-]
     mean_errors: float
     largest_errors: float
-    pictures: int
+    pictures: int  # How many pictures with a halo they were chosen on
 
     def __post_init__(self) -> None:
         positive = (self.width, self.height, self.focal_length, self.steepness, self.sharpness, self.pictures)
@@ -80,18 +60,7 @@ class HaloThreshold:
 
     @classmethod
     def read(cls, path: Path) -> "HaloThreshold":
-        """Read a file that `fogsim calibrate halos` wrote.
-
-        Parameters
-        ----------
-        path : Path
-            The file.
-
-        Raises
-        ------
-        InputError
-            If it cannot be read or is none.
-        """
+        """Read a file that `fogsim calibrate halos` wrote."""
         try:
             data, names = read_json(path), list(cls.__dataclass_fields__)
             if not isinstance(data, Mapping) or sorted(data) != sorted(names):
@@ -104,18 +73,7 @@ class HaloThreshold:
             raise InputError(f"halos must be a file of `fogsim calibrate halos`, got {str(path)!r}: {error}") from error
 
     def checked_for(self, camera: Camera) -> "HaloThreshold":
-        """Itself, if it was measured for a camera.
-
-        Parameters
-        ----------
-        camera : Camera
-            The told calibration.
-
-        Raises
-        ------
-        InputError
-            If it was measured for another one; both are named.
-        """
+        """Itself, if it was measured for a camera."""
         mine, theirs = _traits(self), _traits(camera)
         if mine != theirs:
             raise InputError(
@@ -135,41 +93,17 @@ def _traits(of: HaloThreshold | Camera) -> str:
 
 @dataclass(frozen=True, slots=True)
 class HaloReading:
-    """What the halos of one picture say.
+    """What the halos of one picture say."""
 
-    Attributes
-    ----------
-    value : float or None
-        Value of this picture [levels of 255 a pixel]; None without a halo.
-    smoothed : float or None
-        Its mean over the last pictures that had one, this one among them; None without a halo.
-    is_fog : bool or None
-        Whether there is fog, by the smoothed value; None without a halo.
-    halos : tuple of Halo
-        Of the sources that were selected.
-    tree : SourceTree
-        All sources.
-    """
-
-    value: float | None
-    smoothed: float | None
-    is_fog: bool | None
-    halos: tuple[Halo, ...]
-    tree: SourceTree
+    value: float | None  # Value of this picture [levels of 255 a pixel]; None without a halo
+    smoothed: float | None  # Its mean over the last pictures that had one, this one among them; None without a halo
+    is_fog: bool | None  # Whether there is fog, by the smoothed value; None without a halo
+    halos: tuple[Halo, ...]  # Of the sources that were selected
+    tree: SourceTree  # All sources
 
 
 class HaloWatch:
-    """Looks at the halos of picture after picture.
-
-    Parameters
-    ----------
-    threshold : float
-        Value below which there is fog [levels of 255 a pixel].
-    value_of : callable
-        Value of a picture by its halos: `mean_steepness` or `largest_sharpness`.
-    window : int
-        Pictures of the sliding mean; 1 for every picture by itself.
-    """
+    """Looks at the halos of picture after picture (`threshold` [levels of 255 a pixel])."""
 
     def __init__(
         self, threshold: float = PUBLISHED, value_of: "ValueOf | None" = None, *, window: int = WINDOW
@@ -182,15 +116,7 @@ class HaloWatch:
         self._last.clear()
 
     def look(self, image: Pixels, bits: int = 8) -> HaloReading:
-        """Look at one picture.
-
-        Parameters
-        ----------
-        image : (rows, cols) or (rows, cols, 3) uint8, or uint16 for more than 8 bits
-            Pixel values.
-        bits : int
-            Their bit depth.
-        """
+        """Look at one picture (`image` (rows, cols))."""
         tree = source_tree(image, bits)
         halos = halos_of(tree)
         value = self._value_of(halos)

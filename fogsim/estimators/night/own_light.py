@@ -51,39 +51,22 @@ LEAST_SEEN = 0.6
 
 
 class Cells(NamedTuple):
-    """Rectangles of an image, and where they look.
+    """Rectangles of an image, and where they look."""
 
-    Attributes
-    ----------
-    box : (n, 4) int64
-        First and last row and column + 1 of each [px].
-    rays : (n, SUB_ROWS, 3) float64
-        Unit vectors forward, left and up to the middles of the sub-rows, by the assumed pitch.
-    is_sky : (n,) bool
-        Whether a cell is above the horizon.
-    """
-
-    box: NDArray[np.int64]
-    rays: NDArray[np.float64]
-    is_sky: NDArray[np.bool_]
+    box: NDArray[np.int64]  # (n, 4) int64: First and last row and column + 1 of each [px]
+    rays: NDArray[np.float64]  # Unit vectors forward, left and up to the middles of the sub-rows, by the assumed pitch
+    is_sky: NDArray[np.bool_]  # (n,) bool: Whether a cell is above the horizon
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OwnLight:
-    """What the own head lamps light, for draws of all that an estimator does not know about lamps, fog and road.
+    """What the own head lamps light, for draws of all that an estimator does not know about lamps, fog and road."""
 
-    Attributes
-    ----------
-    veil, road : (draws, visibilities, cells) float32
-        Luminance of the lit fog before road and sky, and of the lit road through the fog [cd/m²]; visibilities are
-        `VISIBILITIES`, cells those of `cells_of`.
-    depth : (draws, cells) float32
-        Distance to the road, 1e9 in the sky [m].
-    """
-
+    # veil, road (draws, visibilities, cells): luminance of the lit fog before road and sky, and of the lit road through
+    # the fog [cd/m²]; visibilities are `VISIBILITIES`, cells those of `cells_of`
     veil: NDArray[np.float32]
     road: NDArray[np.float32]
-    depth: NDArray[np.float32]
+    depth: NDArray[np.float32]  # (draws, cells): Distance to the road, 1e9 in the sky [m]
 
 
 def lit_head_lamps(observation: Observation) -> Lamp:
@@ -103,13 +86,7 @@ def without_noise(camera: Camera) -> Camera:
 
 @functools.lru_cache(maxsize=8)
 def cells_of(camera: Camera) -> Cells:
-    """Cells of a camera's image.
-
-    Parameters
-    ----------
-    camera : Camera
-        The assumed calibration.
-    """
+    """Cells of a camera's image."""
     edges, azimuths, half = SKY
     looks = [
         (azimuth - half, azimuth + half, low, high) for low, high in itertools.pairwise(edges) for azimuth in azimuths
@@ -159,17 +136,10 @@ def _rays(camera: Camera, box: NDArray[np.int64]) -> NDArray[np.float64]:
 
 
 class Seen(NamedTuple):
-    """Cells of an image.
+    """Cells of an image."""
 
-    Attributes
-    ----------
-    luminance : (n,) float64
-        Means, full scale being 1.
-    clipped, dark : (n,) float64
-        Shares of their pixels that are as bright, and as dark, as a pixel can be [-].
-    """
-
-    luminance: NDArray[np.float64]
+    luminance: NDArray[np.float64]  # (n,): Means, full scale being 1
+    # clipped, dark (n,): shares of their pixels that are as bright, and as dark, as a pixel can be [-]
     clipped: NDArray[np.float64]
     dark: NDArray[np.float64]
 
@@ -186,17 +156,7 @@ def without_cut_noise(seen: Seen) -> Seen:
 
 @kernel
 def cell_luminance(pixels: Pixels, table: NDArray[np.float32], box: NDArray[np.int64]) -> Seen:
-    """Luminance of cells.
-
-    Parameters
-    ----------
-    pixels : (rows, cols) uint8 or uint16
-        One channel.
-    table : (levels,) float32
-        Light behind each pixel value.
-    box : (n, 4) int64
-        The cells.
-    """
+    """Luminance of cells (`pixels` (rows, cols) uint8, `table` (levels,), `box` (n, 4) int64)."""
     mean, clipped, dark = np.zeros(len(box)), np.zeros(len(box)), np.zeros(len(box))
     last = len(table) - 1
     for cell in range(len(box)):

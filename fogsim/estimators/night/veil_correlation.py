@@ -19,21 +19,12 @@ LEAST_SCORES = 3
 
 
 class VeilScores(NamedTuple):
-    """How like a picture is to each reference.
+    """How like a picture is to each reference."""
 
-    Attributes
-    ----------
-    visibility : (n,) float64
-        Of the references, without that of a clear night [m].
-    score : (n,) float64
-        Zero-mean normalised cross-correlation inside each reference's mask, −1 … 1; NaN where the mask is empty.
-    clear : float
-        That with the reference of a clear night; NaN if there is none.
-    """
-
-    visibility: NDArray[np.float64]
+    visibility: NDArray[np.float64]  # (n,): Of the references, without that of a clear night [m]
+    # (n,): Zero-mean normalised cross-correlation inside each reference's mask, −1 … 1; NaN where the mask is empty
     score: NDArray[np.float64]
-    clear: float
+    clear: float  # That with the reference of a clear night; NaN if there is none
 
 
 class VeilTemplates:
@@ -42,14 +33,7 @@ class VeilTemplates:
     Each is a luminance map of veil and road, normalised to 0 … 255 and bent by the camera's response, of which Otsu's
     threshold keeps what is bright.
 
-    Parameters
-    ----------
-    references : VeilReferences
-        The references.
-    nearest_to : sequence of float
-        Visibilities of which the nearest reference is taken each [m]; all are if none is named.
-    common_mask : bool
-        Whether one mask, that of the images' mean, serves them all; scores within masks of their own differ by these.
+    Takes `nearest_to` [m].
     """
 
     def __init__(
@@ -67,13 +51,7 @@ class VeilTemplates:
         self._masks = [np.flatnonzero(one.ravel() > otsu_threshold(one)) for one in masked]
 
     def scores(self, picture: NDArray[np.float64]) -> VeilScores:
-        """Compare a picture with each reference.
-
-        Parameters
-        ----------
-        picture : (rows, cols) float64
-            Pixel values by cells.
-        """
+        """Compare a picture with each reference (`picture` (rows, cols))."""
         flat = picture.ravel()
         found = [
             correlation(flat[mask], image.ravel()[mask]) for image, mask in zip(self._images, self._masks, strict=True)
@@ -89,13 +67,7 @@ def _as_image(luminance: NDArray[np.float64], camera: Camera) -> NDArray[np.floa
 
 
 def correlation(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
-    """Zero-mean normalised cross-correlation (ZNCC), −1 … 1; NaN where either is even.
-
-    Parameters
-    ----------
-    one, other : (n,) float64
-        Values at the same places.
-    """
+    """Zero-mean normalised cross-correlation (ZNCC), −1 … 1; NaN where either is even (`one`, `other` (n,))."""
     if one.size == 0:
         return math.nan
     a, b = one - one.mean(), other - other.mean()
@@ -106,10 +78,7 @@ def correlation(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
 def otsu_threshold(image: NDArray[np.float64]) -> float:
     """Value that parts an image into two classes with the least variance within them (Otsu 1979).
 
-    Parameters
-    ----------
-    image : (rows, cols) float64
-        Values 0 … 255.
+    Takes `image` (rows, cols).
     """
     count, edges = np.histogram(image, bins=OTSU_BINS, range=(0.0, 255.0))
     middle = 0.5 * (edges[:-1] + edges[1:])
@@ -125,15 +94,7 @@ def otsu_threshold(image: NDArray[np.float64]) -> float:
 def visibility_by_parabola(scores: VeilScores) -> float | None:
     """Visibility at the top of S = exp(a V² + b V + c) through the scores, −b / 2a [m] (equations 13 and 14).
 
-    Parameters
-    ----------
-    scores : VeilScores
-        The scores; those that are not above 0 have no logarithm and are left out.
-
-    Returns
-    -------
-    float or None
-        None where the parabola has no top above 0.
+    Returns None where the parabola has no top above 0.
     """
     some = np.nan_to_num(scores.score, nan=-1.0) > 0.0
     if np.count_nonzero(some) < LEAST_SCORES:

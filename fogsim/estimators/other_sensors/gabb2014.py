@@ -163,13 +163,7 @@ class Gabb2014:
         observation: Observation,
         found: dict[str, object],
     ) -> str:
-        """Learn from one picture; why nothing was learnt, or nothing.
-
-        Raises
-        ------
-        CannotTellError
-            If this is no road by day.
-        """
+        """Learn from one picture; why nothing was learnt, or nothing."""
         if depth > 1.0 and search_window(self._camera, depth) is None:
             return "the vehicle ahead is too small in the image, or outside it"
         crop = daytime_crop(image, self._camera, depth, self._pitch_deviation)

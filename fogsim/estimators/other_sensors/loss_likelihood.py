@@ -60,13 +60,7 @@ class LossLikelihood:
         self._reach = 0.0
 
     def fade(self, ages: float) -> None:
-        """Let what was learnt count for less.
-
-        Parameters
-        ----------
-        ages : float
-            By a factor of e^(−ages) [-].
-        """
+        """Let what was learnt count for less."""
         kept = math.exp(-ages)
         self._past *= kept
         self._present *= kept
@@ -78,19 +72,7 @@ class LossLikelihood:
         self._present = np.zeros_like(self._present)
 
     def learn(self, distance: float, threshold: float, weight: float, *, found: bool) -> None:
-        """Take in a look.
-
-        Parameters
-        ----------
-        distance : float
-            Of the vehicle [m].
-        threshold : float
-            Contrast from which on it is found, over the airlight [-].
-        weight : float
-            How much of the look is news, 0 … 1 [-].
-        found : bool
-            Whether it was.
-        """
+        """Take in a look (`distance` [m])."""
         contrast = LOG_CONTRAST - distance * EXTINCTION[:, None]
         above = np.clip((contrast - math.log(threshold)) / SLOPE, -40.0, 40.0)
         # A logistic curve is a normal distribution's within 0.01.

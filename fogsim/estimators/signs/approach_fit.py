@@ -46,40 +46,20 @@ MAX_MISFIT = 2.5
 
 @dataclass(frozen=True, slots=True)
 class FaceLook:
-    """One look at a sign.
+    """One look at a sign."""
 
-    Attributes
-    ----------
-    distance : float
-        From the camera by the map [m].
-    face : FaceLight
-        What its face sends.
-    airlight : float
-        Luminance of the sky [linear grey levels].
-    clipped : bool
-        Whether the sky is clipped.
-    """
-
-    distance: float
-    face: FaceLight
-    airlight: float
-    clipped: bool = False
+    distance: float  # From the camera by the map [m]
+    face: FaceLight  # What its face sends
+    airlight: float  # Luminance of the sky [linear grey levels]
+    clipped: bool = False  # Whether the sky is clipped
 
 
 @dataclass(frozen=True, slots=True)
 class ApproachFit:
-    """What the approach to one sign says.
+    """What the approach to one sign says."""
 
-    Attributes
-    ----------
-    log_likelihood : (300,) float64
-        For each k of `GRID`, the largest 0 [-].
-    misfit : float
-        Mean square of the standardised residuals at the likeliest k [-].
-    """
-
-    log_likelihood: Floats
-    misfit: float
+    log_likelihood: Floats  # (300,): For each k of `GRID`, the largest 0 [-]
+    misfit: float  # Mean square of the standardised residuals at the likeliest k [-]
 
 
 def fit_approach(looks: Sequence[FaceLook], range_deviation: float) -> ApproachFit:
@@ -89,12 +69,7 @@ def fit_approach(looks: Sequence[FaceLook], range_deviation: float) -> ApproachF
     reflectance is Q e^(−kd): the brightness Q, the black's own light g and the airlight's error ε are the sign's own,
     and are fitted for each k. A constant error of the map's distance changes Q and g alone.
 
-    Parameters
-    ----------
-    looks : sequence of FaceLook
-        From different distances.
-    range_deviation : float
-        Standard deviation of a single distance about what is common to all [m].
+    Takes `range_deviation` [m].
     """
     distance = np.array([one.distance for one in looks])
     airlight = np.array([one.airlight for one in looks])
@@ -189,15 +164,7 @@ def _solved(matrix: Floats, right: Floats) -> Floats:
 
 
 def extinction_of(fits: Sequence[ApproachFit], wrong_share: float) -> tuple[float, float]:
-    """Mean and standard deviation of k [1/m] after several signs, some of which may be wrong.
-
-    Parameters
-    ----------
-    fits : sequence of ApproachFit
-        One of each sign.
-    wrong_share : float
-        Share of signs that are not what the map says [-].
-    """
+    """Mean and standard deviation of k [1/m] after several signs, some of which may be wrong."""
     likelihoods = [np.exp(np.maximum(fit.log_likelihood, -700.0)) for fit in fits]
     likelihoods = [one / one.mean() for one in likelihoods]
     shares = [np.log((1.0 - wrong_share) * one + wrong_share) for one in likelihoods]

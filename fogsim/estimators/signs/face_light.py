@@ -83,21 +83,13 @@ class Face:
 
 @dataclass(frozen=True, slots=True)
 class FaceLight:
-    """Luminance of a face as a line through its reflectance: L = black + slope · ρ.
+    """Luminance of a face as a line through its reflectance: L = black + slope · ρ."""
 
-    Attributes
-    ----------
-    black, slope : float
-        Luminance at reflectance 0, and what a reflectance of 1 adds [linear grey levels].
-    variance : tuple of float
-        Variances of both and their covariance.
-    is_mean : bool
-        Whether the face was too small for its areas to be told apart, so that only its mean luminance was measured.
-    """
-
+    # black, slope: luminance at reflectance 0, and what a reflectance of 1 adds [linear grey levels]
     black: float
     slope: float
-    variance: tuple[float, ...]
+    variance: tuple[float, ...]  # Variances of both and their covariance
+    # Whether the face was too small for its areas to be told apart, so that only its mean luminance was measured
     is_mean: bool = False
 
 
@@ -109,23 +101,8 @@ def face_light(
     By Koschmieder's law the fog turns L0 = E ρ into L = A (1 − T) + E ρ T whatever the reflectance, so white, red and
     dark parts of a face lie on one line, whose height and slope each tell the transmittance T.
 
-    Parameters
-    ----------
-    light : (rows, cols) float32
-        Luminance around the sign [linear grey levels].
-    place : (float, float)
-        Column and row of its middle there [px].
-    radius : float
-        Half of its diameter [px].
-    layout : Layout
-        Its face.
-    narrowed : float
-        Width over height of a face that is turned [-].
-
-    Returns
-    -------
-    FaceLight or None
-        None if too little of it is in the picture.
+    Returns None if too little of it is in the picture. Takes `light` (rows, cols) [linear grey levels], `place` (float,
+    float) [px], `radius` [px].
     """
     rows, cols = np.mgrid[: light.shape[0], : light.shape[1]].astype(np.float64)
     right, down = (cols - place[0]).ravel(), (rows - place[1]).ravel()

@@ -26,21 +26,13 @@ class Outline(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """A face: areas one within the other, and where a symbol may be that the layout does not know.
+    """A face: areas one within the other, and where a symbol may be that the layout does not know."""
 
-    Attributes
-    ----------
-    outline : Outline
-        Shape of all areas.
-    areas : tuple of (float, float)
-        Size relative to the face's and reflectance of each [-], the largest first.
-    symbol : tuple of float or None
-        Width and height of the box around the symbol, relative to the face's diameter, and the mean reflectance there
-        beyond that of what it is printed on [-]; about so, for what is printed differs.
-    """
-
-    outline: Outline
+    outline: Outline  # Shape of all areas
+    # (float, float): Size relative to the face's and reflectance of each [-], the largest first
     areas: tuple[tuple[float, float], ...]
+    # Width and height of the box around the symbol, relative to the face's diameter, and the mean reflectance there
+    # beyond that of what it is printed on [-]; about so, for what is printed differs
     symbol: tuple[float, float, float] | None = None
 
 
@@ -74,13 +66,7 @@ UNKNOWN = Layout(Outline.DISC, ((1.0, WHITE),), (0.8, 0.8, 0.0))
 
 
 def layout_of(kind: str) -> Layout:
-    """Face of a kind of sign.
-
-    Parameters
-    ----------
-    kind : str
-        Sign code, as maps have it.
-    """
+    """Face of a kind of sign."""
     return LAYOUTS.get(kind.removeprefix("xodr."), UNKNOWN)
 
 
@@ -110,18 +96,7 @@ def face_maps(
 ) -> tuple[Floats, Floats, Floats | None]:
     """Share of each pixel that a face covers, its reflectance there times that, and the share of its symbol's box.
 
-    Parameters
-    ----------
-    layout : Layout
-        The face.
-    right, down : (n,) float64
-        Pixels' places relative to the face's middle [px].
-    radius : float
-        Half of its diameter [px].
-    blur : float
-        Standard deviation of what blurs its edges, the pixels' own size included [px].
-    narrowed : float
-        Width over height of a face that is turned [-].
+    Takes `right`, `down` (n,) [px], `radius` [px], `blur` [px].
     """
     if layout.outline in (Outline.TIP_UP, Outline.TIP_DOWN):
         # The map's height is that of the middle between tip and base, a quarter of the inscribed circle off its middle.

@@ -27,34 +27,16 @@ _LEAST = 3
 
 @dataclass(frozen=True, slots=True)
 class OperatingRange:
-    """How far a detector of signs sees in fog, measured for one camera and one size of signs.
+    """How far a detector of signs sees in fog, measured for one camera and one size of signs."""
 
-    Attributes
-    ----------
-    focal_length : float
-        Of the camera [px].
-    diameter : float
-        Of the signs [m].
-    visibility : tuple of float
-        Meteorological visibilities at which it was measured, ascending [m].
-    operating_range : tuple of float
-        Largest distance within which at least 80 % of looks find the sign, at each [m].
-    first_detection : tuple of float
-        Median distance at which signs were first detected while they were driven up to [m].
-    deviation : tuple of float
-        Standard deviation of that from sign to sign, for normal errors of the same quartiles [m].
-
-    Raises
-    ------
-    InputError
-        If the numbers do not fit.
-    """
-
-    focal_length: float
-    diameter: float
-    visibility: tuple[float, ...]
+    focal_length: float  # Of the camera [px]
+    diameter: float  # Of the signs [m]
+    visibility: tuple[float, ...]  # Meteorological visibilities at which it was measured, ascending [m]
+    # Largest distance within which at least 80 % of looks find the sign, at each [m]
     operating_range: tuple[float, ...]
+    # Median distance at which signs were first detected while they were driven up to [m]
     first_detection: tuple[float, ...]
+    # Standard deviation of that from sign to sign, for normal errors of the same quartiles [m]
     deviation: tuple[float, ...]
 
     def __post_init__(self) -> None:
@@ -84,25 +66,14 @@ class OperatingRange:
     def visibility_by_cubic(self, distance: float) -> float:
         """Visibility of a distance of first detection by the published cubic [m]; it need not be monotone.
 
-        Parameters
-        ----------
-        distance : float
-            d_sign [m].
+        Takes `distance` [m].
         """
         return float(np.polyval(self.cubic, distance))
 
     def visibility_at(self, distance: float) -> tuple[float, float] | None:
         """Visibility of a distance of first detection by the monotone curve, and its standard deviation [m].
 
-        Parameters
-        ----------
-        distance : float
-            Distance at which a sign was first detected [m].
-
-        Returns
-        -------
-        tuple of float, or None
-            None outside what was measured, and where the curve is flat.
+        Returns None outside what was measured, and where the curve is flat. Takes `distance` [m].
         """
         curve = _Curve(self)
         low, high = curve.reach
@@ -120,18 +91,7 @@ class OperatingRange:
 
     @classmethod
     def read(cls, path: Path) -> "OperatingRange":
-        """Read a calibration's file.
-
-        Parameters
-        ----------
-        path : Path
-            JSON, as `write` writes it.
-
-        Raises
-        ------
-        InputError
-            If it cannot be read or does not fit; the message names file and key.
-        """
+        """Read a calibration's file."""
         try:
             data, names = read_json(path), ("focal_length_px", "diameter_m", *_COLUMNS.values())
             if not isinstance(data, Mapping) or set(data) != set(names):

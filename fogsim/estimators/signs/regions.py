@@ -20,52 +20,29 @@ SMALLEST = 3.0
 
 @dataclass(frozen=True, slots=True)
 class PoseDeviation:
-    """How well the place of a sign relative to the camera is known, as standard deviations.
+    """How well the place of a sign relative to the camera is known, as standard deviations."""
 
-    Attributes
-    ----------
-    position : float
-        Of the sign by the map about the vehicle by its fix, along and across [m].
-    height : float
-        Of the sign above the road [m].
-    heading, pitch : float
-        Of the camera's direction [rad].
-    """
-
-    position: float = 0.5
-    height: float = 0.15
+    position: float = 0.5  # Of the sign by the map about the vehicle by its fix, along and across [m]
+    height: float = 0.15  # Of the sign above the road [m]
+    # heading, pitch: of the camera's direction [rad]
     heading: float = math.radians(0.2)
     pitch: float = math.radians(0.1)
 
 
 @dataclass(frozen=True, slots=True)
 class ProjectedSign:
-    """A sign of the map as the told camera should see it.
+    """A sign of the map as the told camera should see it."""
 
-    Attributes
-    ----------
-    sighting : SignSighting
-        What the map says.
-    distance : float
-        From the camera to the sign along the line of sight [m].
-    u, v : float
-        Column and row of the middle of its face [px].
-    radius : float
-        Half of its diameter [px].
-    deviation_u, deviation_v : float
-        Standard deviations of column and row [px].
-    expected : bool
-        Whether the picture should show all of it: if not, that it is not found says nothing.
-    """
-
-    sighting: SignSighting
-    distance: float
+    sighting: SignSighting  # What the map says
+    distance: float  # From the camera to the sign along the line of sight [m]
+    # u, v: column and row of the middle of its face [px]
     u: float
     v: float
-    radius: float
+    radius: float  # Half of its diameter [px]
+    # deviation_u, deviation_v: standard deviations of column and row [px]
     deviation_u: float
     deviation_v: float
-    expected: bool
+    expected: bool  # Whether the picture should show all of it: if not, that it is not found says nothing
 
     @property
     def region(self) -> SearchRegion:
@@ -78,22 +55,8 @@ def project_sightings(
 ) -> tuple[ProjectedSign, ...]:
     """Project what the map says through the told camera.
 
-    Parameters
-    ----------
-    sightings : iterable of SignSighting
-        Signs ahead by the map.
-    camera : Camera
-        The assumed calibration.
-    setback : float
-        Distance of the camera behind the front bumper, from which the map's distances count [m].
-    deviation : PoseDeviation or None
-        How well the place of a sign is known; None for the usual.
-
-    Returns
-    -------
-    tuple of ProjectedSign
-        Signs of which the picture may show something, in the order of the sightings: none that is behind the camera,
-        outside the picture by more than it can be off its place, or too small.
+    Returns signs of which the picture may show something, in the order of the sightings: none that is behind the
+    camera, outside the picture by more than it can be off its place, or too small. Takes `setback` [m].
     """
     known = PoseDeviation() if deviation is None else deviation
     projected = (_projected(sighting, camera, setback, known) for sighting in sightings)

@@ -25,21 +25,11 @@ DETECTED = 0.9
 
 @dataclass(frozen=True, slots=True)
 class Registration:
-    """A detection taken for a sign of the map.
+    """A detection taken for a sign of the map."""
 
-    Attributes
-    ----------
-    sign : ProjectedSign
-        The sign.
-    detection : SignDetection
-        The detection.
-    confidence : float
-        p(c): probability that the detection is this sign and no false alarm [-].
-    """
-
-    sign: ProjectedSign
-    detection: SignDetection
-    confidence: float
+    sign: ProjectedSign  # The sign
+    detection: SignDetection  # The detection
+    confidence: float  # p(c): probability that the detection is this sign and no false alarm [-]
 
 
 def register_signs(signs: Sequence[ProjectedSign], detections: Sequence[SignDetection]) -> tuple[Registration, ...]:
@@ -49,17 +39,7 @@ def register_signs(signs: Sequence[ProjectedSign], detections: Sequence[SignDete
     the offsets over that of a false alarm anywhere in the sign's region: p(c) = P q / (P q + λ) with the share P of
     signs that are detected and the false alarms λ in a region, as of a probabilistic data association with one target.
 
-    Parameters
-    ----------
-    signs : sequence of ProjectedSign
-        Signs that the map says lie ahead.
-    detections : sequence of SignDetection
-        What was found.
-
-    Returns
-    -------
-    tuple of Registration
-        In the order of the signs; signs without a detection are left out.
+    Returns In the order of the signs; signs without a detection are left out.
     """
     ratios = np.array([[_likelihood_ratio(sign, one) for one in detections] for sign in signs])
     if ratios.size == 0:

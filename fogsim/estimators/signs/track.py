@@ -15,35 +15,19 @@ FORGOTTEN = 2
 
 @dataclass(frozen=True, slots=True)
 class SignTrack:
-    """What is known of one sign.
+    """What is known of one sign."""
 
-    Attributes
-    ----------
-    sign : ProjectedSign
-        The sign when it was last looked for.
-    time : float
-        When that was [s].
-    first_seen : float or None
-        Distance of the camera when it was first detected, d_sign, if it was [m].
-    confidence : float
-        p(c) of that detection [-].
-    unseen_before : float or None
-        Nearest distance before that at which it should have been seen and was not [m]; None if it was seen at the first
-        look, so that it may have been visible from farther away.
-    detections, misses : int
-        Looks at which it was detected, and at which it should have been and was not.
-    misses_since : int
-        Of these, how many came one after another in the end.
-    """
-
-    sign: ProjectedSign
-    time: float
-    first_seen: float | None = None
-    confidence: float = 0.0
+    sign: ProjectedSign  # The sign when it was last looked for
+    time: float  # When that was [s]
+    first_seen: float | None = None  # Distance of the camera when it was first detected, d_sign, if it was [m]
+    confidence: float = 0.0  # p(c) of that detection [-]
+    # Nearest distance before that at which it should have been seen and was not [m]; None if it was seen at the first
+    # look, so that it may have been visible from farther away
     unseen_before: float | None = None
+    # detections, misses: looks at which it was detected, and at which it should have been and was not
     detections: int = 0
     misses: int = 0
-    misses_since: int = 0
+    misses_since: int = 0  # Of these, how many came one after another in the end
 
     @property
     def confirmed(self) -> bool:
@@ -71,19 +55,7 @@ class SignTracks:
     ) -> tuple[SignTrack, ...]:
         """Add one look.
 
-        Parameters
-        ----------
-        time : float
-            When [s].
-        signs : sequence of ProjectedSign
-            Signs that were looked for; of several with one id the first counts.
-        found : iterable of Registration
-            Those that were detected.
-
-        Returns
-        -------
-        tuple of SignTrack
-            Signs that were not looked for any more, as they were left: they have been passed.
+        Returns signs that were not looked for any more, as they were left: they have been passed. Takes `time` [s].
         """
         seen = {one.sign.sighting.sign_id: one for one in found}
         ahead = {sign.sighting.sign_id: sign for sign in reversed(signs)}

@@ -34,41 +34,17 @@ Detector = Callable[..., tuple[object, ...]]
 
 @dataclass(frozen=True, slots=True)
 class Watched:
-    """What one frame showed of the signs ahead.
+    """What one frame showed of the signs ahead."""
 
-    Attributes
-    ----------
-    signs : tuple of ProjectedSign
-        Where the map has them.
-    found : tuple of Registration
-        Those that were detected.
-    passed : tuple of SignTrack
-        Signs that are no longer ahead.
-    sky : Sky or None
-        The sky, if there are signs to look for and it is seen.
-    night : str
-        Why the picture is none by day, or nothing.
-    """
-
-    signs: tuple[ProjectedSign, ...]
-    found: tuple[Registration, ...]
-    passed: tuple[SignTrack, ...]
-    sky: Sky | None = None
-    night: str = ""
+    signs: tuple[ProjectedSign, ...]  # Where the map has them
+    found: tuple[Registration, ...]  # Those that were detected
+    passed: tuple[SignTrack, ...]  # Signs that are no longer ahead
+    sky: Sky | None = None  # The sky, if there are signs to look for and it is seen
+    night: str = ""  # Why the picture is none by day, or nothing
 
 
 class SignWatch:
-    """Projects the map's signs into the picture, detects and registers them, and follows each.
-
-    Parameters
-    ----------
-    camera : Camera
-        The assumed calibration.
-    setback : float or None
-        Distance of the camera behind the front bumper [m]; None for what observations tell.
-    deviation : PoseDeviation
-        How well the place of a sign is known.
-    """
+    """Projects the map's signs into the picture, detects and registers them, and follows each (`setback` [m])."""
 
     def __init__(self, camera: Camera, setback: float | None, deviation: PoseDeviation) -> None:
         self._camera, self._setback, self._deviation = camera, setback, deviation
@@ -88,18 +64,7 @@ class SignWatch:
         return self._tracks.tracks
 
     def look(self, observation: Observation) -> Watched:
-        """Look for the signs of one frame.
-
-        Parameters
-        ----------
-        observation : Observation
-            Its image, time, lead, and signs are used; ids of signs that come twice are refused.
-
-        Raises
-        ------
-        InputError
-            If two signs have one id.
-        """
+        """Look for the signs of one frame."""
         image, sightings = for_kernels(observation.image), observation.signs
         ids = [one.sign_id for one in sightings]
         if len(set(ids)) < len(ids):
@@ -143,15 +108,7 @@ class SignWatch:
 
 
 def sign_looks(watched: Watched, tracks: Iterable[SignTrack]) -> tuple[SignLook, ...]:
-    """What came of looking for each sign that the picture may show, for ``Estimate.diagnostics["sign_looks"]``.
-
-    Parameters
-    ----------
-    watched : Watched
-        What the frame showed.
-    tracks : iterable of SignTrack
-        Signs ahead after it.
-    """
+    """What came of looking for each sign that the picture may show, for ``Estimate.diagnostics["sign_looks"]``."""
     pairs = {one.sign.sighting.sign_id: one for one in watched.found}
     known = {one.sign.sighting.sign_id: one for one in tracks}
     ids = [sign.sighting.sign_id for sign in watched.signs]

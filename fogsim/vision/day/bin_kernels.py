@@ -22,35 +22,22 @@ TAIL = 0.04
 
 
 class RowBins(NamedTuple):
-    """Bins of rows, the highest first.
+    """Bins of rows, the highest first."""
 
-    Attributes
-    ----------
-    first, last : (n,) int64
-        Rows.
-    left, right : (n,) int64
-        First and last columns.
-    outer_left, outer_right : (n,) int64
-        The same of a wider strip of road, over which contrast is looked for.
-    """
-
+    # first, last (n,) int64: rows
     first: Ints
     last: Ints
+    # left, right (n,) int64: first and last columns
     left: Ints
     right: Ints
+    # outer_left, outer_right (n,) int64: the same of a wider strip of road, over which contrast is looked for
     outer_left: Ints
     outer_right: Ints
 
 
 @kernel
 def bright_part(seen: Floats) -> tuple[float, float]:
-    """Mean of those pixels of sky that are alike near the brightest, and their mean distance from it.
-
-    Parameters
-    ----------
-    seen : (n,) float64
-        Pixel values, ascending.
-    """
+    """Mean of those pixels of sky that are alike near the brightest, and their mean distance from it (`seen` (n,))."""
     count = seen.size
     centre = seen[count - 1 - count // SKY_SHARE]
     spread = seen[count - 1 - count // 20] - seen[count - 1 - count // 3]
@@ -71,18 +58,7 @@ def bright_part(seen: Floats) -> tuple[float, float]:
 def bin_medians(image: NDArray[Any], bins: RowBins, channel: int, sky_end: int, out: Floats) -> None:
     """Median of each bin, and the median distance from it [pixel values].
 
-    Parameters
-    ----------
-    image : (rows, cols, channels) uint8 or uint16
-        The image.
-    bins : RowBins
-        Where to look.
-    channel : int
-        Which channel.
-    sky_end : int
-        Row before which bins are sky as wide as the image.
-    out : (3, n) float64
-        Is written: medians, their scatter, and the contrast across the wider strip.
+    Takes `image` (rows, cols, channels) uint8, `out` (3, n).
     """
     values = np.empty(MOST_COLUMNS * MOST_ROWS)
     for i in range(bins.first.size):

@@ -28,23 +28,12 @@ NOT_CLEAR = "nothing that fog would hide is seen far away: the air may be clear 
 
 @dataclass(frozen=True, slots=True)
 class _Outcome:
-    """How the estimate of an image compares.
+    """How the estimate of an image compares."""
 
-    Attributes
-    ----------
-    time : float
-        Of the image [s].
-    seen : (float, float)
-        Interval of the estimate [m].
-    reason : str
-        Why it does not count; empty if it does.
-    relative, absolute : float
-        What the day model leaves open besides: of k over k [-], and of k where the air is clear [1/m].
-    """
-
-    time: float = -math.inf
-    seen: tuple[float, float] = (0.0, math.inf)
-    reason: str = ""
+    time: float = -math.inf  # Of the image [s]
+    seen: tuple[float, float] = (0.0, math.inf)  # (float, float): Interval of the estimate [m]
+    reason: str = ""  # Why it does not count; empty if it does
+    # relative, absolute: what the day model leaves open besides: of k over k [-], and of k where the air is clear [1/m]
     relative: float = 0.0
     absolute: float = 0.0
 
@@ -55,15 +44,6 @@ class Confirmation:
     Fog must show in the day model as well, and nothing may stand out at the horizon that it would hide. Clear air needs
     a road that keeps its contrast, or something that stands out. The interval then spans those of both, so that it has
     what height, focal length, response, sky and surface leave open.
-
-    Parameters
-    ----------
-    camera : Camera
-        The assumed calibration.
-    horizon : Horizon
-        Where it has the horizon.
-    scale_deviation : float
-        Standard deviation of ln k by its height and focal length [-].
     """
 
     def __init__(self, camera: Camera, horizon: Horizon, scale_deviation: float) -> None:
@@ -77,16 +57,7 @@ class Confirmation:
     def of(self, own: Estimate, image: NDArray[Any], free: float, time: float) -> Estimate:
         """Return an estimate with a wider interval, or why it does not count.
 
-        Parameters
-        ----------
-        own : Estimate
-            Of the method, valid or not.
-        image : (rows, cols) or (rows, cols, 3) uint8 or uint16
-            The image.
-        free : float
-            Depth up to which the own lane is free [m].
-        time : float
-            Of the image [s].
+        Takes `image` (rows, cols), `free` [m], `time` [s].
         """
         if not own.valid:
             return own

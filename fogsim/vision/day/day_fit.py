@@ -59,62 +59,31 @@ VEHICLE, RANGE_MARGIN = 1.8, 0.5
 
 @dataclass(frozen=True, slots=True)
 class DayFit:
-    """Posterior of the visibility.
+    """Posterior of the visibility."""
 
-    Attributes
-    ----------
-    log_visibility, chance : (n,) float64
-        Logarithms of visibilities [ln m], evenly, and their probabilities.
-    fog_over_none : float
-        Logarithm of the evidence of a road in air or fog over that of no road.
-    responses, surfaces, lights : (r,), (s,), (l,) float64
-        Probabilities of the hypotheses.
-    clipped : float
-        Share of the sky's bins that are clipped [-].
-    brightest : float
-        Light that hardly any bin exceeds, over full scale [-].
-    contrast : float
-        How much brighter the far road is than the near one, over the sky [-].
-    response_deviation : float
-        Standard deviation of ln k among responses [-].
-    obstacle : float
-        Depth at which something hides the road, if something does [m].
-    doubt : float
-        How much contrast across the road speaks against the extinction that another method claims, in logarithms of
-        chances [-].
-    """
-
+    # log_visibility, chance (n,): logarithms of visibilities [ln m], evenly, and their probabilities
     log_visibility: Floats
     chance: Floats
-    fog_over_none: float
+    fog_over_none: float  # Logarithm of the evidence of a road in air or fog over that of no road
+    # responses, surfaces, lights (l,): probabilities of the hypotheses
     responses: Floats
     surfaces: Floats
     lights: Floats
-    clipped: float
-    brightest: float
-    contrast: float
-    response_deviation: float
-    obstacle: float
+    clipped: float  # Share of the sky's bins that are clipped [-]
+    brightest: float  # Light that hardly any bin exceeds, over full scale [-]
+    contrast: float  # How much brighter the far road is than the near one, over the sky [-]
+    response_deviation: float  # Standard deviation of ln k among responses [-]
+    obstacle: float  # Depth at which something hides the road, if something does [m]
+    # How much contrast across the road speaks against the extinction that another method claims, in logarithms of
+    # chances [-]
     doubt: float = 0.0
 
     def quantile(self, share: float) -> float:
-        """Visibility below which the truth lies with a probability [m].
-
-        Parameters
-        ----------
-        share : float
-            That probability.
-        """
+        """Visibility below which the truth lies with a probability [m]."""
         return float(np.exp(np.interp(share, np.cumsum(self.chance), self.log_visibility)))
 
     def below(self, visibility: float) -> float:
-        """Probability that the visibility is less than some [-].
-
-        Parameters
-        ----------
-        visibility : float
-            That one [m].
-        """
+        """Probability that the visibility is less than some [-] (`visibility` [m])."""
         return float(self.chance[self.log_visibility < math.log(visibility)].sum())
 
 
@@ -135,20 +104,7 @@ def fit_day(
 ) -> DayFit:
     """Weigh all hypotheses by their evidence, or those that an earlier image of the same drive has left.
 
-    Parameters
-    ----------
-    image : (rows, cols) or (rows, cols, 3) uint8 or uint16
-        A level image, contiguous.
-    camera : Camera
-        The assumed calibration.
-    horizon : Horizon
-        What is known of the horizon.
-    free : float
-        Depth up to which the own lane is free of the vehicle ahead [m].
-    claimed : float
-        Extinction that another method claims; contrast across the road may speak against it [1/m].
-    earlier : DayFit or None
-        Of that earlier image: other responses and surfaces than it leaves are not tried.
+    Takes `image` (rows, cols), `free` [m], `claimed` [1/m].
     """
     pixels = image if image.ndim == 3 else image[:, :, None]
     bins = row_bins(camera, horizon.standard_deviation, round(horizon.row))

@@ -31,13 +31,7 @@ MOST_ALBEDO = 0.95
 
 @kernel
 def log_normal_share(value: float) -> float:
-    """Logarithm of a normal law's share below a value.
-
-    Parameters
-    ----------
-    value : float
-        In standard deviations.
-    """
+    """Logarithm of a normal law's share below a value."""
     if value > -5.0:
         return math.log(0.5 * math.erfc(-value / math.sqrt(2.0)))
     return -0.5 * value * value - math.log(-value * math.sqrt(2.0 * math.pi))
@@ -49,21 +43,8 @@ def factored(
 ) -> float:
     """Cholesky's factor of the columns' posterior precision, in deviations of their priors.
 
-    Parameters
-    ----------
-    gram, mean, deviation
-        See `evidence`.
-    used : (m,) int64
-        Columns that count.
-    low : (m, m) float64
-        The factor; its lower half is written.
-    right : (m,) float64
-        The factor's solution of the normal equations; is written.
-
-    Returns
-    -------
-    float
-        The sum of squares that is left, and twice the logarithm of the factor's determinant.
+    Returns the sum of squares that is left, and twice the logarithm of the factor's determinant. Takes `used` (m,)
+    int64, `low` (m, m), `right` (m,).
     """
     square = gram[COLUMNS, COLUMNS]
     for a in range(used.size):
@@ -87,19 +68,7 @@ def factored(
 
 @kernel
 def solved(low: Floats, at: int, value: float, out: Floats) -> None:
-    """Solve low · out = value in one place and zero elsewhere.
-
-    Parameters
-    ----------
-    low : (m, m) float64
-        A lower triangle.
-    at : int
-        The place.
-    value : float
-        What is there.
-    out : (m,) float64
-        Is written.
-    """
+    """Solve low · out = value in one place and zero elsewhere (`low` (m, m), `out` (m,))."""
     out[:] = 0.0
     out[at] = value / low[at, at]
     for a in range(at + 1, out.size):
@@ -111,19 +80,7 @@ def solved(low: Floats, at: int, value: float, out: Floats) -> None:
 
 @kernel
 def evidence(gram: Floats, half: float, mean: Floats, deviation: Floats, least_airlight: float) -> float:
-    """Logarithm of the density of the light under normal priors of the columns' factors.
-
-    Parameters
-    ----------
-    gram : (COLUMNS + 1, COLUMNS + 1) float64
-        Upper half, from the passes.
-    half : float
-        From the passes.
-    mean, deviation : (COLUMNS,) float64
-        Of the priors; a column of deviation 0 is left out.
-    least_airlight : float
-        Light that the airlight surely exceeds, as clipped pixels show.
-    """
+    """Logarithm of the density of the light under normal priors of the columns' factors."""
     used = np.flatnonzero(deviation > 0.0)
     low, right = np.empty((used.size, used.size)), np.empty(used.size)
     square = factored(gram, mean, deviation, used, low, right)
@@ -153,21 +110,7 @@ def of_lights(
     rows: RowData, response: int, lights: Floats, many: int, shift: float, sky_gram: Floats, sky_half: float,
     grams: Floats, halves: Floats, out: Floats,
 ) -> None:  # fmt: skip
-    """Evidence of one response and surface under each light, and of a road that ends at a cut.
-
-    Parameters
-    ----------
-    rows, lights, many, shift
-        See `evidence_grid`.
-    response : int
-        Which response.
-    sky_gram, sky_half
-        From `sky_pass`.
-    grams, halves
-        From `road_pass`.
-    out : (m,) float64
-        Is written.
-    """
+    """Evidence of one response and surface under each light, and of a road that ends at a cut (`out` (m,))."""
     mean, deviation, gram = np.empty(COLUMNS), np.empty(COLUMNS), np.empty((COLUMNS + 1, COLUMNS + 1))
     level, last = rows.level[response], rows.cuts.size - 1
     for j in range(out.size):
@@ -189,27 +132,7 @@ def evidence_grid(
 ) -> None:  # fmt: skip
     """Logarithm of the evidence of cells, pairs of a response and a surface, and lights or cuts.
 
-    Parameters
-    ----------
-    rows : RowData
-        What was read.
-    lens : (3,) float64
-        See `fill_columns`.
-    cells : (c, 2) float64
-        Row of the horizon, and k [1/m].
-    tried : (t, 2) int64
-        Response and surface of each pair.
-    surfaces : (s, 4) float64
-        Patches, grain and obstacles, and the depth from which on those hide the road [m].
-    lights : (2, l, COLUMNS) float64
-        Means and deviations of the columns' factors.
-    many : int
-        How many of the lights count, from the first on; where all do, also roads that end at each cut but the last,
-        under the first light.
-    shift : float
-        Standard deviation of the horizon about each of its rows [px].
-    out : (c, t, m) float64
-        Is written.
+    Takes `lens` (3,), `cells` (c, 2) [1/m], `tried` (t, 2) int64, `surfaces` (s, 4) [m], `shift` [px], `out` (c, t, m).
     """
     n = rows.first.size
     columns, place = np.empty((n, COLUMNS)), np.empty((n, 5))

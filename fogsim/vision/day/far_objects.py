@@ -44,20 +44,11 @@ def stands_out(level: NDArray[Any], camera: Camera, horizon: Horizon, extinction
 def share_of_far_objects(level: NDArray[Any], camera: Camera, horizon: Horizon, extinction: float) -> float:
     """Share of the image's width in which something is seen that fog of an extinction would hide [-].
 
-    At the depth d fog leaves no light below A (1 − e^(−k d)), so that something of the light L is nearer than
-    −ln(1 − L / A) / k, and its foot lies as far below the horizon. Where the ground between there and the horizon is
-    seen, it is farther.
+    At the depth d fog leaves no light below A (1 − e^(−k d)), so that something of the light L is nearer than −ln(1 − L
+    / A) / k, and its foot lies as far below the horizon. Where the ground between there and the horizon is seen, it is
+    farther.
 
-    Parameters
-    ----------
-    level : (rows, cols) or (rows, cols, 3) uint8 or uint16
-        A level image.
-    camera : Camera
-        The assumed calibration.
-    horizon : Horizon
-        What is known of the horizon.
-    extinction : float
-        The least that is claimed [1/m].
+    Takes `level` (rows, cols), `extinction` [1/m].
     """
     margin = 2.0 * horizon.standard_deviation + 1.0
     first, last = math.floor(horizon.row - margin) - ABOVE, math.floor(horizon.row - margin)

@@ -24,19 +24,11 @@ Floats = NDArray[np.float64]
 
 
 class Surfaces(NamedTuple):
-    """Roads: deviations of patches, grain and of what hides it, relative to the brightest light, and from which depth.
+    """Roads: deviations of patches, grain and what hides it, relative to the brightest light, and from which depth."""
 
-    Attributes
-    ----------
-    albedo : (n, 3) float64
-    hidden : (n,) float64
-        [m]; NaN where the road has its greatest step.
-    chance : (n,) float64
-    """
-
-    albedo: Floats
-    hidden: Floats
-    chance: Floats
+    albedo: Floats  # (n, 3)
+    hidden: Floats  # (n,): [m]; NaN where the road has its greatest step
+    chance: Floats  # (n,)
 
 
 PATCHES, GRAIN, SHADOW, OBSTACLE = 0.08, 0.02, 0.28, 0.6
@@ -57,24 +49,15 @@ SURFACES = Surfaces(
 
 
 class Lights(NamedTuple):
-    """Laws of the columns' factors, relative to the brightest light, and whether the sky counts.
-
-    Attributes
-    ----------
-    mean, deviation : (n, COLUMNS) float64
-    sky : (n,) int64
-        Whether the sky is as bright as the airlight.
-    is_wet, is_unusual : (n,) bool
-        Whether the road is wet, and whether that or local tone mapping is there.
-    chance : (n,) float64
-    """
+    """Laws of the columns' factors, relative to the brightest light, and whether the sky counts."""
 
     mean: Floats
     deviation: Floats
-    sky: NDArray[np.int64]
+    sky: NDArray[np.int64]  # (n,) int64: Whether the sky is as bright as the airlight
+    # is_wet, is_unusual (n,) bool: whether the road is wet, and whether that or local tone mapping is there
     is_wet: NDArray[np.bool_]
     is_unusual: NDArray[np.bool_]
-    chance: Floats
+    chance: Floats  # (n,)
 
 
 def _lights() -> Lights:
@@ -118,11 +101,5 @@ CUT_CHANCE = 0.05
 
 
 def lights_chances(cuts: int) -> Floats:
-    """Chances of the lights, where so many rows may end the road.
-
-    Parameters
-    ----------
-    cuts : int
-        How many.
-    """
+    """Chances of the lights, where so many rows may end the road."""
     return np.asarray((1.0 - CUT_CHANCE * cuts) * LIGHTS.chance)

@@ -39,32 +39,16 @@ OTHER_LINEAR = 0.02
 
 
 class Curves(NamedTuple):
-    """Inverse response curves.
+    """Inverse response curves."""
 
-    Attributes
-    ----------
-    light : (curves, POINTS) float64
-        Light behind evenly spaced signals, relative to full scale.
-    slope : (curves, POINTS) float64
-        Its derivative by the signal.
-    chance : (curves,) float64
-        How likely each is; their sum is 1.
-    """
-
-    light: Floats
-    slope: Floats
-    chance: Floats
+    light: Floats  # Light behind evenly spaced signals, relative to full scale
+    slope: Floats  # Its derivative by the signal
+    chance: Floats  # (curves,): How likely each is; their sum is 1
 
 
 @lru_cache(maxsize=8)
 def curves_of(camera: Camera) -> Curves:
-    """Curves that a camera may have, the stated one first.
-
-    Parameters
-    ----------
-    camera : Camera
-        The assumed calibration.
-    """
+    """Curves that a camera may have, the stated one first."""
     signal = np.linspace(0.0, 1.0, POINTS)
     others = dict(OTHERS) if camera.response is not Response.SRGB else {n: c for n, c in OTHERS.items() if n != "srgb"}
     if camera.response is not Response.LINEAR:

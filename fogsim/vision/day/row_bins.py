@@ -28,17 +28,7 @@ the bins below [-]."""
 
 @lru_cache(maxsize=64)
 def row_bins(camera: Camera, deviation: float, horizon: float) -> RowBins:
-    """Lay bins over the image of a camera.
-
-    Parameters
-    ----------
-    camera : Camera
-        The assumed calibration; its roll is taken as undone.
-    deviation : float
-        Standard deviation of the horizon's row [px].
-    horizon : float
-        That row.
-    """
+    """Lay bins over the image of a camera (`deviation` [px])."""
     bottom = camera.height - 1
     around = NEAR_HORIZON * deviation + 1.0
     step = max(round(deviation / 2.5), 1)

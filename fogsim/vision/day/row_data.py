@@ -34,19 +34,7 @@ WALKS = np.array([[0.015], [0.04], [0.1]])
 
 
 def read_rows(image: NDArray[Any], bins: RowBins, camera: Camera, horizon: float) -> RowData:
-    """Read the bins of an image.
-
-    Parameters
-    ----------
-    image : (rows, cols, channels) uint8 or uint16
-        A level image, contiguous.
-    bins : RowBins
-        Where to look.
-    camera : Camera
-        The assumed calibration.
-    horizon : float
-        Row of the horizon.
-    """
+    """Read the bins of an image (`image` (rows, cols, channels) uint8)."""
     found = np.empty((3, bins.first.size))
     wide = np.flatnonzero(bins.right - bins.left < 0.5 * SKY_WIDTH * camera.width)
     sky_end = int(bins.first[wide[0]]) if wide.size else 0

@@ -22,13 +22,7 @@ SKY_VARIANCE = 0.10
 
 @kernel
 def footprint(extent: float, length: float) -> float:
-    """Deviation that is left of an exponential process averaged over an extent, relative to its own.
-
-    Parameters
-    ----------
-    extent, length : float
-        Both in one unit.
-    """
+    """Deviation that is left of an exponential process averaged over an extent, relative to its own."""
     ratio = extent / length
     if ratio < 1e-3:
         return 1.0
@@ -37,13 +31,7 @@ def footprint(extent: float, length: float) -> float:
 
 @kernel
 def add_products(whitened: Floats, gram: Floats) -> None:
-    """Add the products of whitened columns to the upper half of a Gram matrix.
-
-    Parameters
-    ----------
-    whitened : (COLUMNS + 1,) float64
-    gram : (COLUMNS + 1, COLUMNS + 1) float64
-    """
+    """Add the products of whitened columns to the upper half of a Gram matrix."""
     for a in range(COLUMNS + 1):
         if whitened[a] != 0.0:
             for b in range(a, COLUMNS + 1):
@@ -54,14 +42,7 @@ def add_products(whitened: Floats, gram: Floats) -> None:
 def advance(p: Floats, state: Floats, metres: float, rows: float) -> None:
     """Predict the road's state some metres and rows nearer: patches and their slope, grain, noise that rows share.
 
-    Parameters
-    ----------
-    p : (4, 4) float64
-        Covariance, its upper half.
-    state : (4, COLUMNS + 1) float64
-        Means, of each column.
-    metres, rows : float
-        How far.
+    Takes `p` (4, 4).
     """
     square, e = RATE * RATE, math.exp(-RATE * metres)
     f00, f01, f10, f11 = e * (1.0 + RATE * metres), e * metres, -e * square * metres, e * (1.0 - RATE * metres)
@@ -87,21 +68,7 @@ def advance(p: Floats, state: Floats, metres: float, rows: float) -> None:
 def take_in(
     p: Floats, state: Floats, seen: Floats, noise: float, column: Floats, light: float, whitened: Floats
 ) -> float:
-    """Correct the road's state by a row, and whiten that; return the variance of what is new.
-
-    Parameters
-    ----------
-    p, state
-        See `advance`.
-    seen : (3,) float64
-        What the row shows of patches, grain and shared noise.
-    noise, light : float
-        The row's own noise, and its light.
-    column : (COLUMNS,) float64
-        The row's columns.
-    whitened : (COLUMNS + 1,) float64
-        Is written.
-    """
+    """Correct the road's state by a row, and whiten that; return the variance of what is new (`seen` (3,))."""
     h0, h2, h3 = seen[0], seen[1], seen[2]
     g0 = p[0, 0] * h0 + p[0, 2] * h2 + p[0, 3] * h3
     g1 = p[0, 1] * h0 + p[1, 2] * h2 + p[1, 3] * h3
@@ -132,23 +99,8 @@ def sky_pass(
 ) -> float:  # fmt: skip
     """Whiten the sky's rows, from the horizon upward, and add them to a Gram matrix.
 
-    Parameters
-    ----------
-    light, slope, noise : (n,) float64
-        Light of each bin, its derivative by the signal, and its noise; none where that is 0.
-    columns, place
-        See `fill_columns`.
-    size : int
-        How many bins, from the first on, are sky.
-    hidden : (2,) float64
-        Deviation by what stands before the sky, and up to which angle above the horizon.
-    gram : (COLUMNS + 1, COLUMNS + 1) float64
-        Sum of products of whitened columns, the light last; its upper half is added to.
-
-    Returns
-    -------
-    float
-        Half the logarithm of the determinant of the covariance, with 2π.
+    Returns half the logarithm of the determinant of the covariance, with 2π. Takes `light`, `slope`, `noise` (n,),
+    `hidden` (2,).
     """
     state, other = np.zeros(COLUMNS + 1), np.zeros(COLUMNS + 1)
     whitened = np.empty(COLUMNS + 1)
@@ -191,22 +143,7 @@ def road_pass(
 ) -> None:  # fmt: skip
     """Whiten the road's rows, from far to near; Gram matrices of all rows up to each of several cuts.
 
-    Parameters
-    ----------
-    light, noise, shared : (n,) float64
-        Light of each bin, its own noise and that which rows share; none where the first noise is 0.
-    columns, place
-        See `fill_columns`.
-    albedo : (3,) float64
-        Deviations of the road's light by patches and grain, and of what hides the road.
-    hidden : float
-        Depth from which on something hides the road [m].
-    cuts : (m,) int64
-        Bins before which rows end, ascending; bins of sky have an angle below 0.
-    grams : (m, COLUMNS + 1, COLUMNS + 1) float64
-        Is written, upper half.
-    halves : (m,) float64
-        Half the logarithm of the determinant of the covariance, with 2π; is written.
+    Takes `light`, `noise`, `shared` (n,), `albedo` (3,), `hidden` [m], `cuts` (m,) int64, `halves` (m,).
     """
     gram, whitened = np.zeros((COLUMNS + 1, COLUMNS + 1)), np.empty(COLUMNS + 1)
     state, p, seen = np.zeros((4, COLUMNS + 1)), np.diag(np.array([1.0, RATE * RATE, 1.0, 1.0])), np.empty(3)

@@ -41,49 +41,30 @@ FARTHEST = 5000.0
 
 
 class RowData(NamedTuple):
-    """What was read of an image, under each response (r, n).
+    """What was read of an image, under each response (r, n)."""
 
-    Attributes
-    ----------
-    first, last : (n,) float64
-        Rows of each bin.
-    light, slope, noise, by_row : (r, n) float64
-        Light of each bin, its derivative by the signal, its noise (0 where clipped), and its change by row.
-    level, least_airlight : (r,) float64
-        Brightest light, and light that the airlight surely exceeds.
-    contrast : (2, n) float64
-        Contrast across a strip of road, relative to the airlight, and the noise of that.
-    cuts : (c,) int64
-        Bins before which the road ends, the first being the first bin below the horizon, the last n.
-    free : (c,) float64
-        Evidence of the signals of the bins from each cut on by a law of no road.
-    none : float
-        The same of all bins, the sky's too.
-    """
-
+    # first, last (n,): rows of each bin
     first: Floats
     last: Floats
+    # light, slope, noise, by_row (r, n): light of each bin, its derivative by the signal, its noise (0 where clipped),
+    # and its change by row
     light: Floats
     slope: Floats
     noise: Floats
     by_row: Floats
+    # level, least_airlight (r,): brightest light, and light that the airlight surely exceeds
     level: Floats
     least_airlight: Floats
-    contrast: Floats
+    contrast: Floats  # (2, n): Contrast across a strip of road, relative to the airlight, and the noise of that
+    # (c,) int64: Bins before which the road ends, the first being the first bin below the horizon, the last n
     cuts: NDArray[np.int64]
-    free: Floats
-    none: float
+    free: Floats  # (c,): Evidence of the signals of the bins from each cut on by a law of no road
+    none: float  # The same of all bins, the sky's too
 
 
 @kernel
 def fresnel(sine: float) -> float:
-    """Share of light that water mirrors under an angle above it.
-
-    Parameters
-    ----------
-    sine : float
-        Of the angle.
-    """
+    """Share of light that water mirrors under an angle above it."""
     root = math.sqrt(REFRACTION - 1.0 + sine * sine)
     across, along = (sine - root) / (sine + root), (REFRACTION * sine - root) / (REFRACTION * sine + root)
     return 0.5 * (across * across + along * along)
@@ -96,23 +77,8 @@ def fill_columns(
 ) -> None:  # fmt: skip
     """Columns of all bins, and where each lies.
 
-    Parameters
-    ----------
-    first, last : (n,) float64
-        Rows of each bin.
-    horizon : float
-        Row of the horizon.
-    lens : (3,) float64
-        Focal length [px], height [m], principal row.
-    extinction : float
-        k [1/m].
-    hidden : float
-        Depth from which on something hides the road [m].
-    columns : (n, COLUMNS) float64
-        Is written.
-    place : (n, 5) float64
-        Is written: what fog leaves of the road, its depth and extent [m], rows below the horizon [px],
-        angle above it [rad].
+    Takes `first`, `last` (n,), `lens` (3,) [px], [m], `extinction` [1/m], `hidden` [m], `place` (n, 5) [m], [px],
+    [rad].
     """
     focal, height = lens[0], lens[1]
     for i in range(first.size):
@@ -158,14 +124,7 @@ def fill_columns(
 def contrast_across(contrast: Floats, place: Floats, size: int) -> float:
     """Logarithm of the chance of contrasts across the road; fog leaves less of them, the farther away they are.
 
-    Parameters
-    ----------
-    contrast : (2, n) float64
-        Contrast of each bin, relative to the airlight, and the noise of that.
-    place
-        See `fill_columns`.
-    size : int
-        How many bins, from the first on, are sky.
+    Takes `contrast` (2, n).
     """
     total = 0.0
     for i in range(size, place.shape[0]):

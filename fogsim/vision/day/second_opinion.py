@@ -29,15 +29,7 @@ PERIOD = 10.0
 
 
 class SecondOpinion:
-    """Weighs estimates of a method by the day model, in a drive from time to time.
-
-    Parameters
-    ----------
-    camera : Camera
-        The assumed calibration.
-    scale_deviation : float
-        Standard deviation of ln k by its height and focal length [-].
-    """
+    """Weighs estimates of a method by the day model, in a drive from time to time."""
 
     def __init__(self, camera: Camera, scale_deviation: float) -> None:
         self._camera, self._scale = camera, scale_deviation
@@ -54,20 +46,7 @@ class SecondOpinion:
     ) -> Estimate:
         """Return an estimate, what the day model has instead, or neither.
 
-        Parameters
-        ----------
-        own : Estimate
-            Of the other method, valid or not.
-        level : (rows, cols) or (rows, cols, 3) uint8 or uint16
-            A level image.
-        horizon : Horizon
-            What is known of the horizon.
-        free : float
-            Depth up to which the own lane is free [m].
-        time : float
-            Of the image [s].
-        is_straight : bool
-            Whether the road neither bends nor sags, as the day model has it.
+        Takes `level` (rows, cols), `free` [m], `time` [s].
         """
         is_recent = self._agreed < time < self._agreed + PERIOD
         if own.valid and is_recent and (self._clear is None or agree(own.visibility_interval, self._clear)):

@@ -49,40 +49,21 @@ DISAGREE = "how the road fades and how its image brightens disagree"
 
 @dataclass(frozen=True, slots=True)
 class DayVerdict:
-    """An answer of the day model.
+    """An answer of the day model."""
 
-    Attributes
-    ----------
-    extinction, deviation : float
-        k and half the width of its 90 % interval over 1.645 [1/m].
-    median : float
-        Of the posterior of k [1/m].
-    interval : (float, float)
-        Ends of the visibility [m].
-    reason : str
-        Why it is no answer; empty if it is.
-    shows_fog : bool
-        Whether there surely is fog on a road, however dense.
-    is_sure : bool
-        Whether it counts against another method: a road under a sky, neither hidden nor in shade.
-    is_even : bool
-        Whether the road is surely one, as even as roads mostly are, and the response may be the stated one.
-    outside : float
-        Probability that the image shows what the joint fit does not know, a wet road, local tone mapping or clipped
-        airlight that is not even; 0 where the road is not sure [-].
-    doubt, response_deviation : float
-        See `DayFit`.
-    """
-
+    # extinction, deviation: k and half the width of its 90 % interval over 1.645 [1/m]
     extinction: float
     deviation: float
-    median: float
-    interval: tuple[float, float]
-    reason: str
-    shows_fog: bool
-    is_sure: bool
-    is_even: bool
+    median: float  # Of the posterior of k [1/m]
+    interval: tuple[float, float]  # (float, float): Ends of the visibility [m]
+    reason: str  # Why it is no answer; empty if it is
+    shows_fog: bool  # Whether there surely is fog on a road, however dense
+    is_sure: bool  # Whether it counts against another method: a road under a sky, neither hidden nor in shade
+    is_even: bool  # Whether the road is surely one, as even as roads mostly are, and the response may be the stated one
+    # Probability that the image shows what the joint fit does not know, a wet road, local tone mapping or clipped
+    # airlight that is not even; 0 where the road is not sure [-]
     outside: float
+    # doubt, response_deviation: see `DayFit`
     doubt: float
     response_deviation: float
 
@@ -108,15 +89,7 @@ class DayVerdict:
 
 
 def verdict_of(fit: DayFit, scale_deviation: float) -> DayVerdict:
-    """Judge a posterior.
-
-    Parameters
-    ----------
-    fit : DayFit
-        The posterior.
-    scale_deviation : float
-        Standard deviation of ln k by the height and the focal length of the camera [-].
-    """
+    """Judge a posterior."""
     low, middle, high = (fit.quantile(share) for share in (0.05, 0.5, 0.95))
     calibration = NORMAL_90_PERCENT * scale_deviation
     low = middle / math.exp(math.hypot(math.log(middle / low), calibration))
@@ -168,11 +141,5 @@ def _reason(fit: DayFit, is_road: bool, sky: float) -> str:
 
 
 def agree(one: tuple[float, float], other: tuple[float, float]) -> bool:
-    """Whether two intervals of visibility have something in common, or almost.
-
-    Parameters
-    ----------
-    one, other : (float, float)
-        Their ends [m].
-    """
+    """Whether two intervals of visibility have something in common, or almost (`one`, `other` (float, float) [m])."""
     return one[0] <= SLACK * other[1] and other[0] <= SLACK * one[1]

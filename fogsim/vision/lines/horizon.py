@@ -29,47 +29,23 @@ ScaleDeviation = Annotated[float, Range(0.0, 1.0)]
 
 @dataclass(frozen=True, slots=True)
 class Horizon:
-    """The horizon as a straight line in the image.
+    """The horizon as a straight line in the image."""
 
-    Attributes
-    ----------
-    row : float
-        Its row at the principal column [px]; not necessarily inside the image.
-    standard_deviation : float
-        Standard deviation of that row [px].
-    """
-
-    row: float
-    standard_deviation: float
+    row: float  # Its row at the principal column [px]; not necessarily inside the image
+    standard_deviation: float  # Standard deviation of that row [px]
 
 
 def calibrated_horizon(camera: Camera, pitch_deviation: float = PITCH_DEVIATION) -> Horizon:
     """Horizon from the calibrated pitch: v_h = v0 − α tan θ (negru2013 eq. 6).
 
-    Parameters
-    ----------
-    camera : Camera
-        The assumed calibration.
-    pitch_deviation : float
-        Standard deviation of the true pitch about the assumed one [rad].
-
-    Returns
-    -------
-    Horizon
-        Row and its standard deviation, α / cos² θ times that of the pitch.
+    Returns row and its standard deviation, α / cos² θ times that of the pitch. Takes `pitch_deviation` [rad].
     """
     deviation = camera.focal_length / math.cos(camera.pitch) ** 2 * pitch_deviation
     return Horizon(row=camera.horizon_row, standard_deviation=deviation)
 
 
 def weighted_mean(first: Horizon, second: Horizon) -> Horizon:
-    """Mean of two independent measurements of the horizon, weighted by one over their variances.
-
-    Parameters
-    ----------
-    first, second : Horizon
-        The measurements.
-    """
+    """Mean of two independent measurements of the horizon, weighted by one over their variances."""
     apart = math.hypot(first.standard_deviation, second.standard_deviation)
     share = (first.standard_deviation / apart) ** 2
     deviation = first.standard_deviation * second.standard_deviation / apart
@@ -79,17 +55,8 @@ def weighted_mean(first: Horizon, second: Horizon) -> Horizon:
 def levelled(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera) -> NDArray[np.uint8] | NDArray[np.uint16]:
     """Turn an image about the principal point such that its horizon is level.
 
-    Parameters
-    ----------
-    image : (rows, cols) or (rows, cols, 3) uint8 or uint16
-        An image of the camera.
-    camera : Camera
-        The assumed calibration; its roll is what is undone.
-
-    Returns
-    -------
-    (rows, cols) or (rows, cols, 3), of the same type
-        The image itself if the camera has no roll; else corners that it does not cover repeat its border.
+    Returns the image itself if the camera has no roll; else corners that it does not cover repeat its border (rows,
+    cols). Takes `image` (rows, cols).
     """
     if camera.roll == 0.0:
         return image
@@ -108,13 +75,7 @@ def levelled(image: NDArray[np.uint8] | NDArray[np.uint16], camera: Camera) -> N
 
 
 def why_no_road(camera: Camera) -> str:
-    """Say why a camera can never show a foggy road before a sky; empty if it can.
-
-    Parameters
-    ----------
-    camera : Camera
-        The assumed calibration.
-    """
+    """Say why a camera can never show a foggy road before a sky; empty if it can."""
     if abs(camera.roll) > math.pi / 4:
         return "the camera lies on its side or is upside-down"
     if not 4.0 <= camera.horizon_row <= camera.height - 1:

@@ -41,31 +41,16 @@ NARROWEST = 0.25
 
 @dataclass(frozen=True, slots=True)
 class Halo:
-    """One source's halo.
+    """One source's halo."""
 
-    Attributes
-    ----------
-    source : int
-        Its number in the tree.
-    u, v : float
-        Centre of the source [px].
-    direction : tuple of float
-        Unit vector along which the halo points [px].
-    profile : (n,) float64
-        Level at whole pixels from the centre along it [levels of 255].
-    height : float
-        H50, half of the decrease [levels of 255].
-    width : float
-        W50, from the end of saturation to where half of the decrease is reached [px].
-    """
-
-    source: int
+    source: int  # Its number in the tree
+    # u, v: centre of the source [px]
     u: float
     v: float
-    direction: tuple[float, float]
-    profile: NDArray[np.float64]
-    height: float
-    width: float
+    direction: tuple[float, float]  # Unit vector along which the halo points [px]
+    profile: NDArray[np.float64]  # (n,): Level at whole pixels from the centre along it [levels of 255]
+    height: float  # H50, half of the decrease [levels of 255]
+    width: float  # W50, from the end of saturation to where half of the decrease is reached [px]
 
     @property
     def steepness(self) -> float:
@@ -79,27 +64,13 @@ class Halo:
 
 
 def halos_of(tree: SourceTree) -> tuple[Halo, ...]:
-    """Halos of the sources that are selected.
-
-    Parameters
-    ----------
-    tree : SourceTree
-        Of a picture.
-    """
+    """Halos of the sources that are selected."""
     found = (_halo_of(tree, source) for source in range(len(tree)) if is_selected(tree, source))
     return tuple(one for one in found if one is not None)
 
 
 def is_selected(tree: SourceTree, source: int) -> bool:
-    """Whether a branch is that of a lamp: it grows in small steps, and its centre stays or drifts one way.
-
-    Parameters
-    ----------
-    tree : SourceTree
-        Of a picture.
-    source : int
-        Number of the source.
-    """
+    """Whether a branch is that of a lamp: it grows in small steps, and its centre stays or drifts one way."""
     last = int(tree.last[source])
     if last < 0:
         return False
@@ -120,15 +91,7 @@ def _is_satellite(tree: SourceTree, source: int) -> bool:
 
 
 def direction_of(tree: SourceTree, source: int) -> tuple[float, float]:
-    """Direction into which the centre of a branch drifts, by regression; `UP` where it stays.
-
-    Parameters
-    ----------
-    tree : SourceTree
-        Of a picture.
-    source : int
-        Number of the source.
-    """
+    """Direction into which the centre of a branch drifts, by regression; `UP` where it stays."""
     centres = tree.centres(source)
     if math.dist(centres[-1], centres[0]) < LEAST_DRIFT:
         return UP
@@ -157,16 +120,7 @@ def level_along(
 ) -> NDArray[np.float64]:
     """Level at whole pixels along a line, interpolated between four pixels; it ends at the picture's border.
 
-    Parameters
-    ----------
-    level : (rows, cols) uint8
-        The picture.
-    u, v : float
-        Where the line begins [px].
-    along_u, along_v : float
-        Its direction, a unit vector [px].
-    count : int
-        Most points.
+    Takes `level` (rows, cols) uint8, `u`, `v` [px], `along_u`, `along_v` [px].
     """
     rows, cols = level.shape
     out = np.empty(count)
@@ -194,10 +148,7 @@ def _falling(profile: NDArray[np.float64]) -> NDArray[np.float64]:
 def half_of(profile: NDArray[np.float64]) -> tuple[float, float] | None:
     """H50 [levels of 255] and W50 [px] of a profile that begins in a source; None if it does not fall.
 
-    Parameters
-    ----------
-    profile : (n,) float64
-        Level at whole pixels [levels of 255].
+    Takes `profile` (n,) [levels of 255].
     """
     top = float(profile.max())
     height = 0.5 * (top - float(profile[-1]))

@@ -52,82 +52,42 @@ LARGEST_HALO, BUDGET = 0.08, 0.12
 
 @dataclass(frozen=True, slots=True)
 class SourceTree:
-    """Sources of light, and how their components grow while the threshold falls.
+    """Sources of light, and how their components grow while the threshold falls."""
 
-    Attributes
-    ----------
-    level : (rows, cols) uint8
-        The picture: its brightest channel in 8 bits.
-    thresholds : (t,) int64
-        Falling [levels of 255].
-    nodes : (t, n, MEASURES) float64
-        What is known of each source's component at each threshold (`fogsim.vision.sources.tree_kernels`); the first row
-        are the leaves.
-    last : (n,) int64
-        Last threshold at which a source's component was its own and had not leaked into something bright; −1 for none.
-    merged_into : (n,) int64
-        Source with whose branch each source's merged, itself where it did with none.
-    leaked : (n,) bool
-        Whether a branch ended because it grew too fast or too large.
-    trouble : str
-        Why there can be no source, or nothing.
-    """
-
-    level: NDArray[np.uint8]
-    thresholds: NDArray[np.int64]
+    level: NDArray[np.uint8]  # (rows, cols) uint8: The picture: its brightest channel in 8 bits
+    thresholds: NDArray[np.int64]  # (t,) int64: Falling [levels of 255]
+    # What is known of each source's component at each threshold (`fogsim.vision.sources.tree_kernels`); the first row
+    # are the leaves
     nodes: NDArray[np.float64]
+    # (n,) int64: Last threshold at which a source's component was its own and had not leaked into something bright; −1
+    # for none
     last: NDArray[np.int64]
+    # (n,) int64: Source with whose branch each source's merged, itself where it did with none
     merged_into: NDArray[np.int64]
-    leaked: NDArray[np.bool_]
-    trouble: str = ""
+    leaked: NDArray[np.bool_]  # (n,) bool: Whether a branch ended because it grew too fast or too large
+    trouble: str = ""  # Why there can be no source, or nothing
 
     def __len__(self) -> int:
         """How many sources there are."""
         return len(self.last)
 
     def centres(self, source: int) -> NDArray[np.float64]:
-        """Centres of gravity along a branch (t, 2), columns and rows [px].
-
-        Parameters
-        ----------
-        source : int
-            Its number.
-        """
+        """Centres of gravity along a branch (t, 2), columns and rows [px]."""
         branch = self.nodes[: max(int(self.last[source]), 0) + 1, source]
         return branch[:, [SUM_U, SUM_V]] / branch[:, AREA, None]
 
     def areas(self, source: int) -> NDArray[np.float64]:
-        """Areas along a branch (t,) [px].
-
-        Parameters
-        ----------
-        source : int
-            Its number.
-        """
+        """Areas along a branch (t,) [px]."""
         return self.nodes[: max(int(self.last[source]), 0) + 1, source, AREA]
 
     def box(self, source: int, threshold: int) -> tuple[float, float, float, float]:
-        """Left, right, top and bottom of a source's component at a threshold [px].
-
-        Parameters
-        ----------
-        source, threshold : int
-            Their numbers.
-        """
+        """Left, right, top and bottom of a source's component at a threshold [px]."""
         left, right, top, bottom = self.nodes[threshold, source, [LEFT, RIGHT, TOP, BOTTOM]].tolist()
         return left, right, top, bottom
 
 
 def source_tree(image: Pixels, bits: int = 8) -> SourceTree:
-    """Find what may be lamps in a picture, and follow their halos down.
-
-    Parameters
-    ----------
-    image : (rows, cols) or (rows, cols, 3) uint8, or uint16 for more than 8 bits
-        Pixel values.
-    bits : int
-        Their bit depth.
-    """
+    """Find what may be lamps in a picture, and follow their halos down (`image` (rows, cols))."""
     layers = np.ascontiguousarray(image if image.ndim == 3 else image[:, :, None])
     level = tree_kernels.brightest_channel(layers, bits - 8)
     brightest = int(level.max())
@@ -178,25 +138,13 @@ def _axes(found: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.f
 
 
 def elongation(found: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Longest over shortest axis of components [-].
-
-    Parameters
-    ----------
-    found : (n, MEASURES) float64
-        The components.
-    """
+    """Longest over shortest axis of components [-]."""
     longest, shortest = _axes(found)
     return np.sqrt(longest / shortest)
 
 
 def compactness(found: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Area of components over that of ellipses with the same second moments: 1 for a disk, 0.95 for a square [-].
-
-    Parameters
-    ----------
-    found : (n, MEASURES) float64
-        The components.
-    """
+    """Area of components over that of ellipses with the same second moments: 1 for a disk, 0.95 for a square [-]."""
     longest, shortest = _axes(found)
     return np.asarray(found[:, AREA] / (4.0 * math.pi * np.sqrt(longest * shortest)))
 

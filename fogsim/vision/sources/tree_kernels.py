@@ -28,12 +28,7 @@ WAITING = np.int32(-1)
 def brightest_channel(image: NDArray[np.generic], shift: int) -> NDArray[np.uint8]:
     """Largest channel of every pixel in 8 bits: tail lamps are as bright in red as head lamps in white.
 
-    Parameters
-    ----------
-    image : (rows, cols, channels) uint8 or uint16
-        Pixel values.
-    shift : int
-        Bits by which they exceed 8.
+    Takes `image` (rows, cols, channels) uint8.
     """
     rows, cols, channels = image.shape
     out = np.empty((rows, cols), np.uint8)
@@ -77,26 +72,7 @@ def _join(into: NDArray[np.float64], other: NDArray[np.float64]) -> None:
 def find_components(
     level: NDArray[np.uint8], threshold: int, most: int, most_pixels: int
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Components of neighbouring pixels, corners too, that are not below a threshold.
-
-    Parameters
-    ----------
-    level : (rows, cols) uint8
-        The picture.
-    threshold : int
-        Least level that belongs to a component.
-    most : int
-        How many components are looked for.
-    most_pixels : int
-        How many pixels they have together at most; where more are as bright, no component is told.
-
-    Returns
-    -------
-    (rows, cols) int32
-        Number of each pixel's component from 1 on, `FREE` elsewhere.
-    (n, MEASURES) float64
-        What is known of each.
-    """
+    """Components of neighbouring pixels, corners too, that are not below a threshold (`level` (rows, cols) uint8)."""
     rows, cols = level.shape
     label = np.zeros((rows, cols), np.int32)
     measures = np.empty((most, MEASURES))
@@ -131,24 +107,15 @@ def find_components(
 
 
 class Flood(NamedTuple):
-    """What flooding from sources finds, level by level.
+    """What flooding from sources finds, level by level."""
 
-    Attributes
-    ----------
-    nodes : (levels, n, MEASURES) float64
-        What is known of each source's component at each level; of merged ones, that of the component it is part of.
-    last : (n,) int64
-        Last level at which each source's component was its own and had not leaked; −1 if there was none.
-    merged_into : (n,) int64
-        The source into whose branch each merged, itself where it merged into none.
-    leaked : (n,) bool
-        Whether each branch ended because it grew too fast or too large.
-    """
-
+    # What is known of each source's component at each level; of merged ones, that of the component it is part of
     nodes: NDArray[np.float64]
+    # (n,) int64: Last level at which each source's component was its own and had not leaked; −1 if there was none
     last: NDArray[np.int64]
+    # (n,) int64: The source into whose branch each merged, itself where it merged into none
     merged_into: NDArray[np.int64]
-    leaked: NDArray[np.bool_]
+    leaked: NDArray[np.bool_]  # (n,) bool: Whether each branch ended because it grew too fast or too large
 
 
 @kernel
@@ -159,23 +126,15 @@ def _root(parent: NDArray[np.int64], source: int) -> int:
 
 
 class _Front(NamedTuple):
-    """Pixels that wait, a list for each level: the first one of each list, and of each pixel in turn the next one.
+    """Pixels that wait, a list for each level: the first one of each list, and of each pixel in turn the next one."""
 
-    Attributes
-    ----------
-    first : (levels,) int64
-        Numbers of the first, −1 for none.
-    following, pixel, source : (most,) int64
-        The next in the same list, which pixel it is and from which source it was found.
-    used : (1,) int64
-        How many there are.
-    """
-
-    first: NDArray[np.int64]
+    first: NDArray[np.int64]  # (levels,) int64: Numbers of the first, −1 for none
+    # following, pixel, source (most,) int64: the next in the same list, which pixel it is and from which source it was
+    # found
     following: NDArray[np.int64]
     pixel: NDArray[np.int64]
     source: NDArray[np.int64]
-    used: NDArray[np.int64]
+    used: NDArray[np.int64]  # (1,) int64: How many there are
 
 
 @kernel
@@ -199,23 +158,12 @@ def _find(
 
 
 class _Branches(NamedTuple):
-    """What becomes of the sources' components.
+    """What becomes of the sources' components."""
 
-    Attributes
-    ----------
-    now : (n, MEASURES) float64
-        What is known of each.
-    parent : (n,) int64
-        The one with which each merged, itself where it did with none.
-    last : (n,) int64
-        Last threshold at which each was its own.
-    ended, leaked : (n,) bool
-        Whether each grows no more, and whether that is because it grew too fast or too large.
-    """
-
-    now: NDArray[np.float64]
-    parent: NDArray[np.int64]
-    last: NDArray[np.int64]
+    now: NDArray[np.float64]  # What is known of each
+    parent: NDArray[np.int64]  # (n,) int64: The one with which each merged, itself where it did with none
+    last: NDArray[np.int64]  # (n,) int64: Last threshold at which each was its own
+    # ended, leaked (n,) bool: whether each grows no more, and whether that is because it grew too fast or too large
     ended: NDArray[np.bool_]
     leaked: NDArray[np.bool_]
 
@@ -287,22 +235,13 @@ def _fill(
 
 
 class Limits(NamedTuple):
-    """Where branches end.
+    """Where branches end."""
 
-    Attributes
-    ----------
-    growth : float
-        A component that grows by more from one threshold to the next has leaked into something bright; one that meets
-        another that is smaller by more goes on as its own.
-    largest : float
-        Pixels from which on a component is no halo.
-    budget : int
-        Pixels that are looked at in all; where they are used up, all branches end.
-    """
-
+    # A component that grows by more from one threshold to the next has leaked into something bright; one that meets
+    # another that is smaller by more goes on as its own
     growth: float
-    largest: float
-    budget: int
+    largest: float  # Pixels from which on a component is no halo
+    budget: int  # Pixels that are looked at in all; where they are used up, all branches end
 
 
 @kernel
@@ -315,18 +254,7 @@ def flood(
 ) -> Flood:
     """Let components grow from sources while the threshold falls, until they merge, leak, or have all been followed.
 
-    Parameters
-    ----------
-    level : (rows, cols) uint8
-        The picture.
-    label : (rows, cols) int32
-        Number of the source to which each pixel belongs from 1 on, `FREE` elsewhere; written to.
-    sources : (n, MEASURES) float64
-        The sources, as `find_components` tells.
-    of_level : (256,) int64
-        At which threshold, from 0 down, a pixel of a level is first met; the number of thresholds where never.
-    limits : Limits
-        Where branches end.
+    Takes `level` (rows, cols) uint8, `label` (rows, cols) int32, `of_level` (256,) int64.
     """
     count, thresholds = len(sources), of_level.max()
     front = _Front(

@@ -286,7 +286,7 @@ class NightRoad:
         diagnostics |= {"lamplight": lamplight, "weight": float(weight.mean())}
         if misfit > MOST_MISFIT[self._lamps != "unknown"]:
             return Estimate.invalid(self.method, "other light than that of the own head lamps", **diagnostics)
-        if measured.lamp_scale == 0.0 and lamplight < LEAST_LAMPLIGHT and not self._in_street:
+        if measured.lamp_scale == 0.0 and lamplight < LEAST_LAMPLIGHT:
             others = "light of the day, or of lamps all around" if measured.sky_scale > 0.0 else OUTSHONE
             return Estimate.invalid(self.method, others, **diagnostics)
         if weight.mean() < LEAST_WEIGHT:

@@ -81,9 +81,12 @@ GLOWS_KEPT, SAMPLE = 6, (15, 6)
 """Shapes that are like an image, in which all draws are tried; and which draws and visibilities find these, each so
 many."""
 
-LAMPS_FROM, HALO, HIGH_LAMPS = 40.0, 0.03, 0.07
-"""Distance on the road beyond which what is clipped may be a lamp [m]; how far from it cells are left out [rad], chosen
-by `benchmarks/night_lamps.py --choose`; and the slope upward beyond which lamps are those of a street [-]."""
+LAMPS_FROM, HALO = 40.0, 0.03
+"""Distance on the road beyond which what is clipped may be a lamp [m], and how far from it cells are left out [rad]:
+chosen by `benchmarks/night_lamps.py --choose`."""
+
+HIGH_LAMPS, STREET_LIGHT = 0.07, 10.0
+"""Slope upward beyond which lamps are those of a street [-], and daylight that is about as much as theirs [lx]."""
 
 MAY_BE_DENSER = 0.25
 """Probability of the densest fog of the model from which on there may be denser fog [-]."""
@@ -254,7 +257,7 @@ class NightRoad:
     def _measured(self, seen: Seen, used: NDArray[np.bool_], light: float, others: Floats) -> Measured:
         luminance, is_sky = seen.luminance[used], self._cells.is_sky[used]
         # The light of a street's lamps is alike that of the day, but no sensor reports it.
-        reported = not (math.isnan(light) or self._in_street)
+        reported = light >= STREET_LIGHT if self._in_street else not math.isnan(light)
         lamp_scale = light / math.pi if reported and light > NIGHT else 0.0
         sky = float(luminance[is_sky].mean()) if is_sky.any() else float(luminance.min())
         sky_scale = 0.0 if reported else sky

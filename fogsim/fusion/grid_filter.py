@@ -29,7 +29,7 @@ MOST_COMMON, COMMON_TIME = 3.0, 5.0
 """Largest common deviation that counts [-]: a wider one leaves nothing known either; and the time over which that of
 worse estimates comes to count [s]."""
 
-SLOW, STILL = 5.0, 0.1
+SLOW, STILL = 15.0, 0.1
 """Speed below which fog changes in proportion to the way [m/s]; and the least share, since wind moves fog, too [-]."""
 
 LEAST_UNBOUND = 0.2
@@ -123,7 +123,7 @@ class GridFilter:
     ) -> Belief:
         """Take in the estimates of one instant at a place along the way; see `LocatedFusion.update_at`.
 
-        Slower than 5 m/s the belief widens more slowly.
+        Slower than 15 m/s the belief widens more slowly.
         """
         elapsed = math.nan if self._time is None else time - self._time
         share = abs(place - self._place) / (SLOW * elapsed) if elapsed > 0.0 else math.nan

@@ -250,6 +250,6 @@ def test_the_belief_hardly_widens_while_the_vehicle_stands() -> None:
         low, high = belief.visibility_quantiles((0.05, 0.95))
         return high / low
 
-    standing, slow, driving, faster = (spread_after_silence(speed) for speed in (0.0, 2.0, 5.0, 30.0))
+    standing, slow, driving, faster = (spread_after_silence(speed) for speed in (0.0, 6.0, 15.0, 30.0))
     assert standing < 2.0 < slow < driving
     assert driving == pytest.approx(faster)

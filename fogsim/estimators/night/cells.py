@@ -34,24 +34,12 @@ class CellMeans(NamedTuple):
 
 
 def cell_size(camera: Camera) -> int:
-    """Side of a cell [px].
-
-    Parameters
-    ----------
-    camera : Camera
-        The camera.
-    """
+    """Side of a cell [px]."""
     return max(min(round(camera.width / CELLS_ACROSS), camera.height), 1)
 
 
 def camera_of_cells(camera: Camera) -> Camera:
-    """The camera whose pixels are the cells of another's.
-
-    Parameters
-    ----------
-    camera : Camera
-        That other camera.
-    """
+    """The camera whose pixels are the cells of another's."""
     cell = cell_size(camera)
     middle = 0.5 * (cell - 1)
     u0, v0 = camera.principal_point
@@ -65,15 +53,7 @@ def camera_of_cells(camera: Camera) -> Camera:
 
 
 def cell_means(image: LinearPixels, cell: int) -> CellMeans:
-    """Mean luminance of each cell of a picture; what is left over at the right and below belongs to none.
-
-    Parameters
-    ----------
-    image : LinearPixels
-        The picture.
-    cell : int
-        Side of a cell [px].
-    """
+    """Mean luminance of each cell, `cell` px wide; what is left over at the right and below belongs to none."""
     rows, cols = image.pixels.shape[0] // cell, image.pixels.shape[1] // cell
     luminance, clipped = np.zeros((rows, cols)), np.zeros((rows, cols), np.bool_)
     _add_cells(image.pixels, image.tables, cell, luminance, clipped)

@@ -94,22 +94,8 @@ def log_likelihoods(
 ) -> Floats:
     """Logarithm of the likelihood (draws, extinctions), largest over amplitudes, summed over ratios.
 
-    Parameters
-    ----------
-    measured : Measured
-        The image.
-    extinction : (n,) float64
-        Extinction coefficients [1/m].
-    veil, road : (draws, n, cells) float32
-        What lamps light.
-    depth : (draws, cells) float32
-        Distance to the road [m].
-    variance : (cells,) float64
-        Of what the model says of each cell.
-    weight : (cells,) float64
-        How much each cell counts.
-    best : Fit
-        Written to.
+    Lamps light `veil` and `road` (draws, extinctions, cells), which is `depth` (draws, cells) away [m]. `variance` and
+    `weight` are those of cells, and `best` is written to.
     """
     seen, independent, others = measured.seen, measured.independent, measured.others
     draws, count, cells = veil.shape

@@ -73,12 +73,20 @@ CLEAR, MAY_BE_CLEAR = 2000.0, {True: 0.15, False: 0.05}
 """Visibility above which own lamps show no fog [m], and its probability from which on there is no upper bound [-], by
 whether the beam is known."""
 
-GLOWS = [(1.2 + 0.2 * (i % 5), 20.0 * 6.0 ** (i % 4 / 3)) for i in range(20)]
-"""Shapes of the glow of others' lamps: power of the angle by which it falls, and distance of the lamps [m]."""
+GLOWS = [(1.2 + 0.2 * (i % 5), 20.0 * 6.0 ** (i % 4 / 3), 2.0 ** (i % 3 / 2)) for i in range(60)]
+"""Shapes of the glow of others' lamps: power of the angle by which it falls, distance of the lamps [m], and how much
+faster it falls upward and downward than sideways, for head lamps shine little above the horizon."""
+
+GLOWS_KEPT, SAMPLE = 6, (15, 6)
+"""Shapes that are like an image, in which all draws are tried; and which draws and visibilities find these, each so
+many."""
 
 LAMPS_FROM, HALO = 40.0, 0.03
 """Distance on the road beyond which what is clipped may be a lamp [m], and how far from it cells are left out [rad]:
 chosen by `benchmarks/night_lamps.py --choose`."""
+
+HIGH_LAMPS, STREET_LIGHT = 0.07, 10.0
+"""Slope upward beyond which lamps are those of a street [-], and daylight that is about as much as theirs [lx]."""
 
 MAY_BE_DENSER = 0.25
 """Probability of the densest fog of the model from which on there may be denser fog [-]."""
@@ -160,7 +168,8 @@ class NightRoad:
     def reset(self) -> None:
         """Forget all earlier frames."""
         self._check.reset()
-        self._earlier: deque[Seen] = deque(maxlen=self._frames)
+        self._earlier: deque[tuple[Seen, NDArray[np.bool_], Floats, bool]] = deque(maxlen=self._frames)
+        self._in_street = False
         self._lit: Lamp | None = None
 
     def update(self, observation: Observation) -> Estimate:
@@ -190,8 +199,7 @@ class NightRoad:
         if lit != self._lit:
             self._earlier.clear()
             self._lit = lit
-        seen = self._look(image)
-        beside, others = self._lamps_of_others(image)
+        seen, beside, others = self._look(image)
         used = (seen.clipped < MOST_CLIPPED) & ~self._hidden(observation) & ~beside
         if why := _too_little(seen, used, self._cells.is_sky):
             return Estimate.invalid(self.method, why)
@@ -206,13 +214,16 @@ class NightRoad:
             used,
         )
 
-    def _look(self, image: Pixels) -> Seen:
-        """Mean of the last frames in green light: tail lamps are red, and so is their glow."""
+    def _look(self, image: Pixels) -> tuple[Seen, NDArray[np.bool_], Floats]:
+        """Means of the last frames in green light, for tail lamps are red; cells near others' lamps, and their glow."""
         green: NDArray[Any] = image if image.ndim == 2 else np.ascontiguousarray(image[:, :, 1])
         camera = self._camera
         table = linear_table(camera.response, camera.bits, camera.black_level).copy()
-        self._earlier.append(cell_luminance(green, table, self._cells.box))
-        return without_cut_noise(Seen(*(np.mean(part, axis=0) for part in zip(*self._earlier, strict=True))))
+        self._earlier.append((cell_luminance(green, table, self._cells.box), *self._lamps_of_others(green)))
+        frames, beside, glows, high = zip(*self._earlier, strict=True)
+        glow, self._in_street = np.mean(glows, axis=0), any(high)
+        seen = Seen(*(np.mean(part, axis=0) for part in zip(*frames, strict=True)))
+        return without_cut_noise(seen), np.any(beside, axis=0), glow if glow.any() else glow[:0]
 
     def _hidden(self, observation: Observation) -> NDArray[np.bool_]:
         """Cells that the vehicle ahead may cover."""
@@ -224,9 +235,9 @@ class NightRoad:
         hidden: NDArray[np.bool_] = upright & (aside < LEAD_HALF_WIDTH)
         return hidden
 
-    def _lamps_of_others(self, image: Pixels) -> tuple[NDArray[np.bool_], Floats]:
-        """Cells beside lamps of others, which are clipped, and shapes that the glow of these may have."""
-        camera, green = self._camera, image if image.ndim == 2 else image[:, :, 1]
+    def _lamps_of_others(self, green: NDArray[Any]) -> tuple[NDArray[np.bool_], Floats, bool]:
+        """Cells near lamps of others, which are clipped, shapes that their glow may have, and whether some are high."""
+        camera = self._camera
         end = max(min(round(camera.horizon_row + camera.row_distance / LAMPS_FROM), camera.height), 0)
         v, u = np.nonzero(green[:end] >= 2**camera.bits - 1)
         # Squares of some pixels are fine enough.
@@ -234,20 +245,22 @@ class NightRoad:
         square, count = np.unique((v // step) * 4096 + u // step, return_counts=True)
         below = (step * (square // 4096 + 0.5) - camera.horizon_row) / camera.focal_length
         aside = (camera.principal_point[0] - step * (square % 4096 + 0.5)) / camera.focal_length
-        away = np.hypot(self._below[:, None] - below, self._aside[:, None] - aside)
+        high = bool((below < -HIGH_LAMPS).any())
+        below, aside = self._below[:, None] - below, self._aside[:, None] - aside
         edge = np.sqrt(count / math.pi) / camera.focal_length
-        glow = np.zeros((len(GLOWS) if len(v) else 0, len(self._below)))
-        for shape, (power, distance) in zip(glow, GLOWS, strict=False):
-            before = np.minimum(1.0, self._depth / distance)
+        glow = np.zeros((len(GLOWS), len(self._below)))
+        for shape, (power, distance, flatness) in zip(glow, GLOWS, strict=True):
+            before, away = np.minimum(1.0, self._depth / distance), np.hypot(flatness * below, aside)
             shape[:] = before * ((edge / np.maximum(away, edge)) ** power).sum(axis=1)
-        beside = (away < HALO).any(axis=1)
-        return beside, glow
+        return (np.hypot(below, aside) < HALO).any(axis=1), glow, high
 
     def _measured(self, seen: Seen, used: NDArray[np.bool_], light: float, others: Floats) -> Measured:
         luminance, is_sky = seen.luminance[used], self._cells.is_sky[used]
-        lamp_scale = light / math.pi if light > NIGHT else 0.0
+        # The light of a street's lamps is alike that of the day, but no sensor reports it.
+        reported = light >= STREET_LIGHT if self._in_street else not math.isnan(light)
+        lamp_scale = light / math.pi if reported and light > NIGHT else 0.0
         sky = float(luminance[is_sky].mean()) if is_sky.any() else float(luminance.min())
-        sky_scale = sky if math.isnan(light) else 0.0
+        sky_scale = 0.0 if reported else sky
         seen_road = np.count_nonzero(~is_sky) / np.count_nonzero(~self._cells.is_sky)
         independent = INDEPENDENT[self._lamps != "unknown"] * seen_road
         scales = sky_scale, lamp_scale, PEDESTAL, independent
@@ -259,6 +272,8 @@ class NightRoad:
         variance = (np.where(is_sky, SKY_TEXTURE, ROAD_TEXTURE) * seen) ** 2 + FLOOR**2 + (LEVEL * seen.mean()) ** 2
         templates = own.veil, own.road, own.depth
         weight, best = np.ones(len(seen)), Fit(np.empty(len(seen)), np.empty(2))
+        if len(measured.others) > GLOWS_KEPT:
+            measured = _with_likely_glows(measured, extinction, own, variance)
         found = log_likelihoods(measured, extinction, *templates, variance, weight, best)
         for _ in range(ROUNDS):
             earlier, weight = weight, robust_weights(seen, best.luminance, variance)
@@ -305,6 +320,17 @@ def _why_not(observation: Observation, lit: Lamp, light: float) -> str:
     if observation.lead is not None and observation.lead.distance < CLOSEST_LEAD:
         return "a vehicle close ahead hides the road"
     return ""
+
+
+def _with_likely_glows(measured: Measured, extinction: Floats, own: OwnLight, variance: Floats) -> Measured:
+    """The image with the shapes of others' glow that are most like it: too few draws would have each of all."""
+    draws, places = (slice(None, None, step) for step in SAMPLE)
+    veil, road = np.ascontiguousarray(own.veil[draws, places]), np.ascontiguousarray(own.road[draws, places])
+    rest = extinction[places], veil, road, np.ascontiguousarray(own.depth[draws]), variance, np.ones(len(variance))
+    unused = Fit(np.empty(len(variance)), np.empty(2))
+    alone = (measured._replace(others=one[None]) for one in measured.others)
+    found = [np.exp(log_likelihoods(one, *rest, unused)).mean() for one in alone]
+    return measured._replace(others=measured.others[np.argsort(found)[-GLOWS_KEPT:]])
 
 
 def _quantiles(share: Floats) -> tuple[float, float, float]:

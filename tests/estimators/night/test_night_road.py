@@ -103,7 +103,7 @@ def test_what_it_cannot_tell() -> None:
         (night, {"light": LightMeasurement(2.0 * DAYLIGHT)}, "200 lx of daylight"),
         (np.full_like(night, 255), {}, "too bright nor too dark"),
         (np.full_like(night, 1), {}, "too dark"),
-        (night[::-1].copy(), {}, "lamps of others"),
+        (night[::-1].copy(), {}, "lamps all around"),
         (np.where(lamps[:, :, :1] > 200, 254, night), {}, "lamp"),
         (night, {"lamps": Lamp.POSITION}, "no head lamp is lit"),
         (night, {"lead": LeadMeasurement(5.0, 0.0)}, "close ahead"),
@@ -127,17 +127,31 @@ def test_vehicles_ahead_and_lamps_of_others_are_left_out() -> None:
     assert estimate(picture, lead=LeadMeasurement(20.0, 0.0)).visibility == pytest.approx(100.0, rel=0.3)
 
 
+@pytest.mark.parametrize("flatness", [1.0, 2.0])
 @pytest.mark.parametrize("power", [1.3, 1.8])
 @pytest.mark.parametrize("visibility", [60.0, 150.0])
-def test_the_glow_of_near_lamps_is_part_of_the_model(visibility: float, power: float) -> None:
+def test_the_glow_of_near_lamps_is_part_of_the_model(visibility: float, power: float, flatness: float) -> None:
     picture = night_picture(visibility)
     rows, cols = np.indices(picture.shape[:2])
-    away = np.hypot(rows - 52.0, cols - 33.0)
+    away = np.hypot(flatness * (rows - 52.0), cols - 33.0)
     linear = (picture / 255.0) ** 2.2 + 1.2 * (np.maximum(away, 4.0) / 4.0)[..., None] ** -power
     glowing = np.round(255.0 * np.minimum(linear, 1.0) ** (1 / 2.2)).astype(np.uint8)
     found = estimate(glowing)
-    assert found.valid or found.bounds is not None
+    assert found.visibility == pytest.approx(visibility, rel=0.35)
     assert holds(found, visibility)
+
+
+@pytest.mark.parametrize(("ambient", "answers"), [(0.1, True), (0.3, False)])
+def test_the_light_of_a_street_is_no_veil(ambient: float, answers: bool) -> None:
+    picture = night_picture(80.0)
+    below = np.arange(len(picture)) - CAMERA.horizon_row
+    kept = np.where(below > 0.0, np.exp(-3.0 / 80.0 * CAMERA.row_distance / np.maximum(below, 0.5)), 0.0)
+    linear = (picture / 255.0) ** 2.2 + ambient * (1.0 - 0.5 * kept)[:, None, None]
+    linear[20:24, 60:64] = 1.0  # a street lamp
+    light = LightMeasurement(0.05)  # the sky's alone
+    found = estimate(np.round(255.0 * np.minimum(linear, 1.0) ** (1 / 2.2)).astype(np.uint8), light=light)
+    assert found.valid == answers
+    assert holds(found, 80.0)
 
 
 def test_a_camera_that_sees_no_sky_reads_the_road() -> None:

@@ -19,17 +19,11 @@ DARK_SHARE = 0.06
 
 
 class CellMeans(NamedTuple):
-    """A picture by cells.
+    """A picture by cells."""
 
-    Attributes
-    ----------
-    luminance : (rows, cols) float64
-        Mean luminance of each cell [linear grey levels, 0 … 255].
-    clipped : (rows, cols) bool
-        Cells of which some pixel is as bright as can be told, or so many as dark that noise about the dark is cut off.
-    """
-
-    luminance: NDArray[np.float64]
+    luminance: NDArray[np.float64]  # (rows, cols): Mean luminance of each cell [linear grey levels, 0 … 255]
+    # (rows, cols) bool: Cells of which some pixel is as bright as can be told, or so many as dark that noise about the
+    # dark is cut off
     clipped: NDArray[np.bool_]
 
 

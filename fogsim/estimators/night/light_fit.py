@@ -38,47 +38,26 @@ GLOW_CLEAR, GLOW_REACH = 0.05, 100.0
 
 
 class Measured(NamedTuple):
-    """What an image shows.
+    """What an image shows."""
 
-    Attributes
-    ----------
-    seen : (cells,) float64
-        Luminance of the cells, full scale being 1.
-    up : (cells,) float64
-        Elevation of sky cells over the highest [-], 0 on the road.
-    others : (shapes, cells) float64
-        Glow of others' lamps, by the shapes that it may have, were it of full scale where they are clipped; of no
-        shape where there are none. Draws have them in turn.
-    sky_scale, lamp_scale : float
-        Standard size of the airlight: of full scale, and relative to the lamplight's amplitude; 0 where unused.
-    even : float
-        Standard deviation of light that is the same everywhere, of full scale [-].
-    independent : float
-        How many of the cells err independently of one another.
-    """
-
-    seen: Floats
-    up: Floats
+    seen: Floats  # (cells,): Luminance of the cells, full scale being 1
+    up: Floats  # (cells,): Elevation of sky cells over the highest [-], 0 on the road
+    # (shapes, cells): Glow of others' lamps, by the shapes that it may have, were it of full scale where they are
+    # clipped; of no shape where there are none. Draws have them in turn
     others: Floats
+    # sky_scale, lamp_scale: standard size of the airlight: of full scale, and relative to the lamplight's amplitude; 0
+    # where unused
     sky_scale: float
     lamp_scale: float
-    even: float
-    independent: float
+    even: float  # Standard deviation of light that is the same everywhere, of full scale [-]
+    independent: float  # How many of the cells err independently of one another
 
 
 class Fit(NamedTuple):
-    """What the likeliest fit says.
+    """What the likeliest fit says."""
 
-    Attributes
-    ----------
-    luminance : (cells,) float64
-        Luminance of the cells, full scale being 1.
-    summary : (2,) float64
-        Mean squared deviation, and share of the light of all cells that is the lamps'.
-    """
-
-    luminance: Floats
-    summary: Floats
+    luminance: Floats  # (cells,): Luminance of the cells, full scale being 1
+    summary: Floats  # (2,): Mean squared deviation, and share of the light of all cells that is the lamps'
 
 
 @kernel

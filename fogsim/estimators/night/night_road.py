@@ -73,7 +73,7 @@ CLEAR, MAY_BE_CLEAR = 2000.0, {True: 0.15, False: 0.05}
 """Visibility above which own lamps show no fog [m], and its probability from which on there is no upper bound [-], by
 whether the beam is known."""
 
-GLOWS = [(1.2 + 0.2 * (i % 5), 20.0 * 6.0 ** (i % 4 / 3), 2.0 ** (i % 3 / 2)) for i in range(60)]
+GLOWS = [(1.2 + 0.2 * (i % 5), 20.0 * 6.0 ** (i % 4 / 3), 2.0 ** (i % 3 / 4)) for i in range(60)]
 """Shapes of the glow of others' lamps: power of the angle by which it falls, distance of the lamps [m], and how much
 faster it falls upward and downward than sideways, for head lamps shine little above the horizon."""
 

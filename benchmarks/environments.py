@@ -1,4 +1,4 @@
-"""Speed of environments: steps a second beside highway-env's fastest, resets, and what a second worker gains.
+"""Speed of environments: steps a second next to highway-env's fastest, resets, and what a second worker gains.
 
 Any id that Gymnasium knows once ``fogsim_envs`` is imported. The agent holds the middle of the action space, and time
 that resets take between two steps is not counted. highway-fast-v0, which draws no camera, is measured alternately in

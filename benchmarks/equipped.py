@@ -19,7 +19,7 @@ PROCESSES = (0, 1)
 
 
 def step_time(share: float, processes: int, seconds: float) -> tuple[float, float]:
-    """Mean time of a step [s], and mean number of cameras beside the ego's."""
+    """Mean time of a step [s], and mean number of cameras next to the ego's."""
     settings = [f"duration_s={seconds}", "camera.width=320", "camera.height=240", f"traffic.equipped={share}"]
     scenario = fogsim.load_scenario("motorway_fog_bank", settings)
     with ClosedLoop(scenario, camera_processes=processes) as loop:

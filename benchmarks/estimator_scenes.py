@@ -50,7 +50,7 @@ SETBACK = 1.7  # of the camera behind the front bumper [m]
 
 @dataclass(frozen=True)
 class Instant:
-    """One moment of the drive: everybody, and the row of the ego."""
+    """One moment of the drive: everyone, and the row of the ego."""
 
     state: TrafficState
     ego: int
@@ -66,7 +66,7 @@ class Drive:
 
 
 def drive(count: int, seed: int) -> Drive:
-    """Drive in running traffic with a camera of a few pixels, and keep where everybody was."""
+    """Drive in running traffic with a camera of a few pixels, and keep where everyone was."""
     small = ["camera.width=64", "camera.height=48", "fog.visibility_m=200", "clocks.camera_period_s=0.5"]
     scenario = fogsim.load_scenario(SCENARIO, [*small, f"duration_s={INSTANTS_APART * count}"])
     steps = list(fogsim.run(scenario, seed))
@@ -113,7 +113,7 @@ def _ahead_and_left(state: TrafficState, ego: int) -> NDArray[np.float64]:
 
 
 def without_leader(instant: Instant) -> Instant:
-    """The same instant with nobody ahead in the own lane."""
+    """The same instant with no one ahead in the own lane."""
     state, ego = instant.state, instant.ego
     ahead, left = _ahead_and_left(state, ego).T
     same = np.array([lane == state.lane[ego] for lane in state.lane])

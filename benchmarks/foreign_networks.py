@@ -62,7 +62,7 @@ class Files(NamedTuple):
     net : Path
         Network.
     routes, additional : tuple of Path
-        Traffic, and what stands beside the road.
+        Traffic, and what stands next to the road.
     begin : float
         When it begins [s].
     """
@@ -286,7 +286,7 @@ def _lane(root: ET.Element, edge: str) -> str:
 
 
 def write_configuration(folder: Path, files: Files, fcd: str) -> Path:
-    """A configuration that also writes where everybody is in each second, in full precision.
+    """A configuration that also writes where everyone is in each second, in full precision.
 
     Parameters
     ----------

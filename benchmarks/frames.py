@@ -6,7 +6,7 @@ response curve and quantisation). Traffic and estimators are not in it. Of the s
 fog and lamplight, "camera" the taking, and "scene" what is left.
 
 The scene is the road of the scenario motorway_fog_bank with trees, rails and posts, 30 vehicles of every kind with lit
-lamps on its lanes 12 ... 250 m ahead and 10 signs beside it, in homogeneous fog of 100 m visibility; by night the
+lamps on its lanes 12 ... 250 m ahead and 10 signs next to it, in homogeneous fog of 100 m visibility; by night the
 camera's own low beam and everyone's lamps light it; `photons` is the day with that airlight. The camera drives on by
 2.5 m a frame, over 50 m and again from the start. Repetitions of all cases alternate, and each record has the median of
 the repetitions' medians, the fastest frame, and each stage's median; on a machine that does other work too, only the
@@ -79,7 +79,7 @@ def read_network() -> RoadNetwork:
 
 
 def place(route: NDArray[np.float64], station: float, left: float) -> tuple[NDArray[np.float64], float]:
-    """Point beside the route and the direction there."""
+    """Point next to the route and the direction there."""
     stations = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(route[:, :2], axis=0), axis=1))))
     here, ahead = (np.array([np.interp(s, stations, route[:, i]) for i in range(3)]) for s in (station, station + 1.0))
     heading = math.atan2(ahead[1] - here[1], ahead[0] - here[0])

@@ -115,7 +115,7 @@ def measure(size: str, steps: int, repeat: int, peer: gymnasium.Env[Any, Any] | 
 
 
 def answer(size: str) -> None:
-    """Take a step, or begin anew, for each line that comes in, and print how long it took [s]."""
+    """Take a step, or begin again, for each line that comes in, and print how long it took [s]."""
     env, cruise = make_env(size), np.array([7, 1])
     env.reset(seed=1)
     env.step(cruise)

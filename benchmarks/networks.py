@@ -96,7 +96,7 @@ class CountingLink(LibsumoLink):
         return len(self._collided)
 
     def stays(self) -> dict[str, float]:
-        """Time that everybody has been on the road [s]."""
+        """Time that everyone has been on the road [s]."""
         now = float(self._simulation.getTime())
         return self.stay | {vehicle: now - since for vehicle, since in self._since.items()}
 

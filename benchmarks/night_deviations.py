@@ -189,7 +189,7 @@ def lobe_lamps() -> dict[str, tuple[Beam, float, tuple[float, float]]]:
 
 
 def lamp_fluxes() -> Rows:
-    """What lamps shine in all: intensity along the axis, beside and above it, and flux."""
+    """What lamps shine in all: intensity along the axis, next to and above it, and flux."""
     axial = {"rear position": (8.0, SignalLobe.SIGNAL), "stop": (100.0, SignalLobe.SIGNAL)}
     axial |= {"rear fog": (200.0, SignalLobe.REAR_FOG), "daytime": (600.0, SignalLobe.DAYTIME)}
     lamps = {name: scaled_beam(SIGNAL_LOBES[lobe], full / FULL) for name, (full, lobe) in axial.items()}

@@ -65,7 +65,7 @@ class Photograph:
         return [one.astype(np.uint8, copy=False) for one in laid]
 
     def taken_in_fog(self, visibilities: tuple[float, ...]) -> list[Image]:
-        """Lay the fog on the light, before the camera makes a picture of it, whose tone curve nobody is told."""
+        """Lay the fog on the light, before the camera makes a picture of it, whose tone curve no one is told."""
         distance = RoadPlane(Calibration(self.taken_by)).distance()
         above = self.light[np.isinf(distance)]
         air = np.median(above[np.argsort(above.sum(axis=1))[-len(above) // 5 :]], axis=0)
@@ -172,7 +172,7 @@ def _marked(out: Floats, ahead: Floats, side: Floats, road: tuple[float, float],
 
 
 def _sunlight(ahead: Floats, side: Floats, half_road: float, rng: np.random.Generator) -> Floats:
-    """Illumination (n, 3) of the ground by sky and sun with shadows of what stands beside the road; 1 if overcast."""
+    """Illumination (n, 3) of the ground by sky and sun with shadows of what stands next to the road; 1 if overcast."""
     sun = float(rng.uniform(1.0, 5.0)) * np.array([1.05, 1.0, 0.92])
     sky = float(rng.uniform(0.5, 0.9)) * np.array([0.85, 0.97, 1.15])
     slant, reach = float(rng.uniform(-2.0, 2.0)), float(rng.uniform(-1.0, 2.5)) * half_road

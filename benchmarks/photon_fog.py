@@ -1,4 +1,4 @@
-"""How `joint_road` and `lead_contrast` read fog whose airlight is that of photons, and even fog beside it.
+"""How `joint_road` and `lead_contrast` read fog whose airlight is that of photons, and even fog next to it.
 
 Drives of `fogsim reproduce airlight` along a road alone, and behind a vehicle that drives away; V_met 50 to 300 m,
 cameras 1.3 and 2.5 m above the road, land of albedos 0.05 to 0.8, droplets of three kinds. Errors are |V_est − V| / V

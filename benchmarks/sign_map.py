@@ -1,4 +1,4 @@
-"""What the pictures of the sign map cost beside the loop's steps, in one run: a scenario with a sign every 100 m.
+"""What the pictures of the sign map cost next to the loop's steps, in one run: a scenario with a sign every 100 m.
 
 python benchmarks/sign_map.py [--json] [--size 320x240 --size 640x480] [--steps 60]
 """

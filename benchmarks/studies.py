@@ -3,7 +3,7 @@
 Throughput: runs a minute of the motorway's fog bank (30 s at 2 Hz and 160×120, with a camera) by turns with one
 process and with two, in one sitting; the processes are started before. The soak kills (SIGKILL) the study, or one of
 the processes that it has started, at moments drawn evenly, starts the same command again until all is done, and
-compares the table with that of a study which nobody disturbed.
+compares the table with that of a study which no one disturbed.
 
     python benchmarks/studies.py [--json] [--seeds 8] [--repeat 3] [--duration 30]
     python benchmarks/studies.py --kills 20 [--json]

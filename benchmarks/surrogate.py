@@ -6,7 +6,7 @@ estimates, and by the largest distance between the two distributions of ln(estim
 each light and each class of visibility with 30 estimates or more.
 
     python benchmarks/surrogate.py [--json] [--episodes 60] [--split test]
-    python benchmarks/surrogate.py --fit          # writes the table anew, from episodes of the split "train"
+    python benchmarks/surrogate.py --fit          # writes the table again, from episodes of the split "train"
 """
 
 import argparse
@@ -41,7 +41,7 @@ SIZE = ("camera.width=160", "camera.height=120")
 
 
 class Record(NamedTuple):
-    """One estimate beside the truth."""
+    """One estimate next to the truth."""
 
     extinction: float
     illuminance: float

@@ -1,7 +1,7 @@
 """Pictures for `estimator_targets.py`, none of them FogSim's own, and what the daytime estimators make of each.
 
 A unit is one drawing (kind and number); fog, exposure and noise are laid on it many times over. Its rows say to which
-target and cell an estimate belongs, by what cells are told apart further, and how far it is off.
+target and cell an estimate belongs, by what cells are distinguished further, and how far it is off.
 """
 
 import math

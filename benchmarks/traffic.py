@@ -4,7 +4,7 @@ On ``motorway`` a straight road with three lanes carries a number of vehicles on
 ``town`` they wander through a grid of junctions with lights, as large as they need, the ego from its middle on. Step
 0.1 s, homogeneous fog with a visibility of 100 m by day, drivers as they are by default. Blocks of bare SUMO steps
 alternate with blocks of whole traffic steps: drivers look (perception) and choose their speed, SUMO steps, collisions
-are watched, and all vehicles within 1000 m of the ego are read. After 50 s the traffic starts anew, before any vehicle
+are watched, and all vehicles within 1000 m of the ego are read. After 50 s the traffic starts again, before any vehicle
 arrives.
 
 Times are the processor's, medians over blocks [ms]. ``ratio`` is the median of the ratios of neighbouring blocks; a
@@ -47,7 +47,7 @@ STEP = 0.1
 STEPS = 20
 """Steps in a block: two seconds, in which drivers choose a speed twice."""
 BLOCKS = 10
-"""Blocks of each kind before the traffic starts anew."""
+"""Blocks of each kind before the traffic starts again."""
 ROUNDS = 40
 """At most so many times."""
 
@@ -165,7 +165,7 @@ def block(traffic: SumoTraffic, link: LibsumoLink, profile: cProfile.Profile | N
     """A block of bare and one of whole steps."""
     command = Command()
     bare = sum(timed(link.step) for _ in range(STEPS))
-    # What has changed in the steps that nobody has seen is taken up first.
+    # What has changed in the steps that no one has seen is taken up first.
     traffic.advance(command)
     traffic.observe()
     moving = reading = 0.0

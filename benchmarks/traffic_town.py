@@ -1,4 +1,4 @@
-"""The town of `traffic.py`: a grid by netgenerate, half of its junctions with lights, where everybody keeps driving."""
+"""The town of `traffic.py`: a grid by netgenerate, half of its junctions with lights, where everyone keeps driving."""
 
 import math
 import subprocess
@@ -87,7 +87,7 @@ def _middle(streets: list[str]) -> str:
 
 
 def _following(net: Path) -> dict[str, list[str]]:
-    """Streets that follow each, the one straight on first; nobody turns round."""
+    """Streets that follow each, the one straight on first; no one turns round."""
     root = _root(net)
     ends = {e.get("id", ""): (e.get("from"), e.get("to")) for e in root.iterfind("edge") if not e.get("function")}
     following: dict[str, list[str]] = {name: [] for name in ends}

@@ -1,4 +1,4 @@
-"""Draw the pictures of docs/explanation/night.md anew: ``python docs/make_night_pictures.py`` (some minutes)."""
+"""Draw the pictures of docs/explanation/night.md again: ``python docs/make_night_pictures.py`` (some minutes)."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Draw the pictures of the README and the docs anew: ``python docs/make_pictures.py`` (about a minute)."""
+"""Draw the pictures of the README and the docs again: ``python docs/make_pictures.py`` (about a minute)."""
 
 from pathlib import Path
 

@@ -57,7 +57,7 @@ def scenario_keys(model: type[BaseModel] = Scenario, prefix: str = "") -> list[t
             # What is wrong with sensors is told where it stands for the whole run.
             inner = [one for one in inner if not issubclass(one, FaultSection)]
         if not inner or _has_words(field.annotation):
-            # Where a word may stand, a block beside it is told in the same row.
+            # Where a word may stand, a block next to it is told in the same row.
             inner = []
             key = field.alias or name
             allowed = _allowed(schema["properties"][key], schema.get("$defs", {}))

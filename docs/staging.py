@@ -143,7 +143,7 @@ def bend(straight: float = 60.0, radius: float = 140.0, width: float = 3.5) -> R
 
 
 def along(route: NDArray[np.float64], station: float, left: float = 0.0) -> tuple[NDArray[np.float64], float]:
-    """Point beside a route, and the direction there."""
+    """Point next to a route, and the direction there."""
     stations = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(route[:, :2], axis=0), axis=1))))
     here, ahead = (np.array([np.interp(s, stations, route[:, i]) for i in range(3)]) for s in (station, station + 1.0))
     heading = math.atan2(ahead[1] - here[1], ahead[0] - here[0])

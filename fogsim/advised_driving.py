@@ -63,7 +63,7 @@ def _questions_to(adviser: Adviser | VehicleAdviser) -> Callable[[Step, Belief, 
 def _lighting_questions(
     policy: LightingPolicy | VehicleLightingPolicy, name: str
 ) -> Callable[[Step, Belief, LampChoice], LampChoice]:
-    """A function that asks a lighting policy likewise."""
+    """A function that asks a lighting policy in the same way."""
     if isinstance(policy, VehicleLightingPolicy):
         return lambda step, known, previous: checked_lamp_choice(
             name, policy.choose_lamps(known, step.observation, step.time, previous)

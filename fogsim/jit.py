@@ -1,4 +1,4 @@
-"""Compiled kernels: numba, cached on disk where a directory can be written, compiled anew where none can.
+"""Compiled kernels: numba, cached on disk where a directory can be written, compiled again where none can.
 
 And what lets two of them work at once on a picture's rows.
 """
@@ -152,7 +152,7 @@ class CompilerProcess:
 
 
 COMPILER_PROCESS = CompilerProcess()
-"""What is compiled beside this process, in another one."""
+"""What is compiled next to this process, in another one."""
 
 
 def is_kept(compiled: object) -> bool | None:
@@ -168,7 +168,7 @@ def is_kept(compiled: object) -> bool | None:
 def kernel(function: F) -> F:
     """Compile a function on its first call, without Python's lock and without threads (forks must stay possible).
 
-    What came compiled with the installation is taken. Other compiled code is kept beside the module or, for a read-only
+    Code that came compiled with the installation is used. Other code is kept next to the module or, for a read-only
     installation, in the user's cache directory; where neither can be written it is compiled again by each process.
     """
     options = {"nogil": True, "fastmath": False, "error_model": "numpy", "no_cfunc_wrapper": True}
@@ -195,7 +195,7 @@ def kernel(function: F) -> F:
 
 
 def _without_literals(get_call_template: Callable[..., Any]) -> Callable[..., Any]:
-    """Let a kernel be compiled for numbers of a type, and not for 0, for 1 and for other numbers each anew."""
+    """Let a kernel be compiled for numbers of a type, and not for 0, for 1 and for other numbers each again."""
 
     def get(arguments: Sequence[Any], keywords: dict[str, Any]) -> Any:
         return get_call_template([unliteral(a) for a in arguments], {k: unliteral(a) for k, a in keywords.items()})
@@ -300,7 +300,7 @@ class Bands:
 
 
 def processors() -> int:
-    """Number of processors that this process may use: one where it is a worker, beside others that draw too.
+    """Number of processors that this process may use: one where it is a worker, next to others that draw too.
 
     Ray tells its workers by ``OMP_NUM_THREADS``, as does whoever else shares a machine out.
     """

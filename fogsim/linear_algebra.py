@@ -44,7 +44,7 @@ def _add_product(left: NDArray[Any], right: NDArray[Any], out: NDArray[Any]) -> 
 def inverse_of(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     """Inverse (n, n) of a symmetric matrix (n, n) without negative eigenvalues, such as that of normal equations.
 
-    What it says nothing of, or nothing beside the others, has zeros in its row and column (a generalised inverse).
+    What it says nothing of, or nothing next to the others, has zeros in its row and column (a generalised inverse).
     Beaton's sweep operator (Goodnight 1979, The American Statistician 33, 149–158), the largest pivots first.
 
     Takes `matrix` (n, n).

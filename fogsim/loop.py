@@ -214,7 +214,7 @@ class ClosedLoop:
 
     @checked_parameters
     def start(self, seed: Seed) -> Step:
-        """Begin a run, or begin anew.
+        """Begin a run, or begin again.
 
         Parameters
         ----------
@@ -288,7 +288,7 @@ class ClosedLoop:
             raise SimulationError("the run has not been started or is over: call start() before advance()")
         checked_command(command)
         if not self._drivers_fog.is_entered and self._fog is not None and command.is_for_others:
-            # In clear air nobody else has chosen a speed so far.
+            # In clear air no one else has chosen a speed so far.
             self._drivers_fog.enter(self._fog, self._traffic)
         begun = self._begin_what_is_due(self._step)
         for_all = self._fleet.advised(command, self._step.equipped)

@@ -253,7 +253,7 @@ class AttachedSession:
         if not self._closed and not self._started and self._looked:
             warnings.warn(self._traffic.absence(), stacklevel=2)
         if not self._closed and self._started:
-            # Nobody is left to be held in a simulation that has ended first.
+            # No one is left to be held in a simulation that has ended first.
             with contextlib.suppress(SimulationError):
                 self._traffic.release()
         self._closed = True

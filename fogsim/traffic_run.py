@@ -129,7 +129,7 @@ class TrafficRun:
 
     @checked_parameters
     def start(self, seed: Seed) -> tuple[TrafficStep, float]:
-        """Begin a run, or begin anew.
+        """Begin a run, or begin again.
 
         Returns the first instant, and the highest speed limit where somebody drives [m/s].
         """
@@ -155,7 +155,7 @@ class TrafficRun:
             raise SimulationError("the run has not been started or is over: call start() before advance()")
         checked_command(command)
         if not self._drivers_fog.is_entered and command.is_for_others:
-            # In clear air nobody has chosen a speed so far.
+            # In clear air no one has chosen a speed so far.
             self._drivers_fog.enter(self._fog, self._traffic)
         begun = self._begin_what_is_due(self._step)
         advance_traffic(self._traffic, self._drivers_fog, self._periods, self._step.index, command)

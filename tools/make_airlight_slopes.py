@@ -26,7 +26,7 @@ FAMILIES = (
     (Droplets.HEAVY_RADIATION,),
     (Droplets.MODERATE_ADVECTION, Droplets.HEAVY_ADVECTION),
 )
-"""Droplets, small to large, that are told apart: large ones scatter more narrowly forward."""
+"""Droplets, small to large, that are distinguished: large ones scatter more narrowly forward."""
 
 THICKNESSES = (3.0, 7.5, 15.0)
 """Optical thicknesses of layers that are averaged [-]."""

@@ -4,7 +4,7 @@ Needs ``netconvert`` (``pip install eclipse-sumo``). Run from the top of a check
 
     python tools/make_motorway_net.py
 
-The axis is a chain of straights and arcs; each carriageway lies beside it, a median apart.
+The axis is a chain of straights and arcs; each carriageway lies next to it, a median apart.
 """
 
 import argparse

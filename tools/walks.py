@@ -30,7 +30,7 @@ ROOMS = {
     "estimate": ("estimators", "vision", "values", "units"),
     "advice": ("loop", "ego", "advice", "values", "traffic", "fusion"),
 }
-"""Rooms that a walk leads through; what runs beside it in others is not of it."""
+"""Rooms that a walk leads through; what runs next to it in others is not of it."""
 
 
 def entered(work: Callable[[], Any], rooms: tuple[str, ...], begin: str = "", end: str = "") -> list[str]:

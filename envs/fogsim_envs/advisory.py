@@ -55,7 +55,7 @@ class FogAdvisoryEnv(AdvisingEnv):
     image_size : (width, height) of the camera; None keeps the scenario's
     continuous : which action space
     reward_weights : `RewardWeights`
-    render_mode : None, "rgb_array" (the camera frame beside a panel with estimate, truth, advice, speed and lamps), or
+    render_mode : None, "rgb_array" (the camera frame next to a panel with estimate, truth, advice, speed and lamps), or
     "human" (that in a window, each step as long as it takes)
     timeout : how long a child process that runs the simulation may give no sign of life [s]; ``inf`` for ever
 

@@ -62,7 +62,7 @@ class Evaluation:
     mean, low, high : float
         Mean return and its 95 % interval, by bootstrap over episodes [points].
     arrived, struck : float
-        Shares of episodes in which the ego arrived, and struck somebody (without an ego: nobody arrives, anybody).
+        Shares of episodes in which the ego arrived, and struck somebody (without an ego: no one arrives, anybody).
     """
 
     episodes: tuple[EpisodeResult, ...]

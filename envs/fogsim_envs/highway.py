@@ -92,7 +92,7 @@ def _begun(environment: Any, scenario: Scenario, seed: int) -> "tuple[HighwayLoo
 
 
 class HighwayLoop:
-    """A closed loop in an environment's traffic, built anew where the environment builds other roads."""
+    """A closed loop in an environment's traffic, built again where the environment builds other roads."""
 
     def __init__(self, environment: Any, scenario: Scenario) -> None:
         self._environment = environment

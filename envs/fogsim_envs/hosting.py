@@ -1,7 +1,7 @@
 """Simulations in this process or in one of their own.
 
 libsumo holds one simulation in a process, but scripts hold several environments: one to train and one to evaluate,
-say. The first environment runs its simulation here; a further one runs it in a child process, and nobody notices.
+say. The first environment runs its simulation here; a further one runs it in a child process, and no one notices.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""What an agent's run looks like: the camera frame, or a view from above, beside a panel, as an array or in a window.
+"""What an agent's run looks like: the camera frame, or a view from above, next to a panel, as an array or in a window.
 
 The window is made by pygame, which comes with highway-env.
 """

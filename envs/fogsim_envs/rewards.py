@@ -1,4 +1,4 @@
-"""What an agent is rewarded for: named terms, so that users can weigh them anew."""
+"""What an agent is rewarded for: named terms, so that users can weigh them again."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Speeds of successive sections of road that fall towards fog in steps, so that nobody brakes hard."""
+"""Speeds of successive sections of road that fall towards fog in steps, so that no one brakes hard."""
 
 import math
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ def harmonised_speeds(
     """Advised speeds, lowered where the next section downstream is advised much less.
 
     A section shows no more than the next one and a step, and no more than √(v² + 2 a d), from which a steady
-    deceleration a along its length d comes down to the next one's v. Motorways step down likewise: Dutch gantries by 20
+    deceleration a along its length d comes down to the next one's v. Motorways do the same: Dutch gantries by 20
     km/h (90, 70, 50), I-77 in Virginia by at most 15 mph from sign to sign (VTRC 19-R6, 2018).
 
     Takes `speeds` [m/s], `lengths` [m], `limits` [m/s], `largest_step` [m/s], `deceleration` [m/s²].

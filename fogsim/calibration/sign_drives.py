@@ -33,7 +33,7 @@ class PoseNoise:
     """How far off map and own pose are, as standard deviations."""
 
     position: float = 0.5  # Of signs in the map, along and across [m]
-    # heading, pitch: of the believed heading and of the told pitch [rad]
+    # heading, pitch: of the believed heading and of the assumed pitch [rad]
     heading: float = math.radians(0.2)
     pitch: float = math.radians(0.1)
     fix: float = 0.0  # Of the own position along and across, from frame to frame [m]

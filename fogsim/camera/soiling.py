@@ -54,7 +54,7 @@ class WetGlass:
         drops = scattered_blots(camera, water.coverage, water.diameter, rng)
         self._passed = passed_light(camera, drops)
         self._wet_rows, self._wet_columns = np.nonzero(self._passed[..., 0] < 1.0)
-        # Drops beside the picture are in it, too, for they are out of focus.
+        # Drops next to the picture are in it, too, for they are out of focus.
         self._margin = math.ceil(2.0 * PUPIL * camera.focal_length / STEP)
         self._inside, self._shown = _shown_by(drops, camera, self._margin)
         # A disc of radius R has the variance R²/4 along each axis.

@@ -35,7 +35,7 @@ def reproduce_command(
     quick: Annotated[bool, typer.Option("--quick", help="Fewer frames and seeds for the same figures.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Flat records, one a line, in place of the tables.")] = False,
 ) -> None:
-    """Run a paper's evaluation again on FogSim's frames or traffic; its figures stand beside ours."""
+    """Run a paper's evaluation again on FogSim's frames or traffic; its figures stand next to ours."""
     from fogsim.files.output_targets import refuse_unwritable, refuse_unwritable_folder
     from fogsim.reproduce import REPRODUCTIONS
 

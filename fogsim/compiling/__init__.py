@@ -1,7 +1,7 @@
 """numba's compiler with less work for the same machine code: a first run compiles hundreds of functions.
 
 All of it is inner working of numba, known for the versions in `KNOWN`; others compile as they do, only longer. It holds
-while one of FogSim's kernels is compiled, and for nobody else's.
+while one of FogSim's kernels is compiled, and for no one else's.
 """
 
 from collections.abc import Callable

@@ -1,7 +1,7 @@
 """Machine code for what Python calls, and none for what is compiled into it.
 
 numba makes machine code of each function that another one calls, though the caller has a copy of its own, and optimises
-that copy anew in each caller of a caller. What is only linked is simplified here, once, and optimised where it arrives.
+that copy again in each caller of a caller. What is linked is simplified here, once, and optimised where it arrives.
 """
 
 from typing import Any, ClassVar

@@ -1,4 +1,4 @@
-"""What numba works out anew a hundred thousand times while it compiles, worked out once or not at all.
+"""What numba works out again a hundred thousand times while it compiles, worked out once or not at all.
 
 Each stands in for a function of numba, and answers as that does.
 """
@@ -166,7 +166,7 @@ def index_element(
 @functools.lru_cache(1024)
 def _plain_array(kind: Any) -> Any:
     class Plain(_make_array(kind)):  # type: ignore[misc] # numba is untyped
-        """An array's fields; numba asks each time anew what an array is as an array."""
+        """An array's fields; numba asks each time again what an array is as an array."""
 
         _make_refs = cgutils.create_struct_proxy(kind)._make_refs
 

@@ -224,7 +224,7 @@ def _speed(meaning: str, value: Callable[..., float | None], **further: object) 
 
 
 def _metres(meaning: str, value: Callable[..., float | None], **further: object) -> Signal:
-    return Signal(meaning, value, unit="m", **{"least": 0.0, **further})  # type: ignore[arg-type]  # likewise
+    return Signal(meaning, value, unit="m", **{"least": 0.0, **further})  # type: ignore[arg-type]  # in the same way
 
 
 _OF_RUN = {

@@ -176,7 +176,7 @@ class EgoEquipment:
         return self._fog
 
     def _view_of_world(self, faults: Sequence[RunningFault]) -> EgoView:
-        """What draws the world, built anew where signs have gone or come back since the last time."""
+        """What draws the world, built again where signs have gone or come back since the last time."""
         if self._network is None:
             raise SimulationError("the run has not been started, or is closed")
         road, signs = self._network
@@ -233,7 +233,7 @@ class EgoEquipment:
             self._view_renderer.enter_fog(fog)
 
     def begin_faults(self, faults: Iterable[Fault], time: float) -> None:
-        """Let faults of the sensors begin, beside those of the scenario.
+        """Let faults of the sensors begin, next to those of the scenario.
 
         Parameters
         ----------

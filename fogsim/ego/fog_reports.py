@@ -1,4 +1,4 @@
-"""What others tell the ego of the fog where they are: sensors beside its route, and vehicles on it."""
+"""What others tell the ego of the fog where they are: sensors next to its route, and vehicles on it."""
 
 import math
 import zlib
@@ -32,19 +32,19 @@ WRONG = extinction_from_visibility(20.0), extinction_from_visibility(5000.0)
 
 
 SENSOR = "sensor"
-"""What names of sensors beside the road begin with."""
+"""What names of sensors next to the road begin with."""
 
 REACH = 300.0
 """Most of the way ahead in whose middle what a camera has seen counts [m]."""
 
 
 def is_of_sensor(report: FogReport) -> bool:
-    """Whether a report is of a sensor beside the road."""
+    """Whether a report is of a sensor next to the road."""
     return report.source.startswith(SENSOR + " ")
 
 
 def sensor_places(sensors: RoadsideReports, length: float) -> Floats:
-    """Places of sensors beside a route of a length [m] along it [m]."""
+    """Places of sensors next to a route of a length [m] along it [m]."""
     return np.arange(sensors.first_m, length, sensors.every_m)
 
 
@@ -106,7 +106,7 @@ class FogReports:
         return self.heard_from_roadside(time, fog)
 
     def heard_from_roadside(self, time: float, fog: FogField) -> tuple[FogReport, ...]:
-        """Let sensors beside the road measure, and tell what has come in by now from anybody."""
+        """Let sensors next to the road measure, and tell what has come in by now from anybody."""
         if self._roadside is not None and self._roadside.camera is None:
             self._measure_roadside(self._roadside, time, fog)
         arrived = tuple(report for due, report in self._under_way if due <= time + 1e-9)

@@ -1,4 +1,4 @@
-"""What the ego's sensors beside its camera measure, faults included."""
+"""What the ego's sensors next to its camera measure, faults included."""
 
 import math
 from collections.abc import Sequence

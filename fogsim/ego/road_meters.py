@@ -1,4 +1,4 @@
-"""Visibility meters beside the ego's route, one for each section of it that is advised by itself."""
+"""Visibility meters next to the ego's route, one for each section of it that is advised by itself."""
 
 import itertools
 from collections.abc import Iterable
@@ -28,7 +28,7 @@ class RoadMeters:
         self._reported = {}
 
     def hear(self, reports: Iterable[FogReport]) -> None:
-        """Let sensors beside the road report."""
+        """Let sensors next to the road report."""
         # Later ones come later: all are on their way for the same time.
         self._reported.update((one.source, (one.place, one.extinction)) for one in reports if is_of_sensor(one))
 

@@ -1,4 +1,4 @@
-"""Cameras on masts beside the ego's route, and what an estimator reads in their images."""
+"""Cameras on masts next to the ego's route, and what an estimator reads in their images."""
 
 import math
 from collections.abc import Callable
@@ -83,7 +83,7 @@ class RoadsideCameras:
         return self._estimators[name]
 
     def _pose(self, place: float) -> CameraPose:
-        """Pose of the camera beside a place along the route [m]."""
+        """Pose of the camera next to a place along the route [m]."""
         here, there = (self._at(station) for station in (place, min(place + AHEAD, float(self._stations[-1]))))
         ahead = there - here
         heading, grade = math.atan2(ahead[1], ahead[0]), math.atan2(ahead[2], math.hypot(ahead[0], ahead[1]))
@@ -99,7 +99,7 @@ def over_road(image: Pixels, camera: Camera, aside: float) -> Pixels:
 
     The camera stands to the right of it [m]. A point of the road v rows below the horizon shows its lateral offset x at
     α x / ζ = x cos θ v / H columns from the axis (negru2013 eq. 11), so each row is shifted by one number. What lies
-    beside the image repeats its border, which is as far away as the row.
+    next to the image repeats its border, which is as far away as the row.
     """
     rows, columns = np.arange(camera.height), np.arange(camera.width)
     below = np.maximum(rows - camera.horizon_row, 0.0)

@@ -1,4 +1,4 @@
-"""The second camera of a stereo rig: beside the first one, with a sensor of its own."""
+"""The second camera of a stereo rig: next to the first one, with a sensor of its own."""
 
 import math
 from collections.abc import Callable

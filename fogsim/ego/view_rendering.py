@@ -55,7 +55,7 @@ BEHIND_BUMPER = 0.15
 """Distance of the bonnet's front edge behind the bumper [m]."""
 
 _LEEWAY = 600.0
-"""How far the ego may leave its route before the scene is built anew around it [m], in a network that is larger."""
+"""How far the ego may leave its route before the scene is built again around it [m], in a network that is larger."""
 
 _UNLIT = Lights.none()
 

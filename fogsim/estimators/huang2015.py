@@ -81,7 +81,7 @@ class Huang2015:
     setback : float
         From the own front bumper, where ranges begin, back to the camera [m].
     blur : float
-        Standard deviation of the lens' blur beside the pixels' own size [px].
+        Standard deviation of the lens' blur next to the pixels' own size [px].
     range_from : {"sensor", "camera"}
         Where ranges of the vehicle ahead are from (see `Huang2015Lead`).
     vehicle_width : float, optional

@@ -77,7 +77,7 @@ class Huang2015Lead:
     setback : float
         From the own front bumper, where ranges begin, back to the camera [m]; it hardly matters.
     blur : float
-        Standard deviation of the lens' blur beside the pixels' own size [px]. Detail that it takes from far pictures
+        Standard deviation of the lens' blur next to the pixels' own size [px]. Detail that it takes from far pictures
         would be taken for fog: with 0.7 px that are not given, 120 m come out as some 105 m.
     spacing : float, optional
         Change of range between pictures that are kept [m]: 2.5 m, as published 5 m.

@@ -57,7 +57,7 @@ class LeadTrack(TrackedVehicle[Comparison]):
     spacing : float
         Change of range that makes a new picture worth keeping [m].
     blur : float
-        Standard deviation of the lens' blur beside the pixels' own size [px].
+        Standard deviation of the lens' blur next to the pixels' own size [px].
     range_deviation : float
         Standard deviation by which ranges are smoothed [m]; 0 leaves them as they are.
 

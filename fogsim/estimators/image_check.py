@@ -19,7 +19,7 @@ class ObservationCheck:
         self._time = -math.inf
 
     def reset(self) -> None:
-        """Let time begin anew."""
+        """Let time begin again."""
         self._time = -math.inf
 
     def image_of(self, observation: Observation) -> NDArray[np.uint8] | NDArray[np.uint16]:

@@ -75,7 +75,7 @@ deviation that of a single one is, and the most of it [-]: fog that has changed 
 
 LEAST_DEPTH = 1.0
 """Least optical depth through which road is seen, where no tracked vehicle says why not [-]: what looks like an
-obstacle across all lanes may be the edge of a shadow, and what is before it too little to tell fog from sun and
+obstacle across all lanes may be the edge of a shadow, and what is before it too little to distinguish fog from sun and
 shade."""
 
 LEAST_DEVIATION = 1e-4
@@ -86,7 +86,7 @@ DARKENS = 0.5
 layer."""
 
 MOST_OBSTACLES = 2
-"""How often what stands in the own lane is looked for anew, each time nearer."""
+"""How often what stands in the own lane is looked for again, each time nearer."""
 
 
 @checked_parameters
@@ -107,7 +107,7 @@ class JointRoad:
     seen; `Estimate.optical_depths` has how it varies, `Estimate.denser` says where it becomes much denser.
 
     Where the own lane's fit is not sure, sun and shade on the road are looked for. If it has two luminances, whose
-    pixels lie beside one another, strips are divided into what is lit and what is shaded, and even fog is fitted to
+    pixels lie next to one another, strips are divided into what is lit and what is shaded, and even fog is fitted to
     both (`fogsim.vision.strips.shade`); with one picture at a time only.
 
     Nor need the airlight be: over dark land it brightens upward from the horizon and darkens toward the road, in a

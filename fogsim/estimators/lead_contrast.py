@@ -186,7 +186,7 @@ class LeadContrast:
             self._forget()
 
     def _surprise(self, lead: LeadMeasurement, time: float) -> float:
-        """How far the range is from where the same vehicle can be [m]; a certain other vehicle begins anew."""
+        """How far the range is from where the same vehicle can be [m]; a certain other vehicle begins again."""
         if self._last is None:
             return 0.0
         before, earlier = self._last

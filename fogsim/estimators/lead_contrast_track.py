@@ -14,7 +14,7 @@ SPACING = 1.0
 """Change of range that makes a new picture worth keeping [m]; between, a picture only shows where the vehicle is."""
 
 CHANGED, REFRESHED = 0.1, 10.0
-"""Relative change of the contrast at a range from which the fog is another one and the track begins anew [-], and age
+"""Relative change of the contrast at a range from which the fog is another one and the track begins again [-], and age
 from which a detection gives way to another from its range [s]."""
 
 NEARER = 0.85
@@ -52,7 +52,7 @@ GAP = 3.0
 """Time without the vehicle after which it is another one, where frames have a time [s]."""
 
 RELEVELLED = 0.15
-"""Change of ln k from which the airlight before known pictures is reckoned anew [-]."""
+"""Change of ln k from which the airlight before known pictures is reckoned again [-]."""
 
 DENSEST = 0.1
 """Densest fog that is thought of before a track says more [1/m]."""
@@ -139,7 +139,7 @@ class ContrastTrack(TrackedVehicle[RearDetection]):
         return detection
 
     def relevel(self, extinction: float) -> None:
-        """Take all pictures relative to their own airlight anew, where that was reckoned with quite another extinction.
+        """Take all images relative to their own airlight again, where it was computed with quite another extinction.
 
         Takes `extinction` [1/m].
         """

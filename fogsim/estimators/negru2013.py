@@ -215,7 +215,7 @@ class Negru2013:
         Parameters
         ----------
         observation : Observation
-            Its image is used, and (repaired) the range of its lead vehicle to look beside it.
+            Its image is used, and (repaired) the range of its lead vehicle to look next to it.
 
         Returns
         -------

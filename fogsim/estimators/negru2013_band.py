@@ -19,7 +19,7 @@ from fogsim.vision.region.road_region import Band, crossing_band, cumulative_lim
 SIMILARITY = 0.25  # [-] steepest fog, in contrasts of road to airlight a row; a silhouette takes at least 0.34
 
 HALF_BODY = 1.1
-"""Half the width of a vehicle ahead, beside which a band may lie at once [m]."""
+"""Half the width of a vehicle ahead, next to which a band may lie at once [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +80,7 @@ def narrowed_curve(seen: SeenBand, axis: float, camera: Camera) -> RoadCurve:
     """
     road, band = seen.road, seen.band
     if not band.left <= axis <= band.right:
-        # What is seen beside a vehicle ahead is all there is.
+        # What is seen next to a vehicle ahead is all there is.
         return road_curve(seen, camera)
     inside = np.zeros(road.luminance.shape, np.uint8)
     inside[band.top : band.bottom + 1, band.left - road.first_column : band.right + 1 - road.first_column] = 1

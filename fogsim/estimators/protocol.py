@@ -39,7 +39,7 @@ class Estimator(Protocol):
         ...
 
     def reset(self) -> None:
-        """Forget all earlier observations; their time may begin anew."""
+        """Forget all earlier observations; their time may begin again."""
         ...
 
 

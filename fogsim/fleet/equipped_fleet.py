@@ -25,7 +25,7 @@ from fogsim.values.script import Actions
 
 
 class EquippedFleet:
-    """All equipped vehicles beside the ego that are read and on its way.
+    """All equipped vehicles next to the ego that are read and on its way.
 
     What they see does not go by who draws it: each has random numbers of its own, by its id.
     """

@@ -40,7 +40,7 @@ class Instant:
     time: float  # Simulated time since the run began [s]
     traffic: TrafficState  # Every vehicle
     route_length: float  # Of the ego's route [m]
-    # Ids of vehicles and names of sensors beside the road, and what their cameras saw in their last pictures
+    # Ids of vehicles and names of sensors next to the road, and what their cameras saw in their last pictures
     sent: tuple[tuple[str, FogReport], ...]
 
 
@@ -105,7 +105,7 @@ class UnitPool:
         self._asked: tuple[Sequence[Lookout], Instant] | None = None
 
     def start_run(self, seed: int, network: tuple[RoadNetwork, SignMap]) -> None:
-        """Begin a run in which nobody is equipped yet."""
+        """Begin a run in which no one is equipped yet."""
         if self._network is not None and self._network[0] is not network[0]:
             self.close()
         self._seed, self._network, self._begun, self._asked = seed, network, [], None

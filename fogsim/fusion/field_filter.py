@@ -29,7 +29,7 @@ CLOCKS_DISAGREE = 5.0
 """How far in the future a report may be for it to count as one of now [s]: clocks of vehicles differ."""
 
 SAME_PLACE, BESIDE, SAME_FOG = 5.0, 100.0, 0.3
-"""Distances between which a report beside a doubted one confirms it [m], and by how much the fog may differ [-]."""
+"""Distances between which a report next to a doubted one confirms it [m], and by how much the fog may differ [-]."""
 
 ANNOUNCED, ANNOUNCED_DEVIATION = 75.0, 0.6
 """Length of the denser fog that is announced [m], and the standard deviation of ln k there: a front is seen, not what
@@ -38,12 +38,12 @@ lies behind it."""
 
 @checked_parameters
 class FieldFilter:
-    """A Gaussian process of ln k over the way, ahead and behind, beside `GridFilter`'s belief of the here and now.
+    """A Gaussian process of ln k over the way, ahead and behind, next to `GridFilter`'s belief of the here and now.
 
     Each estimate tells of the mean extinction over both halves of the stretch that it has seen, for it has taken the
     fog for even; a curve of optical depths, of several stretches. Denser fog that is announced is believed where it
     is told; a report, where it was measured, the less the older it is; two side by side that contradict what was
-    believed, and agree, are the edge of a bank. What nobody has told of is known by what is near, and beyond that by
+    believed, and agree, are the edge of a bank. What no one has told of is known by what is near, and beyond that by
     nothing but that fog varies: the interval widens. Where the filter of the here and now, which believes in leaps,
     surely differs from the field, the edge of a bank has been driven through: what was believed ahead is doubted.
 

@@ -1,4 +1,4 @@
-"""No fusion, for runs whose belief nobody asks for."""
+"""No fusion, for runs whose belief no one asks for."""
 
 from collections.abc import Sequence
 

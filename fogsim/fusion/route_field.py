@@ -31,7 +31,7 @@ SAMPLES = 48
 
 
 class RouteField:
-    """ln k along the way: a level that nobody knows, and what varies about it with place and time.
+    """ln k along the way: a level that no one knows, and what varies about it with place and time.
 
     What varies has a Matérn covariance over the way, σ² (1 + √3 |Δs| / ℓ) e^(−√3 |Δs| / ℓ), and some grain; it forgets
     itself over a time T. What is learnt is taken in by assumed-density filtering: the exact moments of one function of

@@ -1,4 +1,4 @@
-"""High beams where nobody is dazzled: the recommendation of gallen2014, and high beams come what may."""
+"""High beams where no one is dazzled: the recommendation of gallen2014, and high beams come what may."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -44,7 +44,7 @@ class Gallen2014:
 
     Gallen, Cord, Hautière, Dumont & Aubert (2014), § II-C: below V_met = 100 m high beams show less than low beams do;
     from 100 m on they are preferred. By day, and in a vehicle without a light sensor, low beams. Fog lamps as of
-    `FogLampRules`, beside low beams.
+    `FogLampRules`, next to low beams.
 
     Attributes
     ----------

@@ -31,7 +31,7 @@ class SightOptimiser:
     By night it reckons for low and for high beams the distance at which visibility level 7 is reached in the fog as
     believed (`fogsim.lighting.own_sight`), minus `price` for the veil that they would lay over the eyes of a driver who
     meets it at 50 m, if the light sensor tells of head lamps, and of one ahead, if it tells of tail lamps or the radar
-    of a vehicle. Fog lamps as of `FogLampRules`, beside low beams.
+    of a vehicle. Fog lamps as of `FogLampRules`, next to low beams.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class SightOptimiser:
         low = rules.lamps(belief, previous.lamps)
         if not is_dark(observation):
             return settled(low, time, previous, self.dwell)
-        # Belief moves a little in every frame; the sight that it allows need not be reckoned anew for that.
+        # Belief moves a little in every frame; the sight that it allows need not be reckoned again for that.
         visibility = math.exp(round(math.log(known), 2))
         worth = {beam: self._worth(beam, visibility, observation) for beam in _TOWARD}
         lead = worth[Lamp.HIGH_BEAM] - worth[Lamp.LOW_BEAM]

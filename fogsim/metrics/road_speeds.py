@@ -1,4 +1,4 @@
-"""Speeds over a road: those of an ego that drives along it, and of everybody on it in its direction."""
+"""Speeds over a road: those of an ego that drives along it, and of everyone on it in its direction."""
 
 import math
 from typing import NamedTuple
@@ -28,7 +28,7 @@ ROAD_COLUMNS = (
 """Columns of `RoadSpeeds.sums`."""
 
 ROAD_HALF_WIDTH = 20.0
-"""How far beside the path others still drive on its road [m]."""
+"""How far next to the path others still drive on its road [m]."""
 
 _MOST_PENDING = 200_000
 
@@ -89,7 +89,7 @@ class RoadSpeeds:
         """Sums over all steps so far, a row for each stretch of road that somebody was on.
 
         Returns `ROAD_COLUMNS`: middle of the stretch [m]; time [s], way [m] and extinction over time [s/m] of the ego,
-        and of everybody (n, 7).
+        and of everyone (n, 7).
         """
         everybody, nobody = self._all_vehicles(), np.zeros(3)
         cells = sorted(self._ego.keys() | everybody.keys())
@@ -97,7 +97,7 @@ class RoadSpeeds:
         return np.array(rows).reshape(-1, len(ROAD_COLUMNS))
 
     def means(self) -> NDArray[np.float64]:
-        """Means over everybody on the road and all steps so far, a row for each stretch that somebody was on.
+        """Means over everyone on the road and all steps so far, a row for each stretch that somebody was on.
 
         Returns middle of the stretch [m], speed as way over time [m/s], extinction [1/m], and time of the vehicles [s]
         (n, 4).

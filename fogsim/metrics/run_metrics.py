@@ -117,7 +117,7 @@ class MetricsOfRun(ABC, Generic[AnyStep]):
     metrics : mapping from str to Metric or TrafficMetric
         Metrics by name, in the order of the summary.
     watchers : iterable of SpanWatcher
-        Who gets what the metrics of everybody get; `summary` hands over the last of it.
+        Who gets what the metrics of everyone get; `summary` hands over the last of it.
 
     Attributes
     ----------
@@ -160,11 +160,11 @@ class MetricsOfRun(ABC, Generic[AnyStep]):
 
     @abstractmethod
     def _take(self, step: AnyStep, elapsed: float) -> None:
-        """Take from a step what is not of everybody, a time [s] after the one before."""
+        """Take from a step what is not of everyone, a time [s] after the one before."""
 
     @abstractmethod
     def derive(self, step: AnyStep) -> dict[str, float | None]:
-        """Derive from one step alone what recorders write beside it.
+        """Derive from one step alone what recorders write next to it.
 
         Parameters
         ----------
@@ -194,7 +194,7 @@ class RunMetrics(MetricsOfRun[Step]):
     names : iterable of str
         Metrics from `METRICS`; all of them by default.
     watchers : iterable of SpanWatcher
-        Who gets what the metrics of everybody get; `summary` hands over the last of it.
+        Who gets what the metrics of everyone get; `summary` hands over the last of it.
 
     Raises
     ------
@@ -231,7 +231,7 @@ class RunMetrics(MetricsOfRun[Step]):
 
 
 class TrafficRunMetrics(MetricsOfRun[TrafficStep]):
-    """Watches the steps of one run without an ego: the metrics of everybody.
+    """Watches the steps of one run without an ego: the metrics of everyone.
 
     Parameters
     ----------
@@ -240,7 +240,7 @@ class TrafficRunMetrics(MetricsOfRun[TrafficStep]):
     names : iterable of str
         Metrics from `METRICS`; those of an ego among them are left out.
     watchers : iterable of SpanWatcher
-        Who gets what the metrics of everybody get; `summary` hands over the last of it.
+        Who gets what the metrics of everyone get; `summary` hands over the last of it.
 
     Raises
     ------

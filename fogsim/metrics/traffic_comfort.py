@@ -55,7 +55,7 @@ class TrafficComfort(TrafficMetric):
         self._last = moment[last], vehicle[last], elapsed[last], acceleration[last]
 
     def result(self) -> dict[str, JsonValue]:
-        """Say how rough everybody's drive was."""
+        """Say how rough everyone's drive was."""
         mean_square = share(self._squared_jerk_time, self._time)
         return {
             "traffic_rms_jerk_mps3": None if mean_square is None else math.sqrt(mean_square),

@@ -1,4 +1,4 @@
-"""Whether everybody near the ego keeps to the advice that they have heard."""
+"""Whether everyone near the ego keeps to the advice that they have heard."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -30,7 +30,7 @@ class TrafficCompliance(TrafficMetric):
             self._compliant_time += float(elapsed[above <= self.tolerance].sum())
 
     def result(self) -> dict[str, JsonValue]:
-        """Say how everybody followed the advice."""
+        """Say how everyone followed the advice."""
         return {
             "traffic_advised_time_share": share(self._advised_time, self._exposure.time),
             "traffic_advice_compliance_share": share(self._compliant_time, self._advised_time),

@@ -1,4 +1,4 @@
-"""What everybody near the ego emits and burns, by the functions that SUMO has of HBEFA 4."""
+"""What everyone near the ego emits and burns, by the functions that SUMO has of HBEFA 4."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""How fast everybody near the ego gets on, how evenly, and what time is lost."""
+"""How fast everyone near the ego gets on, how evenly, and what time is lost."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -73,7 +73,7 @@ class TrafficFlow(TrafficMetric):
         self._lost += float((elapsed - way[known] / free).sum())
 
     def result(self) -> dict[str, JsonValue]:
-        """Say how everybody got on."""
+        """Say how everyone got on."""
         total, way = self._exposure.time, self._exposure.distance
         mean = share(way, total)
         variance = None if mean is None else max(self._squares / total - mean**2, 0.0)

@@ -1,4 +1,4 @@
-"""Distances in time between everybody and the vehicle ahead."""
+"""Distances in time between everyone and the vehicle ahead."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -92,14 +92,14 @@ class TrafficSpan:
 
 
 class SpanWatcher(Protocol):
-    """Whoever watches everybody near the ego."""
+    """Whoever watches everyone near the ego."""
 
     def add(self, span: TrafficSpan) -> None:
         """Add some steps."""
 
 
 class TrafficMetric(ABC):
-    """A few numbers about everybody near the ego."""
+    """A few numbers about everyone near the ego."""
 
     definitions: ClassVar[Mapping[str, Definition]]
     """Definition of each key of the result; a key ends in its unit."""
@@ -266,7 +266,7 @@ def _across(states: Sequence[TrafficState]) -> NDArray[np.float64]:
 
 
 class GatheredMetrics:
-    """Hands whoever watches everybody the steps of a run, some at a time."""
+    """Hands whoever watches everyone the steps of a run, some at a time."""
 
     def __init__(self, watchers: Sequence[SpanWatcher]) -> None:
         self._watchers = watchers

@@ -1,4 +1,4 @@
-"""What stands beside roads and over them, as something that lines of sight end at."""
+"""What stands next to roads and over them, as something that lines of sight end at."""
 
 from collections.abc import Iterable
 
@@ -70,7 +70,7 @@ def obstructions_of(structures: Iterable[Structure]) -> Obstructions:
 
 
 def box_rows(line: NDArray[np.float64], half_width: float, heights: tuple[float, float]) -> list[tuple[float, ...]]:
-    """A box for each piece of a line that is straight to a centimetre; where two pieces meet, nobody looks between.
+    """A box for each piece of a line that is straight to a centimetre; where two pieces meet, no one looks between.
 
     Takes `line` (n, 3) [m], `half_width` [m], `heights` [m].
     """

@@ -222,7 +222,7 @@ class Triggers:
         return self._between(node, one, node, "headway")
 
     def time_to_collision_condition(self, node: Node, one: Vehicle) -> _Test:
-        """`ttc(X, Y, LENGTH)`, likewise; nothing unless they approach."""
+        """`ttc(X, Y, LENGTH)`, too; nothing unless they approach."""
         return self._between(node, one, node.need("TimeToCollisionConditionTarget").need("EntityRef"), "ttc")
 
     def _between(self, node: Node, one: Vehicle, target: Node, signal: str) -> _Test:

@@ -67,10 +67,10 @@ TRAFFIC_RECORDERS: Registry[TrafficRecorderFactory] = Registry(
 """Every recorder of runs without an ego, by name."""
 
 USUAL_RECORDERS = ("table", "video", "report")
-"""Those that write of a run about an ego where nobody has chosen."""
+"""Those that write of a run about an ego where no one has chosen."""
 
 USUAL_TRAFFIC_RECORDERS = ("table", "report")
-"""Those that write of traffic alone where nobody has chosen."""
+"""Those that write of traffic alone where no one has chosen."""
 
 __all__ = [
     "DERIVED_QUANTITIES",

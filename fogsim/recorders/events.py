@@ -48,7 +48,7 @@ class _Event(NamedTuple):
 class EventRecorder:
     """Writes ``events.parquet``: a row for each event, in the order of time; equal steps give equal bytes.
 
-    Until it is closed, rows are in ``events.arrows`` beside it, from the step on in which they happened.
+    Until it is closed, rows are in ``events.arrows`` next to it, from the step on in which they happened.
     """
 
     def __init__(self, path: Path) -> None:

@@ -69,7 +69,7 @@ class RunInformation:
     # Gives the metrics of the run by key when the run is over; a key ends in its unit
     summary: Callable[[], Mapping[str, object]] = _no_summary
     meanings: Mapping[str, str] = field(default_factory=dict)  # One line on each of those keys
-    # Gives means over everybody on the road of traffic alone when the run is over (n, 4): middle of a stretch [m],
+    # Gives means over everyone on the road of traffic alone when the run is over (n, 4): middle of a stretch [m],
     # speed [m/s], extinction [1/m], and time of the vehicles [s]; empty where no road was named
     along_road: Callable[[], NDArray[np.float64]] = _no_road
     # Those keys by topic, for the report's folded tables

@@ -49,7 +49,7 @@ _NAMED = (
     "gabb2014",
     "scatterometer",
 )
-"""Methods that the first colours belong to, whichever others stand beside them."""
+"""Methods that the first colours belong to, whichever others stand next to them."""
 
 ON_DARK: tuple[Colour, ...] = (
     (210, 255, 15),
@@ -109,7 +109,7 @@ Named methods keep their colour where it is dark enough and far from the report'
 
 
 def method_colours(methods: Sequence[str], table: Sequence[Colour] = ON_DARK) -> dict[str, Colour]:
-    """Colour of each method: of those that come with FogSim always the same, whichever others stand beside it."""
+    """Colour of each method: of those that come with FogSim always the same, whichever others stand next to it."""
     named, left = dict(zip(_NAMED, table, strict=False)), table[len(_NAMED) :]
     others = dict.fromkeys(name for name in methods if name not in named)
     free = {name: left[i % len(left)] for i, name in enumerate(others)}

@@ -30,7 +30,7 @@ class StepTable(Generic[AnyStep_contra]):
 
     The metadata of its schema says ``fogsim.complete`` (``true`` or ``false``), ``fogsim.methods`` (comma-separated)
     and ``fogsim.columns`` (JSON, one line on each column). Equal steps give equal bytes. Until it is closed, rows are
-    in ``steps.arrows`` beside it, at most `LOG_PERIOD` after they were recorded.
+    in ``steps.arrows`` next to it, at most `LOG_PERIOD` after they were recorded.
 
     Takes `clock` [s].
     """

@@ -1,4 +1,4 @@
-"""The report of traffic alone: everybody over time and over the road, and no camera."""
+"""The report of traffic alone: everyone over time and over the road, and no camera."""
 
 import math
 from collections.abc import Sequence
@@ -31,7 +31,7 @@ _SPREAD = (15.0, 85.0)
 
 @dataclass(slots=True)
 class TrafficCurves:
-    """Quantities of everybody over time, one entry a step; None where a quantity is undefined or without limit."""
+    """Quantities of everyone over time, one entry a step; None where a quantity is undefined or without limit."""
 
     # time, mean_speed, slow, fast, advice: in s and m/s; `slow` and `fast` are the 15th and 85th percentile of speed,
     # `advice` is the lowest anywhere
@@ -113,7 +113,7 @@ def road_figure(along_road: NDArray[np.float64]) -> tuple[str, bytes]:
 
     Returns caption and PNG. Takes `along_road` (n, 4).
     """
-    # Nobody's mean is a line across a stretch that nobody was on.
+    # No one's mean is a line across a stretch that no one was on.
     place, speed, extinction, _ = np.insert(along_road, _breaks(along_road[:, 0]), np.nan, axis=0).T
 
     def draw(axes: Sequence[Axes]) -> None:

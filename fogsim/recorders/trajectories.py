@@ -63,7 +63,7 @@ class TrajectoryRecorder:
     """Writes ``trajectories.parquet``: a row for each vehicle and each person on foot that is read, and each step.
 
     Rows go by time, and within a time as the traffic lists the vehicles, then persons; equal steps give equal bytes.
-    Until it is closed, rows are in a log beside it (``trajectories.arrows``), at most 0.5 s after they were recorded,
+    Until it is closed, rows are in a log next to it (``trajectories.arrows``), at most 0.5 s after they were recorded,
     whatever ends the process. Memory does not grow with the run.
 
     Takes `clock` [s].

@@ -60,7 +60,7 @@ class Encoder:
     """An ffmpeg process that eats raw frames."""
 
     def __init__(self, command: list[str]) -> None:
-        # Its complaints go to a file, since nobody reads a pipe while frames are written.
+        # Its complaints go to a file, since no one reads a pipe while frames are written.
         self._complaints = tempfile.TemporaryFile()  # noqa: SIM115 - closed in `finish`
         # A process group of its own: Ctrl-C in a terminal reaches the whole group of FogSim, and would end the
         # encoder before it has written the index without which the video cannot be played.

@@ -37,7 +37,7 @@ LAMPS: Mapping[Surface, tuple[Lamp | SignalLight, float, tuple[float, float, flo
 """Lamps that light a surface, its luminance then [cd/m²] and its colour.
 
 Luminous intensity over area: a tail lamp of 8 cd and 60 cm², a stop lamp of 100 cd and 60 cm², a rear fog lamp of
-200 cd and 100 cm², a head lamp seen beside its beam with 500 cd and 150 cm², a street lamp of 9 klm over a tenth of a
+200 cd and 100 cm², a head lamp seen next to its beam with 500 cd and 150 cm², a street lamp of 9 klm over a tenth of a
 square metre [M], a lens of a traffic light of 200 cd and 200 mm (`SIGNAL_INTENSITY`).
 """
 

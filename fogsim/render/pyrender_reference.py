@@ -110,7 +110,7 @@ class PyrenderReference:
         return np.interp(np.sqrt(sine), np.linspace(0.0, 1.0, len(table)), table)
 
     def _drawer_of(self, camera: Camera) -> Any:
-        """Pyrender's renderer, made anew if the camera's size is another than the last one's."""
+        """Pyrender's renderer, made again if the camera's size is another than the last one's."""
         if self._drawer is None:
             self._drawer = offscreen_renderer(self._pyrender, self._context, camera.width, camera.height)
         self._drawer.viewport_width, self._drawer.viewport_height = camera.width, camera.height

@@ -29,7 +29,7 @@ SCENES: Mapping[str, tuple[bool, tuple[tuple[float, float], ...]]] = {
     "trees": (True, ()),
     "trees and vehicles": (True, ((30.0, 0.0), (22.0, 3.5))),
 }
-"""Whether things stand beside the road, and cars by distance ahead and to the left [m]."""
+"""Whether things stand next to the road, and cars by distance ahead and to the left [m]."""
 
 TABLES = ("figure 4",)
 """Parts of the evaluation that can be run alone."""

@@ -56,7 +56,7 @@ class Reproduction:
     paper: str  # Its name
     # One flat record for each case: what was set, what each variant of the method found; None where it cannot tell
     records: tuple[Mapping[str, Cell], ...]
-    # What is shown: the headings, then the rows; the paper's figure stands beside ours. The first of `tables`, if there
+    # What is shown: the headings, then the rows; the paper's figure is next to ours. The first of `tables`, if there
     # are several
     table: Rows
     notes: tuple[str, ...]  # What the paper leaves open, and where and why we do not reach it

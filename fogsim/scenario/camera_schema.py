@@ -186,7 +186,7 @@ class CameraSection(Section):
     """Errors of the calibration that the estimators assume."""
 
     stereo: StereoSection | None = None
-    """A second camera beside it; `{}` for one half a metre to the right. Each picture is drawn twice then."""
+    """A second camera next to it; `{}` for one half a metre to the right. Each picture is drawn twice then."""
 
     @property
     def automatic(self) -> bool:

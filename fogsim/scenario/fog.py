@@ -36,7 +36,7 @@ class Bank(Section):
     """Where it begins: half as dense as inside, along the ego's route."""
 
     end_m: Place
-    """Where it ends, likewise."""
+    """Where it ends, too."""
 
     visibility_m: Visibility
     """Meteorological visibility inside."""

@@ -15,7 +15,7 @@ SHORTEST = 10.0
 """No section begins nearer to the end of the route than this [m], which two ways of measuring it agree about."""
 
 EYES = (0.0, 0.0, 1.2)
-"""Where a meter beside the road measures, above it [m]: at drivers' eyes."""
+"""Where a meter next to the road measures, above it [m]: at drivers' eyes."""
 
 DISPLAYS = {"signs": Display.MESSAGE_SIGN, "equipped": Display.IN_CAR, "law": Display.LAW}
 """How drivers hear advice that is given to sections of road, by `drivers.advised`."""

@@ -37,9 +37,9 @@ NO_RENDERER = "none"
 
 
 class InformedMethod(Method):
-    """A method that goes by the fog, known from the ego's belief or, as of a meter beside the road, in truth.
+    """A method that goes by the fog, known from the ego's belief or, as of a meter next to the road, in truth.
 
-    Advice may also go by the reports of sensors beside the road, where sections of road are advised.
+    Advice may also go by the reports of sensors next to the road, where sections of road are advised.
     """
 
     informed_by: Literal["belief", "truth", "sensors"] = "belief"
@@ -200,7 +200,7 @@ class Scenario(Section):
     @field_validator("directory", mode="before")
     @classmethod
     def _no_key(cls, _: object) -> None:
-        # Where the file lies is known when it is read; nobody writes it.
+        # Where the file lies is known when it is read; no one writes it.
         raise PydanticCustomError("extra_forbidden", "unknown key")
 
     @model_validator(mode="after")

@@ -72,7 +72,7 @@ Pixels = Annotated[Number, Field(ge=1, le=1e6)]
 """A length in the image [px]."""
 
 PixelPlace = Annotated[Number, Field(ge=-1e6, le=1e6)]
-"""A row or column, also beside the image [px]."""
+"""A row or column, also next to the image [px]."""
 
 Luminance = Annotated[Number, Field(ge=1e-6, le=1e9)]
 """A luminance [cd/m²]."""

@@ -416,7 +416,7 @@ class DriversSection(Section):
     advised: Literal["ego", "all", "stretch", "signs", "equipped", "law"] = "ego"
     """Who hears the advice: the ego alone; all vehicles near it as well; all on a `stretch` of its route; all who pass
     message `signs` along it; all `equipped` vehicles on it; all on it, as a `law` that they know. With
-    `ego: none`, `all` is everybody and the default, and `traffic.along` is the route."""
+    `ego: none`, `all` is everyone and the default, and `traffic.along` is the route."""
 
     signs: Signs = Signs()
     """Those signs."""

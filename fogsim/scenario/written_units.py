@@ -22,7 +22,7 @@ Models = tuple[type[BaseModel], ...]
 
 
 class _Conversion:
-    """Goes down through a document beside its schema."""
+    """Goes down through a document next to its schema."""
 
     def __init__(self, document: Document) -> None:
         self._document = document

@@ -136,7 +136,7 @@ def _free_sides(lanes: Sequence[Lane], index: LaneIndex) -> list[Edge]:
         if lane.kind is LaneKind.CROSSING:
             continue
         if lane.kind is LaneKind.JUNCTION:
-            # Its own limit is what its bend allows; what lies beside it is as beside the road that leads to it.
+            # Its own limit is what its bend allows; what lies next to it is as next to the road that leads to it.
             lane = replace(lane, speed_limit=limits.get(_place(lane.centreline[0]), lane.speed_limit))  # noqa: PLW2901
         found += [lane_edge(lane, side, line, index) for side, line in free_edges(lane, index)]
     return found

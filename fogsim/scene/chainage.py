@@ -17,7 +17,7 @@ class Chainage:
     """Distance along the carriageway of any point of a lane.
 
     All lanes of an edge are measured along the same one of them, and an edge goes on counting where the edge that leads
-    into it has ended. Where an edge runs beside one in the other direction, both are measured so that dashes of the
+    into it has ended. Where an edge runs next to one in the other direction, both are measured so that dashes of the
     line between them coincide.
     """
 
@@ -59,7 +59,7 @@ def _predecessors(lanes: Sequence[Lane], reference: Mapping[str, NDArray[np.floa
 
 
 def _opposites(reference: Mapping[str, NDArray[np.float64]]) -> dict[str, str]:
-    """Edges that run the other way beside an edge: its end near the edge's start, and its start near the edge's end."""
+    """Edges that run the other way along an edge: its end near the edge's start, and its start near the edge's end."""
     edges = list(reference)
     ends = np.array([line[[0, -1]] for line in reference.values()]).reshape(-1, 2, 3)
     order = np.argsort(ends[:, 1, 0], kind="stable")
@@ -71,7 +71,7 @@ def _opposites(reference: Mapping[str, NDArray[np.float64]]) -> dict[str, str]:
 def _opposite_places(
     ends: NDArray[np.float64], order: NDArray[np.int64], east: NDArray[np.float64]
 ) -> NDArray[np.int64]:
-    """For each line with ends (n, 2, 3) the last of those that run the other way beside it, −1 if there is none.
+    """For each line with ends (n, 2, 3) the last of those that run the other way next to it, −1 if there is none.
 
     `order` sorts the lines by the x of their last points, which are `east`.
     """

@@ -19,10 +19,10 @@ _GRAVEL = Material((0.115, 0.105, 0.085))
 _BANK = Material((0.062, 0.085, 0.034))
 _CONCRETE = Material((0.24, 0.238, 0.23))
 
-# Shoulders lie this much lower [m], so that a lane that crosses one covers it; more would hide the line beside them.
+# Shoulders lie this much lower [m], so that a lane that crosses one covers it; more would hide the line next to them.
 _SHOULDER_DROP = 0.002
 _LEVEL = 2.5  # roads higher or lower than this pass over or under one another [m]
-_VERGE = 0.7  # width of the gravel beside a shoulder [m]
+_VERGE = 0.7  # width of the gravel next to a shoulder [m]
 _FOOTWAY = 2.2  # width of a street's footway [m]
 _SPAN = 5.0  # a bridge spans this much on either side of the lanes that pass below it [m]
 _DECK = 1.0  # height of a bridge's deck as seen from the side [m]
@@ -45,7 +45,7 @@ class Edge:
 def lane_edge(lane: Lane, side: int, line: Points, index: LaneIndex) -> Edge:
     """Free side of a lane, as from `free_edges`.
 
-    Beside a footway there is nothing more, and of the room up to another lane each side gets half.
+    Next to a footway there is nothing more, and of the room up to another lane each side gets half.
 
     Takes `line` (n, 3) [m].
     """
@@ -64,7 +64,7 @@ def border_edge(line: Points, speed_limit: float, footways: bool, index: LaneInd
 
 
 def _room_beside(line: Points, inner: float, most: float, index: LaneIndex, share: float) -> NDArray[np.float64]:
-    """Room beside the points of a line [m], at least 0.1 m, at most `most`.
+    """Room next to the points of a line [m], at least 0.1 m, at most `most`.
 
     It begins at `inner` to the left of the line (to the right if that is negative, −0.0 included); of the gap up to
     another lane a share counts.
@@ -75,7 +75,7 @@ def _room_beside(line: Points, inner: float, most: float, index: LaneIndex, shar
 
 
 def _thinned(line: Points, room: NDArray[np.float64]) -> tuple[Points, NDArray[np.float64]]:
-    """A line and the room beside it, without the points between which it is straight and widens evenly."""
+    """A line and the room next to it, without the points between which it is straight and widens evenly."""
     corners = refined(line[_corners(np.ascontiguousarray(line), room)], LONGEST)
     return corners, np.interp(arc_length(corners), arc_length(line), room)
 
@@ -128,7 +128,7 @@ def _shoulder(edge: Edge, paved: NDArray[np.float64], along: NDArray[np.float64]
         (edge.side * (edge.inner - 0.02), edge.side * paved),
         -_SHOULDER_DROP,
         edge.shoulder / 2,
-        # It shows its half of the line beside it: on its right if it lies to the left of the road.
+        # It shows its half of the line next to it: on its right if it lies to the left of the road.
         marking if edge.side > 0 else 3 * marking,
         along,
         _SHOULDER,
@@ -137,7 +137,7 @@ def _shoulder(edge: Edge, paved: NDArray[np.float64], along: NDArray[np.float64]
 
 
 def _down(edge: Edge, distance: NDArray[np.float64], lift: float, terrain: Terrain, index: LaneIndex) -> list[Mesh]:
-    """Embankment from distances beside the line down to the land, or the side of a bridge."""
+    """Embankment from distances next to the line down to the land, or the side of a bridge."""
     line = edge.line
     if np.max(line[:, 2] - terrain.height(line)) > 3.0:
         line = refined(line, 6.0)

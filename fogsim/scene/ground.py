@@ -103,7 +103,7 @@ class Rail:
 
     line: Points  # (n, 3): The road's line along it [m]
     side: int  # 1 on its left, −1 on its right
-    distance: float  # How far beside that line it stands [m]
+    distance: float  # How far next to that line it stands [m]
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +143,7 @@ class GroundPlan:
     overhang : float
         How far triangles may reach beyond the square that their middle is in [m].
     beside : float
-        How far beside lanes and junctions there may be ground of theirs [m].
+        How far next to lanes and junctions there may be ground of theirs [m].
     """
 
     def __init__(

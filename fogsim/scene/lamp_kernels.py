@@ -31,7 +31,7 @@ class LampTable(NamedTuple):
     of_body: NDArray[np.int64]  # (bodies, most) int64: Lamps of each body, then −1
     signals: int  # Bits of lamps whose intensity is that of the table; that of others is left at 0
     lobe: NDArray[np.int64]  # (n,) int64: Number of the way each shines
-    # azimuths, elevations (e,): ascending angles beside and above a lamp's axis from 0 on [rad]
+    # azimuths, elevations (e,): ascending angles next to and above a lamp's axis from 0 on [rad]
     azimuths: NDArray[np.float64]
     elevations: NDArray[np.float64]
     # (lobes, e, a): ln of the share of its axial intensity that a lamp shines there, alike on both sides

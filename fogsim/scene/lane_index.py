@@ -11,7 +11,7 @@ from fogsim.scene.polyline import Points, refined_lines
 from fogsim.values.road import Lane
 
 FARTHEST = 30.0
-"""Distances beyond this are not told apart [m]."""
+"""Distances beyond this are not distinguished [m]."""
 
 _CELL = 10.0  # side of the square cells in which pieces of lanes are looked up [m]
 _LONGEST = 20.0  # piece of a lane [m]

@@ -72,7 +72,7 @@ def left_normals(points: Points) -> NDArray[np.float64]:
 
 
 def parallel(points: Points, left: float | NDArray[np.float64], lift: float = 0.0) -> Points:
-    """Polyline beside another.
+    """Polyline next to another.
 
     On the inside of a bend that is tighter than the distance it is cut short, so that it never runs backwards; it has a
     vertex for each of the line's all the same.

@@ -100,7 +100,7 @@ def footway_mesh(line: Points, left: tuple[float, float | NDArray[np.float64]]) 
 
 
 def free_edges(lane: Lane, index: LaneIndex) -> Iterator[tuple[int, NDArray[np.float64]]]:
-    """Spans of a lane's sides with nothing paved beside them.
+    """Spans of a lane's sides with nothing paved next to them.
 
     Yields 1 for the left or −1 for the right side, and the lane's centreline along the free span [m], with a vertex at
     least every 2 m (n, 3).

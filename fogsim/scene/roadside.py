@@ -1,4 +1,4 @@
-"""What stands beside the road and is drawn many times: trees, posts of guard rails, delineators."""
+"""What stands next to the road and is drawn many times: trees, posts of guard rails, delineators."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -160,7 +160,7 @@ def _scatter(
     reach: float,
     clumps: float,
 ) -> Points:
-    """Random places beside free sides, where a slowly changing density lets them stand."""
+    """Random places next to free sides, where a slowly changing density lets them stand."""
     groups = [np.zeros((0, 3))]
     for side, line in free:
         count = rng.poisson(arc_length(line)[-1] / spacing)

@@ -1,4 +1,4 @@
-"""Lamps on poles beside streets."""
+"""Lamps on poles next to streets."""
 
 from collections.abc import Sequence
 

@@ -25,7 +25,7 @@ class Surroundings:
 
     # Its lanes, areas and traffic lights; its route is the whole one. Places are counted from the origin
     network: RoadNetwork
-    signs: SignMap  # Its signs, likewise
+    signs: SignMap  # Its signs, too
     origin: NDArray[np.float64]  # (3,): Where that origin is in the network's own coordinates [m]
     whole: bool  # True if nothing has been left out
 

@@ -13,7 +13,7 @@ from fogsim.values.scene import Instance, Mesh, Surface
 _LEVEL = 2.0  # roads whose heights differ by no more than this lie in a plain [m]
 _CELL = 14.0  # side of a cell of the land [m]
 _LARGEST = 4_000_000  # cells; larger maps get larger cells
-_BELOW = 0.6  # the land lies this far below the roads beside them [m]
+_BELOW = 0.6  # the land lies this far below the roads next to them [m]
 _SHELF = 6.0  # land this near to a road keeps its level [m]
 _FALL, _RISE = 0.22, 0.5  # steepest slopes away from a road, down and up [-]
 _GRASS = np.array([0.064, 0.088, 0.036])

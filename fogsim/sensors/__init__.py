@@ -1,4 +1,4 @@
-"""What a vehicle measures beside its camera."""
+"""What a vehicle measures next to its camera."""
 
 from fogsim.sensors.faults import (
     check_sign_ids,

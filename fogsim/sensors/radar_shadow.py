@@ -34,7 +34,7 @@ def foliage_loss(way: float, frequency: float = FREQUENCY) -> float:
 
 
 class RadarShadow:
-    """How much less far a radar reaches because of what stands beside the road."""
+    """How much less far a radar reaches because of what stands next to the road."""
 
     def __init__(self, structures: Sequence[Structure]) -> None:
         self._solid = obstructions_of(one for one in structures if one.kind is not StructureKind.HEDGE)

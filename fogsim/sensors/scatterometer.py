@@ -8,7 +8,7 @@ import numpy as np
 class Scatterometer:
     """Averages the extinction where it is, with an error of its calibration and noise.
 
-    Both are factors e^(σ x), as of the sensors beside the road. The noise is averaged as the fog is, so that its
+    Both are factors e^(σ x), as of the sensors next to the road. The noise is averaged as the fog is, so that its
     deviation is that of the values that come out, however often they are asked for. The volume that it looks at is some
     0.1 dm³ (of Vaisala's FD12P: de Haij, KNMI): it tells the fog at its place and nothing of the road ahead.
 

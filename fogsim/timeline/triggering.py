@@ -201,7 +201,7 @@ def _end(begun: Begun, actions: Actions) -> Begun | None:
 
 
 def _duration(action: TrafficAction | ChangeFog | ChangeLight) -> float:
-    """How long an action lasts [s]; 0 for what is done at once, or over when nobody can tell beforehand."""
+    """How long an action lasts [s]; 0 for what is done at once, or over when no one can tell beforehand."""
     match action:
         case ChangeSpeed() | Follow() | SetSignal():
             return action.hold

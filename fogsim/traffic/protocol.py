@@ -34,7 +34,7 @@ class Traffic(AnyTraffic, Protocol):
     """A running traffic simulation with one ego vehicle."""
 
     def start(self, seed: int) -> None:
-        """Begin, or begin anew, and run until the ego is on the road."""
+        """Begin, or begin again, and run until the ego is on the road."""
 
     def planned_network(self) -> tuple[RoadNetwork, SignMap] | None:
         """Roads and signs along the ego's way before `start`; None where no file has it written out."""
@@ -43,14 +43,14 @@ class Traffic(AnyTraffic, Protocol):
         """Roads and signs; after `start`."""
 
     def observe(self) -> TrafficSnapshot | None:
-        """Tell where everybody is and what has happened since the last call; None once the ego has left."""
+        """Tell where everyone is and what has happened since the last call; None once the ego has left."""
 
 
 class NetworkTraffic(AnyTraffic, Protocol):
     """A running traffic simulation without an ego vehicle."""
 
     def start(self, seed: int) -> None:
-        """Begin, or begin anew."""
+        """Begin, or begin again."""
 
     def observe_network(self) -> NetworkSnapshot:
-        """Tell where everybody is and what has happened since the last call."""
+        """Tell where everyone is and what has happened since the last call."""

@@ -142,7 +142,7 @@ class SumoTraffic:
 
     @_translates_errors
     def start(self, seed: int) -> None:
-        """Begin, or begin anew, and run until the ego is on the road or, without one, through the warm-up."""
+        """Begin, or begin again, and run until the ego is on the road or, without one, through the warm-up."""
         arguments = command_line(self._setup, seed)
         api = self._link.begin(arguments)
         if self._any_ego and self._ego_of_seed != seed:
@@ -183,7 +183,7 @@ class SumoTraffic:
         if self._fog is not None:
             self.enter_fog(self._fog)
         elif self._obstructions(api):
-            # What stands beside the roads hides vehicles in clear air, too.
+            # What stands next to the roads hides vehicles in clear air, too.
             self._run = replace(self._run, perception=self._perception(self._run, ClearAir()))
         self._command = _NO_ADVICE
         self._route, self._mark, self._teleported = None, 0, False
@@ -251,7 +251,7 @@ class SumoTraffic:
             )
 
     def _perception(self, run: _Run, fog: FogAccess) -> DriversPerception | None:
-        """What drivers see in a fog, past what stands beside the roads; None if they see through both."""
+        """What drivers see in a fog, past what stands next to the roads; None if they see through both."""
         setup, remote = self._setup, self._link.remote
         if setup.sight is None:
             return None
@@ -260,7 +260,7 @@ class SumoTraffic:
         return drivers_perception(api, fog, setup.sight, roster, remote, session, setup.net, standing)
 
     def _obstructions(self, api: Api) -> Obstructions:
-        """What stands beside the roads and hides others from drivers."""
+        """What stands next to the roads and hides others from drivers."""
         return CLEAR_SIGHT if self._setup.sight is None else obstructions_of(self._read_structures(api))
 
     def _read_structures(self, api: Api) -> tuple[Structure, ...]:
@@ -383,7 +383,7 @@ class SumoTraffic:
 
     @_translates_errors
     def observe(self) -> TrafficSnapshot | None:
-        """Tell where everybody near the ego is; see `Traffic.observe`."""
+        """Tell where everyone near the ego is; see `Traffic.observe`."""
         run, ego = self._running, self._setup.ego
         teleported, self._teleported = self._teleported, False
         run.roster.update()
@@ -413,7 +413,7 @@ class SumoTraffic:
 
     @_translates_errors
     def observe_network(self) -> NetworkSnapshot:
-        """Tell where everybody is; see `NetworkTraffic.observe_network`."""
+        """Tell where everyone is; see `NetworkTraffic.observe_network`."""
         run = self._running
         run.roster.update()
         state = run.reader.state(self._command.lamps, self._heard(run))
@@ -446,7 +446,7 @@ class SumoTraffic:
         return replace(state, signals=signals, persons=persons) if signals.ids or persons.ids else state
 
     def _heard(self, run: _Run) -> Mapping[str, float]:
-        """What everybody has heard advised, the ego its own [m/s]."""
+        """What everyone has heard advised, the ego its own [m/s]."""
         heard = {} if run.drivers is None else run.drivers.heard
         ego, own = self._setup.ego, self._command.advice.speed
         return heard if ego is None or math.isinf(own) else {**heard, ego: own}

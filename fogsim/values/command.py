@@ -173,7 +173,7 @@ class Command:
         Lamps that other vehicles are to light, in place of the dipped ones that all have.
     advice_reach : float
         Distance from the ego within which all others hear the ego's advice too, from vehicle to vehicle, and whoever
-        comes there [m]; 0 for nobody.
+        comes there [m]; 0 for no one.
     stretches : tuple of StretchAdvice
         Advice to all on stretches of road.
     control : EgoControl or None

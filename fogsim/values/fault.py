@@ -137,7 +137,7 @@ class LeadNarrowView:
 
 @dataclass(frozen=True, slots=True)
 class PositionBias:
-    """A satellite position beside the true one, as reflections from walls make it."""
+    """A satellite position next to the true one, as reflections from walls make it."""
 
     sensor: ClassVar[str] = "gps"
     name: ClassVar[str] = "position_bias"

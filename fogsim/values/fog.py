@@ -29,7 +29,7 @@ AIRLIGHT_SHARE = airlight_share()
 class FogBank:
     """A stretch of fog across the road: a slab in the world with soft edges, unlimited sideways.
 
-    The extra extinction rises along `axis` over `edge` metres centred on `start`, and falls likewise at `end`.
+    The extra extinction rises along `axis` over `edge` metres centred on `start`, and falls in the same way at `end`.
 
     Attributes
     ----------
@@ -177,7 +177,7 @@ class FogField:
     shelters : tuple of FogShelter
         Places without fog; they stay where they are.
     reachable_densities : tuple of float
-        Factors of the extinction coefficient that a script may bring beside those of `changes` [-].
+        Factors of the extinction coefficient that a script may bring next to those of `changes` [-].
     airlight_share : float
         The airlight over that of a white horizontal surface under the same sky [-]: what another daylight goes by.
     airlight_shading : float

@@ -34,7 +34,7 @@ class Side(StrEnum):
 DARK_SHIFT: Mapping[Side, int] = {Side.LEFT: 12, Side.RIGHT: 21, Side.MIDDLE: 25}
 """By how many bits a kind of lamp is shifted where the lamps on one side are dark while others of the kind burn.
 
-These bits lie beside those of `Lamp` and of `SignalLight`. In the middle there is a bit for `Lamp.STOP` alone.
+These bits lie next to those of `Lamp` and of `SignalLight`. In the middle there is a bit for `Lamp.STOP` alone.
 """
 
 MIDDLE = 0.05
@@ -81,7 +81,7 @@ def settled(lamps: int) -> int:
 
 
 class SignalLight(IntFlag):
-    """Lit lenses of a traffic light, in bits beside those of `Lamp`; red with yellow comes before green."""
+    """Lit lenses of a traffic light, in bits next to those of `Lamp`; red with yellow comes before green."""
 
     DARK = 0
     RED = 512
@@ -229,7 +229,7 @@ def joined_sources(parts: Sequence[LightSources]) -> LightSources:
 
 @dataclass(frozen=True, slots=True)
 class StreetLighting:
-    """Street lamps as what lights the road, all alike, beside the sky.
+    """Street lamps as what lights the road, all alike, next to the sky.
 
     Attributes
     ----------
@@ -256,7 +256,7 @@ class StreetLighting:
 
 @dataclass(frozen=True, slots=True)
 class RoadBeams:
-    """Lit head lamps of other vehicles as what lights the road, beside the sky; those of a pair shine together."""
+    """Lit head lamps of other vehicles as what lights the road, next to the sky; those of a pair shine together."""
 
     position: NDArray[np.float64]  # (n, 3): Middle between the lamps of a pair [m]
     heading: NDArray[np.float64]  # (n,): Direction of their axes, counter-clockwise from x [rad]

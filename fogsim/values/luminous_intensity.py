@@ -18,7 +18,7 @@ FLOOR = 0.01
 
 
 LOBE_AZIMUTHS = np.radians([0.0, 5.0, 10.0, 20.0, 30.0, 45.0, 80.0])
-"""Angles beside the axis of a signal lamp to which the columns of its lobe belong, alike on both sides [rad]."""
+"""Angles next to the axis of a signal lamp to which the columns of its lobe belong, alike on both sides [rad]."""
 
 LOBE_ELEVATIONS = np.radians([0.0, 5.0, 10.0, 15.0, 30.0])
 """Angles above and below it to which the rows belong [rad]."""

@@ -99,7 +99,7 @@ class LightMeasurement:
 @checked_parameters
 @dataclass(frozen=True, slots=True)
 class FogReport:
-    """One measurement of the fog by another vehicle or by a sensor beside the road.
+    """One measurement of the fog by another vehicle or by a sensor next to the road.
 
     Attributes
     ----------
@@ -205,7 +205,7 @@ class Observation:
 
     @property
     def sign_map(self) -> NDArray[np.uint8]:
-        """(rows, cols, 3) uint8: the signs of the map where the told camera and the believed pose put them.
+        """(rows, cols, 3) uint8: the signs of the map where the assumed camera and the believed pose put them.
 
         Channels: kind (`sign_kind_code`); distance, 255 at the bumper and 1 at 254 m or more; size, 255 for a face of
         2 m or more; all 0 where there is no sign. What hides a sign in the world is unknown to it. It is drawn whenever

@@ -74,7 +74,7 @@ class Lane:
 
 @dataclass(frozen=True, slots=True)
 class PavedArea:
-    """A paved area that is no strip: where roads meet, or where footways meet beside them.
+    """A paved area that is no strip: where roads meet, or where footways meet next to them.
 
     Attributes
     ----------
@@ -138,7 +138,7 @@ class StructureKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """What stands beside a road or over it and hides what is behind: a box, swept along a line.
+    """What stands next to a road or over it and hides what is behind: a box, swept along a line.
 
     Attributes
     ----------
@@ -211,7 +211,7 @@ class RoadNetwork:
     route_limits : (n,) float64
         Highest speed limit of the road that leads to each point of the route [m/s]. Empty where it is not known.
     structures : tuple of Structure
-        What stands beside the roads and over them.
+        What stands next to the roads and over them.
     signal_heads : tuple of SignalHead
         Heads of the traffic lights.
     """

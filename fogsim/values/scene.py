@@ -31,7 +31,7 @@ class Instance(IntEnum):
 class Surface(IntEnum):
     """How a vertex's surface gets its radiance.
 
-    MATT is lit by the sky; PAINT likewise, with the vehicle's paint in place of its own colour; ROAD has asphalt
+    MATT is lit by the sky; PAINT in the same way, with the vehicle's paint in place of its own colour; ROAD has asphalt
     grain and painted lines; TERRAIN has grass grain; lamps and the lenses of traffic lights add light of their own
     while lit, LAMP_STREET always; SHEETING is MATT by day and sends the light of head lamps back to where it came from.
     """

@@ -49,7 +49,7 @@ class Shape(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class ChangeSpeed:
-    """A vehicle comes to a speed, whatever limits and advice say, and holds it; it hits nobody for that."""
+    """A vehicle comes to a speed, whatever limits and advice say, and holds it; it hits no one for that."""
 
     vehicle: str  # Its id
     speed: float  # Speed to come to [m/s]
@@ -161,7 +161,7 @@ class SetSignal:
 class Depart:
     """A vehicle comes onto the road near another one, of the same type and with the rest of its way."""
 
-    vehicle: str  # Its id, which nobody on the road has
+    vehicle: str  # Its id, which no one on the road has
     like: str  # The other one
     gap: float  # Gap to the other one along the road, bumper to bumper [m]; negative behind it
     lane: int | None = None  # Lane from the right; None for the other one's
@@ -173,7 +173,7 @@ class Depart:
 class Enter:
     """A vehicle comes onto the road on a way of its own."""
 
-    vehicle: str  # Its id, which nobody on the road has
+    vehicle: str  # Its id, which no one on the road has
     kind: str  # Its type, of `fogsim.traffic.templates.VEHICLE_KINDS`
     # Its way, from the edge on which it begins; the way between two that do not follow one another is looked for
     edges: tuple[str, ...]

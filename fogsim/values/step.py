@@ -54,7 +54,7 @@ class RoadSection:
     speed_limit : float
         Speed limit where the section begins [m/s], as the map has it; ``inf`` where that is not known.
     reported : float or None
-        Extinction coefficient that the nearest sensor beside the road has reported last [1/m]: with errors, and old;
+        Extinction coefficient that the nearest sensor next to the road has reported last [1/m]: with errors, and old;
         None while it has reported nothing.
     """
 
@@ -95,15 +95,15 @@ class Truth:
     camera : Camera or None
         The true calibration of the ego's camera; None where no camera was there.
     pose : CameraPose or None
-        Where the camera truly is, likewise.
+        Where the camera truly is, too.
     fog : FogField or None
-        The fog at this instant as a field, likewise.
+        The fog at this instant as a field, too.
     signs : SignMap or None
-        Every sign that stands in the world, likewise.
+        Every sign that stands in the world, too.
     vehicle_extinctions : (n,) float64 or None
-        Extinction coefficient at the eyes of each driver of `Step.traffic` [1/m]; None where nobody asked.
+        Extinction coefficient at the eyes of each driver of `Step.traffic` [1/m]; None where no one asked.
     sections : tuple of RoadSection
-        Visibility meters beside the ego's route, or beside ``traffic.along``, in the direction of travel, where
+        Visibility meters next to the ego's route, or next to ``traffic.along``, in the direction of travel, where
         sections of it are advised.
     route : (n, 3) float64 or None
         Polyline along the ego's route, or along ``traffic.along`` [m]; None where there is neither.
@@ -186,7 +186,7 @@ class TrafficStep:
     begun : tuple of Begun
         What of the script began in this period.
     waiting : int
-        Without an ego: vehicles that were to come by now and find no room to; 0 with one, where nobody counts them.
+        Without an ego: vehicles that were to come by now and find no room to; 0 with one, where no one counts them.
     cohort : Cohort or None
         The vehicles that metrics of the cohort are about; None where the scenario has no ``traffic.cohort_s``.
     """

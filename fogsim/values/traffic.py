@@ -108,7 +108,7 @@ NO_PIECES = BodyPieces()
 
 @dataclass(frozen=True, slots=True)
 class TrafficState:
-    """All vehicles at one instant, as arrays; row i belongs to ``ids[i]``; and who and what is beside them.
+    """All vehicles at one instant, as arrays; row i belongs to ``ids[i]``; and who and what is next to them.
 
     Attributes
     ----------
@@ -136,15 +136,15 @@ class TrafficState:
         Linear reflectance of the paint, 0 … 1.
     grade : (n,) float64
         Inclination along the heading of the road that a vehicle stands on, from its rear to its front bumper [rad];
-        positive uphill. Left out, everybody stands on the level.
+        positive uphill. Left out, everyone stands on the level.
     free_speed : (n,) float64
         Speed at which a driver would travel alone in clear air [m/s]: the lane's limit times the driver's own factor,
         and no more than the vehicle can. Empty where it is not known.
     advised_speed : (n,) float64
         Lowest speed in force that a driver has heard advised, whether they follow it or not, the ego its own [m/s];
-        ``inf`` where they have heard none. Empty where nobody has.
+        ``inf`` where they have heard none. Empty where no one has.
     off_lanes : (n,) bool
-        Whether a vehicle is off the lanes: parked beside the road (as a taxi that waits is), or put there by another
+        Whether a vehicle is off the lanes: parked next to the road (as a taxi that waits is), or put there by another
         simulator. It has its position and its heading, but no limit, no leader and no acceleration. Left out, all
         vehicles are on lanes.
     signals : SignalState
@@ -255,7 +255,7 @@ def with_persons(state: TrafficState) -> TrafficState:
 
 
 def advised_speeds(ids: Sequence[str], heard: Mapping[str, float]) -> NDArray[np.float64]:
-    """Advice to vehicles as `TrafficState.advised_speed` has it (n,) [m/s]; empty where nobody has heard any.
+    """Advice to vehicles as `TrafficState.advised_speed` has it (n,) [m/s]; empty where no one has heard any.
 
     Takes `heard` [m/s].
     """
@@ -366,11 +366,11 @@ class NetworkSnapshot:
     state : TrafficState
         Every vehicle.
     speed_limit : float
-        Highest speed limit of the lanes that they are on [m/s]; ``inf`` where nobody is.
+        Highest speed limit of the lanes that they are on [m/s]; ``inf`` where no one is.
     collisions : tuple of Collision
         Collisions since the last snapshot, each pair once.
     is_over : bool
-        True if nobody is there, and nobody will come.
+        True if no one is there, and no one will come.
     waiting : tuple of str
         Ids of vehicles that are due and find no room to enter the road.
     is_ended : bool

@@ -40,7 +40,7 @@ class Span:
     colour : (3,) float64
         Reflectance of that panel.
     light : float
-        Share of the sky's light on the paint beside it.
+        Share of the sky's light on the paint next to it.
     normals : tuple of (3,) float64
         Mean normals of what is not paint, and of paint.
     """

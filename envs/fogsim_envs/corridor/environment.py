@@ -1,4 +1,4 @@
-"""One agent a message sign along a road in fog: what each shows, for everybody's safety and time."""
+"""One agent a message sign along a road in fog: what each shows, for everyone's safety and time."""
 
 import functools
 import math
@@ -65,7 +65,7 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
     | entries | meaning | scale |
     |---|---|---|
     | 0, 1, 2 | loop halfway to the sign before: flow; mean speed; anybody passed | / 2500 /h and lane; / 50 m/s; 0, 1 |
-    | 3, 4, 5 | loop halfway to the next sign, likewise | |
+    | 3, 4, 5 | loop halfway to the next sign, too | |
     | 6 | visibility meter at the sign: up to 2 km, 10 % deviation | logarithmic, 1 m … 10 km to 0 … 1 |
     | 7, 8, 9 | speed shown so far by this sign, the one before, the next | / 50 m/s; 1 for none |
     | 10, 11, 12 | speed limit; place along the road; time left | / 50 m/s; share; share |

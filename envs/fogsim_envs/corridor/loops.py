@@ -16,7 +16,7 @@ class LoopReading(NamedTuple):
     """What a loop across all lanes has counted."""
 
     flow: float  # Vehicles per hour [1/h]
-    speed: float | None  # Mean speed of those who passed [m/s]; None if nobody did
+    speed: float | None  # Mean speed of those who passed [m/s]; None if no one did
 
 
 class InductionLoops:
@@ -30,7 +30,7 @@ class InductionLoops:
         self._time = 0.0
 
     def count(self, traffic: TrafficState, elapsed: float) -> None:
-        """Take in everybody's places after some time (`elapsed` [s])."""
+        """Take in everyone's places after some time (`elapsed` [s])."""
         here = [row for row, lane in enumerate(traffic.lane) if lane.rpartition("_")[0] in self._edges]
         station, ids = project(traffic.position[here, :2], self._route), [traffic.ids[row] for row in here]
         # Who was not there before has not come over a loop: vehicles enter where there is none.
@@ -42,7 +42,7 @@ class InductionLoops:
         self._time += elapsed
 
     def read(self) -> tuple[LoopReading, ...]:
-        """Tell what was counted since the last reading, loop by loop, and begin anew."""
+        """Tell what was counted since the last reading, loop by loop, and begin again."""
         hours = self._time / SECONDS_PER_HOUR
         counted = zip(self._count.tolist(), self._speeds.tolist(), strict=True)
         readings = tuple(

@@ -1,4 +1,4 @@
-"""What all signs are paid together: everybody's safety and delay, those included who wait to come onto the road."""
+"""What all signs are paid together: everyone's safety and delay, those included who wait to come onto the road."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ from fogsim.values import TrafficStep
 _KILOMETRE, _MINUTE = 1000.0, 60.0
 
 _CLEAR = 1e-6
-"""Extinction coefficient of air in which everybody sees far enough [1/m]."""
+"""Extinction coefficient of air in which everyone sees far enough [1/m]."""
 
 
 @checked_parameters
@@ -82,7 +82,7 @@ def overdriven(step: TrafficStep, standard: SafetyStandard) -> float:
 
 
 def conflict(step: TrafficStep, threshold: float) -> float:
-    """How far everybody's time to collision is below a threshold: the sum of 0 … 1 for each vehicle.
+    """How far everyone's time to collision is below a threshold: the sum of 0 … 1 for each vehicle.
 
     Takes `threshold` [s].
     """

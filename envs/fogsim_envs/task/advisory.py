@@ -55,7 +55,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
     | signs_mask | 0 or 1 (8,) | which rows of ``signs`` are filled |
     | state | float32 (22,) in −1 … 1 | see below |
 
-    ``state``: own speed / 25 m/s − 1; speed limit, likewise; distance to go / 2.5 km − 1; time left / 300 s − 1; number
+    ``state``: own speed / 25 m/s − 1; speed limit, too; distance to go / 2.5 km − 1; time left / 300 s − 1; number
     of the own lane from the right / 5; number of lanes / 5; lead present; lead distance / 100 m − 1; relative speed of
     the lead / 25 m/s; estimate valid; log10 of the estimated visibility / 100 m; relative deviation of the estimate;
     believed visibility on the same scale: 5, 25, 50, 75, 95 % quantiles; deviation of ln k; advised speed asked for
@@ -70,7 +70,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
 
     ### Episodes
     Fog, light, traffic, what a lead vehicle does, how fast the ego's own driver goes without advice, and the errors of
-    the told calibration are drawn at each reset (`FogDistribution`, `ScenarioDistribution`);
+    the assumed calibration are drawn at each reset (`FogDistribution`, `ScenarioDistribution`);
     ``info["drawn"]`` has them, and ``reset(options={"episode": info["drawn"]})`` repeats the episode. ``split``
     "test" draws from other random numbers than "train", whatever the seeds.
 
@@ -90,7 +90,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
     image_size : (width, height) of the camera; None keeps the scenario's
     continuous : which action space
     reward_weights : `TaskWeights`
-    render_mode : None, "rgb_array" (the camera frame beside a panel with estimate, truth, advice, speed and lamps), or
+    render_mode : None, "rgb_array" (the camera frame next to a panel with estimate, truth, advice, speed and lamps), or
     "human" (that in a window, each step as long as it takes)
     flat_info : whether ``info`` is a flat dictionary of numbers, ``truth/visibility_m`` for example; ``ending``,
     ``warning`` and ``fault`` are then numbers, 0 for none, and ``drawn`` is left out

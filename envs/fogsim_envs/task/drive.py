@@ -23,7 +23,7 @@ class FogDriveEnv(FogAdvisoryV1Env):
     """Drive in fog that only the camera can judge: acceleration and lane.
 
     Observation, reward, ``info``, episodes and arguments are those of ``fogsim/FogAdvisory-v1`` (`FogAdvisoryV1Env`).
-    Nobody brakes for the agent: it strikes whom it drives into. Lamps are chosen by the scenario's lighting policy.
+    No one brakes for the agent: it strikes whom it drives into. Lamps are chosen by the scenario's lighting policy.
     In ``state``, the advised speed is 1.
 
     ### Action

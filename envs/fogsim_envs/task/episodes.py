@@ -204,7 +204,7 @@ class ScenarioDistribution:
     light : mapping from str to float
         Weights of "day", "dusk" and "night".
     scripts : mapping from str to float
-        Weights of what happens about the ego: "free" (nobody in particular), "lead", "slow_truck", "braking_lead"
+        Weights of what happens about the ego: "free" (no one in particular), "lead", "slow_truck", "braking_lead"
         (which comes to a standstill for a while, somewhere) and "standing_vehicle" (in the ego's lane).
     drivers : mapping from str to float
         Weights of the ego's own driver, by `fogsim.traffic.SPEED_CHOICES`: how fast one goes in fog without advice.

@@ -41,7 +41,7 @@ _DRAWN = ("light.", "camera.told.")
 
 
 class HighwayDistribution(ScenarioDistribution):
-    """Which light, driver and errors of the told calibration there may be, and whether the leader brakes.
+    """Which light, driver and errors of the assumed calibration there may be, and whether the leader brakes.
 
     Roads and traffic are highway-env's; of ``scripts``, "braking_lead" is the one that can be played there.
     """

@@ -1,4 +1,4 @@
-"""The ego's own driver: how fast one goes in fog where nobody advises less."""
+"""The ego's own driver: how fast one goes in fog where no one advises less."""
 
 import dataclasses
 import math

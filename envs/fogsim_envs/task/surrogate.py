@@ -48,7 +48,7 @@ class SurrogateTable:
     becomes_valid: Table
     none_seen: Table  # (lights, bins): Share of valid estimates that say "no fog seen"
     error: Table  # (lights, bins, quantiles): Quantiles of ln(estimated / true k), at even shares from 0 to 1
-    deviation: Table  # (lights, bins, quantiles): Quantiles of ln(standard deviation / k) of those estimates, likewise
+    deviation: Table  # (lights, bins, quantiles): Quantiles of ln(standard deviation / k) of those estimates, too
     # (lights, bins, quantiles): Quantiles of ln(standard deviation · 1 m) of estimates that say "no fog seen"
     none_deviation: Table
     # episode_share, persistence: share of an error's variance that stays for an episode, and correlation of the rest

@@ -30,7 +30,7 @@ def add_forward_scatter(
 
     Of D = (L0 − L∞) T, by which the scene differs from the airlight, the share w (1 − T) is exchanged for its own blur
     h ∗ D, h being a Gaussian: nothing in clear air, most for what lies deep in the fog. What is as bright as the
-    airlight stays so, and fog beside something dark is darker. Forward lobes of fog droplets are 1° to 2° wide; weight
+    airlight stays so, and fog next to something dark is darker. Forward lobes of fog droplets are 1° to 2° wide; weight
     and width are assumptions, not measurements.
 
     Takes `luminance` (rows, cols, 3) [cd/m²], `airlight` [cd/m²], `transmittance` (rows, cols), `width` [px].

@@ -19,7 +19,7 @@ from fogsim.atmosphere.fog.optical_depth_kernels import extinctions_on_ray
 from fogsim.jit import kernel
 
 OPAQUE = 60.0
-"""Optical depth beyond which nothing is told apart [-]."""
+"""Optical depth beyond which nothing is distinguished [-]."""
 
 _OUT_OF_FOG = 1e-9
 

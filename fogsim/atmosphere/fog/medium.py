@@ -17,7 +17,7 @@ _LEAST_REACH = 0.5
 """Fog does not end at a portal more sharply than over this [m]."""
 
 _BESIDE_SHELTER, _SHELTER_SIDE = 30.0, 20.0
-"""How far beside a tunnel's walls there is no fog either, and over how much more it comes back [m]: nobody sees it from
+"""How far from a tunnel's walls there is no fog either, and over how much more it comes back [m]: no one sees it from
 within, but rays to the walls are compared with neighbours that would pass through them."""
 
 _TURN = 0.5

@@ -112,7 +112,7 @@ def _shown(distance: NDArray[np.float32], u: float, v: float, nearest: float) ->
             seen += 1
             if distance[row, column] > nearest:
                 free += 1
-    # A lamp's own surface may be a pixel in size, with other things beside it.
+    # A lamp's own surface may be a pixel in size, with other things next to it.
     return min(1.0, 4.0 * free / max(seen, 1))
 
 

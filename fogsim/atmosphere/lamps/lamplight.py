@@ -111,7 +111,7 @@ def _rays(camera: Camera) -> tuple[VeilRays, NDArray[np.float32]]:
 
 @lru_cache(_REMEMBERED)
 def _group(camera: Camera, lamps: tuple[HeadLamp, ...], droplets: Droplets) -> _Group:
-    """Lamps of one colour, by what is the same in every scene: the next one's renderer needs not compute it anew."""
+    """Lamps of one colour, by what is the same in every scene: the next one's renderer needs not compute it again."""
     places = list(dict.fromkeys(lamp.offset for lamp in lamps))
     # Lamps in one housing shine together.
     tables = [

@@ -145,7 +145,7 @@ def lobe_glow(
 def table_directions() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Azimuths and elevations (AZIMUTHS, ELEVATIONS) to the eye for which tables tell what a lamp's glow is made of.
 
-    Azimuths a lie evenly over a / (|a| + AZIMUTH_FOLD), from straight back to straight back, and elevations likewise.
+    Azimuths a lie evenly over a / (|a| + AZIMUTH_FOLD), from straight back to straight back, and elevations, too.
     """
     azimuth, elevation = np.meshgrid(
         _unfolded(AZIMUTHS, math.pi, AZIMUTH_FOLD), _unfolded(ELEVATIONS, 0.5 * math.pi, ELEVATION_FOLD), indexing="ij"

@@ -37,7 +37,7 @@ class TrafficLight:
     """Adds the light of other vehicles' head lamps on the road to drawn scenes.
 
     A horizontal surface at the distance s from a lamp at the height h has the illuminance I h e^(−ks) / s³. Surfaces
-    return it as they do the sky's, upright ones as the road beside them would, up to the height of the lamps.
+    return it as they do the sky's, upright ones as the road next to them would, up to the height of the lamps.
     """
 
     def __init__(self) -> None:

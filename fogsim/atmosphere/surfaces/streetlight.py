@@ -29,7 +29,7 @@ REACH = 48.0
 
 _CELLS = 320
 _STAY = 64.0  # the map moves on when the camera has left its middle by so much [m]
-_CHANGED = 0.002  # change of extinction beyond which the map is made anew [1/m]
+_CHANGED = 0.002  # change of extinction beyond which the map is made again [1/m]
 _WHITEST = 0.95  # reflectance above which a surface must be a lamp
 _COSINES = np.linspace(0.0, 1.0, 129)
 
@@ -85,7 +85,7 @@ class StreetLight:
         return dataclasses.replace(view, radiance=self._lit)
 
     def _about(self, pose: CameraPose, fog: FogField, lamps: StreetLighting) -> _Map:
-        """The map about the camera, made anew only if the camera, the lamps or the fog have moved."""
+        """The map about the camera, made again only if the camera, the lamps or the fog have moved."""
         eye, known = np.array(pose.position[:2]), self._map
         if known is not None and known.lamps.position is lamps.position and np.abs(eye - known.middle).max() < _STAY:
             middle = known.middle

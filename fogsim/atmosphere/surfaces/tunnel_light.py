@@ -32,7 +32,7 @@ _UTILANCE = 0.6
 class TunnelLight:
     """Lights what a camera sees of tunnels.
 
-    A surface in a tunnel gets, of the light of the whole sky, the share that the road beside it gets through the
+    A surface in a tunnel gets, of the light of the whole sky, the share that the road next to it gets through the
     portals (`sky_share`), whichever way it faces, and the light of lamps in a row under the ceiling. Light that walls
     and road pass on is left out, as is the brighter lighting of an entrance zone.
 

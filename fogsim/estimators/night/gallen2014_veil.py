@@ -24,7 +24,7 @@ from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.lines.horizon import levelled
 
 PUBLISHED = (15.0, 50.0, 100.0, 200.0, 500.0)
-"""Visibilities of the simulated references (figure 12) beside that of a clear night [m]."""
+"""Visibilities of the simulated references (figure 12) next to that of a clear night [m]."""
 
 BANDS = ((50.0, 10.0), (100.0, 20.0), (200.0, 40.0), (np.inf, 100.0))
 """Published accuracy: up to a visibility, so much [m] (section IV-C)."""

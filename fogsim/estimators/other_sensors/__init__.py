@@ -1,1 +1,1 @@
-"""Visibility by sensors beside the one camera, as baselines: a second camera, a radar, a scatterometer."""
+"""Visibility by sensors next to the one camera, as baselines: a second camera, a radar, a scatterometer."""

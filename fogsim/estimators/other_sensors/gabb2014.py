@@ -27,7 +27,7 @@ SHARPEST_BEND = 600.0
 """Radius of a bend on which a vehicle that is not found may be [m]: none must be found up to that far aside."""
 
 SEEN_BEFORE, NEARLY_AHEAD = 10.0, 2.0
-"""Time [s] since it was found so near to the own axis [m] within which a vehicle has not gone beside it."""
+"""Time [s] since it was found so near to the own axis [m] within which a vehicle has not gone next to it."""
 
 DENSEST, ABRUPT = 0.1, 3.0
 """Extinction of the densest fog in which a vehicle fades [1/m], and what must then be left of its contrast for it to be
@@ -146,7 +146,7 @@ class Gabb2014:
         self._time = time
 
     def _follow(self, lead: LeadMeasurement, time: float) -> None:
-        """Begin anew with another vehicle, whose contrast is another."""
+        """Begin again with another vehicle, whose contrast is another."""
         if self._lead is not None:
             before, earlier = self._lead
             expected = earlier.distance + earlier.relative_speed * (time - before)

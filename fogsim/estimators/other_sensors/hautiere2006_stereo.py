@@ -79,7 +79,7 @@ class Hautiere2006Stereo:
         self._as_published, self._deviation = as_published, disparity_deviation
 
     def reset(self) -> None:
-        """Let time begin anew; pictures stand alone."""
+        """Let time begin again; pictures stand alone."""
         self._check.reset()
 
     def update(self, observation: Observation) -> Estimate:

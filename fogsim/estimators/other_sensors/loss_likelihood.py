@@ -14,7 +14,7 @@ CELLS, NEAREST, FARTHEST = 141, 10.0, 10_000.0
 """Cells of ln k, and visibilities at the ends of the grid [m]."""
 
 USUAL_CONTRAST, CONTRAST_DEVIATION = -0.45, 0.35
-"""Mean and standard deviation of the ln of a vehicle's contrast to what is beside it, over the airlight's luminance."""
+"""Mean and standard deviation of the ln of a vehicle's contrast to its surroundings, over the airlight."""
 
 LIGHT_SHARE, LEAST_CONTRAST = 0.1, 0.05
 """Share of vehicles of which nothing is known of it, for light paint before light airlight may vanish at any range [-],

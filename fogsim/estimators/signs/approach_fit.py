@@ -30,7 +30,7 @@ REGISTRATION = 0.012
 """Relative deviation of a single look's contrast by what is not noise: its layout, its place within the pixels [-]."""
 
 SMALL_FACE = 0.05
-"""Relative deviation of the contrast of faces too small for their areas to be told apart, which the looks at a sign
+"""Relative deviation of the contrast of faces too small for their areas to be distinguished, which the looks at a sign
 share: how far their light spreads, how large they are taken to be [-]."""
 
 BRIGHTNESS, BRIGHTNESS_DEVIATION = 1.0, 0.5

@@ -43,7 +43,7 @@ PLACED = np.array([0.15, 0.15, 0.015, 0.1])
 """Their standard deviations once the face has been fitted."""
 
 SEPARABLE = 8.0
-"""Radius from which the areas of a face are told apart [px]; of smaller ones only the mean luminance counts."""
+"""Radius from which the areas of a face are distinguished [px]; of smaller ones only the mean luminance counts."""
 
 LAYOUT = 0.005
 """Deviation of a face's reflectance from its layout's, over that of white [-]."""
@@ -89,7 +89,7 @@ class FaceLight:
     black: float
     slope: float
     variance: tuple[float, ...]  # Variances of both and their covariance
-    # Whether the face was too small for its areas to be told apart, so that only its mean luminance was measured
+    # Whether the face was too small for its areas to be distinguished, so that only its mean luminance was measured
     is_mean: bool = False
 
 

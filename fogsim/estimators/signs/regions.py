@@ -31,7 +31,7 @@ class PoseDeviation:
 
 @dataclass(frozen=True, slots=True)
 class ProjectedSign:
-    """A sign of the map as the told camera should see it."""
+    """A sign of the map as the assumed camera should see it."""
 
     sighting: SignSighting  # What the map says
     distance: float  # From the camera to the sign along the line of sight [m]
@@ -53,7 +53,7 @@ class ProjectedSign:
 def project_sightings(
     sightings: Iterable[SignSighting], camera: Camera, setback: float, deviation: PoseDeviation | None = None
 ) -> tuple[ProjectedSign, ...]:
-    """Project what the map says through the told camera.
+    """Project what the map says through the assumed camera.
 
     Returns signs of which the picture may show something, in the order of the sightings: none that is behind the
     camera, outside the picture by more than it can be off its place, or too small. Takes `setback` [m].

@@ -16,7 +16,7 @@ SPACING = 250.0
 """Way from one cross section to the next [m]; the first lies half of it from where the road begins."""
 
 _FASTEST = 80.0
-"""Speed at which nobody departs from the ego [m/s]."""
+"""Speed at which no one departs from the ego [m/s]."""
 
 _AHEAD = 5.0
 """How far to either side along the road its direction is taken [m]."""

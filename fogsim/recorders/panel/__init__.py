@@ -1,1 +1,1 @@
-"""The picture of a step: camera frame or view from above, and beside it a panel."""
+"""The picture of a step: camera frame or view from above, and next to it a panel."""

@@ -1,4 +1,4 @@
-"""One frame of the video: the camera's image, and beside it what is true, believed, advised and lit."""
+"""One frame of the video: the camera's image, and next to it what is true, believed, advised and lit."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -37,7 +37,7 @@ FRAME_WIDTH = camera_picture.WIDTH + PANEL_WIDTH
 FRAME_HEIGHT = camera_picture.HEIGHT
 
 PICTURE_SIZE = camera_picture.WIDTH, camera_picture.HEIGHT
-"""Width and height of the picture beside the panel [px]."""
+"""Width and height of the picture next to the panel [px]."""
 
 _LEFT, _RIGHT = camera_picture.WIDTH + 16, FRAME_WIDTH - 16
 _SPEED_X, _ADVICE_X, _LIMIT_X = _LEFT, _LEFT + 148, _RIGHT - 27

@@ -31,7 +31,7 @@ _CLEAR, _DENSE = 1e-3, 0.15
 _DARKEST, _BRIGHTEST = 26.0, 150.0
 
 _LONGER, _WIDER = 1.5, 3.0
-"""Vehicles are drawn longer and wider than they are, so that they can be told apart."""
+"""Vehicles are drawn longer and wider than they are, so that they can be distinguished."""
 
 
 def draw_view_from_above(step: Step, extinction: Extinctions) -> Image.Image:

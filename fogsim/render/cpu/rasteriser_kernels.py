@@ -146,7 +146,7 @@ def _fill(work: Work, count: int, lens: Wide, near: float, picture: Index) -> No
 
 @kernel
 def _bounds(x: float, y: float, rest: float) -> tuple[float, float, float, float]:
-    """Where x · u + y · v + rest is not negative: least u as slope over v and value at 0, and greatest u likewise."""
+    """Where x · u + y · v + rest is not negative: least u as slope over v and value at 0, and greatest u."""
     inverse = -1.0 / x
     if x > 0.0:
         return y * inverse, rest * inverse, 0.0, np.inf

@@ -48,7 +48,7 @@ class GLRasteriser:
         return target.read()
 
     def _target_of(self, camera: Camera) -> "Target":
-        """The target, made anew if the camera's size is another than the last one's."""
+        """The target, made again if the camera's size is another than the last one's."""
         size = (camera.width, camera.height)
         if self._target is not None and self._target.size != size:
             self._target.delete()

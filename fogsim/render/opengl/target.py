@@ -18,7 +18,7 @@ class Target:
 
     def __init__(self, width: int, height: int) -> None:
         self.size = (width, height)
-        # Rows lie apart, as those that the processor draws do: for others the shading would be compiled anew.
+        # Rows lie apart, as those that the processor draws do: for others the shading would be compiled again.
         self._rows = np.empty((height, width + 1), np.int32)
         self._framebuffer = int(GL.glGenFramebuffers(1))
         self._renderbuffers = [int(name) for name in GL.glGenRenderbuffers(2)]

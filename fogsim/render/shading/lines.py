@@ -1,4 +1,4 @@
-"""Painted lines beside a lane: which pixels of a span come near one, and how much of a dashed one is paint."""
+"""Painted lines next to a lane: which pixels of a span come near one, and how much of a dashed one is paint."""
 
 import math
 

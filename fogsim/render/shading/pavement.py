@@ -44,7 +44,7 @@ def reflectance_by_sine(surface: RoadSurface) -> Wide:
     path = files("fogsim.render") / "data" / "road_reflectance.csv"
     lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
     names, rows = lines[0].split(","), [[float(cell) for cell in line.split(",")] for line in lines[1:]]
-    # A column of its own: for one among others the shading would be compiled anew.
+    # A column of its own: for one among others the shading would be compiled again.
     column = np.ones(len(rows)) if surface is RoadSurface.LAMBERTIAN else np.array(rows)[:, names.index(surface)].copy()
     column.flags.writeable = False
     return column

@@ -22,7 +22,7 @@ START = layout.START
 LINE_REFLECTANCE = 0.6
 """Reflectance of painted lines."""
 
-_TRACK, _TRACK_WIDTH = 0.85, 0.28  # wheel tracks beside a lane's middle [m]
+_TRACK, _TRACK_WIDTH = 0.85, 0.28  # wheel tracks next to a lane's middle [m]
 _PIECE = 64  # pixels of a row over which the reflectance by angle, and that along the road, are linear
 
 ROAD_RESPONSE = 0.0125

@@ -1,4 +1,4 @@
-"""What field studies found of traffic in fog, and what of ours stands beside it.
+"""What field studies found of traffic in fog, and what of ours stands next to it.
 
 Of the reports only abstracts and summaries have been seen:
 

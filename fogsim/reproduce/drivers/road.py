@@ -16,7 +16,7 @@ from fogsim.units import extinction_from_visibility
 from fogsim.values import Command, FogField
 
 EDGE, EGO = "road", "first"
-"""Ids of the road's edge, and of the ego, which drives ahead of all others and meets nobody."""
+"""Ids of the road's edge, and of the ego, which drives ahead of all others and meets no one."""
 
 WIDTH = 3.75
 """Width of a lane [m]."""

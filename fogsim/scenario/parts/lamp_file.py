@@ -38,7 +38,7 @@ class LampFile(Section):
     """Height of the front fog lamps above the road."""
 
     low_beam: str | None = None
-    """Table of one lamp's intensities (`fogsim.lighting.beams.read_beam`), beside the file."""
+    """Table of one lamp's intensities (`fogsim.lighting.beams.read_beam`), next to the file."""
 
     high_beam: str | None = None
     """The same of the high beam."""

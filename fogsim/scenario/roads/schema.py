@@ -34,13 +34,13 @@ _SIZES = {"wall": (0.3, 3.0, 60.0), "hedge": (1.2, 2.2, 60.0), "building": (9.0,
 
 
 class ObstructionSection(Section):
-    """Something beside the road that hides what is behind it from the camera."""
+    """Something next to the road that hides what is behind it from the camera."""
 
     kind: Literal["wall", "hedge", "building", "truck"]
     """What it is."""
 
     along: Id = "same_way"
-    """Way beside which it is."""
+    """Way next to which it is."""
 
     at_m: Distance
     """Where along that way it begins."""
@@ -115,7 +115,7 @@ class Road(Section):
     """Whether a crossing has traffic lights; without, the road that crosses the ego's gives way."""
 
     footways: Flag | None = None
-    """Whether there are footways beside the road; where streets cross, with crossings on foot over all of them."""
+    """Whether there are footways next to the road; where streets cross, with crossings on foot over all of them."""
 
     footway_width_m: Annotated[Length, Field(ge=1, le=10)] | None = None
     """Width of each footway."""
@@ -148,7 +148,7 @@ class Road(Section):
     """Its height."""
 
     obstructions: tuple[ObstructionSection, ...] = ()
-    """What stands beside the road and hides what is behind it from the camera; drivers see through it."""
+    """What stands next to the road and hides what is behind it from the camera; drivers see through it."""
 
     @field_validator("template")
     @classmethod
@@ -186,7 +186,7 @@ class PersonsSection(Section):
 
 
 class DemandSection(Section):
-    """Traffic beside the actors, on a road by template: it is there from the beginning, and differs with the seed."""
+    """Traffic next to the actors, on a road by template: it is there from the beginning, and differs with the seed."""
 
     same_way_vph: Flow = 0.0
     """Vehicles that drive as the ego does."""
@@ -272,7 +272,7 @@ class ActorSection(Section):
     """It is behind this actor, by `gap_m`."""
 
     beside: Id | None = None
-    """It is beside this actor, front by front, in another lane."""
+    """It is next to this actor, front by front, in another lane."""
 
     gap_m: Length | None = None
     """That gap."""

@@ -278,10 +278,10 @@ class GpsFaultSection(FaultSection):
 
 
 class GpsPositionBias(GpsFaultSection):
-    """A position beside the true one."""
+    """A position next to the true one."""
 
     fault: Literal["position_bias"]
-    """`position_bias`: the position is beside the true one, as reflections from walls make it."""
+    """`position_bias`: the position is next to the true one, as reflections from walls make it."""
 
     east_m: Place = 0.0
     """How far east."""

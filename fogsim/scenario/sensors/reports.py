@@ -1,4 +1,4 @@
-"""The keys of a scenario file about what others tell of the fog: sensors beside the road, and other vehicles."""
+"""The keys of a scenario file about what others tell of the fog: sensors next to the road, and other vehicles."""
 
 from typing import Annotated, Self
 
@@ -47,7 +47,7 @@ class MeasuredReports(ReportsFrom):
 
 
 class RoadsideCamera(Section):
-    """A camera on a mast beside the road, looking along it in the direction of travel.
+    """A camera on a mast next to the road, looking along it in the direction of travel.
 
     Its lens, image sensor and exposure are those that `camera` describes for the ego.
     """
@@ -78,7 +78,7 @@ class RoadsideCamera(Section):
 
 
 class RoadsideReports(MeasuredReports):
-    """Visibility sensors beside the ego's route, as on California's Highway 99."""
+    """Visibility sensors next to the ego's route, as on California's Highway 99."""
 
     every_m: Length = HALF_A_MILE
     """Distance from one to the next; half a mile there."""
@@ -136,10 +136,10 @@ class CameraReports(ReportsFrom):
 
 
 class Reports(Section):
-    """Who tells the ego of the fog elsewhere; nobody if not given. `fusion: field_filter` makes use of it."""
+    """Who tells the ego of the fog elsewhere; no one if not given. `fusion: field_filter` makes use of it."""
 
     roadside: RoadsideReports | None = None
-    """Sensors beside the road."""
+    """Sensors next to the road."""
 
     vehicles: VehicleReports | None = None
     """Other vehicles on its road, whose measurement is the truth with noise."""

@@ -1,4 +1,4 @@
-"""The block of a scenario file about the ego's sensors beside the camera, and about the faults of all of them."""
+"""The block of a scenario file about the ego's sensors next to the camera, and about the faults of all of them."""
 
 from typing import Annotated
 
@@ -66,7 +66,7 @@ class ScatterometerSection(Section):
 
 
 class Sensors(Section):
-    """Sensors beside the camera."""
+    """Sensors next to the camera."""
 
     lead: Lead = Lead()
     """The radar."""

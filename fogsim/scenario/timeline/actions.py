@@ -1,4 +1,4 @@
-"""From the entries of a timeline to actions in SI units, where everybody is when they begin."""
+"""From the entries of a timeline to actions in SI units, where everyone is when they begin."""
 
 import dataclasses
 import math

@@ -103,7 +103,7 @@ class LampActions(Section):
     """Every lamp but those of which something else is said."""
 
     def kinds_by_side(self) -> tuple[str, ...]:
-        """Kinds of which the sides are told apart."""
+        """Kinds of which the sides are distinguished."""
         return tuple(key for key in type(self).model_fields if isinstance(getattr(self, key), LampSides))
 
 

@@ -40,7 +40,7 @@ from fogsim.values.script import Shape
 
 
 class SpeedAction(Section):
-    """A vehicle comes to a speed and holds it, whatever the limit and advice say; it hits nobody for that."""
+    """A vehicle comes to a speed and holds it, whatever the limit and advice say; it hits no one for that."""
 
     to_kmh: SpeedKmh | None = None
     """Speed that a vehicle comes to, no higher than its type's `maxSpeed`."""

@@ -29,7 +29,7 @@ HEAD, POST, ARM, WALK = "signal_head", "signal_post", "signal_arm", "signal_walk
 
 _CELL = 1.5  # height and width of a lens's part of the housing, in diameters
 _ABOVE = 0.25  # of posts over the middle of their head or arm [m]
-_BESIDE = 0.3  # arms are for heads farther beside their post than this [m]
+_BESIDE = 0.3  # arms are for heads farther next to their post than this [m]
 _BEHIND = 0.32  # from the lenses to posts and arms, which are behind the heads [m]
 _IN_FRONT = 0.1  # of the light before the lens [m]
 
@@ -56,7 +56,7 @@ _LIT = {
     SignalColour.BLINKING: SignalLight.YELLOW,
     SignalColour.OFF: SignalLight.DARK,
 }
-"""Lit lenses; a green arrow is a plate beside the red light."""
+"""Lit lenses; a green arrow is a plate next to the red light."""
 
 
 def signal_shapes() -> dict[str, Mesh]:
@@ -204,7 +204,7 @@ def signal_light_sources(signals: SignalState, eye: NDArray[np.float64], time: f
 
 @cache
 def _lens() -> Beam:
-    """How a lens of 200 mm shines, of which those above its axis are not told apart from its axis."""
+    """How a lens of 200 mm shines, of which those above its axis are not distinguished from its axis."""
     azimuth, elevation = np.radians(np.linspace(-90.0, 90.0, 61)), np.radians(np.linspace(-90.0, 30.0, 61))
     share = directed_share(*np.broadcast_arrays(azimuth, -elevation[:, None]))
     return Beam(azimuth, elevation, SIGNAL_INTENSITY * share)

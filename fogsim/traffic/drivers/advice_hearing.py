@@ -8,7 +8,7 @@ from fogsim.errors import InputError, suggest
 from fogsim.values import Command, Display, Stretch
 
 Heard = dict[Display, dict[str, float]]
-"""The lowest speed that each driver has heard, by where; nothing by where nobody has heard any [m/s]."""
+"""The lowest speed that each driver has heard, by where; nothing by where no one has heard any [m/s]."""
 
 HARDEST_BRAKING = 9.0
 """No vehicle brakes harder than this for long [m/s²]."""
@@ -21,7 +21,7 @@ class VehiclePlaces(Protocol):
         """Vehicles on a stretch, and how far past its beginning their front bumpers are [m]."""
 
     def near_ego(self, distance: float, among: Collection[str] | None = None) -> Collection[str]:
-        """Vehicles near the ego; nobody while the ego is not on the road (`distance` [m])."""
+        """Vehicles near the ego; no one while the ego is not on the road (`distance` [m])."""
 
     def speed(self, vehicle: str) -> float:
         """Speed of a vehicle [m/s]."""

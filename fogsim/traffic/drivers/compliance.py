@@ -25,7 +25,7 @@ class Compliance:
 
 
 FULL = Compliance()
-"""Everybody is reached and goes all the way down, and nobody up: the best case."""
+"""Everyone is reached and goes all the way down, and no one up: the best case."""
 
 SPEED_LIMIT_SIGN = Compliance(strength=0.6, trust=1.0)
 """Signs with a speed limit for the visibility, above every lane, which drivers know and trust.
@@ -36,7 +36,7 @@ made 2 to 5 mph (Gonzales & Fontaine 2018); in Finland 80 for 100 km/h on slippe
 """
 
 ADVISORY_SIGN = Compliance(rate=0.1, strength=0.35)
-"""Signs beside the road that advise a speed.
+"""Signs next to the road that advise a speed.
 
 Caltrans' CAWS near Stockton (MacCarley, Ackles & Watts 2006): mean speeds fell by 1.1 mph over all fogs, and were
 61 mph where 30 mph were advised in dense fog: 0.035 of the way. In Saudi Arabia an advised speed made 6.5 km/h; the
@@ -47,7 +47,7 @@ IN_CAR = Compliance(strength=0.55)
 """Advice on a display in the car.
 
 Guan et al. 2022, in a simulator (table 3): 92.2 km/h in place of 107.2 on the way into the fog and 64.8 in place of
-70.4 in dense fog, lower than with a sign beside. The advised speeds are not in what we have seen: 0.55 supposes
+70.4 in dense fog, lower than with a sign next to. The advised speeds are not in what we have seen: 0.55 supposes
 60 km/h.
 """
 

@@ -17,7 +17,7 @@ def signed_gap(ahead: float | None, behind: float | None, length: float, ego_len
     """Gap of a vehicle to the ego, from the ways between their front bumpers.
 
     Returns positive for a vehicle ahead of the ego: from the ego's front bumper to its rear bumper [m]. Negative for
-    one behind it: minus the gap from its front bumper to the ego's rear bumper. 0 while they are beside one another.
+    one behind it: minus the gap from its front bumper to the ego's rear bumper. 0 while they are next to one another.
     None if no way leads from one to the other. Takes `ahead` [m], `length`, `ego_length` [m].
     """
     # On a road that leads in a circle there are both ways: the shorter one counts.
@@ -33,7 +33,7 @@ class Trigger:
     at_position: float | None = None  # Distance that the vehicle has driven since it departed [m]
     at_time: float | None = None  # Time since the ego appeared [s]
     # Gap to the ego along the road, from bumper to bumper [m]: positive for a vehicle ahead of the ego, negative for
-    # one behind it, 0 for one beside it. It holds when the gap comes to this value or passes it, from either side, and
+    # one behind it, 0 for one next to it. It holds when the gap comes to this value or passes it, from either side, and
     # for a vehicle that is nearer on the same side already when both are first on the road
     at_gap_to_ego: float | None = None
     name: str = ""  # What the event is called in messages

@@ -97,7 +97,7 @@ class DriverSight:
         return adaptation(self.illuminance, glare, self.airlight_share)
 
     def _eyes(self, glare: float) -> tuple[Adaptation, float, float]:
-        """What kernels are told of eyes and head lamps; whole numbers would be compiled for anew."""
+        """What kernels are told of eyes and head lamps; whole numbers would be compiled for again."""
         return self._adapted(glare), float(self.contrast_threshold), float(self.headlamp_reach)
 
     def seen_distance(
@@ -141,7 +141,7 @@ class DriverSight:
 
         Takes `minimum_extinction` [1/m], `brightest` [cd].
         """
-        # By day nobody sees by head lamps.
+        # By day no one sees by head lamps.
         own = HIGH_BEAM_LIGHT if self.illuminance < DAY_ILLUMINANCE else 1.0
         return self.seen_distance(minimum_extinction, 1.0, brightest, own) + DISTANCE_TOLERANCE
 

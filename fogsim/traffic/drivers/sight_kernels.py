@@ -10,13 +10,13 @@ from fogsim.jit import kernel
 from fogsim.traffic.drivers.adaptation import NIGHT_EYE_THRESHOLD, Adaptation, contrast_ratio
 
 FARTHEST = 1e5
-"""Distance beyond which sight is not told apart from sight without end [m]."""
+"""Distance beyond which sight is not distinguished from sight without end [m]."""
 
 DISTANCE_TOLERANCE = 0.01
 """By how much a distance that is searched for may be too small [m]."""
 
 NEAREST = 0.1
-"""Nobody is nearer than this [m]."""
+"""No one is nearer than this [m]."""
 
 BODY_MIDDLE = 1.2
 """Height above the road at which a vehicle is looked at by those whose eyes are higher [m]."""

@@ -1,6 +1,6 @@
-"""What highway-env's drivers do beside following their leader.
+"""What highway-env's drivers do next to following their leader.
 
-Its environments let their road decide for everybody (``act``) in each simulation step; here the road decides after the
+Its environments let their road decide for everyone (``act``) in each simulation step; here the road decides after the
 drivers have chosen their speeds, and before the script has its way. IDM and MOBIL stay as they are.
 """
 
@@ -45,7 +45,7 @@ class DriverControl:
             limit_sight(fog, self._fleet, self._sight)
 
     def heard(self) -> Mapping[str, float]:
-        """What everybody has heard advised, the ego its own [m/s]."""
+        """What everyone has heard advised, the ego its own [m/s]."""
         own, ego = self.command.advice.speed, self._fleet.name(self._fleet.ego)
         return self._desired_speeds.heard if math.isinf(own) else {**self._desired_speeds.heard, ego: own}
 
@@ -58,7 +58,7 @@ class DriverControl:
         return self._manoeuvres.unplayed(keep_lane)
 
     def __call__(self) -> None:
-        """Decide for everybody on the road."""
+        """Decide for everyone on the road."""
         road = self._fleet.environment.road
         self._desired_speeds.update(self.command)
         orders = self._manoeuvres.plan()
@@ -67,7 +67,7 @@ class DriverControl:
 
 
 def hold_at_standstill(fleet: Fleet) -> None:
-    """Let nobody who drives by IDM back away: its acceleration has no end at standstill."""
+    """Let no one who drives by IDM back away: its acceleration has no end at standstill."""
     for vehicle in fleet.environment.road.vehicles:
         if isinstance(vehicle, IDMVehicle):
             stopping = -vehicle.speed / fleet.step_length

@@ -2,7 +2,7 @@
 
 Its drivers ask their road for the vehicles ahead and behind, in their own lane and in those to which they could change;
 in fog, a road answers with none where the driver sees none. IDM and MOBIL stay as they are. At junctions a road
-tells who gives way to whom; in fog nobody does to a vehicle that they do not see.
+tells who gives way to whom; in fog no one does to a vehicle that they do not see.
 """
 
 import math
@@ -75,7 +75,7 @@ class VisibleNeighbours:
         ahead = float(east * forward_east + north * forward_north)
         aside = float(north * forward_east - east * forward_north)
         lit = intensity_toward(int(fleet.lamps(other)), other.LENGTH, ahead, aside)
-        # What is behind stands in nobody's own head lamps.
+        # What is behind stands in no one's own head lamps.
         own = head_lamp_light(int(fleet.lamps(vehicle))) if ahead < 0.0 else 0.0
         glare = high_beam_veil(float(self._fog.extinction(eye + lift))) if own > 1.0 else 0.0
         contrast = inherent_contrast(fleet.paint(other), self._sight.airlight_share)

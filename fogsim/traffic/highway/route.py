@@ -1,7 +1,7 @@
 """The ego's way over highway-env's lanes, and how far along it the ego is.
 
 Lanes need not begin where those of the road before end: some begin farther back, some run the other way (into a
-junction, beside the way out of it). And ways cross themselves. So a way goes on where a lane is reached, not where it
+junction, next to the way out of it). And ways cross themselves. So a way goes on where a lane is reached, not where it
 begins, and a place on it is looked for where the ego can have come since the last time.
 """
 

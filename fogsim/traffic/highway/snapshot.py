@@ -51,7 +51,7 @@ def read_snapshot(
     reach : float
         Vehicles farther from the ego than this are left out [m].
     heard : mapping from vehicle id to float or None
-        What drivers have heard advised [m/s]; None if nobody has heard anything.
+        What drivers have heard advised [m/s]; None if no one has heard anything.
 
     Returns
     -------

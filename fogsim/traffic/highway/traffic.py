@@ -23,7 +23,7 @@ from fogsim.values.script import TrafficAction
 
 
 class OtherRoadsError(SimulationError):
-    """The environment has built other roads than before, or sends the ego another way: all has to be drawn anew."""
+    """The environment has built other roads than before, or sends the ego another way: all has to be drawn again."""
 
 
 def is_highway_environment(environment: object) -> bool:
@@ -145,7 +145,7 @@ class HighwayTraffic:
             road.vehicles = [v for v in road.vehicles if v is fleet.ego or not v.crashed]
 
     def observe(self) -> TrafficSnapshot | None:
-        """Tell where everybody is and what has happened since the last call; None once the ego has left.
+        """Tell where everyone is and what has happened since the last call; None once the ego has left.
 
         The impact speed of a collision is the length of the difference of both velocities.
         """

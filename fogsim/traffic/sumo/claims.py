@@ -55,7 +55,7 @@ TIME_HEADWAY = Attribute("tau", lambda get, v: float(get.getTau(v)), lambda set_
 
 
 def _set_speed_factor(vehicles: Api, vehicle: str, factor: float) -> None:
-    # With the first change of what its type says a vehicle gets a type of its own, and SUMO draws its factor anew if
+    # With the first change of what its type says a vehicle gets a type of its own, and SUMO draws its factor again if
     # the type's has no deviation. So that comes before.
     vehicles.setTau(vehicle, vehicles.getTau(vehicle))
     vehicles.setSpeedFactor(vehicle, factor)

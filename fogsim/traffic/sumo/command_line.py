@@ -27,7 +27,7 @@ def command_line(setup: TrafficSetup, seed: int) -> list[str]:
 
 
 def _usual(setup: TrafficSetup) -> dict[str, str]:
-    """Options as they are where nobody has chosen."""
+    """Options as they are where no one has chosen."""
     quiet = {
         **dict.fromkeys(("no-step-log", "duration-log.disable", "no-warnings"), "true"),
         **dict.fromkeys(("verbose", "duration-log.statistics"), "false"),

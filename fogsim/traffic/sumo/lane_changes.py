@@ -60,7 +60,7 @@ class LaneChangeSmoothing:
     """Lets vehicles that change lane glide to it: a cubic from their place and sideways speed to rest in the new lane.
 
     The new lane is SUMO's from the first step on, in `TrafficState.lane` too; the heading follows the sideways speed.
-    States in which nobody has changed lane within the last 3 s are given back as they are.
+    States in which no one has changed lane within the last 3 s are given back as they are.
     """
 
     def __init__(self) -> None:

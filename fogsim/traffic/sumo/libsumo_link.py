@@ -40,7 +40,7 @@ class LibsumoLink:
         self._sumo: ModuleType | None = None
 
     def begin(self, arguments: Sequence[str]) -> Api:
-        """Start SUMO here, or load it anew; see `SumoLink.begin`."""
+        """Start SUMO here, or load it again; see `SumoLink.begin`."""
         sumo = load_libsumo()
         if sumo.isLoaded() and self._sumo is None:
             raise SimulationRunningError(

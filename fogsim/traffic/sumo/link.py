@@ -35,7 +35,7 @@ class SumoLink(Protocol):
         """See the class."""
 
     def begin(self, arguments: Sequence[str]) -> Api:
-        """Start SUMO with arguments of its command line, or load it anew if this link has begun it before."""
+        """Start SUMO with arguments of its command line, or load it again if this link has begun it before."""
 
     def step(self) -> None:
         """Move the simulation by one step."""
@@ -87,7 +87,7 @@ def vehicle_getter(api: Api, name: str) -> Getter:
 
 
 def is_off_lanes(api: Api, vehicle: str) -> bool:
-    """Whether a vehicle on the road is on no lane: parked beside it, or put there; see `TrafficState.off_lanes`."""
+    """Whether a vehicle on the road is on no lane: parked next to it, or put there; see `TrafficState.off_lanes`."""
     return not api.vehicle.getLaneID(vehicle)
 
 
@@ -101,7 +101,7 @@ def subscribed(api: Api, names: Mapping[str, int]) -> tuple[Getter, ...]:
             try:
                 return simulation.getSubscriptionResults()[variable]
             except (AttributeError, KeyError):
-                # A simulation that is loaded anew has forgotten what was subscribed, and
+                # A simulation that is loaded again has forgotten what was subscribed, and
                 # traci stumbles over a connection that was closed; its getters tell it.
                 return getattr(simulation, name)()
 

@@ -1,4 +1,4 @@
-"""Which vehicles are read: those near the ego, without asking all where they are in every step, or everybody."""
+"""Which vehicles are read: those near the ego, without asking all where they are in every step, or everyone."""
 
 import itertools
 import math
@@ -19,7 +19,7 @@ MAX_WAIT = 1.0
 
 
 class AllVehicles:
-    """Finds everybody on the road."""
+    """Finds everyone on the road."""
 
     def __init__(self, api: Api, roster: Roster) -> None:
         self._position = vehicle_getter(api, "getPosition3D")
@@ -28,7 +28,7 @@ class AllVehicles:
         self._mark = self._removals = 0
 
     def find(self) -> tuple[tuple[str, ...], NDArray[np.float64]]:
-        """Ids in SUMO's order and positions (n, 3) [m]; the ids are the same object while nobody comes or goes."""
+        """Ids in SUMO's order and positions (n, 3) [m]; the ids are the same object while no one comes or goes."""
         roster = self._roster
         roster.update()
         new, self._mark = roster.entered_since(self._mark)

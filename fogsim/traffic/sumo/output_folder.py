@@ -60,7 +60,7 @@ class OutputFolder:
         self.warnings = ()
         if self._own is None and (self._folder is None or not _can_be_named(self._folder)):
             self._own = Path(tempfile.mkdtemp(prefix="fogsim-"))
-            # Also where nobody closes it.
+            # Also where no one closes it.
             self._removal = weakref.finalize(self, shutil.rmtree, self._own, ignore_errors=True)
         leads = self._writable() if self._own is None or self._folder is None else self._link(self._own)
         self._way = f"{_TO_THE_ROOT}{str(leads)[1:]}/{self._prefix}"

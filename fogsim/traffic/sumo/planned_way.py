@@ -13,7 +13,7 @@ class PlannedWay(NamedTuple):
     """Where the ego drives."""
 
     net: Path  # Network
-    additional: tuple[Path, ...]  # Files with what stands beside the road
+    additional: tuple[Path, ...]  # Files with what stands next to the road
     edges: tuple[str, ...]  # Ids of the edges that the ego drives on
 
 

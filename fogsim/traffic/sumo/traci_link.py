@@ -62,7 +62,7 @@ class TraciLink:
         return f"at {self._host}:{self._port}"
 
     def begin(self, arguments: Sequence[str]) -> Api:
-        """Connect, or load the simulation anew; see `SumoLink.begin`."""
+        """Connect, or load the simulation again; see `SumoLink.begin`."""
         if self._connection is None:
             self._connection = self._connect()
         else:
@@ -105,7 +105,7 @@ class TraciLink:
                 f"SUMO {self._where} has {clients} clients, and beginning anew would take the simulation away from the "
                 "others: start SUMO again for another run"
             )
-        # Loaded anew, a sumo-gui would wait for its button to be pressed, and forget whether to close at the end.
+        # Loaded again, a sumo-gui would wait for its button to be pressed, and forget whether to close at the end.
         closes = self._connection.simulation.getOption("quit-on-end") == "true"
         self._connection.load([*arguments, "--start", *(("--quit-on-end",) if closes else ())])
 

@@ -196,13 +196,13 @@ class VehicleReader:
         return np.array([known[lane] for lane in lanes])
 
     def _lamps(self, signals: Sequence[int]) -> NDArray[np.int32]:
-        """Lamps of all by their own signals; computed anew when a signal has changed."""
+        """Lamps of all by their own signals; computed again when a signal has changed."""
         if signals != self._signals[0]:
             self._signals = signals, lamps_from_many_signals(signals) | np.int32(OTHERS_LAMPS)
         return self._signals[1].copy()
 
     def _constants_of(self, ids: Sequence[str]) -> _Constants:
-        """What never changes; looked up anew when other vehicles are near."""
+        """What never changes; looked up again when other vehicles are near."""
         if self._constants is None or self._constants.ids is not ids:
             kinds, numbers = self._bodies.look_up(ids)
             length, width, height = numbers[:, :3].T

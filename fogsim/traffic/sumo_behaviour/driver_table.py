@@ -103,7 +103,7 @@ class DriverTable:
         return np.array([known[v] if v in known else self._fill(v) for v in vehicles], dtype=np.intp)
 
     def reset(self, vehicles: Sequence[str]) -> None:
-        """Fill rows anew for vehicles that have entered, come back, or bear the id of one that was there."""
+        """Fill rows again for vehicles that have entered, come back, or bear the id of one that was there."""
         for vehicle in vehicles:
             self._fill(vehicle)
 

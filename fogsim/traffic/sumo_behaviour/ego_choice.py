@@ -33,10 +33,10 @@ class EgoChoice:
         self._until = 0.0
         self._longest = (False, 0.0)
         self.best: str | None = None
-        """Who would be chosen if nobody came any more."""
+        """Who would be chosen if no one came any more."""
 
     def look(self) -> str | None:
-        """The ego; None while nobody suits. To be called after each step."""
+        """The ego; None while no one suits. To be called after each step."""
         self._waiting += self._departed()
         now = float(self._time())
         if ANY_EGO in self._waiting:

@@ -20,10 +20,10 @@ _REGARD_OF_OTHERS, _NO_COLLISION = 3 << 8, 1 << 8
 not hit anybody."""
 
 LONGEST_CHANGE = 10.0
-"""Time after which a change of lane that nobody could make is given up [s]."""
+"""Time after which a change of lane that no one could make is given up [s]."""
 
 _ONCOMING_STAY = 1.0
-"""Time for which SUMO is asked for the oncoming lane [s]: it wants as much free road, and leads nobody back."""
+"""Time for which SUMO is asked for the oncoming lane [s]: it wants as much free road, and leads no one back."""
 
 
 class ScriptedActions:

@@ -29,7 +29,7 @@ from fogsim.values import Command, Display
 
 _SUMO_DRIVES = -1.0
 _IMPOSED = 1 + 8 + 16 + 64
-"""Speed mode of a vehicle whose speed is imposed: it hits nobody, gives way and stops at red lights.
+"""Speed mode of a vehicle whose speed is imposed: it hits no one, gives way and stops at red lights.
 
 It regards neither the road's limit nor how hard its type may speed up and brake, which is seen to here.
 """
@@ -94,7 +94,7 @@ class SpeedControl:
         return bool(get.getSpeedWithoutTraCI(vehicle) < get.getSpeed(vehicle) - hardest - _SAME)
 
     def _is_in_danger(self, vehicle: str) -> bool:
-        """Whether somebody ahead is so near, or so slow, that the type's deceleration hardly does to hit nobody."""
+        """Whether somebody ahead is so near, or so slow, that the type's deceleration hardly does to hit no one."""
         get = self._vehicles
         found = self._leader(vehicle, _LEADER_RANGE)
         if not found or not found[0]:
@@ -210,7 +210,7 @@ class SumoDesiredSpeeds:
         self._shares.update(time, present)
 
     def _drivers(self) -> list[str]:
-        """Everybody on the road but the ego and trains, which go by their signals."""
+        """Everyone on the road but the ego and trains, which go by their signals."""
         return [v for v in self._roster.present if v != self._ego and v not in self._trains]
 
     def _choose_on_entry(self, new: Sequence[str], command: Command) -> None:

@@ -1,4 +1,4 @@
-"""All that SUMO's drivers perceive only as far as it can be seen, through fog and past what stands beside roads."""
+"""All that SUMO's drivers perceive only as far as it can be seen, through fog and past what stands next to roads."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -28,7 +28,7 @@ class PerceivedPart(Protocol):
         """Tell SUMO's drivers, before a step, what they do not see."""
 
     def release(self) -> None:
-        """Let everybody on the road see everything again, as SUMO's own drivers do."""
+        """Let everyone on the road see everything again, as SUMO's own drivers do."""
 
 
 class DriversPerception:
@@ -45,7 +45,7 @@ class DriversPerception:
             part.update(own_lamps)
 
     def release(self) -> None:
-        """Let everybody on the road see everything again."""
+        """Let everyone on the road see everything again."""
         for part in self._parts:
             part.release()
 

@@ -1,4 +1,4 @@
-"""Which vehicles are behind what stands beside the road, to a driver's eyes."""
+"""Which vehicles are behind what stands next to the road, to a driver's eyes."""
 
 import itertools
 import math

@@ -38,7 +38,7 @@ class LaneChangeSwitch:
             self._claims.withdraw(vehicle)
 
     def decide(self, vehicles: Sequence[str], on: Collection[str]) -> None:
-        """Turn it on for some of those for whom it is decided anew, and off for the others."""
+        """Turn it on for some of those for whom it is decided again, and off for the others."""
         for vehicle in self._turned.intersection(vehicles).difference(on) if self._turned else ():
             self.turn_off(vehicle)
         for vehicle in on:
@@ -53,5 +53,5 @@ class LaneChangeSwitch:
                 self._turned.remove(vehicle)
 
     def release(self, present: Collection[str]) -> None:
-        """Turn it off for everybody."""
+        """Turn it off for everyone."""
         self.restart(tuple(self._turned), present)

@@ -2,16 +2,16 @@
 
 SUMO's lane-change models look through any fog. Here, for the drivers for whom that makes a difference:
 
-- Who wants to change lanes and is held back by nobody in sight changes: SUMO makes the change by its ``changeLane``,
+- Who wants to change lanes and is held back by no one in sight changes: SUMO makes the change by its ``changeLane``,
   for one step without respect for others' gaps, but never into an overlap. What follows, braking or a collision, is
   SUMO's.
 - A leader that stands out of sight is no obstacle to leave the lane for (``lcStrategic``), as long as the route goes
   on in this lane.
 - A slow vehicle in the lane to the left that is out of sight is no reason to fall back behind it, as where overtaking
   on the right is forbidden (``lcOvertakeRight``).
-- Nobody makes room for somebody who is out of sight (``lcCooperative``, ``lcCooperativeSpeed``).
+- No one makes room for somebody who is out of sight (``lcCooperative``, ``lcCooperativeSpeed``).
 
-Drivers look each `LOOK_PERIOD`; who has nobody unseen about is not touched.
+Drivers look each `LOOK_PERIOD`; who has no one unseen about is not touched.
 """
 
 import math
@@ -40,7 +40,7 @@ LOOK_PERIOD = 0.5
 """Time between two looks of a driver [s]."""
 
 CERTAIN_PERIOD = 1.0
-"""Who has somebody in sight for certain ahead in the lane to the left, or nobody, looks there again after this [s]."""
+"""Who has somebody in sight for certain ahead in the lane to the left, or no one, looks there again after this [s]."""
 
 STANDING_REACH = 150.0
 """SUMO's drivers leave the lane for who stands within 100 m; between two looks they drive less than the rest [m]."""
@@ -52,7 +52,7 @@ SUBLANE_CHANGE = 4.0
 """Time for which SUMO's sublane model is asked to change lanes, at up to 1 m/s to the side [s]."""
 
 MUCH_FASTER = 2.0
-"""Who drives so much faster in the lane to the left holds nobody back, seen or not [m/s]."""
+"""Who drives so much faster in the lane to the left holds no one back, seen or not [m/s]."""
 
 _NEVER, _ALWAYS = -1.0, 1.0
 _RESPECT = 0x300
@@ -68,7 +68,7 @@ class StandingLeaders:
         self._strategic = LaneChangeSwitch(api, STRATEGIC, _NEVER, session)
 
     def update(self, drivers: Sequence[str], present: set[str]) -> None:
-        """Decide anew for some drivers."""
+        """Decide again for some drivers."""
         # A hidden leader may have left since the driver's last look ahead.
         behind = [(v, leader) for v in drivers if (leader := self._leaders.hidden.get(v)) in present]
         self._strategic.decide(drivers, [v for v, leader in behind if leader and self._would_be_left_for(v, leader)])
@@ -97,7 +97,7 @@ class StandingLeaders:
         self._strategic.restart(drivers, present)
 
     def release(self, present: set[str]) -> None:
-        """Give everybody their own behaviour back; see `LaneChangeSwitch.release`."""
+        """Give everyone their own behaviour back; see `LaneChangeSwitch.release`."""
         self._strategic.release(present)
 
 
@@ -118,7 +118,7 @@ class RequestedChanges:
         Returns false if there is no such lane on the same edge. Takes `time` [s].
         """
         edge, lane = str(self._vehicles.getRoadID(driver)), int(self._vehicles.getLaneIndex(driver)) + lanes
-        # Nobody changes lanes on a junction.
+        # No one changes lanes on a junction.
         if edge.startswith(":") or not 0 <= lane < int(self._edges.getLaneNumber(edge)):
             return False
         self._modes.claim(driver, int(self._modes.own_value(driver)) & ~_RESPECT | _NO_OVERLAP)
@@ -167,7 +167,7 @@ class LaneChanging:
         self._certain_until: dict[str, float] = {}
 
     def update(self, own_lamps: OwnLamps) -> None:
-        """Let those who are due look at the lanes beside them."""
+        """Let those who are due look at the lanes next to them."""
         if self._certainly_seen >= REACH:
             return
         due, _, gone = self._due.take()
@@ -216,7 +216,7 @@ class LaneChanging:
         return unseen | {driver: None for (driver, _), is_perceived in perceived.items() if not is_perceived}
 
     def _change_lanes(self, drivers: Sequence[str], wishes: Iterable[str], own_lamps: OwnLamps) -> None:
-        """Let those change lanes who are blocked by nobody whom they perceive, and whom nobody helps whom they see."""
+        """Let those change lanes who are blocked by no one whom they perceive, and whom no one helps whom they see."""
         wanted = self._neighbours.wanted_changes(drivers, wishes)
         doubtful = [change for change in wanted if not self._is_held_back_for_certain(change)]
         ahead = [self._neighbours.ahead(change) for change in doubtful]
@@ -251,7 +251,7 @@ class LaneChanging:
                 self._leaders.expect_unseen(follower, change.driver)
 
     def release(self) -> None:
-        """Give everybody on the road their own lane changing back."""
+        """Give everyone on the road their own lane changing back."""
         present = self._roster.present
         self._requests.end(present, math.inf)
         self._standing.release(present)

@@ -115,7 +115,7 @@ class LeaderSight:
     def _doubt_own_beams(
         judged: NDArray[np.float64], pauses: NDArray[np.float64], pairs: Sequence[Pair], own_lamps: OwnLamps
     ) -> None:
-        """Look anew, one by one, for drivers with high beams, which veil the fog; and soon, for those who may have."""
+        """Look again, one by one, for drivers with high beams, which veil the fog; and soon, for those who may have."""
         for i, (follower, _, _) in enumerate(pairs):
             if follower in own_lamps:
                 pauses[i] = 0.0

@@ -9,7 +9,7 @@ from fogsim.traffic.sumo_drivers.seen_vehicles import OwnLamps
 from fogsim.traffic.sumo_drivers.vehicle_sight import VehicleSight
 
 NEAR = 5.0
-"""A vehicle beside, or with less gap than this along the road, is seen in any fog [m]."""
+"""A vehicle next to, or with less gap than this along the road, is seen in any fog [m]."""
 
 # Bits of signals, states and modes in SUMO's TraCI protocol.
 _BLINKERS = 1 | 2

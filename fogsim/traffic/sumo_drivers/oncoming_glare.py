@@ -31,13 +31,13 @@ LAMP_HEIGHT = 0.65
 
 MIRROR_ANGLE, MIRROR_SHARE = math.radians(40.0), 0.8
 """Where a driver sees what is behind, from straight ahead [rad], and how much of its light [-]: the mirror inside and
-that beside the driver at about 40° to either side, of the 40 % each that UNECE R46 asks for at least."""
+that next to the driver at about 40° to either side, of the 40 % each that UNECE R46 asks for at least."""
 
 _Point = tuple[float, float, float]
 
 
 def most_glare(illuminance: float) -> float:
-    """Veil of glare that there can be at most [cd/m²]; none by day, when it is nothing beside the airlight.
+    """Veil of glare that there can be at most [cd/m²]; none by day, when it is nothing next to the airlight.
 
     Takes `illuminance` [lx].
     """

@@ -54,7 +54,7 @@ class OvertakingWishes:
         self._gains: dict[str, float] = {}
 
     def update(self, drivers: Iterable[str]) -> list[str]:
-        """Those of some drivers who want to overtake; all others begin anew."""
+        """Those of some drivers who want to overtake; all others begin again."""
         before, self._gains = self._gains, {}
         for driver in drivers:
             gain = self._relative_gain(driver)

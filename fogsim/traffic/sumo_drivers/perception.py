@@ -99,7 +99,7 @@ class Perception:
     session : str
         Name of the session.
     obstructions : Obstructions
-        What stands beside the roads.
+        What stands next to the roads.
 
     Attributes
     ----------
@@ -216,7 +216,7 @@ class Perception:
         return doubtful
 
     def _obstructed(self, followers: Sequence[str], ahead: Sequence[tuple[str, float]]) -> Collection[str]:
-        """Those whose leaders are behind something that stands beside the road."""
+        """Those whose leaders are behind something that stands next to the road."""
         if self._hidden_vehicles is None:
             return ()
         pairs = [(follower, leader) for follower, (leader, _) in zip(followers, ahead, strict=True) if leader]
@@ -252,7 +252,7 @@ class Perception:
             self._ignored[follower] = leader
 
     def _reveal(self, follower: str) -> None:
-        """From now on a follower reacts to everybody."""
+        """From now on a follower reacts to everyone."""
         self._emerging.pop(follower, None)
         if self._ignored.pop(follower, None) is not None:
             self._ignored_leaders.stop_ignoring(follower)
@@ -268,7 +268,7 @@ class Perception:
         return self._roster.time - since >= self._reaction_time
 
     def release(self) -> None:
-        """Let everybody on the road react to everybody again."""
+        """Let everyone on the road react to everyone again."""
         for follower in self._roster.present.intersection(self._ignored):
             self._reveal(follower)
         self._ignored.clear()

@@ -16,7 +16,7 @@ OwnLamps = dict[str, int]
 """Lamps, as `TrafficState.lamps` has them, of vehicles whose lamps are not SUMO's; with the sides that have failed."""
 
 _NO_THIRD_STOP_LAMP = frozenset({"truck", "motorcycle"})
-"""Body kinds without a stop lamp in the middle beside two others."""
+"""Body kinds without a stop lamp in the middle next to two others."""
 
 
 class SeenBody(NamedTuple):

@@ -19,7 +19,7 @@ NEAREST = 0.1
 """Distances are at least this [m]."""
 
 FARTHEST = 2000.0
-"""Nobody is seen farther away than this [m]; a vehicle that is teleported is nowhere."""
+"""No one is seen farther away than this [m]; a vehicle that is teleported is nowhere."""
 
 _Point = tuple[float, float, float]
 
@@ -38,9 +38,9 @@ class LineOfSight(NamedTuple):
 
 
 class VehicleSight:
-    """Tells which vehicles drivers see, along straight lines through the fog and past what stands beside the road.
+    """Tells which vehicles drivers see, along straight lines through the fog and past what stands next to the road.
 
-    Other vehicles hide nobody.
+    Other vehicles hide no one.
     """
 
     def __init__(

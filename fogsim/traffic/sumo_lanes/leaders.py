@@ -157,7 +157,7 @@ class Leaders:
             following = next(route, "")
 
     def _way(self, lane: str, following: str) -> tuple[str, ...]:
-        """Lanes from one to the next edge, and that edge's; by a lane beside it where it does not lead there itself."""
+        """Lanes from one to the next edge, and that edge's; by a lane at its side where it does not lead there."""
         known = self._ways.get((lane, following))
         if known is None:
             edge, _, number = lane.rpartition("_")

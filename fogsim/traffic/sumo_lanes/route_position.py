@@ -107,7 +107,7 @@ class RoutePlaces:
 class RoutePosition:
     """Position of a vehicle along its route.
 
-    Follows a route that changes on the way, and a vehicle that is moved by hand, whose odometer SUMO sets anew. Off the
+    Follows a route that changes on the way, and a vehicle that is moved by hand, whose odometer SUMO resets. Off the
     lanes, a vehicle stays where it left them.
     """
 

@@ -1,1 +1,1 @@
-"""What is beside the vehicles in a SUMO simulation: traffic lights and persons on foot."""
+"""What is next to the vehicles in a SUMO simulation: traffic lights and persons on foot."""

@@ -12,7 +12,7 @@ from fogsim.traffic.road.plan_view import Piece
 Points = NDArray[np.float64]
 
 _STRAIGHT_STEP, _STEP = 100.0, 12.0  # between points of straights, and most between others [m]
-_SAGITTA = 0.02  # how far a chord may lie beside its arc [m]
+_SAGITTA = 0.02  # how far a chord may lie next to its arc [m]
 _SAME = 1e-6  # [m]
 
 

@@ -1,4 +1,4 @@
-"""What stands beside a road by template, and tunnels over it: lines of structures, and the file that tells of them."""
+"""What stands next to a road by template, and tunnels over it: lines of structures, and the file that tells of them."""
 
 import itertools
 from collections.abc import Sequence
@@ -19,10 +19,10 @@ _KERB = 1.0  # between a tunnel's carriageway and its walls [m]
 
 @dataclass(frozen=True, slots=True)
 class Obstruction:
-    """Something beside a way that hides what is behind it."""
+    """Something next to a way that hides what is behind it."""
 
     kind: str  # ``wall``, ``hedge``, ``building`` or ``truck``
-    way: str  # Way beside which it is
+    way: str  # Way next to which it is
     # at, length: where along it it begins, and how long it is [m]
     at: float
     length: float
@@ -34,7 +34,7 @@ class Obstruction:
 
 
 def additional_text(layout: Layout, obstructions: Sequence[Obstruction]) -> str:
-    """Text of an additional file with all that stands beside a road; "" if nothing does."""
+    """Text of an additional file with all that stands next to a road; "" if nothing does."""
     lines = list[str]()
     for number, one in enumerate(obstructions):
         name = f"obstruction.{number}"

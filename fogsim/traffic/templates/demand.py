@@ -13,14 +13,14 @@ from fogsim.traffic.templates.xml_text import element, opening
 
 _END = 1_000_000  # of flows [s]
 _MEAN_SHARE_OF_LIMIT = 0.9
-_GAP = 2.0  # time gap to others that who gives way wants beside SUMO's, with which some collide [s]
+_GAP = 2.0  # time gap to others that who gives way wants next to SUMO's, with which some collide [s]
 _ROOM = 30.0  # around actors, kept free in their lanes [m]
 _SHORTEST = 25.0  # edge that is filled [m]
 
 
 @dataclass(frozen=True, slots=True)
 class Demand:
-    """Traffic beside the actors."""
+    """Traffic next to the actors."""
 
     flows: tuple[tuple[str, float], ...]  # (str, float): Vehicles per second [1/s] by way
     mix: tuple[tuple[str, float], ...]  # (str, float): Shares of types, together 1

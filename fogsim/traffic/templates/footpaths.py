@@ -51,7 +51,7 @@ class WalkingArea:
     """Where a footway that leads to a node goes on as one that leads away, around a corner or along the road."""
 
     name: str  # Id of its edge
-    # into, away: the edges beside which the footways lie
+    # into, away: the edges next to which the footways lie
     into: Edge
     away: Edge
     leads: tuple[float, float]  # How far the kerb goes straight on from either: past a crossing [m]

@@ -153,7 +153,7 @@ def _waits_at(
 ) -> float | None:
     """Where a way is waited on within the junction: who turns left off the main road, or at lights, lets pass.
 
-    Where persons cross, nobody waits within a junction without lights, and at lights who turns right waits for them.
+    Where persons cross, no one waits within a junction without lights, and at lights who turns right waits for them.
     """
     ways, zebras = across
     way = ways[number]

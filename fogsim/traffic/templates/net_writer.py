@@ -1,4 +1,4 @@
-"""SUMO's network files, as netconvert writes them: `MSNet` reads what stands there, and nothing is computed anew."""
+"""SUMO's network files, as netconvert writes them: `MSNet` reads what stands there, and nothing is computed again."""
 
 import itertools
 import math
@@ -190,7 +190,7 @@ def _lane_from(way: CrossingWay) -> str:
 
 
 def _area_before(node: Junction, zebra: Zebra) -> WalkingArea:
-    """Where SUMO has a crossing begin: beside the edge that leads away."""
+    """Where SUMO has a crossing begin: next to the edge that leads away."""
     return next(area for area in node.areas if area.away == zebra.away)
 
 

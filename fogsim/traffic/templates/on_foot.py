@@ -28,7 +28,7 @@ class Walker:
     """A person that a scenario places."""
 
     name: str  # Its id
-    way: str = "same_way"  # Way beside which it walks
+    way: str = "same_way"  # Way next to which it walks
     is_left: bool = False  # Whether it begins on the footway to the left of the road
     position: float = 200.0  # Where along that way it begins [m]
     speed: float = WALKING_SPEED  # How fast it walks [m/s]
@@ -40,7 +40,7 @@ class Walker:
 
 @dataclass(frozen=True, slots=True)
 class Footfall:
-    """Persons beside those that a scenario places."""
+    """Persons next to those that a scenario places."""
 
     along: float = 0.0  # Persons who walk along each footway, in both directions together [1/s]
     across: float = 0.0  # Persons who cross at each crossing, from both sides together [1/s]
@@ -93,7 +93,7 @@ def _check(walker: Walker, layout: Layout) -> None:
 
 
 def _beside(walker: Walker, layout: Layout) -> tuple[Edge, float]:
-    """Edge beside which a person begins, and where along it [m]."""
+    """Edge next to which a person begins, and where along it [m]."""
     name, position = edge_at(layout, walker.way, walker.position)
     edge = layout.edge(name)
     return (_opposite(layout, edge, walker.name), edge.length - position) if walker.is_left else (edge, position)
@@ -114,7 +114,7 @@ def _onward(walker: Walker, layout: Layout) -> tuple[str, float]:
 
 
 def _crossed(walker: Walker, layout: Layout) -> tuple[str, float]:
-    """Where a person arrives who crosses: on the other side of the road, beside the crossing."""
+    """Where a person arrives who crosses: on the other side of the road, next to the crossing."""
     zebra = _zebra(walker, layout)
     at = zebra_places(layout, walker.way)[zebra]
     names = layout.way(walker.way)

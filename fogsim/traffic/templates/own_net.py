@@ -14,7 +14,7 @@ _MOST_BYTES = 2_000_000_000
 class KnownEdge:
     """What is known of an edge."""
 
-    lanes: int  # How many lanes it has, beside footways
+    lanes: int  # How many lanes it has, next to footways
     length: float  # Its length [m]
     limit: float  # Its speed limit [m/s]
     footways: int = 0  # How many footways lie to the right of its lanes

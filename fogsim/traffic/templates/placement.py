@@ -1,4 +1,4 @@
-"""Where actors are when a run begins: along their ways, by themselves or beside one another."""
+"""Where actors are when a run begins: along their ways, by themselves or next to one another."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -160,7 +160,7 @@ def edge_at(layout: Ways, way: str, position: float) -> tuple[str, float]:
     for name, following in itertools.pairwise(names):
         length, across = layout.edge(name).length, layout.between(name, following)
         if position <= length + across:
-            # Nobody begins within a junction.
+            # No one begins within a junction.
             return name, min(position, length)
         position -= length + across
     return names[-1], min(position, layout.edge(names[-1]).length)

@@ -14,7 +14,7 @@ from fogsim.traffic.templates.net_plan import Edge, Link, NetPlan
 RAMP = "ramp"
 """Name of the way from the ramp, and of its first edge."""
 
-_PARALLEL = 40.0  # [m] along which the ramp runs beside the motorway before they are one carriageway
+_PARALLEL = 40.0  # [m] along which the ramp runs next to the motorway before they are one carriageway
 _NOSE = 0.6  # [m] between them there
 _PRIORITY, _RAMP_PRIORITY = 10, 5
 

@@ -28,7 +28,7 @@ _GREEN, _YELLOW, _RED = 25.0, 3.0, 2.0  # of traffic lights; red is when all hav
 _WALK = 18.0  # green for persons [s]
 _MAIN, _SIDE = 4, 2  # priorities
 _RING_WIDTH = 5.0  # [m]
-_ASIDE, _HALF_NODE = math.radians(22.0), math.radians(13.0)  # of entries and exits of a roundabout beside their arm
+_ASIDE, _HALF_NODE = math.radians(22.0), math.radians(13.0)  # of entries and exits of a roundabout next to their arm
 _APPROACH = 9.0  # from the middle of the ring to where an arm ends [m]
 _TURNS = {"straight": 2, "left": 3, "right": 1}
 """Where it goes to, by how many arms on counterclockwise."""

@@ -28,7 +28,7 @@ HIDES_ABOVE = 20.0
 """Distance within which a vehicle ahead may hide sky or roof above the lane [m]."""
 
 HALF_LANE, ASIDE = 1.2, (4.0, 7.0)
-"""Half the width of the own lane's middle, and the strips beside it that low beams light least [m]."""
+"""Half the width of the own lane's middle, and the strips next to it that low beams light least [m]."""
 
 LAMP, LAMPS_SHARE, DARK_SKY = 250.0, 0.004, 140.0
 """Luminance of what may be a lamp in the sky, least share of the sky's pixels that lamps cover [-], and most luminance
@@ -61,7 +61,7 @@ def lit_by_lamps(level: Pixels, camera: Camera, lead: LeadMeasurement | None = N
     What the sky alone lights is never brighter than the sky, however bright its surface and however dense the fog: a
     perfectly white road has the mean luminance of the sky, and air along the way at most that of the sky behind it.
     Oncoming lamps brighten the fog along the horizon, so the sky is measured above that. Street lamps brighten the sky,
-    too; but they stand out of it, and own lamps still light the own lane more than what lies beside it. In a tunnel the
+    too; but they stand out of it, and own lamps still light the own lane more than its sides. In a tunnel the
     ceiling over the lane is darker than the road, though bright walls may be seen at the height of the sky; the dark
     rear of a truck right ahead says nothing of that kind.
 

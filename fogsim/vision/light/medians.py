@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from fogsim.jit import kernel
 
 MOST_SAMPLES = 64
-"""Pixels that one row's statistic is made of; more cost time and gain little beside the road's own texture."""
+"""Pixels that one row's statistic is made of; more cost time and gain little next to the road's own texture."""
 
 FEWEST_SAMPLES = 3
 """Fewest pixels of a row of a region that make a median."""

@@ -66,7 +66,7 @@ def _gaussian() -> Image:
 class EdgeDetector:
     """Edge detector for images of one size, which works in buffers of its own.
 
-    Large arrays made anew for every frame cost more than the filters: the result of a call is overwritten by the next.
+    Large arrays made again for every frame cost more than the filters: the result of a call is overwritten by the next.
 
     Takes `of_row`, `of_road` [px].
     """

@@ -115,7 +115,7 @@ class _EdgePoints:
 def _edge_points(edges: NDArray[np.uint8], luminance: NDArray[np.float32], first_row: int) -> _EdgePoints:
     rows, cols = np.nonzero(edges[first_row:, 3:-3])
     rows, cols = rows + first_row, cols + 3
-    # Central differences at the edge and beside it.
+    # Central differences at the edge and next to it.
     left, here, right = (luminance[rows, cols + i + 1] - luminance[rows, cols + i - 1] for i in (-1, 0, 1))
     sign = np.sign(here)
     bend = sign * (left - 2.0 * here + right)

@@ -1,4 +1,4 @@
-"""The luminance of the road's rows within a corridor along the vehicle's axis, beside what a vehicle ahead hides."""
+"""The luminance of the road's rows within a corridor along the vehicle's axis, next to what a vehicle ahead hides."""
 
 import math
 

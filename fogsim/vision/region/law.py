@@ -16,7 +16,7 @@ BLOCKS = 10
 """Stretches of road, each in the same ratio of distances, whose residuals are taken to be independent."""
 
 PATTERNS = 24
-"""Curves that are drawn anew from one."""
+"""Curves that are drawn again from one."""
 
 ALBEDO_DEVIATION = 0.03
 """Relative deviation of k by slow changes of a road's reflectance, which look like fog [-]."""
@@ -119,7 +119,7 @@ def _read_below(curve: RoadCurve, shift: float, read: Read) -> float:
 
 
 def spread(values: Floats, about: float) -> float:
-    """Robust standard deviation of what curves drawn anew gave about what the curve itself gave (`values` (n,))."""
+    """Robust standard deviation of what curves drawn again gave about what the curve itself gave (`values` (n,))."""
     apart = np.abs(values[np.isfinite(values)] - about)
     if apart.size < 2:
         return math.inf

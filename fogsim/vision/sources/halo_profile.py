@@ -85,7 +85,7 @@ def is_selected(tree: SourceTree, source: int) -> bool:
 
 
 def _is_satellite(tree: SourceTree, source: int) -> bool:
-    """Whether a source is a speck, of noise say, beside a much larger one in whose branch it ends."""
+    """Whether a source is a speck, of noise say, next to a much larger one in whose branch it ends."""
     into, last = int(tree.merged_into[source]), int(tree.last[source])
     return into != source and tree.nodes[last, source, AREA] * GROWTH < tree.nodes[last, into, AREA]
 

@@ -7,7 +7,7 @@ import numpy as np
 from fogsim.vision.strips.airlight_slopes import DROPLET_CHANCES
 
 OTHER_ROAD = 30.0
-"""Way after which a picture shows so much other road that what it tells counts anew [m]."""
+"""Way after which a picture shows so much other road that what it tells counts again [m]."""
 
 LASTS = 1000.0
 """Way over which droplets stay the same [m]."""

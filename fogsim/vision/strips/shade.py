@@ -48,7 +48,7 @@ NOTHING = np.zeros(0, np.bool_)
 """Bins in use of an answer that is only a start."""
 
 MISLED = 0.15
-"""How likely a shadow's edge is taken for a line along the road, so that the told horizon is better than the seen one
+"""How likely a shadow's edge is taken for a line along the road, so that the assumed horizon is better than the seen
 [-]."""
 
 

@@ -160,7 +160,7 @@ def sky_shading(
     """Sky as L = a + b x + c y + e y² − d (1 − cos⁴ of the angle to the camera's axis), in Cauchy's norm.
 
     Returns a, b, c, e, d, their covariance, the share of pixels that lie near, and the robust deviation of all of them
-    beside their noise [linear grey levels] (5, 5). Takes `rows` (n,) int64, `axis` (4,) [px], `bright` (n,) [linear
+    next to their noise [linear grey levels] (5, 5). Takes `rows` (n,) int64, `axis` (4,) [px], `bright` (n,) [linear
     grey levels], `noise` [linear grey levels].
     """
     cols, count = image.pixels.shape[1], SHADING_COLS
@@ -198,7 +198,7 @@ def _scatter(
     found: NDArray[np.float64],
     noise: float,
 ) -> float:
-    """Robust deviation of pixels from a sky's shading, beside that of their noise."""
+    """Robust deviation of pixels from a sky's shading, next to that of their noise."""
     apart = np.empty(seen.size)
     for i in range(height.size):
         for j in range(aside.size):

@@ -17,7 +17,7 @@ from fogsim.vision.strips.strip_geometry import StripGeometry
 Floats = NDArray[np.float64]
 
 GRAIN = 0.5
-"""Size of pieces of road whose albedo counts as independent beside the patches [m]."""
+"""Size of pieces of road whose albedo counts as independent next to the patches [m]."""
 
 ALL_PIXELS = np.array([[-math.inf], [math.inf]])
 """Limits that every pixel is within [linear grey levels]."""

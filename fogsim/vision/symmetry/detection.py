@@ -99,7 +99,7 @@ def detect_signs(
 
     Returns the surest first; of those in the same place one. Takes `image` (rows, cols), `radii` [px].
     """
-    # numba would compile all anew for an array that cannot be written.
+    # numba would compile all again for an array that cannot be written.
     pixels: NDArray[Any] = np.require(image if image.ndim == 3 else image[:, :, None], requirements=["C", "W"])
     if regions is None:
         searches = list(_tiles(pixels.shape[:2], radii))

@@ -1,6 +1,6 @@
 """Where the ground ahead ends in airlight, nearer than even fog has it: the front of a bank that hides all beyond it.
 
-Far away lanes are a few pixels wide, and a vehicle ahead hides them; ground beside the road, vehicles and trees vanish
+Far away lanes are a few pixels wide, and a vehicle ahead hides them; ground next to the road, vehicles and trees vanish
 in a bank as the road does. So whole rows are looked at: how much of each is as bright as the sky. In even fog that
 share grows slowly towards the horizon, up to which ground is to be seen; before a bank it steps up some rows below it.
 """

@@ -24,7 +24,7 @@ OBSTACLE_CHANCE = 0.01
 """How likely it is that an obstacle that no sensor tells begins in a lane at one of its rows [-]."""
 
 STRANGE = 2.0
-"""What an outlier adds to a cost beside its luminance's chance, where even fog is weighed against uneven [-]."""
+"""What an outlier adds to a cost next to its luminance's chance, where even fog is weighed against uneven [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ def left_out(found: Solution, bins: Bins) -> int:
 def hidden_cost(found: Solution, bins: Bins) -> float:
     """What is to be added to a cost for bins behind obstacles and for outliers.
 
-    In the fit of one fog they are cheap and dear, so that what is behind an obstacle is left out whole. Beside an
+    In the fit of one fog they are cheap and dear, so that what is behind an obstacle is left out whole. Next to an
     obstacle, denser fog is another explanation, and the two are weighed fairly: either's luminance may be any.
     """
     hidden = (found.used == HIDDEN) & (bins.noise > 0)

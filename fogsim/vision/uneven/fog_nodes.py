@@ -16,7 +16,7 @@ MEAN, BROAD = math.log(0.01), 1.6
 """Mean and standard deviation of ln k of fog before anything is seen [ln 1/m]."""
 
 ROUGHNESS = 0.03
-"""Standard deviation of ln k from node to node beside that [-]."""
+"""Standard deviation of ln k from node to node next to that [-]."""
 
 UNEVENNESS = ((0.4, 300.0), (0.25, 100.0), (0.7, 30.0), (0.7, 100.0), (2.0, 80.0))
 """Standard deviations of ln k along the way [-], and their correlation lengths [m]: nearly even, patches, banks."""

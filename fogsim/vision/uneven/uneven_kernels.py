@@ -29,7 +29,7 @@ from fogsim.vision.strips.joint_kernels import (
 )
 
 OTHERS = 3
-"""Parameters beside the cells: airlight, rows by which the horizon is lower, vignetting that is left."""
+"""Parameters next to the cells: airlight, rows by which the horizon is lower, vignetting that is left."""
 
 LONGEST_STEP = 1.2
 """Longest step of ln k of a cell [-]."""

@@ -1,4 +1,4 @@
-"""Airlight beside the vehicle ahead, and whether the sky or lamps light the road before it."""
+"""Airlight next to the vehicle ahead, and whether the sky or lamps light the road before it."""
 
 import math
 from collections.abc import Callable
@@ -138,10 +138,10 @@ BLOCKS, BRIGHT_BLOCKS = 12, 80.0
 """Blocks of columns of the sky, and the percentile of their brightness that is the airlight: trees hide the others."""
 
 HALF_TRUCK = 1.6
-"""How much of the sky beside the axis a high vehicle ahead can hide [m]."""
+"""How much of the sky next to the axis a high vehicle ahead can hide [m]."""
 
 ALIKE = 0.03
-"""How far from the light of all of the sky a pixel's may be, relative to it, beside noise [-]: trees are darker."""
+"""How far from the light of all of the sky a pixel's may be, relative to it, next to noise [-]: trees are darker."""
 
 LEAST_SEEN = 0.05
 """Share of a block's pixels that must be of that light for the block to count [-]."""

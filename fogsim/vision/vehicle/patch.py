@@ -26,7 +26,7 @@ class Patch:
     # half_width, half_height: size of the followed thing about that point [px]; the patch may hold more around it
     half_width: float
     half_height: float
-    blur: float = 0.0  # Standard deviation of the lens' blur beside the pixels' own size [px]
+    blur: float = 0.0  # Standard deviation of the lens' blur next to the pixels' own size [px]
 
 
 @dataclass(frozen=True, slots=True)

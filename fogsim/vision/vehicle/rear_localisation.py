@@ -24,7 +24,7 @@ NARROWER = 1.5
 """Factor by which a motorcycle must stand out more than the wider vehicle that might be there instead [-]."""
 
 ASIDE = 3.5
-"""Farthest that a vehicle's middle is looked for beside the own axis [m]."""
+"""Farthest that a vehicle's middle is looked for next to the own axis [m]."""
 
 USUAL_ASIDE = 1.2
 """Standard deviation of that offset [m]: place in the lane, heading of the own vehicle, bends."""
@@ -149,7 +149,7 @@ def _pair(
     wanted = np.arange(math.floor(widths[0] * scale), math.ceil(widths[1] * scale) + 1)
     for width in wanted[(wanted >= 3) & (wanted < step.size - 1)]:
         first, second = step[:-width], step[width:]
-        # A rear is darker than what is beside it on both sides, or brighter on both.
+        # A rear is darker than what is next to it on both sides, or brighter on both.
         strength = np.where(first * second < 0, np.minimum(np.abs(first), np.abs(second)), 0.0)
         middle = np.arange(strength.size) + 0.5 * width
         usual = np.exp(-0.5 * ((middle - axis) / (USUAL_ASIDE * scale)) ** 2)

@@ -32,7 +32,7 @@ OUTLIER = 4.0
 """Residual beyond which a pixel shows something that has changed (a lit lamp), in robust standard deviations [-]."""
 
 OWN_SHARE, EDGE_SHARE = 0.25, 0.5
-"""What a pixel's residual may be beside that: shares of its own contrast and of the change to its neighbours (half a
+"""What a pixel's residual may be next to that: shares of its own contrast and of the change to its neighbours (half a
 pixel of misplacement), so that small bright things that carry the contrast are not taken for changes [-]."""
 
 SATURATED = 250.0
@@ -176,7 +176,7 @@ def _step(near: Patch, grid: PixelGrid, at: Placement, prior: PlacementPrior, no
         return None
     used, slope, near_mean, mean, scale = line
     residual = (grid.far - mean - slope * (shown - near_mean))[used]
-    # From either side, so that a mirrored picture is placed alike; only what is moved is computed anew.
+    # From either side, so that a mirrored picture is placed alike; only what is moved is computed again.
     sides = (1.0, -1.0)
     right, left = (matrix_product(rows, column_weights(near, grid, _moved(at, s * NUDGE, 0.0, 0.0)).T) for s in sides)
     below, above = (matrix_product(shrunk_rows(near, grid, _moved(at, 0.0, s * NUDGE, 0.0)), cols.T) for s in sides)
@@ -284,7 +284,7 @@ def register_rear(
 
 
 def _less_road_beside(contrast: Floats, lateral: Floats, reference: RearPicture) -> Floats:
-    """Contrast less that of the road beside the vehicle at the same height: near road fades into far road upwards."""
+    """Contrast less that of the road next to the vehicle at the same height: near road fades into far road upwards."""
     beside = np.abs(lateral) > 0.5 * reference.width + 0.3 * ASIDE
     outer = contrast[:, beside] if beside.any() else contrast[:, [0, -1]]
     return np.asarray(contrast - np.median(outer, axis=1)[:, None], np.float64)

@@ -1,7 +1,7 @@
 """Foes at junctions, as SUMO tells them, and none where it cannot.
 
-Where nobody has the right of way (junctions of type ``unregulated``, also those that netconvert makes so since they
-have too many lanes), nobody yields; SUMO 1.28 ends with a segmentation fault if it is asked for foes there.
+Where no one has the right of way (junctions of type ``unregulated``, also those that netconvert makes so since they
+have too many lanes), no one yields; SUMO 1.28 ends with a segmentation fault if it is asked for foes there.
 """
 
 import functools
@@ -70,7 +70,7 @@ class JunctionFoes:
 
 
 def unregulated_junctions(net: Path) -> frozenset[str]:
-    """Junctions of a network at which nobody has the right of way; none if there is no such file here."""
+    """Junctions of a network at which no one has the right of way; none if there is no such file here."""
     if not net.is_file():
         return frozenset()
     with open_unpacked(net) as source:

@@ -51,7 +51,7 @@ LONG_LANE = 150.0
 """On shorter lanes a junction is always near [m]."""
 
 FASTEST_GAIN = 10.0
-"""Nobody is faster by more than this after `ALONG_A_LANE` [m/s]."""
+"""No one is faster by more than this after `ALONG_A_LANE` [m/s]."""
 
 # Of the lamps that others light, on any side of a vehicle.
 _BRIGHTEST = max(BRIGHTEST, intensity_toward(int(OTHERS_LAMPS), 0.0, 1.0, 0.0))
@@ -169,5 +169,5 @@ class JunctionSight:
         return seen
 
     def release(self) -> None:
-        """Let everybody on the road yield to everybody again."""
+        """Let everyone on the road yield to everyone again."""
         self._unseen.release(self._roster.present)

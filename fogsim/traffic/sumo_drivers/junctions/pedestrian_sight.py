@@ -23,7 +23,7 @@ LOOK_PERIOD = 0.2
 """Time between two looks at pedestrians [s]."""
 
 FARTHEST_PERSON = 100.0
-"""Nobody yields to a pedestrian farther away than this [m]."""
+"""No one yields to a pedestrian farther away than this [m]."""
 
 CONTRAST = 0.6
 """Contrast of a person in everyday clothes to the airlight [-]; FogSim's choice."""
@@ -143,5 +143,5 @@ class PedestrianSight:
         return float(self._fog.optical_depth(eyes, end)) <= limit
 
     def release(self) -> None:
-        """Let everybody yield to every pedestrian again."""
+        """Let everyone yield to every pedestrian again."""
         self._unseen.release(self._roster.present)

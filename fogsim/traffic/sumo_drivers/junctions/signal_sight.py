@@ -27,10 +27,10 @@ SIGNAL_HEIGHT = 2.0
 """Height above the road of the line of sight: between eyes and signal heads [m]."""
 
 EYE_HEIGHT, HEAD_HEIGHT = 1.2, 3.0
-"""Heights above the road from which and at which a light is looked for past what stands beside the road [m]."""
+"""Heights above the road from which and at which a light is looked for past what stands next to the road [m]."""
 
 REACH = 250.0
-"""Nobody brakes for a light farther ahead than this [m]."""
+"""No one brakes for a light farther ahead than this [m]."""
 
 MAX_PAUSE = 0.5
 """A driver within reach of a light looks at least this often [s]."""
@@ -42,7 +42,7 @@ FAR_PAUSE = 2.0
 """And one who is not, at least this often [s]."""
 
 FASTEST_GAIN = 10.0
-"""Nobody is faster by more than this after `FAR_PAUSE` [m/s]."""
+"""No one is faster by more than this after `FAR_PAUSE` [m/s]."""
 
 _OBEY_LIGHTS = 16
 _STOPPING = frozenset("ryu")
@@ -197,7 +197,7 @@ class SignalSight:
             self._modes.withdraw(driver)
 
     def release(self) -> None:
-        """Let everybody on the road obey lights again."""
+        """Let everyone on the road obey lights again."""
         for driver in self._roster.present.intersection({*self._unseen, *self._braking_late}):
             self._modes.withdraw(driver)
         self._unseen.clear()

@@ -87,7 +87,7 @@ class UnseenFoes:
             self._ignored.ignore(driver, ())
 
     def release(self, present: Collection[str]) -> None:
-        """Let everybody react to everybody again."""
+        """Let everyone react to everyone again."""
         for driver in self._since.keys() & set(present):
             self._ignored.ignore(driver, ())
         self._since.clear()

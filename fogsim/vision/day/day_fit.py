@@ -52,6 +52,9 @@ UNLIKELY = -1e4
 """Logarithm of the chance of what was not tried."""
 
 
+FEWEST_BINS = 4
+"""Fewest bins of road about which anything can be said."""
+
 VEHICLE, RANGE_MARGIN = 1.8, 0.5
 """Height up to which a vehicle ahead may hide the sky, and by how much its foot may be nearer than its range says
 [m]."""
@@ -110,6 +113,8 @@ def fit_day(
     bins = row_bins(camera, horizon.standard_deviation, round(horizon.row))
     if math.isfinite(free):
         bins = _without_vehicle(bins, camera, horizon.row, free)
+        if int((bins.first > horizon.row).sum()) < FEWEST_BINS:
+            return _nothing_seen(camera)
     rows = read_rows(pixels, bins, camera, horizon.row)
     fit = replace(_weighed(rows, camera, horizon, earlier), doubt=_doubt(rows, camera, horizon, claimed))
     if earlier is None:
@@ -260,6 +265,23 @@ class _Grid:
         places = np.ascontiguousarray(cells)
         evidence_grid(self._rows, self._lens, places, tried, self._surfaces, laws, lights.size, self._shift, out)
         return np.where(np.isfinite(out), out, UNLIKELY)
+
+
+def _nothing_seen(camera: Camera) -> DayFit:
+    """What is known beforehand: a vehicle hides the road."""
+    logs, _, likely = _visibilities()
+    chances = curves_of(camera).chance, SURFACES.chance, LIGHTS.chance
+    return DayFit(
+        logs,
+        np.exp(likely),
+        0.0,
+        *chances,
+        clipped=0.0,
+        brightest=1.0,
+        contrast=1.0,
+        response_deviation=0.0,
+        obstacle=math.inf,
+    )
 
 
 def _without_vehicle(bins: RowBins, camera: Camera, horizon: float, free: float) -> RowBins:

@@ -25,4 +25,4 @@ def test_oncoming_lamps_leave_the_fog_to_be_seen() -> None:
     assert any(step.observation.light is not None and step.observation.light.oncoming for step in steps)
     assert all(step.belief.is_informed() for step in steps)
     assert all(step.belief.visibility_quantile(0.05) <= 70.0 <= step.belief.visibility_quantile(0.95) for step in steps)
-    assert all(Lamp.FRONT_FOG in step.command.lamps for step in steps[15:])
+    assert all(Lamp.FRONT_FOG in step.command.lamps for step in steps[18:])

@@ -40,7 +40,8 @@ def test_a_video_says_nearly_the_same_as_its_frames(drive) -> None:
 
 def test_images_from_disk_are_estimated_as_those_in_memory(drive) -> None:
     estimator = make("negru2013", drive.camera)
-    in_memory = [estimator.update(Observation(Frame(0.0, frame, drive.camera))) for frame in drive.frames]
+    frames = [Frame(0.1 * i, frame, drive.camera) for i, frame in enumerate(drive.frames)]
+    in_memory = [estimator.update(Observation(frame)) for frame in frames]
     from_disk = [result.estimates[0] for result in estimate_images(drive.folder / "images", drive.camera, "negru2013")]
     assert [one.extinction for one in from_disk] == [one.extinction for one in in_memory]
 

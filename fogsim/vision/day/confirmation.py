@@ -23,6 +23,9 @@ MODEL_DEVIATION = 0.15
 """Relative deviation of k by light and surfaces that methods of the road's brightness do not know, next to how far they
 are from the day model; chosen on pool 0 of `benchmarks/camera_kinds.py` [-]."""
 
+CONTRAST = 300.0
+"""Lower end of the day model's visibility from which on its road keeps enough contrast for the air to be clear [m]."""
+
 NOT_CLEAR = "nothing that fog would hide is seen far away: the air may be clear or not"
 
 
@@ -76,15 +79,18 @@ class Confirmation:
         half, limit = NORMAL_90_PERCENT * own.standard_deviation, extinction_from_visibility(CLEAR)
         fit = fit_free_road(np.ascontiguousarray(level), self._camera, self._horizon, free)
         day = verdict_of(fit, self._scale)
+        has_contrast = day.is_clear or (day.is_road and day.interval[0] > CONTRAST)
         # Thin fog may be none, where clear air shows.
         is_open = not day.shows_fog and (own.extinction <= half or own.extinction + half <= limit)
         if day.shows_fog:
             reason = STANDS_OUT if self._stands_out(level, own.extinction - half) else _contradiction(own, day)
         elif is_open:
-            reason = "" if day.is_clear or self._stands_out(level, limit) else NOT_CLEAR
+            reason = "" if has_contrast or self._stands_out(level, limit) else NOT_CLEAR
         else:
             reason = day.reason or DISAGREE
-        least, most = (0.0, day.most if day.is_clear else limit) if is_open else (day.least, day.most)
+        least, most = (0.0, extinction_from_visibility(day.interval[0]) if has_contrast else limit)
+        if not is_open:
+            least, most = day.least, day.most
         more = _beyond(half, max(own.extinction - least, most - own.extinction))
         if day.shows_fog:
             # Behind a vehicle it sees less than the method, and is off by as much as it is unsure.

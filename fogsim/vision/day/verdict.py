@@ -66,6 +66,7 @@ class DayVerdict:
     # doubt, response_deviation: see `DayFit`
     doubt: float
     response_deviation: float
+    is_road: bool = True  # Whether a road is likelier than none
 
     @property
     def is_clear(self) -> bool:
@@ -120,6 +121,7 @@ def verdict_of(fit: DayFit, scale_deviation: float) -> DayVerdict:
         outside=outside if is_sure and is_even else 0.0,
         doubt=fit.doubt,
         response_deviation=fit.response_deviation if fit.below(FOG) > LEAST_FOG else 0.0,
+        is_road=is_road,
     )
 
 

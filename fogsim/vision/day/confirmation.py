@@ -81,7 +81,9 @@ class Confirmation:
         day = verdict_of(fit, self._scale)
         has_contrast = day.is_clear or (day.is_road and day.interval[0] > CONTRAST)
         # Thin fog may be none, where clear air shows.
-        is_open = not day.shows_fog and (own.extinction <= half or own.extinction + half <= limit)
+        is_thin = own.extinction <= half or own.extinction + half <= limit
+        is_thin = is_thin or (has_contrast and agree(own.visibility_interval, day.interval))
+        is_open = not day.shows_fog and is_thin
         if day.shows_fog:
             reason = STANDS_OUT if self._stands_out(level, own.extinction - half) else _contradiction(own, day)
         elif is_open:

@@ -17,6 +17,9 @@ import numpy as np
 import pytest
 
 from fogsim.estimators import ESTIMATORS, make
+from fogsim.estimators.huang2015_medians import Huang2015Repair
+from fogsim.estimators.negru2013 import Negru2013Repair
+from fogsim.estimators.zhu2015_road import Zhu2015Repair
 from fogsim.registry import parameters
 from fogsim.values import Camera, Estimate, Frame, LeadMeasurement, Observation, Response
 
@@ -33,7 +36,9 @@ NOT_BY_DAY = {
 }
 """Methods that cannot tell from this drive by day, and where their relations are tested instead."""
 
-CONFIRMED = ("huang2015_rough", "negru2013", "zhu2015")
+CONFIRMED = {"huang2015_rough": Huang2015Repair, "negru2013": Negru2013Repair, "zhu2015": Zhu2015Repair}
+"""Methods that the day model confirms, and their repairs."""
+
 METHODS = sorted(set(ESTIMATORS) - set(NOT_BY_DAY))
 RANGES = (14.0, 18.0, 22.0, 26.0, 30.0, 35.0, 40.0, 45.0, 50.0)
 """Of the tracked vehicle before the own bumper, which is 1.7 m before the camera [m]."""
@@ -102,7 +107,18 @@ def test_the_drive_tells(reference, method):
     told = f"{method} says nothing of the drive ({found.diagnostics.get('reason')}): mend it or name it in NOT_BY_DAY"
     assert found.valid, told
     assert found.visibility == pytest.approx(100.0, rel=0.1)
-    assert spread(found) < (0.3 if method in CONFIRMED else 0.1)
+    if method not in CONFIRMED:
+        assert spread(found) < 0.1
+
+
+@pytest.mark.parametrize("method", CONFIRMED)
+def test_confirmation_makes_methods_of_the_road_less_sure(drive, reference, method):
+    """What it adds is what they do not know of sky, camera and surface; by themselves they are as sure as others."""
+    repairs = [repair for repair in CONFIRMED[method] if repair.value != "confirmed"]
+    alone = last(method, drive(), repairs=repairs)
+    assert alone.visibility == pytest.approx(reference[method].visibility)
+    assert spread(alone) < 0.1
+    assert spread(alone) < spread(reference[method]) < 0.3
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -65,7 +65,7 @@ class Photograph:
         return [one.astype(np.uint8, copy=False) for one in laid]
 
     def taken_in_fog(self, visibilities: tuple[float, ...]) -> list[Image]:
-        """Lay the fog on the light, before the camera makes a picture of it, whose tone curve no one is told."""
+        """Lay the fog on the light, before the camera makes a picture of it, whose tone curve methods are not given."""
         distance = RoadPlane(Calibration(self.taken_by)).distance()
         above = self.light[np.isinf(distance)]
         air = np.median(above[np.argsort(above.sum(axis=1))[-len(above) // 5 :]], axis=0)

@@ -26,6 +26,7 @@ are from the day model; chosen on pool 0 of `benchmarks/camera_kinds.py` [-]."""
 CONTRAST = 300.0
 """Lower end of the day model's visibility from which on its road keeps enough contrast for the air to be clear [m]."""
 
+UNCONFIRMED = "the rest of the image does not confirm the fog that the road's brightness shows"
 NOT_CLEAR = "nothing that fog would hide is seen far away: the air may be clear or not"
 
 
@@ -89,7 +90,7 @@ class Confirmation:
         elif is_open:
             reason = "" if has_contrast or self._stands_out(level, limit) else NOT_CLEAR
         else:
-            reason = day.reason or DISAGREE
+            reason = UNCONFIRMED
         least, most = (0.0, extinction_from_visibility(day.interval[0]) if has_contrast else limit)
         if not is_open:
             least, most = day.least, day.most

@@ -8,7 +8,15 @@ import pytest
 
 from fogsim.values import Camera, Estimate, LeadMeasurement
 from fogsim.vision.day import confirmation
-from fogsim.vision.day.confirmation import MODEL_DEVIATION, NOT_CLEAR, PERIOD, SOON, Confirmation, without_far_objects
+from fogsim.vision.day.confirmation import (
+    MODEL_DEVIATION,
+    NOT_CLEAR,
+    PERIOD,
+    SOON,
+    UNCONFIRMED,
+    Confirmation,
+    without_far_objects,
+)
 from fogsim.vision.day.day_fit import free_road
 from fogsim.vision.day.far_objects import STANDS_OUT
 from fogsim.vision.day.verdict import DISAGREE, DayVerdict
@@ -62,7 +70,7 @@ def test_a_day_model_with_other_fog_or_without_any_refuses(looked, own):
     other = replace(FOG, extinction=0.2, deviation=0.01, median=0.2, interval=(14.0, 16.0))
     assert once(looked, own, other).diagnostics["reason"] == DISAGREE
     reasons = {once(looked, own, SILENT).diagnostics["reason"], once(looked, OWN, CLEAR).diagnostics["reason"]}
-    assert reasons == {SILENT.reason if own is OWN else NOT_CLEAR, DISAGREE}
+    assert reasons == {UNCONFIRMED if own is OWN else NOT_CLEAR, UNCONFIRMED}
 
 
 def test_clear_air_needs_contrast_far_away(looked):

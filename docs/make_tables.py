@@ -35,7 +35,7 @@ from fogsim.recorders.events import EVENT_COLUMNS
 from fogsim.recorders.table_columns import Column, table_columns, traffic_table_columns
 from fogsim.recorders.trajectories import TRAJECTORY_COLUMNS
 from fogsim.scenario.schema import Scenario
-from fogsim.scenario.section import GIVEN_BY_THE_LOOP, Method
+from fogsim.scenario.section import GIVEN_BY_THE_LOOP, Method, key_descriptions
 from fogsim.scenario.sensors.faults import FaultSection
 from fogsim.scenario.timeline import TimelineEntry
 from fogsim.scene import SIGN_KINDS
@@ -61,7 +61,7 @@ def scenario_keys(model: type[BaseModel] = Scenario, prefix: str = "") -> list[t
             inner = []
             key = field.alias or name
             allowed = _allowed(schema["properties"][key], schema.get("$defs", {}))
-            told = " ".join((field.description or "").split())
+            told = " ".join(key_descriptions(model).get(name, "").split())
             rows.append((f"`{prefix}{key}`", _default(field), allowed, told))
         by_name = get_origin(field.annotation) is dict
         place = ".NAME" if by_name else ".N" if "tuple" in str(field.annotation) else ""

@@ -5,13 +5,28 @@ text is neither, and values are finite unless declared otherwise. Parameters of 
 constructors.
 """
 
+import ast
+import inspect
+import itertools
 import math
+import sys
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, ValidationInfo
-from pydantic_core import InitErrorDetails, PydanticCustomError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    GetJsonSchemaHandler,
+    ValidationError,
+    ValidationInfo,
+)
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError
 
 from fogsim.errors import InputError, is_name
 from fogsim.parameters import parameter_mistakes, paths_in
@@ -136,7 +151,38 @@ RoadEnd = Annotated[float, _endless(0.0), BeforeValidator(_infinity), AfterValid
 class Section(BaseModel):
     """A block of a scenario file: unknown keys are errors, values never change."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
+    # Built on first use: at import, each of a hundred blocks would be built for itself.
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler, /) -> JsonSchemaValue:
+        """JSON Schema of the block, with its keys' docstrings as descriptions."""
+        written = handler(core_schema)
+        properties = handler.resolve_ref_schema(written)["properties"]
+        for name, text in key_descriptions(cls).items():
+            key = cls.model_fields[name].alias or name
+            properties[key] = dict(sorted({**properties[key], "description": text}.items()))
+        return written
+
+
+def key_descriptions(section: type[BaseModel]) -> dict[str, str]:
+    """Docstrings of a block's keys, by attribute; pydantic would read every block's source when it is imported."""
+    found: dict[str, str] = {}
+    for cls in reversed(section.mro()):
+        if cls is not Section and issubclass(cls, Section):
+            body = _classes(cls.__module__)[cls.__name__].body
+            for node, following in itertools.pairwise(body):
+                if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+                    match following:
+                        case ast.Expr(ast.Constant(str(text))):
+                            found[node.target.id] = inspect.cleandoc(text)
+    return found
+
+
+@cache
+def _classes(module: str) -> dict[str, ast.ClassDef]:
+    tree = ast.parse(inspect.getsource(sys.modules[module]))
+    return {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
 
 
 GIVEN_BY_THE_LOOP = frozenset({"camera"})

@@ -7,6 +7,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from fogsim.scenario.schema import Scenario
+from fogsim.scenario.section import key_descriptions
 
 _WORDS = frozenset({"name", "description", "expect", "directory"})
 """Keys that decide nothing about a run."""
@@ -26,13 +27,14 @@ def non_default_settings(scenario: Scenario) -> dict[str, Setting]:
 
 
 def _of_section(section: BaseModel, usual: object, path: tuple[str, ...]) -> Iterator[tuple[str, Setting]]:
+    meanings = key_descriptions(type(section))
     for key, field in type(section).model_fields.items():
         if not path and key in _WORDS:
             continue
         value = getattr(section, key)
         default = getattr(usual, key) if isinstance(usual, type(section)) and hasattr(usual, key) else _default(field)
         if value != default:
-            yield from _of_value(value, default, (*path, key), field.description or "")
+            yield from _of_value(value, default, (*path, key), meanings.get(key, ""))
 
 
 def _default(field: FieldInfo) -> object:

@@ -1,10 +1,11 @@
 """A dirty and a wet windscreen before a camera."""
 
 import math
+from importlib import import_module
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
 
 from fogsim.camera.blots import PUPIL, Blots, passed_light, scattered_blots
 from fogsim.values import Camera
@@ -59,19 +60,19 @@ class WetGlass:
         self._inside, self._shown = _shown_by(drops, camera, self._margin)
         # A disc of radius R has the variance R²/4 along each axis.
         self._defocus = 0.5 * PUPIL * camera.focal_length / STEP
-        self._share = gaussian_filter(self._inside.astype(float), self._defocus)
+        self._share = _smoothed(self._inside.astype(float), self._defocus)
 
     def look_through(self, radiance: Floats32) -> Floats32:
         """Luminance behind the glass (`radiance` (rows, cols, 3) [cd/m²])."""
         behind: Floats32 = radiance
         if self._blur > 0.0:
-            behind = gaussian_filter(radiance, (self._blur, self._blur, 0.0), mode="nearest")
+            behind = _smoothed(radiance, (self._blur, self._blur, 0.0), mode="nearest")
         cells, through = _cells(radiance), np.zeros_like(radiance)
         rows, columns = (place / STEP + self._margin for place in (self._wet_rows, self._wet_columns))
         for channel in range(3):
             light = np.zeros(self._inside.shape)
             light[self._inside] = _between(cells[..., channel], *self._shown)
-            mean = gaussian_filter(light, self._defocus) / np.maximum(self._share, 1e-12)
+            mean = _smoothed(light, self._defocus) / np.maximum(self._share, 1e-12)
             through[self._wet_rows, self._wet_columns, channel] = _between(mean, rows, columns)
         wet: Floats32 = behind * self._passed + (1.0 - self._passed) * through
         return wet
@@ -119,3 +120,8 @@ def _between(grid: Floats, rows: Floats, columns: Floats) -> Floats:
     upper = grid[top, left] * (1.0 - across) + grid[top, right] * across
     lower = grid[bottom, left] * (1.0 - across) + grid[bottom, right] * across
     return np.asarray(upper * (1.0 - down) + lower * down)
+
+
+def _smoothed(values: Any, deviation: Any, **options: Any) -> Any:
+    """SciPy's Gaussian filter, imported by what is soiled alone."""
+    return import_module("scipy.ndimage").gaussian_filter(values, deviation, **options)

@@ -5,57 +5,43 @@ from importlib import import_module
 
 from fogsim import registry
 from fogsim.estimators.cramer_rao import FoggyRoad, extinction_bound
-from fogsim.estimators.huang2015 import Huang2015
-from fogsim.estimators.huang2015_lead import Huang2015Lead
-from fogsim.estimators.huang2015_rough import Huang2015Rough
-from fogsim.estimators.joint_road import JointRoad
-from fogsim.estimators.lead_contrast import LeadContrast
 from fogsim.estimators.learned import OnnxGuest, conformal_factor, onnx_guest
-from fogsim.estimators.negru2013 import Negru2013
-from fogsim.estimators.night.gallen2014 import Gallen2014, Gallen2014Halo
-from fogsim.estimators.night.gallen2014_veil import Gallen2014Veil
-from fogsim.estimators.night.night_road import NightRoad
-from fogsim.estimators.other_sensors.gabb2014 import Gabb2014
-from fogsim.estimators.other_sensors.hautiere2006_stereo import Hautiere2006Stereo
-from fogsim.estimators.other_sensors.scatterometer import Scatterometer
 from fogsim.estimators.protocol import Estimator, TakesCalibrations
-from fogsim.estimators.signs.belaroussi2015 import Belaroussi2015
-from fogsim.estimators.signs.sign_contrast import SignContrast
-from fogsim.estimators.zhu2015 import Zhu2015
 from fogsim.parameters import checked_parameters
 from fogsim.registry import Registry
 from fogsim.values.camera import Camera
 
 
-def _refusing(estimator: type[Estimator]) -> type[Estimator]:
-    """An estimator whose `update` refuses what is not an `Observation`."""
-    estimator.update = checked_parameters(estimator.update)  # type: ignore[method-assign]
+def _refusing(estimator: Callable[..., Estimator]) -> Callable[..., Estimator]:
+    """An estimator's class whose `update` refuses what is not an `Observation`."""
+    estimator.update = checked_parameters(estimator.update)  # type: ignore[attr-defined]
     return estimator
 
 
 ESTIMATORS: Registry[Callable[..., Estimator]] = Registry(
     "estimator",
     {
-        "negru2013": _refusing(Negru2013),
-        "zhu2015": _refusing(Zhu2015),
-        "huang2015": _refusing(Huang2015),
-        "huang2015_rough": _refusing(Huang2015Rough),
-        "huang2015_lead": _refusing(Huang2015Lead),
-        "belaroussi2015": _refusing(Belaroussi2015),
-        "joint_road": _refusing(JointRoad),
-        "lead_contrast": _refusing(LeadContrast),
-        "sign_contrast": _refusing(SignContrast),
-        "gallen2014_veil": _refusing(Gallen2014Veil),
-        "night_road": _refusing(NightRoad),
-        "hautiere2006_stereo": _refusing(Hautiere2006Stereo),
-        "gallen2014": _refusing(Gallen2014),
-        "gallen2014_halo": _refusing(Gallen2014Halo),
-        "gabb2014": _refusing(Gabb2014),
-        "scatterometer": _refusing(Scatterometer),
+        "negru2013": "fogsim.estimators.negru2013:Negru2013",
+        "zhu2015": "fogsim.estimators.zhu2015:Zhu2015",
+        "huang2015": "fogsim.estimators.huang2015:Huang2015",
+        "huang2015_rough": "fogsim.estimators.huang2015_rough:Huang2015Rough",
+        "huang2015_lead": "fogsim.estimators.huang2015_lead:Huang2015Lead",
+        "belaroussi2015": "fogsim.estimators.signs.belaroussi2015:Belaroussi2015",
+        "joint_road": "fogsim.estimators.joint_road:JointRoad",
+        "lead_contrast": "fogsim.estimators.lead_contrast:LeadContrast",
+        "sign_contrast": "fogsim.estimators.signs.sign_contrast:SignContrast",
+        "gallen2014_veil": "fogsim.estimators.night.gallen2014_veil:Gallen2014Veil",
+        "night_road": "fogsim.estimators.night.night_road:NightRoad",
+        "hautiere2006_stereo": "fogsim.estimators.other_sensors.hautiere2006_stereo:Hautiere2006Stereo",
+        "gallen2014": "fogsim.estimators.night.gallen2014:Gallen2014",
+        "gallen2014_halo": "fogsim.estimators.night.gallen2014:Gallen2014Halo",
+        "gabb2014": "fogsim.estimators.other_sensors.gabb2014:Gabb2014",
+        "scatterometer": "fogsim.estimators.other_sensors.scatterometer:Scatterometer",
     },
     group="fogsim.estimators",
     methods=("update", "reset"),
     files={"onnx": onnx_guest},
+    prepared=_refusing,
 )
 """Every estimator by name: called with a camera and keyword parameters it gives an `Estimator`.
 

@@ -1,15 +1,17 @@
 """What every estimator is to the loop."""
 
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
-from fogsim.estimators.night.halos import HaloThreshold
-from fogsim.estimators.night.own_light import OwnLight
-from fogsim.estimators.night.references import VeilReferences
-from fogsim.estimators.signs.operating_range import OperatingRange
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.light import Lamp
 from fogsim.values.observation import Observation
+
+if TYPE_CHECKING:
+    from fogsim.estimators.night.halos import HaloThreshold
+    from fogsim.estimators.night.own_light import OwnLight
+    from fogsim.estimators.night.references import VeilReferences
+    from fogsim.estimators.signs.operating_range import OperatingRange
 
 
 class Estimator(Protocol):
@@ -46,19 +48,19 @@ class Estimator(Protocol):
 class Calibrations(Protocol):
     """Calibrations of a camera, each made when it is first needed; InputError if the camera cannot be calibrated."""
 
-    def veil_references(self, camera: Camera, lamps: Lamp, setback: float) -> VeilReferences:
+    def veil_references(self, camera: Camera, lamps: Lamp, setback: float) -> "VeilReferences":
         """References of the lit head lamps' veil; `setback` is from the front bumper back to the camera [m]."""
         ...
 
-    def own_light(self, camera: Camera, lamps: Lamp, setback: float, head_lamps: str) -> OwnLight:
+    def own_light(self, camera: Camera, lamps: Lamp, setback: float, head_lamps: str) -> "OwnLight":
         """What a camera sees of the lit head lamps in any fog; see `NightRoad` for `head_lamps`."""
         ...
 
-    def halo_threshold(self, camera: Camera) -> HaloThreshold:
+    def halo_threshold(self, camera: Camera) -> "HaloThreshold":
         """Sharpness of halos below which there is fog."""
         ...
 
-    def operating_range(self, camera: Camera, diameter: float) -> OperatingRange:
+    def operating_range(self, camera: Camera, diameter: float) -> "OperatingRange":
         """Distances at which signs of a diameter [m] are detected in fog."""
         ...
 

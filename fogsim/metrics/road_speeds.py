@@ -1,11 +1,11 @@
 """Speeds over a road: those of an ego that drives along it, and of everyone on it in its direction."""
 
 import math
+from importlib import import_module
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from fogsim.metrics.traffic_span import TrafficSpan
 from fogsim.values import Step
@@ -116,7 +116,7 @@ class RoadSpeeds:
         path = self.path
         tangent = np.gradient(path[:, 1:], axis=0)
         tangent /= np.maximum(np.hypot(*tangent.T), 1e-9)[:, None]
-        nearest = np.asarray(cKDTree(path[:, 1:]).query(middle)[1])
+        nearest = np.asarray(import_module("scipy.spatial").cKDTree(path[:, 1:]).query(middle)[1])
         way, along = middle - path[nearest, 1:], tangent[nearest]
         ahead = (way * along).sum(axis=1)
         beside = np.abs(way[:, 0] * along[:, 1] - way[:, 1] * along[:, 0])

@@ -4,10 +4,10 @@ Every function takes scalars or arrays that broadcast, and gives float64 of thei
 """
 
 from dataclasses import dataclass
+from importlib import import_module
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import ndtr
 
 from fogsim.kinematics import DECELERATION, REACTION_TIME
 
@@ -170,6 +170,7 @@ def crash_potential(drac: ArrayLike) -> NDArray[np.float64]:
         Probability [-] by the distribution `AVAILABLE_DECELERATION`, 0 … 1.
     """
     mean, deviation, least, highest = AVAILABLE_DECELERATION
+    ndtr = import_module("scipy.special").ndtr
     below, up_to, below_highest = (
         ndtr((x - mean) / deviation) for x in (least, np.clip(drac, least, highest), highest)
     )

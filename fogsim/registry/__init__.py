@@ -2,6 +2,7 @@
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -31,19 +32,21 @@ class Registry(Mapping[str, T]):
     It also finds users' classes: ``module:Class`` next to a scenario, and entry points of `group` in installed
     packages. They must have `methods` ("a|b" for either) and are guarded: they raise only `MethodError` and
     KeyboardInterrupt. And it makes methods of files: ``onnx:model.onnx`` next to a scenario is made by `files["onnx"]`,
-    from its name, path and time limit.
+    from its name, path and time limit. An entry "package.module:name" is imported on first use, and `prepared`.
     """
 
     def __init__(
         self,
         kind: str,
-        entries: Mapping[str, T],
+        entries: Mapping[str, T | str],
         group: str = "",
         methods: Sequence[str] = (),
         files: Mapping[str, Callable[[str, Path, float | None], T]] = MappingProxyType({}),
+        prepared: Callable[[T], T] = lambda factory: factory,
     ) -> None:
         self.kind = kind
         self._entries = dict(entries)
+        self._prepared = prepared
         self._group = group
         self._methods = tuple(methods)
         self.files = dict(files)
@@ -75,9 +78,11 @@ class Registry(Mapping[str, T]):
         or the class does not fit.
         """
         try:
-            return self._entries[name]
+            entry = self._entries[name]
         except (KeyError, TypeError):
             pass
+        else:
+            return self._imported(name, entry) if isinstance(entry, str) else entry
         if (file := self._file(name, folder)) is not None:
             return self.files[name.partition(":")[0]](name, file, time_limit)
         if self._group and is_class_name(name):
@@ -86,6 +91,12 @@ class Registry(Mapping[str, T]):
         if name not in further:
             raise UnknownNameError(self.kind, name, self.known) from None
         return self._guarded(name, load_announced(further[name]), time_limit)
+
+    def _imported(self, name: str, entry: str) -> T:
+        module, _, own = entry.partition(":")
+        factory: T = self._prepared(getattr(import_module(module), own))
+        self._entries[name] = factory
+        return factory
 
     def find_if_allowed(self, name: str, folder: Path | None, may_import: MayImport = import_anything) -> T | None:
         """As `find`, but None for a user's class whose file defines it and may not be imported."""

@@ -2,10 +2,10 @@
 
 import dataclasses
 from collections.abc import Callable
+from importlib import import_module
 from typing import TypeVar
 
 from fogsim.advice import ADVISERS, Adviser, VehicleAdviser
-from fogsim.calibration.cached import CachedCalibrations
 from fogsim.errors import InputError
 from fogsim.estimators import ESTIMATORS, Estimator
 from fogsim.estimators.protocol import TakesCalibrations
@@ -49,7 +49,9 @@ def estimators(scenario: Scenario, assumed: Camera) -> tuple[Estimator, ...]:
 def supply(estimator: Estimator) -> None:
     """Give an estimator cached calibrations to take where it was given no files of them."""
     if isinstance(estimator, TakesCalibrations):
-        estimator.take_calibrations(CachedCalibrations(load_lamps))
+        # What draws staged scenes is imported when a calibration may be needed.
+        calibrations = import_module("fogsim.calibration.cached").CachedCalibrations(load_lamps)
+        estimator.take_calibrations(calibrations)
 
 
 def fusion(scenario: Scenario) -> Fusion | LocatedFusion:

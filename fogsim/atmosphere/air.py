@@ -126,6 +126,3 @@ class Air:
             0 … 1; for the sky, that of the whole path to the fog's end.
         """
         return transmittance(view, field_at(self.field, time), camera, pose)
-
-    transmission = transmittance
-    """The name that `transmittance` had up to version 0.1."""

@@ -8,9 +8,6 @@ from fogsim.camera.mount import USUAL_MOUNTS, BodyPitch, CameraMount, Suspension
 from fogsim.camera.sampling import averaged, middle_samples, supersampled
 from fogsim.camera.sensor import CameraSensor
 
-Photographer = CameraSensor
-"""The name that `CameraSensor` had up to version 0.1."""
-
 __all__ = [
     "USUAL_MOUNTS",
     "AutoExposure",
@@ -22,7 +19,6 @@ __all__ = [
     "FrameDelivery",
     "LensGlare",
     "Metering",
-    "Photographer",
     "Pixels",
     "Sensor",
     "Suspension",

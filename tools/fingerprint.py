@@ -152,11 +152,10 @@ def _rollout(name: str) -> list[str]:
     with warnings.catch_warnings(action="ignore", category=DeprecationWarning):
         env = gymnasium.make(name)
     env.action_space.seed(1)
-    told = [_hash(*_arrays(env.reset(seed=1)))]
-    for _ in range(STEPS):
-        told.append(_hash(*_arrays(env.step(env.action_space.sample()))))
+    given = [env.reset(seed=1), *(env.step(env.action_space.sample()) for _ in range(STEPS))]
+    hashes = [_hash(*_arrays(one)) for one in given]
     env.close()
-    return told
+    return hashes
 
 
 def _arrays(value: object) -> Iterator[np.ndarray[Any, Any]]:
@@ -226,7 +225,7 @@ def _portable(text: str) -> str:
 
 def _command(*arguments: str | Path, codes: tuple[int, ...] = (0,)) -> str:
     """What a command of FogSim prints."""
-    done = subprocess.run(
+    done = subprocess.run(  # noqa: S603 - FogSim's own command
         [sys.executable, "-m", "fogsim", *arguments], capture_output=True, text=True, check=False, timeout=1200
     )
     if done.returncode not in codes:

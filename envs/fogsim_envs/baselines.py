@@ -13,7 +13,7 @@ from fogsim.metrics import DEFAULT_STANDARD
 from fogsim.registry import Registry, make
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Lamp
-from fogsim_envs.spaces import ADVISED_SPEEDS, LAMP_MODES, action_of
+from fogsim_envs.spaces import ACTION_LEVELS, ADVISED_SPEEDS, LAMP_MODES, action_of
 from fogsim_envs.task.rewards import FRONT_FOG_LAMP_VISIBILITY, REAR_FOG_LAMP_VISIBILITY, TaskWeights
 
 Info = Mapping[str, Any]
@@ -40,7 +40,9 @@ class Unremembering:
 
     def action(self, speed: float, lamps: Lamp) -> NDArray[Any]:
         """The action nearest to an advice, not above it, with lamps (`speed` [m/s])."""
-        return action_of(speed, lamps, isinstance(self._space, spaces.Box))
+        action = action_of(speed, lamps, isinstance(self._space, spaces.Box))
+        is_flat = isinstance(self._space, spaces.Discrete)
+        return np.asarray(np.ravel_multi_index(tuple(action), ACTION_LEVELS)) if is_flat else action
 
 
 class NoAdvice(Unremembering):
@@ -126,7 +128,7 @@ BASELINES: Registry[Callable[..., Policy]] = Registry(
 
 def baseline(name: str, action_space: spaces.Space[Any]) -> Policy:
     """Make a baseline for an environment."""
-    if isinstance(action_space, spaces.Discrete):
+    if isinstance(action_space, spaces.Discrete) and action_space.n != math.prod(ACTION_LEVELS):
         # Who has signs has PettingZoo, without which that room cannot be imported.
         from fogsim_envs.corridor.baselines import SIGN_BASELINES  # noqa: PLC0415
 

@@ -74,11 +74,13 @@ def observation_space(camera: Camera) -> spaces.Dict:
     )
 
 
-def action_space(continuous: bool) -> spaces.Space[Any]:
-    """Space of actions: a speed level and a lamp mode, or both as numbers in −1 … 1."""
-    if continuous:
-        return spaces.Box(-1.0, 1.0, (2,), np.float32)
-    return spaces.MultiDiscrete([len(ADVISED_SPEEDS) + 1, len(LAMP_MODES)])
+ACTION_LEVELS = (len(ADVISED_SPEEDS) + 1, len(LAMP_MODES))
+"""Levels of the advised speed and lamp modes."""
+
+
+def action_space(continuous: bool, levels: tuple[int, int] = ACTION_LEVELS) -> spaces.Space[Any]:
+    """Space of actions: two levels, or two numbers in −1 … 1."""
+    return spaces.Box(-1.0, 1.0, (2,), np.float32) if continuous else spaces.MultiDiscrete(list(levels))
 
 
 def observe(step: Step) -> dict[str, NDArray[Any]]:

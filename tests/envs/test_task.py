@@ -1,6 +1,8 @@
 """The task of version 1: episodes that differ, a reward that cannot be farmed, and what stands in for frames."""
 
 import dataclasses
+import importlib
+import inspect
 import math
 from collections.abc import Iterator
 from typing import Any
@@ -58,6 +60,34 @@ def _at(step: Step, speed: float, acceleration: float = 0.0) -> Step:
 
 def test_gymnasiums_checker_finds_nothing(fast: gymnasium.Env[Any, Any]) -> None:
     check_env(fast.unwrapped, skip_render_check=True)
+
+
+def test_a_number_is_a_pair_of_levels(fast: gymnasium.Env[Any, Any]) -> None:
+    rewards: list[list[Any]] = []
+    with gymnasium.make(FAST, discrete=True) as flat:
+        assert flat.action_space == gymnasium.spaces.Discrete(39)
+        for env, actions in ((flat, (16, 5)), (fast, ([5, 1], [1, 2]))):
+            env.reset(seed=2)
+            rewards.append([env.step(action)[1] for action in actions])
+        assert rewards[0] == rewards[1]
+        rule = fogsim_envs.evaluate("rule", flat, [4])
+    assert rule.mean == fogsim_envs.evaluate("rule", fast, [4]).mean
+
+
+def test_every_version_1_takes_the_same_keywords() -> None:
+    keywords = {
+        name: set(inspect.signature(_class_of(name)).parameters)
+        for name in ("fogsim/FogAdvisory-v1", FAST, "fogsim/FogHighway-v1", "fogsim/FogDrive-v1")
+    }
+    shared = keywords["fogsim/FogAdvisory-v1"]
+    assert shared == keywords["fogsim/FogDrive-v1"] == keywords[FAST] - {"surrogate"}
+    # Roads and traffic are highway-env's.
+    assert shared - {"scenario"} <= keywords["fogsim/FogHighway-v1"]
+
+
+def _class_of(name: str) -> Any:
+    module, _, own = str(gymnasium.spec(name).entry_point).partition(":")
+    return getattr(importlib.import_module(module), own)
 
 
 def test_a_frame_is_observed_and_an_unknown_mode_refused() -> None:

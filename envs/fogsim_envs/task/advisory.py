@@ -21,7 +21,7 @@ from fogsim_envs.actions import checked_action, checked_options
 from fogsim_envs.hosting import TIMEOUT, Simulation, Timeout, begin, checked_timeout, refuse_copies, restart
 from fogsim_envs.infos import flat_numbers
 from fogsim_envs.rendering import RENDER_MODES, StepRenderer, render_modes
-from fogsim_envs.spaces import ImageSize, action_space, command_of
+from fogsim_envs.spaces import ACTION_LEVELS, ImageSize, action_space, command_of
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
 from fogsim_envs.task.observation import task_observation, task_space
 from fogsim_envs.task.own_driver import OwnDriver
@@ -36,7 +36,8 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
     One step is one decision period of the scenario (0.5 s); a frame is drawn and judged in each.
 
     ### Action
-    ``MultiDiscrete([13, 3])``, or with ``continuous=True`` ``Box(-1, 1, (2,))``
+    ``MultiDiscrete([13, 3])``, or with ``continuous=True`` ``Box(-1, 1, (2,))``, or for DQN with ``discrete=True``
+    ``Discrete(39)``, which is 3 · speed level + lamps
 
     | entry | discrete | continuous |
     |---|---|---|
@@ -88,7 +89,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
     observation : "dict", "state", "camera", "camera+sign_map" or "dict+sign_map"
     overrides : ``key.path=value`` each, as after ``fogsim run --set``
     image_size : (width, height) of the camera; None keeps the scenario's
-    continuous : which action space
+    continuous, discrete : which action space
     reward_weights : `TaskWeights`
     render_mode : None, "rgb_array" (the camera frame next to a panel with estimate, truth, advice, speed and lamps), or
     "human" (that in a window, each step as long as it takes)
@@ -114,6 +115,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         overrides: Iterable[str] = (),
         image_size: ImageSize | None = (160, 120),
         continuous: bool = False,
+        discrete: bool = False,
         reward_weights: TaskWeights | None = None,
         render_mode: str | None = None,
         flat_info: bool = False,
@@ -139,7 +141,12 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
             # Once a process; else the first night's reset would take half a second longer than others.
             prepare_lamplight(first)
         self.observation_space = task_space(observation, self._camera)
-        self.action_space = self._make_action_space(continuous)
+        if continuous and discrete:
+            raise InputError("continuous and discrete: expected one of them at most")
+        self._levels = self._action_levels()
+        self.action_space = (
+            spaces.Discrete(math.prod(self._levels)) if discrete else action_space(continuous, self._levels)
+        )
         modes = [mode for mode in self.metadata["render_modes"] if mode in render_modes()]
         self.metadata = {"render_modes": modes, "render_fps": 1 / first.clocks.decision_period_s}
 
@@ -234,7 +241,10 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         if self._simulation is None or self._step is None or self._step.ending is not None:
             raise gymnasium.error.ResetNeeded("the episode is over or none has begun: call reset() before step()")
         name = type(self).__name__ if self.spec is None else self.spec.id
-        chosen = self._commanded(checked_action(action, self.action_space, name))
+        given = checked_action(action, self.action_space, name)
+        if isinstance(self.action_space, spaces.Discrete):
+            given = np.array(np.unravel_index(int(given - self.action_space.start), self._levels))
+        chosen = self._commanded(given)
         self._own = replace(chosen, warning=self._built_in.warning)
         before = self._step
         self._step = self._drive(before)
@@ -244,11 +254,12 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         terminated = self._step.ending is not None and not truncated
         return self._observe(), float(sum(terms.values())), terminated, truncated, self._info(terms)
 
-    def _make_action_space(self, continuous: bool) -> spaces.Space[Any]:
-        return action_space(continuous)
+    def _action_levels(self) -> tuple[int, int]:
+        """Levels of the two entries of an action."""
+        return ACTION_LEVELS
 
     def _commanded(self, action: NDArray[Any]) -> Command:
-        """What a member of the action space stands for."""
+        """The command of two levels, or of two numbers."""
         return command_of(action, self._continuous)
 
     def _completed(self, step: Step) -> Step:

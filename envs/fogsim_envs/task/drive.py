@@ -2,8 +2,6 @@
 
 from typing import Any
 
-import numpy as np
-from gymnasium import spaces
 from numpy.typing import NDArray
 
 from fogsim.values import Command, EgoControl
@@ -27,7 +25,8 @@ class FogDriveEnv(FogAdvisoryV1Env):
     In ``state``, the advised speed is 1.
 
     ### Action
-    ``MultiDiscrete([6, 3])``, or with ``continuous=True`` ``Box(-1, 1, (2,))``
+    ``MultiDiscrete([6, 3])``, or with ``continuous=True`` ``Box(-1, 1, (2,))``, or with ``discrete=True``
+    ``Discrete(18)``, which is 3 · acceleration + lane
 
     | entry | discrete | continuous |
     |---|---|---|
@@ -40,10 +39,8 @@ class FogDriveEnv(FogAdvisoryV1Env):
     * v1: first version
     """
 
-    def _make_action_space(self, continuous: bool) -> spaces.Space[Any]:
-        if continuous:
-            return spaces.Box(-1.0, 1.0, (2,), np.float32)
-        return spaces.MultiDiscrete([len(ACCELERATIONS), len(LANE_CHANGES)])
+    def _action_levels(self) -> tuple[int, int]:
+        return len(ACCELERATIONS), len(LANE_CHANGES)
 
     def _commanded(self, action: NDArray[Any]) -> Command:
         if self._continuous:

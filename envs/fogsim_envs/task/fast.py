@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import extinction
+from fogsim.errors import InputError
 from fogsim.fusion import DatedFusion
 from fogsim.parameters import checked_parameters
 from fogsim.recorders import FramePanel, draw_view_from_above
@@ -18,6 +19,7 @@ from fogsim.scenario.section import Method
 from fogsim.values import Step
 from fogsim_envs.hosting import TIMEOUT, Timeout
 from fogsim_envs.rendering import RENDER_MODES, StepRenderer
+from fogsim_envs.spaces import ImageSize
 from fogsim_envs.task.advisory import FogAdvisoryV1Env
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
 from fogsim_envs.task.rewards import TaskWeights
@@ -45,8 +47,9 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
     frames.
 
     ### Arguments
-    scenario, scenario_distribution, fog_distribution, split, overrides, continuous, reward_weights, flat_info,
-    timeout : as of `FogAdvisoryV1Env`
+    scenario, scenario_distribution, fog_distribution, split, overrides, continuous, discrete, reward_weights,
+    flat_info, timeout : as in `FogAdvisoryV1Env`
+    observation, image_size : "state" and None, so that the keywords are those of `FogAdvisoryV1Env`
     render_mode : None, "rgb_array" (road, traffic and fog from above next to a panel with belief, truth, advice, speed
     and lamps), or "human", which shows it in a window
     surrogate : file with a table of your own, made by ``benchmarks/surrogate.py --fit``; None for the one that was
@@ -65,14 +68,22 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
         scenario_distribution: ScenarioDistribution | Sequence[str | Path | Scenario] | None = None,
         fog_distribution: FogDistribution | None = None,
         split: str = "train",
+        observation: str = "state",
         overrides: Iterable[str] = (),
+        image_size: ImageSize | None = None,
         continuous: bool = False,
+        discrete: bool = False,
         reward_weights: TaskWeights | None = None,
         render_mode: str | None = None,
         surrogate: str | Path | None = None,
         flat_info: bool = False,
         timeout: Timeout = TIMEOUT,
     ) -> None:
+        if observation != "state" or image_size is not None:
+            raise InputError(
+                "observation, image_size: expected 'state' and None, since no frame is drawn here, got "
+                f"{observation!r} and {image_size!r}; fogsim/FogAdvisory-v1 draws frames"
+            )
         is_own = is_own_motorway(scenario, scenario_distribution)
         table = SurrogateTable.load() if surrogate is None else SurrogateTable.load(Path(surrogate))
         self._surrogate = EstimatorSurrogate(table)
@@ -85,6 +96,7 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
             overrides=(*(_DEFAULT if is_own else ()), *_WITHOUT_FRAMES, *overrides),
             image_size=None,
             continuous=continuous,
+            discrete=discrete,
             reward_weights=reward_weights,
             render_mode=render_mode,
             flat_info=flat_info,

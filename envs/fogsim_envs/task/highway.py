@@ -22,7 +22,7 @@ from fogsim_envs.highway import (
     highway_scenario,
     one_frame_clocks,
 )
-from fogsim_envs.hosting import TIMEOUT
+from fogsim_envs.hosting import TIMEOUT, Timeout
 from fogsim_envs.spaces import ImageSize
 from fogsim_envs.task.advisory import FogAdvisoryV1Env
 from fogsim_envs.task.episodes import Episode, FogDistribution, ScenarioDistribution
@@ -91,8 +91,8 @@ class FogHighwayV1Env(FogAdvisoryV1Env):
     config : its configuration; ``duration`` is 150 s where it is not among it
     way : how far the ego has to go [m]; less where the road ends before
     scenario_distribution : `HighwayDistribution`
-    fog_distribution, split, observation, overrides, image_size, continuous, reward_weights, render_mode,
-    flat_info : as of `FogAdvisoryV1Env`; of ``traffic`` no overrides that name files or the ego
+    fog_distribution, split, observation, overrides, image_size, continuous, discrete, reward_weights, render_mode,
+    flat_info, timeout : as in `FogAdvisoryV1Env`; of ``traffic`` no overrides that name files or the ego
 
     ### Version history
     * v1: another fog, light and driver in each episode; the task's reward, in which time and arrival count
@@ -112,9 +112,11 @@ class FogHighwayV1Env(FogAdvisoryV1Env):
         overrides: Iterable[str] = (),
         image_size: ImageSize | None = (160, 120),
         continuous: bool = False,
+        discrete: bool = False,
         reward_weights: TaskWeights | None = None,
         render_mode: str | None = None,
         flat_info: bool = False,
+        timeout: Timeout = TIMEOUT,
     ) -> None:
         if not way > 0.0:
             raise InputError(f"way: expected more than 0 m, got {way!r}")
@@ -130,10 +132,11 @@ class FogHighwayV1Env(FogAdvisoryV1Env):
             overrides=overrides,
             image_size=image_size,
             continuous=continuous,
+            discrete=discrete,
             reward_weights=reward_weights,
             render_mode=render_mode,
             flat_info=flat_info,
-            timeout=TIMEOUT,
+            timeout=timeout,
         )
 
     @checked_parameters

@@ -49,6 +49,7 @@ class EpisodeResult:
     struck: bool  # Whether the ego struck somebody; without an ego, whether anybody did
     cost: float  # Sum of ``info["cost"]``
     terms: Mapping[str, float]  # Undiscounted sums of the reward's terms
+    metrics: Mapping[str, float]  # Metrics of the drive by a study's names; NaN where one is undefined
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +64,9 @@ class Evaluation:
         Mean return and its 95 % interval, by bootstrap over episodes [points].
     arrived, struck : float
         Shares of episodes in which the ego arrived, and struck somebody (without an ego: no one arrives, anybody).
+    metrics : mapping from str to (float, float, float)
+        Mean of each metric, by the names of a study, and its 95 % interval, over the episodes in which it is defined;
+        empty where the environment measures none (`metrics=True`).
     """
 
     episodes: tuple[EpisodeResult, ...]
@@ -71,6 +75,7 @@ class Evaluation:
     high: float
     arrived: float
     struck: float
+    metrics: Mapping[str, tuple[float, float, float]]
 
     def __str__(self) -> str:
         """One line."""
@@ -124,7 +129,7 @@ def evaluate(
         Stable-Baselines3; or the name of one of `fogsim_envs.baselines.BASELINES` (of FogCorridor:
         `fogsim_envs.corridor.baselines.SIGN_BASELINES`).
     env_id : str, gymnasium.Env or pettingzoo.ParallelEnv
-        The environment; one that is made here has ``split="test"`` unless told otherwise. Of several agents
+        The environment; one that is made here has ``split="test"`` and ``metrics=True`` by default. Of several agents
         (``fogsim/FogCorridor-v1``) each asks the policy by itself, and all are paid the same.
     seeds : iterable of int
         Seeds of the episodes.
@@ -145,7 +150,7 @@ def evaluate(
         raise InputError("discount: expected more than 0, got 0")
     if not isinstance(env_id, str):
         return summarise([_episode_of(policy, env_id, seed, discount) for seed in numbers])
-    env = _made(env_id, {"split": "test", **arguments})
+    env = _made(env_id, arguments)
     try:
         return summarise([_episode_of(policy, env, seed, discount) for seed in numbers])
     finally:
@@ -154,11 +159,11 @@ def evaluate(
 
 def _made(env_id: str, arguments: Mapping[str, Any]) -> Any:
     if env_id.rpartition(":")[2] != CORRIDOR:
-        return gymnasium.make(env_id, **arguments)
+        return gymnasium.make(env_id, **{"split": "test", "metrics": True, **arguments})
     # It needs PettingZoo, an extra.
     from fogsim_envs.corridor import parallel_env  # noqa: PLC0415
 
-    return parallel_env(**arguments)
+    return parallel_env(**{"split": "test", **arguments})
 
 
 def _episode_of(policy: AnyPolicy, env: Any, seed: int, discount: float) -> EpisodeResult:
@@ -178,7 +183,17 @@ def summarise(episodes: Sequence[EpisodeResult]) -> Evaluation:
         high,
         sum(episode.ending == "arrived" for episode in episodes) / len(episodes),
         sum(episode.struck for episode in episodes) / len(episodes),
+        _metrics_over(episodes),
     )
+
+
+def _metrics_over(episodes: Sequence[EpisodeResult]) -> dict[str, tuple[float, float, float]]:
+    """Means of metrics and their intervals, over the episodes in which they are defined."""
+    columns = {
+        name: np.array([episode.metrics.get(name, math.nan) for episode in episodes]) for name in episodes[0].metrics
+    }
+    defined = {name: values[~np.isnan(values)] for name, values in columns.items()}
+    return {name: (float(one.mean()), *bootstrap_interval(one)) for name, one in defined.items() if one.size}
 
 
 def bootstrap_interval(values: NDArray[np.float64]) -> tuple[float, float]:
@@ -247,7 +262,8 @@ class _Sums:
 
     def result(self, seed: int, info: Info, struck: bool) -> EpisodeResult:
         ending, time = word_of(info, "ending") or "time", float(info.get("time_s", math.nan))
-        return EpisodeResult(seed, self.value, self.steps, time, ending, struck, self.cost, self.terms)
+        metrics = dict(info.get("metrics", {}))
+        return EpisodeResult(seed, self.value, self.steps, time, ending, struck, self.cost, self.terms, metrics)
 
 
 def _episode(env: gymnasium.Env[Any, Any], policy: Policy, seed: int, discount: float) -> EpisodeResult:

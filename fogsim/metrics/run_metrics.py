@@ -1,7 +1,7 @@
 """All metrics of one run, from its steps one at a time."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -95,6 +95,18 @@ class RunSummary:
         Processors differ in the last bits of exponentials and logarithms, and no measurement has ten digits.
         """
         return {key: _written(value) for key, value in self.values.items()}
+
+    def flat(self) -> dict[str, str | int | float | None]:
+        """Give what `to_json` gives without levels, as studies name it: those of a method become ``method.metric``."""
+        return dict(_flat(self.to_json()))
+
+
+def _flat(values: Mapping[str, JsonValue], prefix: str = "") -> Iterator[tuple[str, str | int | float | None]]:
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{key}.")
+        elif value is None or isinstance(value, str | int | float):
+            yield prefix + key, value
 
 
 def _written(value: JsonValue) -> JsonValue:

@@ -2,7 +2,7 @@
 
 import traceback
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,14 +14,13 @@ from fogsim.loop import run
 from fogsim.metrics import MetricsOfRun, RunMetrics, RunSummary, TrafficRunMetrics
 from fogsim.scenario import Scenario, build
 from fogsim.study.profiles import RunProfiles
-from fogsim.study.run_file import Value
 from fogsim.traffic import libsumo_traffic
 from fogsim.traffic_run import TrafficRun, run_traffic
 from fogsim.values import TrafficStep
 
 
 def measure_run(scenario: Scenario, seed: int, sumo_outputs: Path | None = None) -> dict[str, Any]:
-    """Run a scenario and return its ``metrics``, from `flat_metrics`, and ``profiles``, from `RunProfiles.to_json`."""
+    """Run a scenario and return its ``metrics`` (`RunSummary.flat`) and ``profiles`` (`RunProfiles.to_json`)."""
     standard, profiles = build.safety_standard(scenario), RunProfiles()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnplayedWarning)
@@ -31,7 +30,7 @@ def measure_run(scenario: Scenario, seed: int, sumo_outputs: Path | None = None)
         else:
             of_traffic = TrafficRunMetrics(standard, watchers=[profiles])
             summary = _watched(run_traffic(scenario, seed, sumo_outputs), of_traffic, profiles)
-    return {"metrics": flat_metrics(summary.to_json()), "profiles": profiles.to_json()}
+    return {"metrics": summary.flat(), "profiles": profiles.to_json()}
 
 
 _AnyStep = TypeVar("_AnyStep", bound=TrafficStep)
@@ -42,21 +41,6 @@ def _watched(steps: Iterable[_AnyStep], metrics: MetricsOfRun[_AnyStep], profile
         profiles.update(step)
         metrics.update(step)
     return metrics.summary()
-
-
-def flat_metrics(values: Mapping[str, object]) -> dict[str, Value]:
-    """Metrics without levels: those of a method become ``method.metric``."""
-    return dict(_flat(values))
-
-
-def _flat(values: Mapping[str, object], prefix: str = "") -> list[tuple[str, Value]]:
-    rows: list[tuple[str, Value]] = []
-    for key, value in values.items():
-        if isinstance(value, Mapping):
-            rows += _flat(value, f"{prefix}{key}.")
-        elif value is None or isinstance(value, str | int | float):
-            rows.append((prefix + key, value))
-    return rows
 
 
 def build_without_running(scenario: Scenario) -> None:

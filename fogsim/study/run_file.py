@@ -19,7 +19,7 @@ Value = Word | Annotated[int, Field(strict=True)] | Finite | None
 """Value of a metric, or of a cell of a study's table."""
 
 Metrics = Annotated[dict[str, Value], Field(min_length=1)]
-"""Metrics of a run by name, as `flat_metrics` gives them."""
+"""Metrics of a run by name, as `RunSummary.flat` gives them."""
 
 _ByClass = Annotated[list[Finite], Field(min_length=CLASSES, max_length=CLASSES)]
 

@@ -12,7 +12,7 @@ from fogsim.loop import run
 from fogsim.metrics import RunMetrics, TrafficRunMetrics
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.expect.schema import clauses_of
-from fogsim.study.execution import flat_metrics, outcome_of
+from fogsim.study.execution import outcome_of
 from fogsim.testing.results import finding_to_json
 from fogsim.traffic_run import run_traffic
 
@@ -38,9 +38,8 @@ def check_case(scenario: Scenario, seed: int, sumo_outputs: Path | None = None) 
                 watch.update(instant)
                 ending = instant.ending
             summary = of_traffic.summary()
-    metrics = summary.to_json()
-    findings = [finding_to_json(one) for one in watch.findings(metrics)]
-    return {"findings": findings, "metrics": flat_metrics(metrics), "ending": ending}
+    findings = [finding_to_json(one) for one in watch.findings(summary.to_json())]
+    return {"findings": findings, "metrics": summary.flat(), "ending": ending}
 
 
 def check_to_file(scenario: Scenario, seed: int, result: Path) -> str | None:

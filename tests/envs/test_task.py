@@ -348,6 +348,27 @@ def test_without_frames_the_road_is_drawn_from_above(fast: gymnasium.Env[Any, An
     assert picture.std() > 5.0
 
 
+def test_an_episode_ends_with_a_studys_metrics() -> None:
+    with gymnasium.make(FAST, metrics=True) as env:
+        _, info = env.reset(seed=1, options={"visibility": 100.0})
+        names, over = list(info["metrics"]), False
+        while not over:
+            assert list(info["metrics"]) == names
+            assert all(math.isnan(value) for value in info["metrics"].values())
+            _, _, terminated, truncated, info = env.step(NO_ADVICE)
+            over = terminated or truncated
+        found = info["metrics"]
+        assert list(found) == names
+        assert found["duration_s"] == info["time_s"]
+        assert found["ego_collisions"] == 0.0
+        assert found["minimum_visibility_m"] == pytest.approx(100.0, rel=0.02)
+        assert math.isnan(found["mean_advised_speed_mps"])
+        rule = fogsim_envs.evaluate("rule", env, [1, 2])
+    mean, low, high = rule.metrics["mean_speed_mps"]
+    assert low <= mean <= high
+    assert mean == pytest.approx(np.mean([episode.metrics["mean_speed_mps"] for episode in rule.episodes]))
+
+
 def test_baselines_are_evaluated() -> None:
     found = fogsim_envs.evaluate("oracle", FAST, seeds=range(2), discount=0.99)
     assert len(found.episodes) == 2

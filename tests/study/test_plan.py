@@ -12,7 +12,6 @@ from fogsim.scenario.document import read_scenario_document
 from fogsim.scenario.loading import catalogue
 from fogsim.scenario.variation import grid_mistake
 from fogsim.study import load_study
-from fogsim.study.execution import flat_metrics
 from fogsim.study.plan import shipped_studies, study_file
 from fogsim.study.table import FIXED_COLUMNS, check_factors, column_mistake
 
@@ -109,7 +108,7 @@ def test_a_factor_is_not_named_like_a_column_of_the_table(tmp_path: Path, name: 
 
 def test_every_metric_of_a_run_is_a_name_that_no_factor_has() -> None:
     for summary in (RunMetrics().summary(), TrafficRunMetrics().summary()):
-        assert all(column_mistake(name) for name in flat_metrics(summary.to_json()))
+        assert all(column_mistake(name) for name in summary.flat())
 
 
 def test_a_metric_of_a_users_own_does_not_take_the_column_of_a_factor() -> None:

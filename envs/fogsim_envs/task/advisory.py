@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fogsim.advised_driving import AdvisedDriving, spread_advice
 from fogsim.ego.view_rendering import prepare_lamplight
 from fogsim.errors import InputError, UnknownNameError
+from fogsim.metrics import RunMetrics
 from fogsim.parameters import checked_parameters
 from fogsim.randomness import Seed
 from fogsim.scenario import Scenario, build
@@ -95,6 +96,8 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
     "human" (that in a window, each step as long as it takes)
     flat_info : whether ``info`` is a flat dictionary of numbers, ``truth/visibility_m`` for example; ``ending``,
     ``warning`` and ``fault`` are then numbers, 0 for none, and ``drawn`` is left out
+    metrics : whether ``info["metrics"]`` of an episode's last step has the metrics of a study by their names, NaN
+    where one is undefined and at all earlier steps; takes 0.1 ms a step
     timeout : how long a child process that runs the simulation may give no sign of life [s]; ``inf`` for ever
 
     ### Version history
@@ -119,6 +122,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         reward_weights: TaskWeights | None = None,
         render_mode: str | None = None,
         flat_info: bool = False,
+        metrics: bool = False,
         timeout: Timeout = TIMEOUT,
     ) -> None:
         checked_timeout(timeout)
@@ -128,6 +132,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         size = () if image_size is None else (f"camera.width={image_size[0]}", f"camera.height={image_size[1]}")
         self._source = EpisodeSource(scenario, scenario_distribution, fog_distribution, (*size, *overrides), split)
         self._mode, self._continuous, self._is_flat = observation, continuous, flat_info
+        self._is_measured, self._measured = metrics, RunMetrics()
         self._weights = reward_weights or TaskWeights()
         self._renderer = self._make_renderer(render_mode)
         self.render_mode = render_mode
@@ -178,6 +183,10 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         self._adviser = AdvisedDriving(scenario)
         self._frames = build.periods(scenario).decision_frames
         self._standard = build.safety_standard(scenario)
+        if self._is_measured:
+            self._measured = RunMetrics(self._standard)
+            self._measured.update(self._step)
+            self._unmeasured = dict.fromkeys(self._metrics(), math.nan)
         self._way_end = self._arrival(self._step, scenario)
         length = max(self._way_end - self._step.route_position, 1.0)
         self._way = Way(length, max(_limit(self._step), 1.0), scenario.duration_s)
@@ -274,6 +283,9 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         for _ in range(self._frames):
             asked = spread_advice(self._own, scenario, before.truth.sections)
             step = self._completed(simulation.advance(self._driver.follow(asked, step)))
+            if self._is_measured:
+                # What the ego's own driver chooses is no advice.
+                self._measured.update(replace(step, command=asked))
             if step.ending is not None:
                 break
         return step
@@ -320,7 +332,14 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
             "reward_terms": terms,
             "drawn": self._episode.as_info(),
         }
+        if self._is_measured:
+            info["metrics"] = self._unmeasured.copy() if step.ending is None else self._metrics()
         return flat_numbers(info) if self._is_flat else info
+
+    def _metrics(self) -> dict[str, float]:
+        """Metrics of the episode so far, NaN where one is undefined."""
+        found = self._measured.summary().flat()
+        return {key: math.nan if one is None else float(one) for key, one in found.items() if key != "ending"}
 
     def render(self) -> NDArray[np.uint8] | None:
         """Draw the latest camera frame and its panel; with a window, each step is drawn as it is made."""

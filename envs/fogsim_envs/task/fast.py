@@ -48,7 +48,7 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
 
     ### Arguments
     scenario, scenario_distribution, fog_distribution, split, overrides, continuous, discrete, reward_weights,
-    flat_info, timeout : as in `FogAdvisoryV1Env`
+    flat_info, metrics, timeout : as in `FogAdvisoryV1Env`
     observation, image_size : "state" and None, so that the keywords are those of `FogAdvisoryV1Env`
     render_mode : None, "rgb_array" (road, traffic and fog from above next to a panel with belief, truth, advice, speed
     and lamps), or "human", which shows it in a window
@@ -77,6 +77,7 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
         render_mode: str | None = None,
         surrogate: str | Path | None = None,
         flat_info: bool = False,
+        metrics: bool = False,
         timeout: Timeout = TIMEOUT,
     ) -> None:
         if observation != "state" or image_size is not None:
@@ -100,6 +101,7 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
             reward_weights=reward_weights,
             render_mode=render_mode,
             flat_info=flat_info,
+            metrics=metrics,
             timeout=timeout,
         )
 

@@ -92,7 +92,7 @@ class FogHighwayV1Env(FogAdvisoryV1Env):
     way : how far the ego has to go [m]; less where the road ends before
     scenario_distribution : `HighwayDistribution`
     fog_distribution, split, observation, overrides, image_size, continuous, discrete, reward_weights, render_mode,
-    flat_info, timeout : as in `FogAdvisoryV1Env`; of ``traffic`` no overrides that name files or the ego
+    flat_info, metrics, timeout : as in `FogAdvisoryV1Env`; of ``traffic`` no overrides that name files or the ego
 
     ### Version history
     * v1: another fog, light and driver in each episode; the task's reward, in which time and arrival count
@@ -116,6 +116,7 @@ class FogHighwayV1Env(FogAdvisoryV1Env):
         reward_weights: TaskWeights | None = None,
         render_mode: str | None = None,
         flat_info: bool = False,
+        metrics: bool = False,
         timeout: Timeout = TIMEOUT,
     ) -> None:
         if not way > 0.0:
@@ -136,6 +137,7 @@ class FogHighwayV1Env(FogAdvisoryV1Env):
             reward_weights=reward_weights,
             render_mode=render_mode,
             flat_info=flat_info,
+            metrics=metrics,
             timeout=timeout,
         )
 

@@ -1,7 +1,6 @@
 """Parameters of methods: the ranges in their annotations hold in scenario files and in Python."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
@@ -21,31 +20,24 @@ from fogsim.values import Camera
 
 CAMERA = Camera(64, 48, 60.0, (31.5, 23.5), 1.4)
 METHODS = [
-    pytest.param(block, kind, name, key, id=f"{name}.{key}")
-    for block, kind in (
-        ("estimators", ESTIMATORS),
-        ("fusion", FUSIONS),
-        ("advice", ADVISERS),
-        ("lighting", LIGHTING_POLICIES),
-    )
+    (kind, name, key)
+    for kind in (ESTIMATORS, FUSIONS, ADVISERS, LIGHTING_POLICIES)
     for name, factory in kind.items()
     for key in accepted_parameters(factory, {"camera"})
 ]
 
 
-@pytest.mark.parametrize(("block", "kind", "name", "key"), METHODS)
-def test_every_parameter_of_every_method_has_a_type_and_a_range(
-    block: str, kind: Registry[Callable[..., Any]], name: str, key: str
-) -> None:
-    given = (CAMERA,) if kind is ESTIMATORS else ()
-    flag = isinstance(accepted_parameters(kind[name])[key].default, bool)
-    # A text may name a file, and which there are is no question of its type.
-    text = [] if mismatch(accepted_parameters(kind[name])[key].annotation, "x") is None else ["x"]
-    for value in (1e30, -1e30, math.nan, math.inf, *text, [], *([1] if flag else [True])):
-        with pytest.raises(InputError, match=rf"^{kind[name].__name__}: {key} must be .*, got "):
-            kind[name](*given, **{key: value})
-        with pytest.raises(InputError, match=rf"^{kind.kind} '{name}': {key}: must be "):
-            registry.make(kind, name, *given, **{key: value})
+def test_every_parameter_of_every_method_has_a_type_and_a_range() -> None:
+    for kind, name, key in METHODS:
+        given = (CAMERA,) if kind is ESTIMATORS else ()
+        flag = isinstance(accepted_parameters(kind[name])[key].default, bool)
+        # A text may name a file, and which there are is no question of its type.
+        text = [] if mismatch(accepted_parameters(kind[name])[key].annotation, "x") is None else ["x"]
+        for value in (1e30, -1e30, math.nan, math.inf, *text, [], *([1] if flag else [True])):
+            with pytest.raises(InputError, match=rf"^{kind[name].__name__}: {key} must be .*, got "):
+                kind[name](*given, **{key: value})
+            with pytest.raises(InputError, match=rf"^{kind.kind} '{name}': {key}: must be "):
+                registry.make(kind, name, *given, **{key: value})
 
 
 @pytest.mark.parametrize(

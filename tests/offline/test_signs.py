@@ -232,9 +232,8 @@ def test_files_that_are_no_map(tmp_path: Path, text: str | None, told: str) -> N
         load_sign_file(tmp_path / "map.geojson")
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "told"),
-    [
+def test_tracks_that_are_refused(tmp_path: Path) -> None:
+    for name, text, told in [
         ("a.csv", None, "cannot be read"),
         ("a.txt", "", r"ends in \.gpx or \.csv"),
         ("a.csv", "time_s,lat\n", "expected a column longitude or lon, got time_s, lat"),
@@ -246,13 +245,11 @@ def test_files_that_are_no_map(tmp_path: Path, text: str | None, told: str) -> N
         ("a.csv", "time_s,lat,lon\n0,1,2\n1,1,2\n", "never moves"),
         ("a.gpx", "<gpx", ":1: not XML"),
         ("a.gpx", '<gpx><trk><trkseg><trkpt lat="1" lon="2"/></trkseg></trk></gpx>', "point 0 has no <time>"),
-    ],
-)
-def test_tracks_that_are_refused(tmp_path: Path, name: str, text: str | None, told: str) -> None:
-    if text is not None:
-        (tmp_path / name).write_text(text, encoding="utf-8")
-    with pytest.raises(InputError, match=told):
-        load_track(tmp_path / name)
+    ]:
+        if text is not None:
+            (tmp_path / name).write_text(text, encoding="utf-8")
+        with pytest.raises(InputError, match=told):
+            load_track(tmp_path / name)
 
 
 @pytest.mark.parametrize(

@@ -129,9 +129,8 @@ def test_what_would_run_as_something_else_is_refused(name: str, told: str) -> No
         _loaded(CASES / f"{name}.xosc")
 
 
-@pytest.mark.parametrize(
-    ("position", "is_along"),
-    [
+def test_a_vehicle_stands_along_its_lane_or_against_it_or_is_refused(tmp_path: Path) -> None:
+    for position, is_along in [
         ('<LanePosition roadId="7" laneId="-1" s="500"><Orientation type="relative" h="6.28"/></LanePosition>', True),
         ('<LanePosition roadId="7" laneId="-1" s="500"><Orientation type="absolute" h="0"/></LanePosition>', True),
         ('<LanePosition roadId="7" laneId="1" s="500"><Orientation type="absolute" h="3.14"/></LanePosition>', True),
@@ -142,21 +141,17 @@ def test_what_would_run_as_something_else_is_refused(name: str, told: str) -> No
         ('<WorldPosition x="500" y="-1.7" h="0.9"/>', False),
         ('<WorldPosition x="500" y="1.7" h="3.1"/>', True),
         ('<RelativeLanePosition entityRef="Ego" dLane="0" ds="9"><Orientation p="1"/></RelativeLanePosition>', True),
-    ],
-)
-def test_a_vehicle_stands_along_its_lane_or_against_it_or_is_refused(
-    tmp_path: Path, position: str, is_along: bool | None
-) -> None:
-    text = (CASES / "turned_round.xosc").read_text(encoding="utf-8")
-    begin = text.index('<LanePosition roadId="7" laneId="-1" s="500">')
-    old = text[begin : text.index("</LanePosition>", begin) + len("</LanePosition>")]
-    file = _changed(tmp_path, "turned_round", (old, position))
-    if is_along or is_along is None:
-        first = _loaded(file).timeline[0].name
-        assert (first == "Init_off_the_lanes") == (is_along is None)
-    else:
-        with pytest.raises(InputError, match="h: vehicles stand, and drive, along their lanes"):
-            _loaded(file)
+    ]:
+        text = (CASES / "turned_round.xosc").read_text(encoding="utf-8")
+        begin = text.index('<LanePosition roadId="7" laneId="-1" s="500">')
+        old = text[begin : text.index("</LanePosition>", begin) + len("</LanePosition>")]
+        file = _changed(tmp_path, "turned_round", (old, position))
+        if is_along or is_along is None:
+            first = _loaded(file).timeline[0].name
+            assert (first == "Init_off_the_lanes") == (is_along is None)
+        else:
+            with pytest.raises(InputError, match="h: vehicles stand, and drive, along their lanes"):
+                _loaded(file)
 
 
 @pytest.mark.parametrize(

@@ -107,11 +107,11 @@ def assert_same(renderers: Pair, vehicles: tuple[Batch, ...], camera: Camera, po
     return by_opengl
 
 
-@pytest.mark.parametrize("camera", [LARGE, SMALL, TILTED], ids=["large", "small", "tilted"])
-@pytest.mark.parametrize("station", [20.0, 1700.0, 3000.0], ids=["straight", "curve", "far on"])
-def test_on_the_motorway(motorway: Pair, route: np.ndarray, camera: Camera, station: float) -> None:
-    view = assert_same(motorway, (), camera, pose_at(route, station))
-    assert {0, 1, 2, 3} <= set(np.unique(view.instance))
+def test_on_the_motorway(motorway: Pair, route: np.ndarray) -> None:
+    for station in [20.0, 1700.0, 3000.0]:
+        for camera in [LARGE, SMALL, TILTED]:
+            view = assert_same(motorway, (), camera, pose_at(route, station))
+            assert {0, 1, 2, 3} <= set(np.unique(view.instance))
 
 
 @pytest.mark.parametrize("camera", [LARGE, SMALL], ids=["large", "small"])

@@ -83,9 +83,8 @@ def test_a_road_by_template_is_written_for_sumo(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["cache", "scenario.yaml"]
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "told"),
-    [
+def test_mistakes_are_told_where_they_stand(tmp_path: Path) -> None:
+    for old, new, told in [
         ("template: motorway", "template: motorwy", "unknown road template 'motorwy'"),
         ("540 veh/h", "540 km/h", "scenario.yaml:4: demand.same_way: "),
         ("oncoming: 540", "ramp: 540", "scenario.yaml:4: demand.ramp_vph: the road has no way 'ramp'"),
@@ -98,11 +97,9 @@ def test_a_road_by_template_is_written_for_sumo(tmp_path: Path) -> None:
         ("ahead_of: ego", "ahead_of: ego, behind: ego", "give one of position_m, ahead_of"),
         ("fog:", "traffic: {net: a.net.xml}\nfog:", "give road or traffic.net, not both"),
         ("road:", "# road:", "traffic: this key is missing"),
-    ],
-)
-def test_mistakes_are_told_where_they_stand(tmp_path: Path, old: str, new: str, told: str) -> None:
-    with pytest.raises(InputError, match=told):
-        loaded(tmp_path, TEXT.replace(old, new, 1))
+    ]:
+        with pytest.raises(InputError, match=told):
+            loaded(tmp_path, TEXT.replace(old, new, 1))
 
 
 def test_demand_and_actors_need_a_road(tmp_path: Path) -> None:

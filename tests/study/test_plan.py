@@ -89,9 +89,8 @@ def test_mistakes_are_named_with_their_place(tmp_path: Path, change: tuple[str, 
         load_study(written(tmp_path, STUDY.replace(*change, 1)))
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
+def test_a_factor_is_not_named_like_a_column_of_the_table(tmp_path: Path) -> None:
+    for name in [
         *sorted(FIXED_COLUMNS),
         "ending",
         "duration_s",
@@ -100,11 +99,9 @@ def test_mistakes_are_named_with_their_place(tmp_path: Path, change: tuple[str, 
         "belief_median_error_percent",
         "estimators.joint_road.valid_share",
         "estimators.mine.anything",
-    ],
-)
-def test_a_factor_is_not_named_like_a_column_of_the_table(tmp_path: Path, name: str) -> None:
-    with pytest.raises(InputError, match=rf"mine\.yaml:8: factors\.{name}: .*; choose another$"):
-        load_study(written(tmp_path, STUDY.replace("visibility:\n", f"{name}:\n", 1)))
+    ]:
+        with pytest.raises(InputError, match=rf"mine\.yaml:8: factors\.{name}: .*; choose another$"):
+            load_study(written(tmp_path, STUDY.replace("visibility:\n", f"{name}:\n", 1)))
 
 
 def test_every_metric_of_a_run_is_a_name_that_no_factor_has() -> None:

@@ -74,17 +74,17 @@ def deviations(tables, rows):
         yield math.log(up_to(veil_along(known[key], k, k)[0], row["reach"]) / row["all"])
 
 
-@pytest.mark.parametrize("fog", ["heavy_advection", "heavy_radiation", "moderate_radiation"])
-@pytest.mark.parametrize(
-    ("from_", "to", "typical", "worst"), [(150, 500, 0.14, 0.4), (50, 100, 0.2, 0.5), (30, 30, 0.3, 0.6)]
-)
-def test_veil_is_that_of_photons(tables, fog, from_, to, typical, worst):
-    sure = PHOTONS["all_error"] < 0.15 * PHOTONS["all"]
-    rows = PHOTONS[(PHOTONS["fog"] == fog) & (PHOTONS["visibility"] >= from_) & (PHOTONS["visibility"] <= to) & sure]
-    found = np.array(list(deviations(tables, rows)))
-    assert len(found) > 4
-    assert math.sqrt(np.mean(found**2)) < typical
-    assert np.abs(found).max() < worst
+def test_veil_is_that_of_photons(tables):
+    for from_, to, typical, worst in [(150, 500, 0.14, 0.4), (50, 100, 0.2, 0.5), (30, 30, 0.3, 0.6)]:
+        for fog in ["heavy_advection", "heavy_radiation", "moderate_radiation"]:
+            sure = PHOTONS["all_error"] < 0.15 * PHOTONS["all"]
+            rows = PHOTONS[
+                (PHOTONS["fog"] == fog) & (PHOTONS["visibility"] >= from_) & (PHOTONS["visibility"] <= to) & sure
+            ]
+            found = np.array(list(deviations(tables, rows)))
+            assert len(found) > 4
+            assert math.sqrt(np.mean(found**2)) < typical
+            assert np.abs(found).max() < worst
 
 
 @pytest.mark.parametrize(

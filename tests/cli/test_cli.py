@@ -107,9 +107,8 @@ def test_an_interrupted_run_leaves_readable_results_that_say_they_are_partial(tm
     assert "PARTIAL" in (out / "report.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
+def test_bad_input_ends_in_one_message_and_writes_nothing(tmp_path: Path, command: Command) -> None:
+    for arguments, message in [
         (["run", "motorway_fog_bnk"], "did you mean 'motorway_fog_bank'?"),
         (["run", "motorway_fog_bank", "--set", "fog.visibilty_m=80"], "fog.visibilty_m: unknown key"),
         (["run", "motorway_fog_bank", "--set", "fog.visibility_m=-80"], "greater than or equal to 1; got -80"),
@@ -126,16 +125,12 @@ def test_an_interrupted_run_leaves_readable_results_that_say_they_are_partial(tm
         (["run", "--sumocfg", TOWN, "--ego", "veh18"], "--visibility is missing"),
         (["run", "--sumocfg", "no.sumocfg", "--ego", "a", "--visibility", "80"], "there is no file 'no.sumocfg'"),
         (["run", "--sumocfg", "no.sumocfg", "--ego", "a"], "there is no file 'no.sumocfg'"),
-    ],
-)
-def test_bad_input_ends_in_one_message_and_writes_nothing(
-    arguments: list[str], message: str, tmp_path: Path, command: Command
-) -> None:
-    done = command(*arguments, cwd=tmp_path)
-    assert done.returncode == 2
-    assert message in done.stderr
-    assert "Traceback" not in done.stderr
-    assert not list(tmp_path.iterdir())
+    ]:
+        done = command(*arguments, cwd=tmp_path)
+        assert done.returncode == 2
+        assert message in done.stderr
+        assert "Traceback" not in done.stderr
+        assert not list(tmp_path.iterdir())
 
 
 def test_validate_tells_the_good_from_the_bad(tmp_path: Path, command: Command) -> None:

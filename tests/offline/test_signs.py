@@ -205,9 +205,8 @@ def test_a_map_that_fogsim_wrote_can_be_read(folder: Path) -> None:
 POINT = feature((24.9, 60.2))
 
 
-@pytest.mark.parametrize(
-    ("features", "members", "told"),
-    [
+def test_maps_that_are_refused(tmp_path: Path) -> None:
+    for features, members, told in [
         ([], {}, "the map has no signs"),
         ([{**POINT, "id": "a"}, {**POINT, "id": "a"}], {}, "two signs have the id 'a'"),
         ([feature((24.9, 60.2), kind=None)], {}, 'feature 0: a sign needs a property "kind"'),
@@ -217,11 +216,9 @@ POINT = feature((24.9, 60.2))
         ([POINT], {"crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::3067"}}}, "is in .urn.*3067"),
         ([POINT], {"coordinates": NET}, "x and y of a SUMO network"),
         ([POINT], {"features": None, "type": "Point"}, "expected a GeoJSON FeatureCollection .*got type 'Point'"),
-    ],
-)
-def test_maps_that_are_refused(tmp_path: Path, features: list[object], members: dict[str, object], told: str) -> None:
-    with pytest.raises(InputError, match=told):
-        load_sign_file(geojson(tmp_path / "map.geojson", *features, **members))
+    ]:
+        with pytest.raises(InputError, match=told):
+            load_sign_file(geojson(tmp_path / "map.geojson", *features, **members))
 
 
 @pytest.mark.parametrize(("text", "told"), [("", ":1: not valid JSON"), ("[]", "got list"), (None, "cannot be read")])

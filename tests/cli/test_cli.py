@@ -20,6 +20,7 @@ from fogsim.scenario import catalogue
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 FOGSIM = (sys.executable, "-m", "fogsim")
 SMALL = ("--set", "camera.width=160", "--set", "camera.height=120", "--set", "duration_s=3", "--set", EARLY)
+RARE = ("--set", "clocks.camera_period_s=1", "--set", "clocks.decision_period_s=1")
 TOWN = str(Path(__file__).resolve().parents[1] / "data" / "grid" / "grid.sumocfg")
 FILES = {"manifest.json", "metrics.json", "steps.parquet", "trajectories.parquet", "video.mp4", "report.html"}
 
@@ -165,7 +166,7 @@ def test_any_sumo_configuration_runs_with_a_chosen_ego(tmp_path: Path) -> None:
     text = Path(TOWN).read_text(encoding="utf-8").replace("grid.", f"{Path(TOWN).parent}/grid.")
     config.write_text(text.replace("</configuration>", f"{own}</configuration>"), encoding="utf-8")
     chosen = ("--sumocfg", str(config), "--ego", "veh18", "--visibility", "120", "--out", str(tmp_path / "out"))
-    done = fogsim("run", *chosen, *SMALL[:4], "--set", "duration_s=600", "--no-video", "--no-report")
+    done = fogsim("run", *chosen, *SMALL[:4], *RARE, "--set", "duration_s=600", "--no-video", "--no-report")
     assert done.returncode == 0, done.stderr
     assert "ended: arrived" in done.stdout
     assert [line.split("=")[0] for line in done.stderr.splitlines() if line.startswith("warning:")] == [

@@ -274,7 +274,7 @@ def test_a_tiny_image_is_worked_on(fogsim, folder: Path, size: tuple[int, int], 
     assert code == 0, err
 
 
-@pytest.mark.parametrize("subject", ["signs", "halos"])
+@pytest.mark.parametrize("subject", [pytest.param("signs", marks=pytest.mark.nightly), "halos"])
 def test_a_camera_of_one_pixel_cannot_be_calibrated(fogsim, folder: Path, subject: str) -> None:
     text = CAMERA_YAML.replace("80", "1").replace("60", "1").replace("[39.5, 29.5]", "[0, 0]")
     (folder / "tiny.yaml").write_text(text, encoding="utf-8")

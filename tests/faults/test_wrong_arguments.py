@@ -324,7 +324,7 @@ def test_a_simulation_that_is_loaded_under_a_session(steps: int) -> None:
     libsumo.start(["sumo", *arguments])
     try:
         session = fogsim.attach(
-            libsumo, ego="veh0", visibility=100.0, settings=("camera.width=32", "camera.height=24"), drivers=False
+            libsumo, ego="veh0", visibility=100.0, settings=("renderer=none", "estimators=[]"), drivers=False
         )
         for _ in range(15):
             libsumo.simulationStep()

@@ -15,7 +15,7 @@ RUNS = ["SUMO alone", "inf m", "30 m"]
 
 @pytest.fixture(scope="module")
 def records() -> list[dict[str, Any]]:
-    arguments = ["--json", "--seconds", "60", "--step", "1", "--visibilities", "inf", "30", "--networks", *NETWORKS]
+    arguments = ["--json", "--seconds", "40", "--step", "1", "--visibilities", "inf", "30", "--networks", *NETWORKS]
     command = [sys.executable, str(PROGRAM), *arguments, "--one-process"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=280, check=False)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -64,14 +64,14 @@ def test_infos_have_one_tree_and_are_numbers_on_request(name: str) -> None:
 
 
 @pytest.mark.filterwarnings("ignore:.*out of date")
-@pytest.mark.parametrize("name", ALL)
-def test_environments_pickle_before_the_reset_and_say_why_not_after(name: str) -> None:
-    env = made(name).unwrapped
-    pickle.loads(pickle.dumps(env))  # noqa: S301 - our own
-    env.reset(seed=1)
-    with pytest.raises(InputError, match=r"only before its first reset\(\)"):
-        pickle.dumps(env)
-    env.close()
+def test_environments_pickle_before_the_reset_and_say_why_not_after() -> None:
+    for name in ALL:
+        env = made(name).unwrapped
+        pickle.loads(pickle.dumps(env))  # noqa: S301 - our own
+        env.reset(seed=1)
+        with pytest.raises(InputError, match=r"only before its first reset\(\)"):
+            pickle.dumps(env)
+        env.close()
 
 
 def test_corridors_pickle_and_their_infos_are_numbers() -> None:

@@ -93,9 +93,8 @@ def eventually(condition: str, within: float = math.inf) -> Eventually:
     return Eventually("a", parse_condition(condition), None, within)
 
 
-@pytest.mark.parametrize(
-    ("clause", "verdict", "time"),
-    [
+def test_eventually() -> None:
+    for clause, verdict, time in [
         (eventually("ego.speed < 15 m/s"), PASSED, 8.0),
         (eventually("ego.speed < 15 m/s", 9.0), PASSED, 8.0),
         (eventually("ego.speed < 15 m/s", 7.0), FAILED, 8.0),
@@ -103,11 +102,9 @@ def eventually(condition: str, within: float = math.inf) -> Eventually:
         (eventually("ego.speed < 5 m/s"), FAILED, 10.0),
         (eventually("ego.speed < 5 m/s", 30.0), OPEN, None),
         (Eventually("a", parse_condition("ego.speed < 15 m/s"), parse_condition("time > 99 s")), OPEN, None),
-    ],
-)
-def test_eventually(clause: Eventually, verdict: FindingVerdict, time: float | None) -> None:
-    found = find(clause, SLOWING)
-    assert (found.verdict, found.time) == (verdict, time)
+    ]:
+        found = find(clause, SLOWING)
+        assert (found.verdict, found.time) == (verdict, time)
 
 
 def reaction(delay: float, hold: float = 99.0) -> list[Step]:

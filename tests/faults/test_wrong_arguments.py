@@ -83,12 +83,10 @@ def test_arguments_of_environments() -> None:
                 assert "did you mean 'overrides'? Known: " in told
 
 
-@pytest.mark.parametrize(
-    "argument", ["scenario", "fog_distribution", "overrides", "reward_weights", "timeout", "split"]
-)
-def test_arguments_of_the_corridor(argument: str) -> None:
-    told = refusal(FogCorridorEnv, **{argument: 5.5 if argument != "timeout" else "x"})
-    assert argument in told
+def test_arguments_of_the_corridor() -> None:
+    for argument in ["scenario", "fog_distribution", "overrides", "reward_weights", "timeout", "split"]:
+        told = refusal(FogCorridorEnv, **{argument: 5.5 if argument != "timeout" else "x"})
+        assert argument in told
 
 
 def test_arguments_of_what_environments_are_given() -> None:
@@ -269,10 +267,10 @@ def test_what_scenarios_and_runs_are_named_by() -> None:
     assert not Path("nowhere").exists()
 
 
-@pytest.mark.parametrize("field", ["lamps_of", "advised_speeds", "stretches", "advice", "lamps", "control", "warning"])
-def test_commands(field: str) -> None:
-    for value in WRONG:
-        assert field in refusal(checked_command, fogsim.Command(**{field: value})) or value == {"a": "b"}
+def test_commands() -> None:
+    for field in ["lamps_of", "advised_speeds", "stretches", "advice", "lamps", "control", "warning"]:
+        for value in WRONG:
+            assert field in refusal(checked_command, fogsim.Command(**{field: value})) or value == {"a": "b"}
 
 
 def test_conditions() -> None:

@@ -154,24 +154,21 @@ def test_a_vehicle_stands_along_its_lane_or_against_it_or_is_refused(tmp_path: P
                 _loaded(file)
 
 
-@pytest.mark.parametrize(
-    ("sun", "lux"),
-    [
+def test_the_sun_is_in_lux(tmp_path: Path) -> None:
+    for sun, lux in [
         ('intensity="0.85" azimuth="3" elevation="-0.2"', 0.85),
         ('intensity="0" azimuth="3" elevation="0.9"', 0.0),
         ('illuminance="900" azimuth="3" elevation="0.05"', 900.0),
         ('intensity="40" azimuth="3" elevation="0.9"', None),
         ('illuminance="0.85" azimuth="3" elevation="0.9"', None),
         ('illuminance="0.5" azimuth="3"', None),
-    ],
-)
-def test_the_sun_is_in_lux(tmp_path: Path, sun: str, lux: float | None) -> None:
-    file = _changed(tmp_path, "sun_between_0_and_1", ('intensity="0.85" azimuth="3" elevation="0.9"', sun))
-    if lux is not None:
-        assert _loaded(file).light.illuminance_lx == lux
-    else:
-        with pytest.raises(InputError, match=r"Sun: (intensity|illuminance): \S+ lx would be night at a sun of"):
-            _loaded(file)
+    ]:
+        file = _changed(tmp_path, "sun_between_0_and_1", ('intensity="0.85" azimuth="3" elevation="0.9"', sun))
+        if lux is not None:
+            assert _loaded(file).light.illuminance_lx == lux
+        else:
+            with pytest.raises(InputError, match=r"Sun: (intensity|illuminance): \S+ lx would be night at a sun of"):
+                _loaded(file)
 
 
 @pytest.mark.parametrize(("intensity", "lux"), [(1.0, 90_164.0), (0.5, 90_164.0 * (1.0 - 0.75 * 0.5**3.4))])

@@ -131,9 +131,9 @@ def test_measures_of_three_vehicles() -> None:
     assert (found.ttc_15, found.ttc_50, found.ttc_below_10) == (2.0, 2.0, 0.5)
 
 
-@pytest.mark.parametrize(("mph", "metres"), [(20, 12), (30, 23), (40, 36), (50, 53), (60, 73), (70, 96)])
-def test_stopping_distances_are_the_highway_codes(mph: float, metres: float) -> None:
-    assert safe_speed(metres, THINKING_TIME, BRAKING) / 0.44704 == pytest.approx(mph, rel=0.02)
+def test_stopping_distances_are_the_highway_codes() -> None:
+    for mph, metres in [(20, 12), (30, 23), (40, 36), (50, 53), (60, 73), (70, 96)]:
+        assert safe_speed(metres, THINKING_TIME, BRAKING) / 0.44704 == pytest.approx(mph, rel=0.02)
 
 
 def test_verdicts() -> None:

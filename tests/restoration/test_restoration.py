@@ -72,22 +72,24 @@ def test_the_distance_of_the_road_is_that_of_its_geometry() -> None:
     assert blocks.shape == (30, 40)
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("most_gain", [2.0, 8.0])
-def test_noise_rises_by_no_more_than_the_bound(method: str, most_gain: float) -> None:
-    rng = np.random.default_rng(2)
-    distance = road_distance(DEEP)[0].astype(np.float64)
-    light = fogged(road(rng), distance)
-    noise = 0.002 * rng.standard_normal(light.shape)
-    given = (K, airlight(DEEP))
-    noisy, calm = (image_of(one, DEEP) for one in (light + noise, light))
-    one, other = (restore_contrast(image, DEEP, *given, method=method, most_gain=most_gain) for image in (noisy, calm))
-    assert one.transmission.min() >= (1.0 - 1e-6) / most_gain
-    sky = distance == FARTHEST
-    difference = (one.image.astype(np.float64) - other.image)[sky].std() / 4095
-    assert difference <= 1.05 * most_gain * 0.002
-    if method == "planar":
-        assert difference < 0.65 * most_gain * 0.002  # what is noise alone is smoothed
+def test_noise_rises_by_no_more_than_the_bound() -> None:
+    for most_gain in [2.0, 8.0]:
+        for method in METHODS:
+            rng = np.random.default_rng(2)
+            distance = road_distance(DEEP)[0].astype(np.float64)
+            light = fogged(road(rng), distance)
+            noise = 0.002 * rng.standard_normal(light.shape)
+            given = (K, airlight(DEEP))
+            noisy, calm = (image_of(one, DEEP) for one in (light + noise, light))
+            one, other = (
+                restore_contrast(image, DEEP, *given, method=method, most_gain=most_gain) for image in (noisy, calm)
+            )
+            assert one.transmission.min() >= (1.0 - 1e-6) / most_gain
+            sky = distance == FARTHEST
+            difference = (one.image.astype(np.float64) - other.image)[sky].std() / 4095
+            assert difference <= 1.05 * most_gain * 0.002
+            if method == "planar":
+                assert difference < 0.65 * most_gain * 0.002  # what is noise alone is smoothed
 
 
 @pytest.mark.parametrize("image", [image_of(np.full((120, 160, 3), 0.4)), image_of(np.full((120, 160), 0.4))])

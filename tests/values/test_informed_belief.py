@@ -91,9 +91,8 @@ def test_constant_lamps_ask_nothing(name: str) -> None:
     assert {lamps(name, belief, NIGHT) for belief in (IGNORANT, certain_belief(0.05))} == {CONSTANT[name]}
 
 
-@pytest.mark.parametrize(
-    ("belief", "gallen2014", "fog_lamp_rules"),
-    [
+def test_lamps_by_belief_alone_on_a_dark_road() -> None:
+    for belief, gallen2014, fog_lamp_rules in [
         (normal(40.0, 0.1), FOG, FOG),
         # With a quarter of chance or more the visibility is too good for the rear fog lamps, which dazzle.
         (normal(47.0, 0.3), LOW | Lamp.FRONT_FOG, LOW | Lamp.FRONT_FOG),
@@ -102,11 +101,9 @@ def test_constant_lamps_ask_nothing(name: str) -> None:
         (normal(130.0, 0.3), LOW, LOW),
         (AT_LEAST_400, HIGH, LOW),
         (certain_belief(0.0), HIGH, LOW),
-    ],
-)
-def test_lamps_by_belief_alone_on_a_dark_road(belief: Belief, gallen2014: Lamp, fog_lamp_rules: Lamp) -> None:
-    assert lamps("gallen2014", belief, NIGHT) == gallen2014
-    assert lamps("fog_lamp_rules", belief, NIGHT) == fog_lamp_rules
+    ]:
+        assert lamps("gallen2014", belief, NIGHT) == gallen2014
+        assert lamps("fog_lamp_rules", belief, NIGHT) == fog_lamp_rules
 
 
 def test_no_high_beams_by_day_or_toward_others_whatever_is_believed() -> None:

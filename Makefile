@@ -14,7 +14,7 @@ INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check uv \
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --use-pep517 --editable '.$(EXTRAS)'; }
 
 .DEFAULT_GOAL := help
-.PHONY: help check demo test quick hooks portability cluster notebooks site browse wheel pythons lint types contracts ci tables clean
+.PHONY: help check demo test affected nightly hooks portability cluster notebooks site browse wheel pythons lint types contracts ci tables clean
 
 help: ## Show what can be made
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -46,18 +46,24 @@ $(VENV)/.compiled: $(VENV)/.installed-test
 demo: $(VENV)/.installed ## Run the demo scenario; results go to runs/demo/
 	@$(BIN)/fogsim run motorway_fog_bank --seed 1 --out runs/demo --overwrite
 
-# Otherwise glibc gives the memory of pictures back after each operation on them, and is given it anew page by page: a
-# tenth of the time of tests that paint. Other C libraries do not know these names.
-test: export MALLOC_MMAP_THRESHOLD_ := 1000000000
-test: export MALLOC_TRIM_THRESHOLD_ := 2000000000
-test: $(VENV)/.installed-test $(VENV)/.compiled ## Run the whole test suite but for what has a command of its own
-	@$(BIN)/python -m pytest -n auto --dist worksteal --ignore tests/portability --ignore tests/cluster --ignore tests/notebooks --ignore tests/site \
-		--ignore tests/pythons
+# Otherwise glibc returns the memory of images after each operation on them and requests it again page by page: a tenth
+# of the time of tests that draw. Other C libraries do not know these names.
+test affected nightly: export MALLOC_MMAP_THRESHOLD_ := 1000000000
+test affected nightly: export MALLOC_TRIM_THRESHOLD_ := 2000000000
+PYTEST = $(BIN)/python -m pytest -n auto --dist worksteal
 
-quick: $(VENV)/.installed-test ## Run the tests that take half a minute together
-	@$(BIN)/python -m pytest -q tests/advice tests/files tests/fusion tests/lighting tests/metrics tests/sensors tests/values
+test: $(VENV)/.installed-test $(VENV)/.compiled ## Run the test suite, except what has its own command and what is nightly
+	@$(PYTEST) -m "not nightly"
 
-hooks: $(VENV)/.installed-test ## Check style, types, contracts and quick tests before each commit
+affected: $(VENV)/.installed-test $(VENV)/.compiled ## Run the tests that changes since the branch left main can touch; REF=HEAD~1: since that commit
+	@tests="$$($(BIN)/python tools/affected.py $(REF))"; \
+	if [ -z "$$tests" ]; then echo "No test can be touched."; else $(PYTEST) -m "not nightly" $$tests; fi
+
+nightly: $(VENV)/.installed-test $(VENV)/.compiled ## Run the tests that take minutes: before a release
+	@$(PYTEST) -m nightly
+	@$(MAKE) portability pythons
+
+hooks: $(VENV)/.installed-test ## Check style, types and contracts before each commit
 	@$(BIN)/pre-commit install
 
 portability: $(VENV)/.installed-test ## Check that other processors' kernels change nothing (compiles all anew)
@@ -122,9 +128,7 @@ $(VENV)/.installed-ci: pyproject.toml | check
 ci: $(VENV)/.installed-ci ## Everything that .ci/run checks
 	@$(MAKE) --jobs=2 --output-sync=target types lint contracts $(VENV)/.compiled
 	@$(MAKE) test
-	@$(MAKE) notebooks
-	@$(MAKE) portability
-	@$(MAKE) --jobs=2 --output-sync=target browse cluster
+	@$(MAKE) --jobs=2 --output-sync=target notebooks browse cluster
 
 tables: $(VENV)/.installed-test ## Measure the docs' tables whose code has changed (resumable); STUDIES=1: policy studies; TABLES="belief …"
 	@$(BIN)/python docs/rerun_tables.py $(TABLES) $(if $(STUDIES),--studies)

@@ -33,6 +33,7 @@ class Checkout:
         known = memory is not None and memory.exists()
         self._known: dict[str, tuple[str, list[str]]] = json.loads(memory.read_text()) if memory and known else {}
         self._read: dict[str, tuple[str, list[str]] | None] = {}
+        self._next: dict[str, list[str]] = {}
         self._remembered = len(self._known)
 
     def files(self, entries: Iterable[str]) -> dict[str, str]:
@@ -40,14 +41,19 @@ class Checkout:
         to_do, found = [path for entry in entries for path in self._expanded(entry)], {}
         while to_do:
             path = to_do.pop()
-            if path in found or (look := self._look(path)) is None:
-                continue
-            found[path] = look[0]
-            to_do += self._beside(path)
-            if not path.startswith("docs/"):
-                to_do += [one for name in look[1] for one in self._named(name, path)]
+            if path not in found and (look := self._look(path)) is not None:
+                found[path] = look[0]
+                to_do += self.next_files(path)
         self._remember()
         return dict(sorted(found.items()))
+
+    def next_files(self, path: str) -> list[str]:
+        """Files that a file imports or names, and the data next to it."""
+        if path not in self._next:
+            look = self._look(path)
+            names = look[1] if look and not path.startswith("docs/") else ()
+            self._next[path] = [*self._beside(path), *(one for name in names for one in self._named(name, path))]
+        return self._next[path]
 
     def changed(self, files: dict[str, str]) -> list[str]:
         """The files whose digests have changed, or that are gone."""

@@ -1,7 +1,6 @@
 """Parameters of methods: the ranges in their annotations hold in scenario files and in Python."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
@@ -21,49 +20,39 @@ from fogsim.values import Camera
 
 CAMERA = Camera(64, 48, 60.0, (31.5, 23.5), 1.4)
 METHODS = [
-    pytest.param(block, kind, name, key, id=f"{name}.{key}")
-    for block, kind in (
-        ("estimators", ESTIMATORS),
-        ("fusion", FUSIONS),
-        ("advice", ADVISERS),
-        ("lighting", LIGHTING_POLICIES),
-    )
+    (kind, name, key)
+    for kind in (ESTIMATORS, FUSIONS, ADVISERS, LIGHTING_POLICIES)
     for name, factory in kind.items()
     for key in accepted_parameters(factory, {"camera"})
 ]
 
 
-@pytest.mark.parametrize(("block", "kind", "name", "key"), METHODS)
-def test_every_parameter_of_every_method_has_a_type_and_a_range(
-    block: str, kind: Registry[Callable[..., Any]], name: str, key: str
-) -> None:
-    given = (CAMERA,) if kind is ESTIMATORS else ()
-    flag = isinstance(accepted_parameters(kind[name])[key].default, bool)
-    # A text may name a file, and which there are is no question of its type.
-    text = [] if mismatch(accepted_parameters(kind[name])[key].annotation, "x") is None else ["x"]
-    for value in (1e30, -1e30, math.nan, math.inf, *text, [], *([1] if flag else [True])):
-        with pytest.raises(InputError, match=rf"^{kind[name].__name__}: {key} must be .*, got "):
-            kind[name](*given, **{key: value})
-        with pytest.raises(InputError, match=rf"^{kind.kind} '{name}': {key}: must be "):
-            registry.make(kind, name, *given, **{key: value})
+def test_every_parameter_of_every_method_has_a_type_and_a_range() -> None:
+    for kind, name, key in METHODS:
+        given = (CAMERA,) if kind is ESTIMATORS else ()
+        flag = isinstance(accepted_parameters(kind[name])[key].default, bool)
+        # A text may name a file, and which there are is no question of its type.
+        text = [] if mismatch(accepted_parameters(kind[name])[key].annotation, "x") is None else ["x"]
+        for value in (1e30, -1e30, math.nan, math.inf, *text, [], *([1] if flag else [True])):
+            with pytest.raises(InputError, match=rf"^{kind[name].__name__}: {key} must be .*, got "):
+                kind[name](*given, **{key: value})
+            with pytest.raises(InputError, match=rf"^{kind.kind} '{name}': {key}: must be "):
+                registry.make(kind, name, *given, **{key: value})
 
 
-@pytest.mark.parametrize(
-    ("setting", "told"),
-    [
+def test_a_scenario_with_a_parameter_out_of_range_is_refused() -> None:
+    for setting, told in [
         ("quantile: 7", "quantile: must be a number 0 … 1, got 7"),
         ("deceleration: 0", "deceleration: must be a number 0.1 … 15 m/s², got 0"),
         ("reaction_time: .nan", "reaction_time: must be a number 0 … 60 s, got nan"),
         ("rounding: 0", "rounding: must be a number 0.01 … 50 m/s, got 0"),
         ("rounding: yes", "rounding: must be a number 0.01 … 50 m/s, got True"),
         ("rounding: '2'", "rounding: must be a number 0.01 … 50 m/s, got '2'"),
-    ],
-)
-def test_a_scenario_with_a_parameter_out_of_range_is_refused(setting: str, told: str) -> None:
-    override = f"advice={{method: stopping_sight_distance, parameters: {{{setting}}}}}"
-    with pytest.raises(InputError) as error:
-        load_scenario("motorway_fog_bank", [override])
-    assert str(error.value) == f"--set {override}: advice.parameters.{told}"
+    ]:
+        override = f"advice={{method: stopping_sight_distance, parameters: {{{setting}}}}}"
+        with pytest.raises(InputError) as error:
+            load_scenario("motorway_fog_bank", [override])
+        assert str(error.value) == f"--set {override}: advice.parameters.{told}"
 
 
 def test_every_wrong_parameter_is_told() -> None:
@@ -82,9 +71,8 @@ def test_numbers_of_any_real_type_are_numbers() -> None:
     assert StoppingSightDistance(2.0) == StoppingSightDistance(reaction_time=2)
 
 
-@pytest.mark.parametrize(
-    ("annotation", "good", "bad", "told"),
-    [
+def test_what_annotations_allow() -> None:
+    for annotation, good, bad, told in [
         (float, [1, -1e300], [math.nan, math.inf, True, "1", None], "a number, finite"),
         (int, [1, np.int64(3)], [1.0, False, "1"], "a whole number"),
         (Annotated[float, Range(0.0, 9.0, "m")] | None, [None, 9], [9.1, "x"], "a number 0 … 9 m or nothing"),
@@ -92,11 +80,9 @@ def test_numbers_of_any_real_type_are_numbers() -> None:
         (str, ["a"], [1], "text"),
         (Literal["a", 1], ["a", 1], ["b", True], "'a' or 1"),
         (list[int], [[1], "anything"], [], ""),
-    ],
-)
-def test_what_annotations_allow(annotation: object, good: list[object], bad: list[object], told: str) -> None:
-    assert [mismatch(annotation, value) for value in good] == [None] * len(good)
-    assert [mismatch(annotation, value) for value in bad] == [told] * len(bad)
+    ]:
+        assert [mismatch(annotation, value) for value in good] == [None] * len(good)
+        assert [mismatch(annotation, value) for value in bad] == [told] * len(bad)
 
 
 def test_a_method_of_the_users_own_is_checked_where_it_is_named() -> None:

@@ -114,9 +114,8 @@ def test_signs_along_named_edges_go_each_by_its_own_meter() -> None:
     assert math.isinf(last.command.advice.speed)
 
 
-@pytest.mark.parametrize(
-    ("overrides", "said"),
-    [
+def test_what_needs_an_ego_is_refused_in_one_line() -> None:
+    for overrides, said in [
         (("estimators=[negru2013]",), r"estimators: reading frames needs an ego, and traffic.ego is none"),
         (("sensors.faults=[{fault: dropout}]",), r"sensors\.faults: a fault of a sensor needs an ego"),
         (("sensors.reports.roadside={camera: {}}",), r"roadside\.camera: drawing images needs an ego"),
@@ -140,12 +139,10 @@ def test_signs_along_named_edges_go_each_by_its_own_meter() -> None:
             ("traffic.ego=ego", "traffic.warm_up_s=5", "estimators=[negru2013]"),
             r"traffic: warm_up_s: goes with ego: none, and the ego is 'ego'",
         ),
-    ],
-)
-def test_what_needs_an_ego_is_refused_in_one_line(overrides: tuple[str, ...], said: str) -> None:
-    with pytest.raises(InputError, match=said) as refused:
-        alone(EVEN, *overrides)
-    assert "\n" not in str(refused.value)
+    ]:
+        with pytest.raises(InputError, match=said) as refused:
+            alone(EVEN, *overrides)
+        assert "\n" not in str(refused.value)
 
 
 def test_frames_need_an_ego() -> None:

@@ -49,17 +49,19 @@ def test_unrounded_speeds_come_as_they_are() -> None:
     assert speeds("stopping_sight_distance", [100.0], rounding=0.01) == [pytest.approx(safe, abs=0.04)]
 
 
-@pytest.mark.parametrize("name", PRESENTED)
-def test_a_higher_speed_asks_for_more_visibility_where_there_is_hysteresis(name: str) -> None:
-    for hysteresis, rises in ((0.0, True), (0.2, False)):
-        low, same, high = speeds(name, [40.0, 44.0, 500.0], hold=0.0, hysteresis=hysteresis, rounding=0.01, minimum=0.0)
-        if name == "stopping_sight_distance":
-            assert (same > low) == rises
-        assert high > low
-    assert speeds("netherlands_a16", [65.0, 80.0, 85.0], hold=0.0, hysteresis=0.2)[1:] == [
-        pytest.approx(60.0),
-        pytest.approx(80.0),
-    ]
+def test_a_higher_speed_asks_for_more_visibility_where_there_is_hysteresis() -> None:
+    for name in PRESENTED:
+        for hysteresis, rises in ((0.0, True), (0.2, False)):
+            low, same, high = speeds(
+                name, [40.0, 44.0, 500.0], hold=0.0, hysteresis=hysteresis, rounding=0.01, minimum=0.0
+            )
+            if name == "stopping_sight_distance":
+                assert (same > low) == rises
+            assert high > low
+        assert speeds("netherlands_a16", [65.0, 80.0, 85.0], hold=0.0, hysteresis=0.2)[1:] == [
+            pytest.approx(60.0),
+            pytest.approx(80.0),
+        ]
 
 
 def test_smoothing_follows_an_exponential_in_the_logarithm_of_the_visibility() -> None:

@@ -20,9 +20,8 @@ def certain_of(visibility: float) -> Belief:
     return Belief(cells, weight / weight.sum())
 
 
-@pytest.mark.parametrize(
-    ("name", "visibility", "expected"),
-    [
+def test_published_steps() -> None:
+    for name, visibility, expected in [
         ("netherlands_a16", 145.0, math.inf),
         ("netherlands_a16", 130.0, 80 / 3.6),
         ("netherlands_a16", 60.0, 60 / 3.6),
@@ -42,10 +41,10 @@ def certain_of(visibility: float) -> Belief:
         ("germany_stvo_3", 51.0, math.inf),
         ("virginia_i77", 205.0, math.inf),
         ("virginia_i77", 20.0, 30 * MPH),
-    ],
-)
-def test_published_steps(name: str, visibility: float, expected: float) -> None:
-    assert ADVISERS[name]().advise(certain_of(visibility), LIMIT, 0.0, SpeedAdvice()).speed == pytest.approx(expected)
+    ]:
+        assert ADVISERS[name]().advise(certain_of(visibility), LIMIT, 0.0, SpeedAdvice()).speed == pytest.approx(
+            expected
+        )
 
 
 @pytest.mark.parametrize("visibility", [80.0, 110.0, 160.0, 190.0])
@@ -73,9 +72,8 @@ def test_a_belief_that_says_nothing_changes_no_step() -> None:
             assert ADVISERS[name]().advise(ignorant, LIMIT, 0.0, SpeedAdvice(speed)).speed == speed
 
 
-@pytest.mark.parametrize(
-    ("visibilities", "speeds", "said"),
-    [
+def test_bad_tables_are_refused() -> None:
+    for visibilities, speeds, said in [
         ((140.0, 70.0), (10.0, 20.0), "visibilities must be in ascending order, got"),
         ((70.0, 140.0), (20.0, 10.0), "speeds must be in ascending order"),
         ((70.0,), (10.0, 20.0), "a speed for each visibility, got 1 visibilities and 2 speeds"),
@@ -84,11 +82,9 @@ def test_a_belief_that_says_nothing_changes_no_step() -> None:
         ((math.inf,), (10.0,), "visibilities must be a list, each"),
         ("70", (10.0,), "visibilities must be a list, each"),
         (("70",), (10.0,), "visibilities must be a list, each"),
-    ],
-)
-def test_bad_tables_are_refused(visibilities: tuple[float, ...], speeds: tuple[float, ...], said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        StepTable(visibilities, speeds)
+    ]:
+        with pytest.raises(InputError, match=said):
+            StepTable(visibilities, speeds)
 
 
 def test_wet_roads_and_slopes_lower_the_sight_distance_advice() -> None:

@@ -4,7 +4,6 @@ import dataclasses
 import math
 
 import numpy as np
-import pytest
 
 from fogsim.advice.warning import choose_warning, is_fog_in_the_way
 from fogsim.kinematics import stopping_sight_distance
@@ -46,9 +45,8 @@ def warnings(*seen: tuple[Belief, str], speed: float = SPEED) -> list[DriverWarn
     return given
 
 
-@pytest.mark.parametrize(
-    ("belief", "warns"),
-    [
+def test_fog_is_warned_of_where_one_cannot_stop_in_sight_and_that_is_known():
+    for belief, warns in [
         (CLEAR, False),
         (fog(0.98 * NEEDED), True),
         (fog(1.02 * NEEDED), False),
@@ -60,10 +58,8 @@ def warnings(*seen: tuple[Belief, str], speed: float = SPEED) -> list[DriverWarn
         (profile(9.0 * SPEED, 0.9 * NEEDED, deviation=0.8), False),
         (dataclasses.replace(fog(0.5 * NEEDED), age=61.0), False),
         (dataclasses.replace(profile(9.0 * SPEED, 0.5 * NEEDED), age=61.0), False),
-    ],
-)
-def test_fog_is_warned_of_where_one_cannot_stop_in_sight_and_that_is_known(belief: Belief, warns: bool):
-    assert is_fog_in_the_way(belief, SPEED) is warns
+    ]:
+        assert is_fog_in_the_way(belief, SPEED) is warns
 
 
 def test_slow_enough_nobody_is_warned():

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
+SLOW = pytest.mark.nightly
 Records = Callable[..., list[dict[str, Any]]]
 
 
@@ -37,10 +38,11 @@ def records(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
             ("--images", "1"),
             {"pool", "method", "visibility_m", "pictures", "valid_share"},
         ),
-        (
+        pytest.param(
             "environments.py",
             ("--env", "fogsim/FogAdvisory-v1", "--steps", "2", "--repeat", "1", "--resets", "1", "--no-workers"),
             {"env", "camera", "vehicles", "steps_per_s", "peer_steps_per_s", "reset_ms", "reset_other_ms"},
+            marks=SLOW,
         ),
         (
             "junctions.py",
@@ -60,15 +62,14 @@ def records(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
             ("--frames", "none", "--vehicles", "6", "--seconds", "4", "--block", "2"),
             {"frames", "vehicles_read", "ms_step", "ms_metrics", "share", "share_low", "share_high", "blocks"},
         ),
-        (
-            "resets.py",
-            ("--resets", "2", "--part", "environment"),
-            {"ms_median", "growth_kib_per_reset"},
+        pytest.param(
+            "resets.py", ("--resets", "2", "--part", "environment"), {"ms_median", "growth_kib_per_reset"}, marks=SLOW
         ),
-        (
+        pytest.param(
             "estimator_accuracy.py",
             ("--cameras", "1", "--scenes", "1", "--draws", "1"),
             {"method", "visibility", "median_pct", "p95_pct", "valid_share", "ms"},
+            marks=SLOW,
         ),
         (
             "told_calibration.py",
@@ -102,16 +103,18 @@ def records(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
             ("--size", "64x48", "--frames", "2", "--repeat", "1"),
             {"renderer", "light", "width", "height", "samples", "ms_median", "ms_min", "ms_render"},
         ),
-        (
+        pytest.param(
             "renderers.py",
             ("--renderers", "4", "--frames", "8", "--renderer", "cpu"),
             {"growth_kib_per_renderer", "growth_kib_per_1000_frames"},
+            marks=SLOW,
         ),
         ("air.py", ("--repeat", "2"), {"fog", "lamps", "changing", "width", "height", "ms_median", "ms_min", "ms_max"}),
-        (
+        pytest.param(
             "grades.py",
             ("--visibility", "100", "--duration", "1", "--drawings", "1"),
             {"V_met", "road", "method", "frames", "valid", "bias", "median", "p95", "held"},
+            marks=SLOW,
         ),
         ("sign_map.py", ("--size", "64x48", "--steps", "2"), {"camera", "signs", "step_ms", "sign_map_ms"}),
         ("traffic.py", ("--vehicles", "20", "--seconds", "1"), {"vehicles", "ms_sumo", "ms_total", "ratio"}),
@@ -122,6 +125,7 @@ def test_records(name: str, arguments: tuple[str, ...], keys: set[str], records:
         assert keys <= set(record)
 
 
+@pytest.mark.nightly
 def test_fog_costs_lives_and_an_oracle_saves_some(records: Records) -> None:
     """The scenario that the closing figures come from, with few seeds; the full study is the benchmark itself."""
     dense = records("collisions.py", "--seeds", "1", "--visibility", "40", "--protocol", "from_the_beginning")

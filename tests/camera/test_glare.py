@@ -65,11 +65,11 @@ def test_glow_is_round() -> None:
         assert found == pytest.approx([np.mean(found)] * len(found), rel=0.12), distance
 
 
-@pytest.mark.parametrize("column", range(300, 364, 7))
-def test_glow_moves_with_its_lamp_and_does_not_jump_from_cell_to_cell(column: int) -> None:
-    added = np.maximum(glow(with_lamp(column=column))[..., 0], 0.0)
-    near = added[:, column - 250 : column + 251].sum(axis=0)
-    assert near @ np.arange(-250, 251) / near.sum() == pytest.approx(0.0, abs=1.0)
+def test_glow_moves_with_its_lamp_and_does_not_jump_from_cell_to_cell() -> None:
+    for column in range(300, 364, 7):
+        added = np.maximum(glow(with_lamp(column=column))[..., 0], 0.0)
+        near = added[:, column - 250 : column + 251].sum(axis=0)
+        assert near @ np.arange(-250, 251) / near.sum() == pytest.approx(0.0, abs=1.0)
 
 
 def test_glow_grows_with_the_lamp_and_the_share() -> None:

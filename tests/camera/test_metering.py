@@ -41,10 +41,10 @@ def test_luminance_weighs_the_colours() -> None:
     assert metered_luminance(red, Metering.HIGHLIGHTS) == pytest.approx(212.6)
 
 
-@pytest.mark.parametrize("shape", [(16, 16), (120, 160), (480, 640), (515, 688)])
-@pytest.mark.parametrize("metering", list(Metering))
-def test_every_size_is_metered(shape: tuple[int, int], metering: Metering) -> None:
-    assert metered_luminance(np.full((*shape, 3), 7.0, np.float32), metering) == pytest.approx(7.0, rel=1e-5)
+def test_every_size_is_metered() -> None:
+    for metering in list(Metering):
+        for shape in [(16, 16), (120, 160), (480, 640), (515, 688)]:
+            assert metered_luminance(np.full((*shape, 3), 7.0, np.float32), metering) == pytest.approx(7.0, rel=1e-5)
 
 
 def test_black_is_metered_as_the_camera_s_darkest() -> None:

@@ -44,7 +44,7 @@ try:
         compile_for(scenario)
         raise KeyboardInterrupt
 except KeyboardInterrupt:
-    print(len(started), started[0].poll() is not None)
+    print(len(started), started[-1].poll() is not None)
 """
 
 UNTOLD = """
@@ -52,13 +52,13 @@ try:
     with compiler_process.compiling_in_background():
         raise ValueError("a mistake in the scenario")
 except ValueError:
-    print(len(started), started[0].poll() is not None)
+    print(len(started), started[-1].poll() is not None)
 """
 
 NO_METHODS = """
 with compiler_process.compiling_in_background() as compile_for:
     compile_for(fogsim.load_scenario("motorway_fog_bank", ["renderer=none", "estimators=[]"]))
-    print(len(started), started[0].poll() is not None)
+    print(len(started), started[-1].poll() is not None)
 """
 
 DEAD = """
@@ -100,23 +100,19 @@ def run(code: str, kept: Path) -> list[str]:
     return done.stdout.split()
 
 
+@pytest.mark.nightly
 def test_what_the_other_process_compiles_is_loaded_and_a_second_run_needs_none(tmp_path: Path) -> None:
     assert run(READ, tmp_path) == ["1", "1", "0", "1", "1", "0", "1", "True"]
     assert run(READ, tmp_path) == ["0", "1", "0", "0", "1", "0", "0", "True"]
 
 
-def test_an_interrupted_run_takes_the_other_process_along(tmp_path: Path) -> None:
-    assert run(FAIL, tmp_path) == ["1", "True"]
+def test_the_other_process_ends_where_no_scenario_comes_or_nothing_is_to_compile_and_with_an_interrupted_run(
+    tmp_path: Path,
+) -> None:
+    assert run(UNTOLD + NO_METHODS + FAIL, tmp_path) == ["1", "True", "2", "True", "3", "True"]
 
 
-def test_where_no_scenario_comes_the_other_process_ends(tmp_path: Path) -> None:
-    assert run(UNTOLD, tmp_path) == ["1", "True"]
-
-
-def test_where_there_is_nothing_to_compile_the_other_process_ends_before_the_run(tmp_path: Path) -> None:
-    assert run(NO_METHODS, tmp_path) == ["1", "True"]
-
-
+@pytest.mark.nightly
 def test_where_the_other_process_dies_a_run_compiles_alone(tmp_path: Path) -> None:
     assert run(DEAD, tmp_path) == ["4"]
 

@@ -58,9 +58,8 @@ def test_a_file_that_is_there_is_replaced_only_when_it_is_asked_for(folder: Path
     assert cv2.imread(str(folder / "out.png")) is not None
 
 
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
+def test_mistakes_end_in_one_line_and_exit_code_2(folder: Path, fog: Fog) -> None:
+    for arguments, told in [
         (("--visibility", "80"), "--depth-kind is missing"),
         (("--visibility", "80", "--depth-kind", "rnage"), "did you mean 'range'"),
         (("--visibility", "nan", "--depth-kind", "range"), "--visibility: expected a number from"),
@@ -79,16 +78,12 @@ def test_a_file_that_is_there_is_replaced_only_when_it_is_asked_for(folder: Path
             "--layer-height goes with --ground-alb",
         ),
         (("--visibility", "80", "--depth-kind", "range", "--horizon-row", "9"), "--horizon-row goes with --road-plane"),
-    ],
-)
-def test_mistakes_end_in_one_line_and_exit_code_2(
-    folder: Path, arguments: tuple[str, ...], told: str, fog: Fog
-) -> None:
-    done = fog(folder, *arguments)
-    assert done.returncode == 2
-    assert told in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
-    assert not (folder / "out.png").exists()
+    ]:
+        done = fog(folder, *arguments)
+        assert done.returncode == 2
+        assert told in done.stderr
+        assert len(done.stderr.strip().splitlines()) == 1
+        assert not (folder / "out.png").exists()
 
 
 def test_fog_over_the_flat_road_needs_no_depth_map(

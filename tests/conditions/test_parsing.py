@@ -9,9 +9,8 @@ from fogsim.conditions.syntax import AllOf, AnyOf, Comparison, Delayed, Edge, Fl
 EGO_SPEED = Reference("X.speed", ("ego",))
 
 
-@pytest.mark.parametrize(
-    ("written", "read"),
-    [
+def test_one_test_of_a_signal() -> None:
+    for written, read in [
         ("ego.speed > 90 km/h", Comparison(EGO_SPEED, ">", Quantity(25.0, "90", "km/h"))),
         ("ego.speed<=advice", Comparison(EGO_SPEED, "<=", Reference("advice"))),
         ("ego.collision", Flag(Reference("X.collision", ("ego",)))),
@@ -37,10 +36,8 @@ EGO_SPEED = Reference("X.speed", ("ego",))
         ("belief.error > 20 %", Comparison(Reference("belief.error"), ">", Quantity(0.2, "20", "%"))),
         ("ego.collision delayed 2 s", Delayed(Flag(Reference("X.collision", ("ego",))), Quantity(2.0, "2", "s"))),
         ("ego.collision for 2 s", Held(Flag(Reference("X.collision", ("ego",))), Quantity(2.0, "2", "s"))),
-    ],
-)
-def test_one_test_of_a_signal(written: str, read: object) -> None:
-    assert parse_condition(written) == read
+    ]:
+        assert parse_condition(written) == read
 
 
 def test_and_binds_closer_than_or_and_not_closest() -> None:
@@ -50,9 +47,8 @@ def test_and_binds_closer_than_or_and_not_closest() -> None:
     assert parse_condition("(a.collision and b.collision) and c.collision") == AllOf((a, b, c))
 
 
-@pytest.mark.parametrize(
-    ("written", "text"),
-    [
+def test_mappings_and_lists() -> None:
+    for written, text in [
         ({"gap(ego, slow)": "< 80 m"}, "gap(ego, slow) < 80 m"),
         # What YAML makes of the same between braces.
         ({"gap(ego": None, "slow)": "< 80 m"}, "gap(ego, slow) < 80 m"),
@@ -62,10 +58,8 @@ def test_and_binds_closer_than_or_and_not_closest() -> None:
         ({"any": ["time > 3 s", {"ego.collision": True}]}, "time > 3 s or ego.collision"),
         ({"all": ["time > 3 s", {"not": "ego.collision"}]}, "time > 3 s and not ego.collision"),
         (["time > 3 s", "ego.collision"], "time > 3 s and ego.collision"),
-    ],
-)
-def test_mappings_and_lists(written: object, text: str) -> None:
-    assert str(parse_condition(written)) == text
+    ]:
+        assert str(parse_condition(written)) == text
 
 
 def test_what_yaml_tears_apart_is_mended() -> None:
@@ -74,9 +68,8 @@ def test_what_yaml_tears_apart_is_mended() -> None:
     assert mended({"gap(a": None}) == {"gap(a": None}
 
 
-@pytest.mark.parametrize(
-    ("written", "told"),
-    [
+def test_what_is_refused() -> None:
+    for written, told in [
         ("ego.spede > 3 m/s", "did you mean 'ego.speed'"),
         ("fog.visibility_ahed < 3 m", "did you mean 'fog.visibility_ahead'"),
         ("gap(ego) < 3 m", r"it is gap\(X, Y\)"),
@@ -106,11 +99,9 @@ def test_what_yaml_tears_apart_is_mended() -> None:
         ({"ego.speed": ["> 3 m/s"]}, "expected a quantity"),
         ("(" * (DEEPEST + 1) + "time > 3 s" + ")" * (DEEPEST + 1), "deep inside one another"),
         ("time > 3 s and " * 100, "at most 1000 characters"),
-    ],
-)
-def test_what_is_refused(written: object, told: str) -> None:
-    with pytest.raises(ValueError, match=told):
-        parse_condition(written)
+    ]:
+        with pytest.raises(ValueError, match=told):
+            parse_condition(written)
 
 
 def test_lists_in_lists_have_a_limit() -> None:

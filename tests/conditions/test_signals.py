@@ -74,9 +74,8 @@ def test_who_is_not_on_the_road_has_no_value() -> None:
     assert read("other.present", step) is True
 
 
-@pytest.mark.parametrize(
-    ("other", "heading", "gap", "ttc", "headway"),
-    [
+def test_gaps_and_times_along_the_route() -> None:
+    for other, heading, gap, ttc, headway in [
         # The ego is at 200 m with 25 m/s, vehicles are 4.6 m long, and the other drives 20 m/s.
         ((260.0, -3.5), 0.0, 55.4, 55.4 / 5.0, 55.4 / 25.0),
         ((150.0, 0.0), 0.0, -45.4, math.inf, 45.4 / 20.0),
@@ -86,15 +85,11 @@ def test_who_is_not_on_the_road_has_no_value() -> None:
         # Round the corner.
         ((500.0, 300.0), math.pi / 2, 595.4, 595.4 / 5.0, 595.4 / 25.0),
         ((260.0, 40.0), 0.0, None, None, None),
-    ],
-)
-def test_gaps_and_times_along_the_route(
-    other: tuple[float, float], heading: float, gap: float | None, ttc: float | None, headway: float | None
-) -> None:
-    step = placed(make_step(speed=25.0, route_position=200.0), other, (200.0, 0.0), heading=(heading, 0.0))
-    for signal, expected in (("gap", gap), ("ttc", ttc), ("headway", headway)):
-        found = read(f"{signal}(ego, other)", step)
-        assert found == (None if expected is None else pytest.approx(expected)), signal
+    ]:
+        step = placed(make_step(speed=25.0, route_position=200.0), other, (200.0, 0.0), heading=(heading, 0.0))
+        for signal, expected in (("gap", gap), ("ttc", ttc), ("headway", headway)):
+            found = read(f"{signal}(ego, other)", step)
+            assert found == (None if expected is None else pytest.approx(expected)), signal
 
 
 def test_persons_are_asked_for_as_vehicles_are() -> None:

@@ -16,6 +16,8 @@ from fogsim.errors import MissingDependencyError
 from fogsim.render import gl_report
 from fogsim.values import Lamp
 
+pytestmark = pytest.mark.nightly
+
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 TOLERANCE = 2.0
 """Difference that JPEG and another computer's rounding may make [levels of 255]."""

@@ -1,11 +1,14 @@
 import sys
 from pathlib import Path
 
+import pytest
+
 from fogsim import catalogue
 
 DOCS = Path(__file__).parents[2] / "docs"
 
 
+@pytest.mark.nightly
 def test_the_gallery_shows_every_scenario_as_it_is(monkeypatch):
     monkeypatch.syspath_prepend(DOCS)
     import make_gallery

@@ -9,6 +9,8 @@ from subprocess import CompletedProcess
 
 import pytest
 
+pytestmark = pytest.mark.nightly
+
 CHECKOUT = Path(__file__).resolve().parents[2]
 PAGE = (CHECKOUT / "docs" / "how_to" / "plugin.md").read_text(encoding="utf-8")
 (CONNECT,) = (block for block in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL) if "fogsim.connect" in block)

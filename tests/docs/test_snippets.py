@@ -98,6 +98,7 @@ def shortened(line: list[str]) -> list[str]:
     }.get(name, line)
 
 
+@pytest.mark.nightly
 def test_what_is_printed_runs(
     readers_folder: Callable[[str], Path], early_motorway: Path, python: Run, listening: int
 ) -> None:
@@ -138,26 +139,28 @@ def test_what_trains_can_be_read() -> None:
             assert name in gymnasium.registry
 
 
-@pytest.mark.parametrize("page", TEXTS)
-def test_command_lines_parse(page: str) -> None:
-    for line in LINES[page]:
-        _, name, *rest = shlex.split(line, comments=True)
-        KNOWN[name].make_context(name, rest)
+def test_command_lines_parse() -> None:
+    for page in TEXTS:
+        for line in LINES[page]:
+            _, name, *rest = shlex.split(line, comments=True)
+            KNOWN[name].make_context(name, rest)
 
 
-@pytest.mark.parametrize("page", TEXTS)
-def test_options_exist(page: str) -> None:
-    for line in MENTIONS[page]:
-        program, name, *rest = line.split()
-        if name.startswith("--") or (name == "-m" and not rest[0].startswith("fogsim_envs")):
-            # An option of the program itself, or another project's module.
-            continue
-        options = {part.partition("=")[0] for part in rest if part.startswith("--")}
-        if program == "fogsim":
-            assert options <= {name for one in KNOWN[name].params for name in (*one.opts, *one.secondary_opts)}, line
-        else:
-            file = f"envs/{rest[0].replace('.', '/')}.py" if name == "-m" else name
-            assert options <= set(re.findall(r'"(--[\w-]+)"', (CHECKOUT / file).read_text(encoding="utf-8"))), line
+def test_options_exist() -> None:
+    for page in TEXTS:
+        for line in MENTIONS[page]:
+            program, name, *rest = line.split()
+            if name.startswith("--") or (name == "-m" and not rest[0].startswith("fogsim_envs")):
+                # An option of the program itself, or another project's module.
+                continue
+            options = {part.partition("=")[0] for part in rest if part.startswith("--")}
+            if program == "fogsim":
+                assert options <= {name for one in KNOWN[name].params for name in (*one.opts, *one.secondary_opts)}, (
+                    line
+                )
+            else:
+                file = f"envs/{rest[0].replace('.', '/')}.py" if name == "-m" else name
+                assert options <= set(re.findall(r'"(--[\w-]+)"', (CHECKOUT / file).read_text(encoding="utf-8"))), line
 
 
 SETTINGS = {
@@ -167,10 +170,10 @@ SETTINGS = {
 }
 
 
-@pytest.mark.parametrize("page", SETTINGS)
-def test_settings_that_a_scenario_speaks_of_are_its_keys(page: str) -> None:
-    for setting in SETTINGS[page]:
-        load_scenario(str(CHECKOUT / Path(page).parent), [setting])
+def test_settings_that_a_scenario_speaks_of_are_its_keys() -> None:
+    for page, settings in SETTINGS.items():
+        for setting in settings:
+            load_scenario(str(CHECKOUT / Path(page).parent), [setting])
 
 
 def test_a_wrong_option_is_found() -> None:

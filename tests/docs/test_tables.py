@@ -21,8 +21,6 @@ PAGES = [
     *sorted((CHECKOUT / "scenarios").glob("*/README.md")),
 ]
 
-every_page = pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(CHECKOUT)))
-
 
 def prose(page: Path) -> str:
     """Text of a page without its fenced blocks."""
@@ -51,7 +49,10 @@ def cells(row: str) -> int:
     return len(re.findall(r"(?<!\\)\|", row)) - 1
 
 
-@pytest.mark.parametrize("command", [("make_tables.py",), ("make_measured_tables.py", "excerpt", "night")])
+@pytest.mark.parametrize(
+    "command",
+    [("make_tables.py",), pytest.param(("make_measured_tables.py", "excerpt", "night"), marks=pytest.mark.nightly)],
+)
 def test_tables_are_up_to_date(command: tuple[str, ...]) -> None:
     script, *names = command
     done = subprocess.run(
@@ -71,11 +72,11 @@ def test_measured_numbers_may_differ_by_one_in_the_last_digit(monkeypatch: pytes
         assert not same("| 0.82 … 1.04 | 20 |", other)
 
 
-@every_page
-def test_rows_of_a_table_have_the_same_cells(page: Path) -> None:
-    for heading, rule, *rows in tables(prose(page)):
-        assert re.fullmatch(r"\|( ?:?-+:? ?\|)+", rule), rule
-        assert {row: cells(row) for row in (rule, *rows) if cells(row) != cells(heading)} == {}
+def test_rows_of_a_table_have_the_same_cells() -> None:
+    for page in PAGES:
+        for heading, rule, *rows in tables(prose(page)):
+            assert re.fullmatch(r"\|( ?:?-+:? ?\|)+", rule), (page, rule)
+            assert {row: cells(row) for row in (rule, *rows) if cells(row) != cells(heading)} == {}, page
 
 
 def test_pipes_and_broken_rows_are_found() -> None:
@@ -86,29 +87,32 @@ def test_pipes_and_broken_rows_are_found() -> None:
         [cells(row) for row in rows]
 
 
-@every_page
-def test_links_lead_somewhere(page: Path) -> None:
-    for link in re.findall(r"\]\(([^)\s]+)\)", prose(page)):
+def named(pattern: str) -> Iterator[tuple[Path, str]]:
+    """What a pattern finds in the text of each page."""
+    for page in PAGES:
+        yield from ((page, found) for found in re.findall(pattern, prose(page)))
+
+
+def test_links_lead_somewhere() -> None:
+    for page, link in named(r"\]\(([^)\s]+)\)"):
         if "://" in link:
             continue
         target, _, anchor = link.partition("#")
         file = page.parent / target if target else page
-        assert file.exists(), link
+        assert file.exists(), (page, link)
         if anchor:
-            assert anchor in anchors(file), link
+            assert anchor in anchors(file), (page, link)
 
 
-@every_page
-def test_files_that_are_named_exist(page: Path) -> None:
+def test_files_that_are_named_exist() -> None:
     """What stands as code and begins like a path of the repository is one, seen from its root."""
-    named = re.findall(r"`(?:python )?((?:benchmarks|docs|envs|fogsim|tests|tools)/[\w./-]+)", prose(page))
     ids = {*gymnasium.registry, FogCorridorEnv.metadata["name"]}
-    assert [name for name in named if name not in ids and not (CHECKOUT / name).exists()] == []
+    for page, name in named(r"`(?:python )?((?:benchmarks|docs|envs|fogsim|tests|tools)/[\w./-]+)"):
+        assert name in ids or (CHECKOUT / name).exists(), (page, name)
 
 
-@every_page
-def test_names_of_the_package_exist(page: Path) -> None:
-    for name in re.findall(r"`((?:fogsim|fogsim_envs)(?:\.\w+)+)\b", prose(page)):
+def test_names_of_the_package_exist() -> None:
+    for _, name in named(r"`((?:fogsim|fogsim_envs)(?:\.\w+)+)\b"):
         # Types of signs begin likewise, and are data.
         if not name.startswith("fogsim.sign") and name != "fogsim.complete":
             resolve_name(name)

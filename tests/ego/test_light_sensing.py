@@ -45,21 +45,16 @@ def measured(state: TrafficState, visibility: float = math.inf, illuminance: flo
     return SENSING.measure(state, 0, fog(visibility), illuminance)
 
 
-@pytest.mark.parametrize(
-    ("distance", "visibility", "lamps", "found"),
-    [
+def test_head_lamps_are_found_as_far_as_told_in_clear_air_and_less_far_in_fog() -> None:
+    for distance, visibility, lamps, found in [
         (380.0, math.inf, LOW, True),
         (420.0, math.inf, LOW, False),
         (390.0, math.inf, HIGH, True),
         (380.0, 200.0, LOW, False),
         (100.0, 200.0, LOW, True),
         (200.0, math.inf, int(Lamp.POSITION), False),
-    ],
-)
-def test_head_lamps_are_found_as_far_as_told_in_clear_air_and_less_far_in_fog(
-    distance: float, visibility: float, lamps: int, found: bool
-) -> None:
-    assert measured(road((distance, 3.5, math.pi, lamps)), visibility) == LightMeasurement(NIGHT, oncoming=found)
+    ]:
+        assert measured(road((distance, 3.5, math.pi, lamps)), visibility) == LightMeasurement(NIGHT, oncoming=found)
 
 
 def test_tail_lamps_are_found_ahead_and_nothing_behind_or_aside() -> None:

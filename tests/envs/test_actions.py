@@ -1,7 +1,6 @@
 """Actions are members of their space, in whatever type of numbers they come, or are refused by name."""
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,9 +14,8 @@ SHARES = spaces.Box(-1.0, 1.0, (2,), np.float32)
 CHOICE = spaces.Discrete(5, start=-1)
 
 
-@pytest.mark.parametrize(
-    ("space", "action", "expected"),
-    [
+def test_members_are_taken_as_they_come() -> None:
+    for space, action, expected in [
         (LEVELS, [12, 2], [12, 2]),
         (LEVELS, (0, 0), [0, 0]),
         (LEVELS, np.array([3.0, 1.0], dtype=np.float32), [3, 1]),
@@ -29,17 +27,14 @@ CHOICE = spaces.Discrete(5, start=-1)
         (CHOICE, np.int64(3), 3),
         (CHOICE, -1, -1),
         (CHOICE, np.array(2.0), 2),
-    ],
-)
-def test_members_are_taken_as_they_come(space: spaces.Space[Any], action: object, expected: object) -> None:
-    taken = checked_action(action, space, "x")
-    assert taken.tolist() == expected
-    assert (taken.dtype, taken.shape) == (space.dtype, space.shape)
+    ]:
+        taken = checked_action(action, space, "x")
+        assert taken.tolist() == expected
+        assert (taken.dtype, taken.shape) == (space.dtype, space.shape)
 
 
-@pytest.mark.parametrize(
-    ("space", "action", "why"),
-    [
+def test_what_is_no_member_is_refused_by_name() -> None:
+    for space, action, why in [
         (LEVELS, [-1, 0], r"expected \[0, 0\] to \[12, 2\]; got \[-1, 0\]"),
         (LEVELS, [13, 0], r"\[0, 0\] to \[12, 2\]"),
         (LEVELS, np.array([13, 0]), r"got array\(\[13,  0\]\)"),
@@ -60,8 +55,6 @@ def test_members_are_taken_as_they_come(space: spaces.Space[Any], action: object
         (CHOICE, 4, "expected -1 to 3; got 4"),
         (CHOICE, [3], r"the shape \(\), got \(1,\)"),
         (spaces.Text(3), "a", "has no check"),
-    ],
-)
-def test_what_is_no_member_is_refused_by_name(space: spaces.Space[Any], action: object, why: str) -> None:
-    with pytest.raises(InputError, match=rf"^action of x: .*{why}"):
-        checked_action(action, space, "x")
+    ]:
+        with pytest.raises(InputError, match=rf"^action of x: .*{why}"):
+            checked_action(action, space, "x")

@@ -147,20 +147,17 @@ def test_what_the_caller_fixes(fast: gymnasium.Env[Any, Any]) -> None:
     assert task._current.truth.visibility == pytest.approx(70.0)
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
+def test_options_that_are_none(fast: gymnasium.Env[Any, Any]) -> None:
+    for options, message in [
         ({"visibilty": 60}, "did you mean 'visibility'"),
         ({"visibility": -5}, "a number ≥ 1 m"),
         ({"visibility": True}, "a number ≥ 1 m"),
         ({"overrides": "fog.visibility_m=70"}, "must be a list"),
         ({"driver": "reckless"}, "unknown driver"),
         ({"episode": {"fog": 1}}, r"info\['drawn'\]"),
-    ],
-)
-def test_options_that_are_none(fast: gymnasium.Env[Any, Any], options: dict[str, Any], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        fast.reset(options=options)
+    ]:
+        with pytest.raises(InputError, match=message):
+            fast.reset(options=options)
 
 
 def test_splits_share_no_seed() -> None:

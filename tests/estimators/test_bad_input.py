@@ -1,11 +1,11 @@
 """What each registered method does with input that no foggy road by day gives: a reason or an error, and no warning."""
 
 import dataclasses
-import functools
 import math
 import re
 from collections.abc import Iterator
-from itertools import cycle
+from functools import cache, partial
+from itertools import islice, product
 
 import numpy as np
 import pytest
@@ -17,6 +17,7 @@ from fogsim.values import Camera, Estimate, Frame, LeadMeasurement, Observation,
 
 METHODS = sorted(ESTIMATORS)
 FOR_THE_NIGHT = {"gallen2014", "gallen2014_veil", "night_road"}
+FOR_SIGNS = {"belaroussi2015", "sign_contrast"}
 ROWS, COLS = 240, 320
 CAMERA = Camera(COLS, ROWS, 289.0, (159.5, 119.5), 1.38, np.radians(2.0))
 RANGES = (14.0, 18.0, 22.0, 27.0, 33.0, 39.0, 46.0)
@@ -47,7 +48,7 @@ def observation(image, index: int = 0, **changes) -> Observation:
 def undisturbed(sequence):
     """What a method makes of that drive, which it drives once: whether valid, extinction, deviation, frame by frame."""
 
-    @functools.cache
+    @cache
     def drive(method: str) -> list[tuple[bool, float, float]]:
         estimator = make(method, CAMERA)
         return [said(estimator.update(observation(image, index))) for index, image in enumerate(sequence)]
@@ -113,23 +114,16 @@ def without_road() -> dict[str, np.ndarray]:
     lit = 120.0 * np.clip((below - 2) / 124.0, 0.0, 1.0) ** 2 + 2.0
     cells = np.indices((ROWS, COLS))
     return {
-        "black": bytes_of(np.zeros(1)),
         "white": bytes_of(np.full(1, 255)),
-        "grey": bytes_of(np.full(1, 128)),
-        "noise": rng.integers(0, 256, (ROWS, COLS), dtype=np.uint8),
         "colour noise": rng.integers(0, 256, (ROWS, COLS, 3), dtype=np.uint8),
-        "checkerboard of 1 px": bytes_of(cells.sum(axis=0) % 2 * 255),
-        **{f"checkerboard of {size} px": bytes_of((cells // size).sum(axis=0) % 2 * 255) for size in (7, 12, 24, 60)},
+        **{f"checkerboard of {size} px": bytes_of((cells // size).sum(axis=0) % 2 * 255) for size in (12, 60)},
         "upright stripes": bytes_of(cells[1] // 40 % 2 * 255),
-        "ramp": bytes_of(200.0 - 140.0 * row / ROWS),
         "faint ramp with noise": bytes_of(150.0 - 50.0 * row / ROWS + noise),
         "ramp below a bright sky": bytes_of(240.0 - np.clip(below, 0, None)),
         "slanting ramp": bytes_of(180.0 - 160.0 * (cells[0] / ROWS + cells[1] / COLS) / 2.0),
         "night": bytes_of(lit + noise),
-        "forest": bytes_of(forest),
         "forest before the sky": bytes_of(np.where(below > -50, forest, 200.0)),
         "snow, brighter than the sky": bytes_of(np.where(below > 0, 230.0, 150.0) + noise),
-        "sky alone": bytes_of(150.0 + 60.0 * row / ROWS + noise),
         "wall": bytes_of(np.where(below > -50, 70.0, 200.0) + noise),
     }
 
@@ -137,13 +131,13 @@ def without_road() -> dict[str, np.ndarray]:
 WITHOUT_ROAD = without_road()
 
 
-@pytest.mark.parametrize("name", WITHOUT_ROAD)
 @pytest.mark.parametrize("method", METHODS)
-def test_a_picture_without_a_road_by_day_is_refused_with_a_reason(method, name):
-    for found in estimates(method, WITHOUT_ROAD[name]):
-        check_sound(found, method)
-        # A road by night is what methods for the night are for.
-        assert not found.valid or (name == "night" and method in FOR_THE_NIGHT)
+def test_a_picture_without_a_road_by_day_is_refused_with_a_reason(method):
+    for name, image in WITHOUT_ROAD.items():
+        for found in estimates(method, image):
+            check_sound(found, method)
+            # A road by night is what methods for the night are for.
+            assert not found.valid or (name == "night" and method in FOR_THE_NIGHT), name
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -157,46 +151,43 @@ def test_an_upside_down_camera_is_refused_or_turned(method, render, road):
         check_sound(found, method)
 
 
-@pytest.mark.parametrize("value", [0, 90, 255])
-@pytest.mark.parametrize("size", [(1, 1), (16, 16), (2, 300), (300, 2), (33, 20)])
 @pytest.mark.parametrize("method", METHODS)
-def test_tiny_images_are_refused_with_a_reason(method, size, value):
-    camera = Camera(*size, 100.0, (size[0] / 2, size[1] / 2), 1.4)
-    for found in estimates(method, np.full(size[::-1], value, np.uint8), camera):
-        check_sound(found, method)
-        assert not found.valid
+def test_tiny_images_are_refused_with_a_reason(method):
+    for size in ((1, 1), (16, 16), (2, 300), (300, 2), (33, 20)):
+        camera = Camera(*size, 100.0, (size[0] / 2, size[1] / 2), 1.4)
+        for value in (0, 90, 255):
+            for found in estimates(method, np.full(size[::-1], value, np.uint8), camera):
+                check_sound(found, method)
+                assert not found.valid, (size, value)
 
 
-@pytest.mark.parametrize("pitch", [-89.0, -40.0, 40.0, 89.0])
 @pytest.mark.parametrize("method", METHODS)
-def test_a_horizon_outside_the_image_is_refused_with_a_reason(method, pitch, render, road):
+def test_a_horizon_outside_the_image_is_refused_with_a_reason(method, render, road):
     image = render(road.but(camera=CAMERA, lead_distance=20.0))
-    for found in estimates(method, image, dataclasses.replace(CAMERA, pitch=math.radians(pitch))):
-        check_sound(found, method)
-        assert not found.valid
+    for pitch in (-89.0, -40.0, 40.0, 89.0):
+        for found in estimates(method, image, dataclasses.replace(CAMERA, pitch=math.radians(pitch))):
+            check_sound(found, method)
+            assert not found.valid, pitch
 
 
-@pytest.mark.parametrize("seed", range(15))
 @pytest.mark.parametrize("method", METHODS)
-def test_nothing_odd_gets_out_of_random_pictures(method, seed):
-    rng = np.random.default_rng(seed)
-    camera = Camera(96, 72, rng.uniform(30, 300), (48.0, rng.uniform(0, 72)), 1.4, rng.uniform(-0.3, 0.3))
-    rows = np.interp(np.arange(72), np.sort(rng.uniform(0, 72, 5)), rng.uniform(0, 300, 5))
-    image = np.clip(rows[:, None] + rng.normal(0, rng.choice([0, 1, 20]), (72, 96)), 0, 255).astype(np.uint8)
-    for found in estimates(method, image, camera):
-        check_sound(found, method)
+def test_nothing_odd_gets_out_of_random_pictures(method):
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        camera = Camera(96, 72, rng.uniform(30, 300), (48.0, rng.uniform(0, 72)), 1.4, rng.uniform(-0.3, 0.3))
+        rows = np.interp(np.arange(72), np.sort(rng.uniform(0, 72, 5)), rng.uniform(0, 300, 5))
+        image = np.clip(rows[:, None] + rng.normal(0, rng.choice([0, 1, 20]), (72, 96)), 0, 255).astype(np.uint8)
+        for found in estimates(method, image, camera):
+            check_sound(found, method)
 
 
-NAN_KEYS = ["focal_length", "mount_height", "pitch", "roll"]
-
-
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-@pytest.mark.parametrize("key", NAN_KEYS)
-def test_a_calibration_that_is_no_number_cannot_be_made(key, value):
-    with pytest.raises(InputError, match=key):
-        dataclasses.replace(CAMERA, **{key: value})
-    with pytest.raises(InputError, match="principal_point must be two finite numbers"):
-        dataclasses.replace(CAMERA, principal_point=(value, 10.0))
+def test_a_calibration_that_is_no_number_cannot_be_made():
+    for value in ODD:
+        for key in ("focal_length", "mount_height", "pitch", "roll"):
+            with pytest.raises(InputError, match=key):
+                dataclasses.replace(CAMERA, **{key: value})
+        with pytest.raises(InputError, match="principal_point must be two finite numbers"):
+            dataclasses.replace(CAMERA, principal_point=(value, 10.0))
 
 
 GREY = np.full((ROWS, COLS), 90, np.uint8)
@@ -219,14 +210,12 @@ WRONG_IMAGES = {
 }
 
 
-@pytest.mark.parametrize("name", WRONG_IMAGES)
 @pytest.mark.parametrize("method", METHODS)
-def test_an_image_of_the_wrong_kind_is_told_and_leaves_no_trace(method, name, sequence, undisturbed):
+def test_an_image_of_the_wrong_kind_is_told_and_leaves_no_trace(method, sequence, undisturbed):
     """The error says what was expected and what came, and later estimates are those of a drive without the frame."""
-    image, told = WRONG_IMAGES[name]
     disturbed = make(method, CAMERA)
     for index, frame in enumerate(sequence):
-        if index in (0, 3):
+        for image, told in WRONG_IMAGES.values() if index in (0, 3) else ():
             with pytest.raises(InputError, match=told):
                 disturbed.update(observation(image, index))
         assert said(disturbed.update(observation(frame, index))) == undisturbed(method)[index]
@@ -254,40 +243,37 @@ def sound_or_told(method: str, frames, *changes) -> list[Estimate]:
 
 
 ODD = [math.nan, math.inf, -math.inf]
-ODD_DISTANCES, ODD_SPEEDS = [*ODD, -1.0, 0.0, 1e-9, 1e9], [*ODD, -10.0, 1e9]
-ODD_LEADS = [
-    *((distance, 10.0) for distance in ODD_DISTANCES),
-    *((20.0, speed) for speed in ODD_SPEEDS),
-    *zip(ODD_DISTANCES, cycle(ODD_SPEEDS[::-1])),
-]
-"""Either is odd, or both."""
+ODD_SPEEDS = [*ODD, -10.0, 1e9]
+ODD_LEADS = [*((distance, 10.0) for distance in (math.nan, math.inf, -1.0, 0.0, 1e9)), (20.0, math.nan), (20.0, -1e9)]
 
 
-@pytest.mark.parametrize(("distance", "speed"), ODD_LEADS)
 @pytest.mark.parametrize("method", METHODS)
-def test_an_odd_range_is_refused_or_made_nothing_of(method, distance, speed, sequence):
-    sound_or_told(method, sequence, *[{"lead": LeadMeasurement(distance, speed)}] * len(sequence))
+def test_an_odd_range_is_refused_or_made_nothing_of(method, sequence):
+    for lead in ((math.nan, math.inf), (1e-9, 1e9), (1e9, -10.0)):
+        sound_or_told(method, sequence, *[{"lead": LeadMeasurement(*lead)}] * len(sequence))
     # One bad measurement among good ones.
-    odd: list[dict] = [{}] * len(sequence)
-    odd[3] = {"lead": LeadMeasurement(distance, speed)}
-    assert len(sound_or_told(method, sequence, *odd)) >= len(sequence) - 1
+    for lead in ODD_LEADS:
+        odd: list[dict] = [{}] * len(sequence)
+        odd[3] = {"lead": LeadMeasurement(*lead)}
+        assert len(sound_or_told(method, sequence, *odd)) >= len(sequence) - 1, lead
 
 
-@pytest.mark.parametrize("speed", [*ODD, -10.0, 1e9])
 @pytest.mark.parametrize("method", METHODS)
-def test_an_odd_own_speed_is_refused_or_made_nothing_of(method, speed, sequence, undisturbed):
-    odd: list[dict] = [{}] * len(sequence)
-    odd[2] = {"speed": speed}
-    found = sound_or_told(method, sequence, *odd)
-    assert found[-1].valid == undisturbed(method)[-1][0]
+def test_an_odd_own_speed_is_refused_or_made_nothing_of(method, sequence, undisturbed):
+    for speed in ODD_SPEEDS:
+        odd: list[dict] = [{}] * len(sequence)
+        odd[2] = {"speed": speed}
+        found = sound_or_told(method, sequence, *odd)
+        assert found[-1].valid == undisturbed(method)[-1][0], speed
 
 
-@pytest.mark.parametrize("field", ["value", "distance", "lateral", "diameter"])
-@pytest.mark.parametrize("value", [*ODD, -1.0, 0.0, 1e9])
 @pytest.mark.parametrize("method", METHODS)
-def test_an_odd_sign_is_refused_or_made_nothing_of(method, field, value, sequence):
-    sign = dataclasses.replace(observation(GREY).signs[0], **{field: value})
-    sound_or_told(method, sequence, *[{"signs": (sign,)}] * len(sequence))
+def test_an_odd_sign_is_refused_or_made_nothing_of(method, sequence):
+    odd = product(("value", "distance", "lateral", "diameter"), (*ODD, -1.0, 0.0, 1e9))
+    # To other methods than those of signs, all of them mean the same: nothing.
+    for field, value in odd if method in FOR_SIGNS else islice(odd, 0, None, 5):
+        sign = dataclasses.replace(observation(GREY).signs[0], **{field: value})
+        sound_or_told(method, sequence, *[{"signs": (sign,)}] * len(sequence))
 
 
 WRONG_TIMES = (
@@ -320,29 +306,20 @@ def test_time_may_stand_and_begins_anew_after_a_reset(method, sequence):
     check_sound(estimator.update(observation(sequence[0])), method)
 
 
-@pytest.mark.parametrize(
-    "changes", [{"pitch": 0.03}, {"response": "srgb"}, {"principal_point": (160.0, 119.5)}, {"bits": 10}], ids=str
-)
 @pytest.mark.parametrize("method", METHODS)
-def test_a_frame_of_another_camera_is_told(method, changes):
-    other = Frame(0.0, GREY, dataclasses.replace(CAMERA, **changes))
-    with pytest.raises(InputError, match="camera must be the told one"):
-        make(method, CAMERA).update(observation(GREY, frame=other))
+def test_a_frame_of_another_camera_is_told(method):
+    estimator = make(method, CAMERA)
+    for changes in ({"pitch": 0.03}, {"response": "srgb"}, {"principal_point": (160.0, 119.5)}, {"bits": 10}):
+        other = Frame(0.0, GREY, dataclasses.replace(CAMERA, **changes))
+        with pytest.raises(InputError, match="camera must be the told one"):
+            estimator.update(observation(GREY, frame=other))
 
 
-ODD_VALUES = ["x", None, [1.0], math.nan, math.inf, -math.inf, -1.0, 1e300, 1j]
-ODD_PARAMETERS = [
-    (method, name, value)
-    for method in METHODS
-    for name, default in parameters(ESTIMATORS[method]).items()
-    for value in ODD_VALUES
-    if value != default
-]
-
-
-@pytest.mark.parametrize(("method", "name", "value"), ODD_PARAMETERS, ids=repr)
-def test_a_parameter_that_is_none_is_told(method, name, value):
+@pytest.mark.parametrize("method", METHODS)
+def test_a_parameter_that_is_none_is_told(method):
     """By the registry and by the class itself: with the parameter's name and what came."""
-    for build in (make, lambda _, camera, **options: ESTIMATORS[method](camera, **options)):
-        with pytest.raises(InputError, match=rf"{name}\b.* must be .*got {re.escape(repr(value))}"):
-            build(method, CAMERA, **{name: value})
+    values = ("x", None, [1.0], math.nan, math.inf, -math.inf, -1.0, 1e300, 1j)
+    for (name, default), value in product(parameters(ESTIMATORS[method]).items(), values):
+        for build in (partial(make, method), ESTIMATORS[method]) if value != default else ():
+            with pytest.raises(InputError, match=rf"{name}\b.* must be .*got {re.escape(repr(value))}"):
+                build(CAMERA, **{name: value})

@@ -28,7 +28,7 @@ def drawn(scenes):
 
 
 def test_whatever_a_dashcam_sees_is_no_gross_error():
-    scenes = list(islice(small_scenes(5000), 40))
+    scenes = list(islice(small_scenes(5000), 24))
     # The pictures take longer than both methods.
     pictures = drawn(scenes)
     for method, valid in (("joint_road", 0.8), ("negru2013", 0.6)):

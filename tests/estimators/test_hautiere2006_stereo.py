@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from early_motorway import EARLY
 
 import fogsim
 from fogsim.errors import InputError
@@ -14,7 +15,7 @@ from fogsim.values import Camera, Estimate, Frame, Observation, Response, Second
 CAMERA = Camera(640, 480, 600.0, (319.5, 239.5), 1.4, math.radians(2.0), response=Response.LINEAR)
 BASELINE, AIRLIGHT, DARK = 0.5, 200.0, 10.0
 DISPARITIES = (3, 4, 5, 6, 8, 10, 12, 15, 20)
-QUIET = ("traffic.events=[]", "clocks.camera_period_s=1", "clocks.decision_period_s=1", "duration_s=4")
+QUIET = (EARLY, "traffic.events=[]", "clocks.camera_period_s=1", "clocks.decision_period_s=1", "duration_s=4")
 SMALL = ("camera.width=320", "camera.height=240", "estimators=[negru2013]")
 
 

@@ -170,26 +170,23 @@ def test_gain_changes_nothing_while_unsaturated(drive, reference, method):
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("response", [Response.GAMMA, Response.SRGB])
-def test_a_response_that_is_told_is_undone(drive, reference, method, response):
+def test_a_response_that_is_told_is_undone(drive, reference, method):
     """Koschmieder's law is linear in light. Noise of the darker parts is amplified otherwise."""
-    camera = replace(CAMERA, response=response)
+    camera = replace(CAMERA, response=Response.SRGB)
     assert close(last(method, drive(camera), camera), reference[method])
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("degrees", [-4.0, 3.0])
-def test_a_roll_that_is_told_is_undone(drive, reference, method, degrees):
+def test_a_roll_that_is_told_is_undone(drive, reference, method):
     """Turning back interpolates between pixels, and corners show other ground."""
-    camera = replace(CAMERA, roll=np.radians(degrees))
+    camera = replace(CAMERA, roll=np.radians(-4.0))
     assert close(last(method, drive(camera), camera), reference[method])
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("degrees", [0.5, 4.0])
-def test_a_pitch_that_is_told_is_undone(drive, reference, method, degrees):
+def test_a_pitch_that_is_told_is_undone(drive, reference, method):
     """The horizon lies on other rows; the road about the inflection is the same."""
-    camera = replace(CAMERA, pitch=np.radians(degrees))
+    camera = replace(CAMERA, pitch=np.radians(4.0))
     assert close(last(method, drive(camera), camera), reference[method])
 
 
@@ -221,11 +218,10 @@ def test_grey_in_three_channels_is_grey(drive, reference, method):
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize(("bits", "factor"), [(10, 4), (12, 16)])
-def test_more_bits_of_the_same_picture_change_nothing(drive, reference, method, bits, factor):
-    """The largest value is 2^bits − 1, not `factor` · 255: a gain of 0.3 % or 0.4 %."""
-    deep = [np.repeat((image.astype(np.uint16) * factor)[:, :, None], 3, axis=2) for image in drive()]
-    found = last(method, deep, replace(CAMERA, bits=bits))
+def test_more_bits_of_the_same_picture_change_nothing(drive, reference, method):
+    """The largest value is 2^12 − 1, not 16 · 255: a gain of 0.4 %."""
+    deep = [np.repeat((image.astype(np.uint16) * 16)[:, :, None], 3, axis=2) for image in drive()]
+    found = last(method, deep, replace(CAMERA, bits=12))
     assert found.extinction == pytest.approx(reference[method].extinction, rel=0.01)
 
 

@@ -77,11 +77,10 @@ def test_a_mirrored_picture_of_a_mirrored_camera_says_the_same(drawn, method: st
     assert valid > 0.5 * len(drawn)
 
 
-@pytest.mark.parametrize("roll", [0.0, -3.0])
 @pytest.mark.parametrize("method", METHODS)
-def test_a_mirrored_drive_says_the_same(method: str, roll: float) -> None:
+def test_a_mirrored_drive_says_the_same(method: str) -> None:
     """With a vehicle ahead whose range is told."""
-    camera = Camera(400, 300, 360.0, (190.5, 149.5), 1.38, np.radians(2.0), np.radians(roll))
+    camera = Camera(400, 300, 360.0, (190.5, 149.5), 1.38, np.radians(2.0), np.radians(-3.0))
     one, two = make(method, camera), make(method, mirrored(camera))
     for index, distance in enumerate(RANGES):
         road = Road(camera=camera, lead_distance=distance + 1.7, verge=True)

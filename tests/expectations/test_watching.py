@@ -93,9 +93,8 @@ def eventually(condition: str, within: float = math.inf) -> Eventually:
     return Eventually("a", parse_condition(condition), None, within)
 
 
-@pytest.mark.parametrize(
-    ("clause", "verdict", "time"),
-    [
+def test_eventually() -> None:
+    for clause, verdict, time in [
         (eventually("ego.speed < 15 m/s"), PASSED, 8.0),
         (eventually("ego.speed < 15 m/s", 9.0), PASSED, 8.0),
         (eventually("ego.speed < 15 m/s", 7.0), FAILED, 8.0),
@@ -103,11 +102,9 @@ def eventually(condition: str, within: float = math.inf) -> Eventually:
         (eventually("ego.speed < 5 m/s"), FAILED, 10.0),
         (eventually("ego.speed < 5 m/s", 30.0), OPEN, None),
         (Eventually("a", parse_condition("ego.speed < 15 m/s"), parse_condition("time > 99 s")), OPEN, None),
-    ],
-)
-def test_eventually(clause: Eventually, verdict: FindingVerdict, time: float | None) -> None:
-    found = find(clause, SLOWING)
-    assert (found.verdict, found.time) == (verdict, time)
+    ]:
+        found = find(clause, SLOWING)
+        assert (found.verdict, found.time) == (verdict, time)
 
 
 def reaction(delay: float, hold: float = 99.0) -> list[Step]:
@@ -130,9 +127,8 @@ def whenever(
     return Whenever("a", trigger, parse_condition(require), within, throughout, least)
 
 
-@pytest.mark.parametrize(
-    ("clause", "steps", "verdict"),
-    [
+def test_whenever() -> None:
+    for clause, steps, verdict in [
         (whenever(2.0), reaction(2.0), PASSED),
         (whenever(1.5), reaction(2.0), FAILED),
         (whenever(0.0), reaction(0.0), PASSED),
@@ -146,10 +142,8 @@ def whenever(
         # The second time is not decided when the run ends.
         (whenever(2.0, least=2), reaction(2.0)[:28], OPEN),
         (whenever(2.0, require="ghost.speed > 3 m/s"), reaction(0.0), OPEN),
-    ],
-)
-def test_whenever(clause: Whenever, steps: list[Step], verdict: FindingVerdict) -> None:
-    assert find(clause, steps).verdict is verdict
+    ]:
+        assert find(clause, steps).verdict is verdict
 
 
 def test_whenever_tells_how_often_and_when_it_was_not_so() -> None:
@@ -177,9 +171,8 @@ def test_what_never_happened_shows_nothing() -> None:
     assert (found.verdict, found.reason) == (OPEN, "timeline.0 never began")
 
 
-@pytest.mark.parametrize(
-    ("check", "verdict"),
-    [
+def test_metrics() -> None:
+    for check, verdict in [
         (MetricCheck("a", "gap_m", ">=", 5.0), PASSED),
         (MetricCheck("a", "gap_m", "<", 5.0), FAILED),
         (MetricCheck("a", "estimators.huang2015.count", "==", 3.0), PASSED),
@@ -188,11 +181,9 @@ def test_what_never_happened_shows_nothing() -> None:
         (MetricCheck("a", "ending", "==", 3.0), OPEN),
         (MetricCheck("a", "none_m", "<", 3.0), OPEN),
         (MetricCheck("a", "estimators", "<", 3.0), OPEN),
-    ],
-)
-def test_metrics(check: MetricCheck, verdict: FindingVerdict) -> None:
-    metrics = {"gap_m": 5, "ending": "arrived", "none_m": None, "estimators": {"huang2015": {"count": 3}}}
-    assert find(check, SLOWING, metrics).verdict is verdict
+    ]:
+        metrics = {"gap_m": 5, "ending": "arrived", "none_m": None, "estimators": {"huang2015": {"count": 3}}}
+        assert find(check, SLOWING, metrics).verdict is verdict
 
 
 def test_a_gap_that_shrinks_is_told_in_the_units_that_were_written() -> None:

@@ -55,40 +55,37 @@ def refused(tmp_path: Path, written: str, *settings: str) -> str:
     return line
 
 
-@pytest.mark.parametrize(
-    "clause", ["never: '{}'", "eventually: '{}'", "always: 'not ({})'", "never: 'ego.collision or ({})'"]
-)
-@pytest.mark.parametrize(("condition", "why"), NEVER_TRUE)
-def test_an_expectation_that_decides_nothing(tmp_path: Path, clause: str, condition: str, why: str) -> None:
-    line = refused(tmp_path, f"expect: {{safe: {{{clause.format(condition)}}}}}")
-    assert f"expect.safe.{clause.partition(':')[0]}: " in line
-    assert why in line
+def test_an_expectation_that_decides_nothing(tmp_path: Path) -> None:
+    for condition, why in NEVER_TRUE:
+        for clause in ["never: '{}'", "eventually: '{}'", "always: 'not ({})'", "never: 'ego.collision or ({})'"]:
+            line = refused(tmp_path, f"expect: {{safe: {{{clause.format(condition)}}}}}")
+            assert f"expect.safe.{clause.partition(':')[0]}: " in line
+            assert why in line
 
 
-@pytest.mark.parametrize("key", ["while", "whenever", "require"])
-@pytest.mark.parametrize(("condition", "why"), NEVER_TRUE[:4])
-def test_a_condition_that_never_applies(tmp_path: Path, key: str, condition: str, why: str) -> None:
-    others = {
-        "while": "always: ego.speed > 3 km/h",
-        "whenever": "require: ego.speed > 3 km/h",
-        "require": "whenever: ego.collision",
-    }
-    line = refused(tmp_path, f"expect: {{safe: {{{key}: '{condition}', {others[key]}}}}}")
-    assert f"expect.safe.{key}: " in line
-    assert why in line
+def test_a_condition_that_never_applies(tmp_path: Path) -> None:
+    for condition, why in NEVER_TRUE[:4]:
+        for key in ["while", "whenever", "require"]:
+            others = {
+                "while": "always: ego.speed > 3 km/h",
+                "whenever": "require: ego.speed > 3 km/h",
+                "require": "whenever: ego.collision",
+            }
+            line = refused(tmp_path, f"expect: {{safe: {{{key}: '{condition}', {others[key]}}}}}")
+            assert f"expect.safe.{key}: " in line
+            assert why in line
 
 
-@pytest.mark.parametrize("place", ["timeline: [{{when: '{}', do: {{ego: {{brake: {{}}}}}}}}]", "end_when: '{}'"])
-@pytest.mark.parametrize(("condition", "why"), NEVER_TRUE)
-def test_a_trigger_that_can_never_come(tmp_path: Path, place: str, condition: str, why: str) -> None:
-    line = refused(tmp_path, place.format(condition))
-    assert ("timeline.0.when: " if place.startswith("timeline") else "end_when: ") in line
-    assert why in line
+def test_a_trigger_that_can_never_come(tmp_path: Path) -> None:
+    for condition, why in NEVER_TRUE:
+        for place in ["timeline: [{{when: '{}', do: {{ego: {{brake: {{}}}}}}}}]", "end_when: '{}'"]:
+            line = refused(tmp_path, place.format(condition))
+            assert ("timeline.0.when: " if place.startswith("timeline") else "end_when: ") in line
+            assert why in line
 
 
-@pytest.mark.parametrize(
-    ("expectation", "why"),
-    [
+def test_times_bounds_and_names_that_decide_nothing(tmp_path: Path) -> None:
+    for expectation, why in [
         ("{eventually: time > 1.5 s, within: 1 s}", "this cannot pass: time > 1.5 s is never true"),
         ("{eventually: ego.collision, within: 3 s}", "this cannot be decided: the run lasts 2 s; got 3 s"),
         ("{never: ego.collision, for_at_least: 3 s}", "this cannot be decided: the run lasts 2 s; got 3 s"),
@@ -105,10 +102,8 @@ def test_a_trigger_that_can_never_come(tmp_path: Path, place: str, condition: st
         ("{metric: traffic_fog_time_share > 100 %}", "this cannot pass"),
         ("{metric: traffic_fog_time_share < -0.1}", "this cannot pass"),
         ("{never: ego.leader == parkd}", "there is no vehicle 'parkd' in"),
-    ],
-)
-def test_times_bounds_and_names_that_decide_nothing(tmp_path: Path, expectation: str, why: str) -> None:
-    assert why in refused(tmp_path, f"expect: {{safe: {expectation}}}")
+    ]:
+        assert why in refused(tmp_path, f"expect: {{safe: {expectation}}}")
 
 
 def test_the_ego_has_two_names(tmp_path: Path) -> None:

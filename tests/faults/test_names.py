@@ -51,37 +51,37 @@ VALUES = UNFIT[:4]
 """Values of ``vary`` may have blanks and ``<``: they are put in quotes or escaped where they are shown."""
 
 
-@pytest.mark.parametrize(
-    ("place", "name"), [(place, name) for place in NAMES for name in (VALUES if place == "value" else UNFIT)]
-)
-def test_a_scenario_with_an_unfit_name_is_refused(tmp_path: Path, place: str, name: str) -> None:
-    file = tmp_path / "named.fog.yaml"
-    file.write_text(SCENARIO.format(**{**NAMES, place: name}), encoding="utf-8")
-    with pytest.raises(InputError) as error:
-        load_cases(file)
-    assert all(line.isprintable() for line in str(error.value).splitlines())
-    assert str(error.value).startswith(f"{file}:")
+def test_a_scenario_with_an_unfit_name_is_refused(tmp_path: Path) -> None:
+    for place, name in [(at, name) for at in NAMES for name in (VALUES if at == "value" else UNFIT)]:
+        file = tmp_path / "named.fog.yaml"
+        file.write_text(SCENARIO.format(**{**NAMES, place: name}), encoding="utf-8")
+        with pytest.raises(InputError) as error:
+            load_cases(file)
+        assert all(line.isprintable() for line in str(error.value).splitlines())
+        assert str(error.value).startswith(f"{file}:")
 
 
-@pytest.mark.parametrize("name", [" ", ";", "|", "&", ",", ">", "\\\\", '\\"', "'"])
-def test_an_actor_has_a_name_that_sumo_takes(tmp_path: Path, name: str) -> None:
-    file = tmp_path / "named.fog.yaml"
-    file.write_text(SCENARIO.format(**{**NAMES, "actor": f'"a{name}b"', "reference": "ego", "subject": "ego"}), "utf-8")
-    with pytest.raises(InputError, match="a name in SUMO has no blank and none of") as error:
-        load_cases(file)
-    assert len(str(error.value).splitlines()) == 2  # the mistake, and its case
+def test_an_actor_has_a_name_that_sumo_takes(tmp_path: Path) -> None:
+    for name in [" ", ";", "|", "&", ",", ">", "\\\\", '\\"', "'"]:
+        file = tmp_path / "named.fog.yaml"
+        file.write_text(
+            SCENARIO.format(**{**NAMES, "actor": f'"a{name}b"', "reference": "ego", "subject": "ego"}), "utf-8"
+        )
+        with pytest.raises(InputError, match="a name in SUMO has no blank and none of") as error:
+            load_cases(file)
+        assert len(str(error.value).splitlines()) == 2  # the mistake, and its case
 
 
-@pytest.mark.parametrize("place", ["factor", "level"])
-@pytest.mark.parametrize("name", UNFIT)
-def test_a_study_with_an_unfit_name_is_refused(tmp_path: Path, place: str, name: str) -> None:
-    file = tmp_path / "named.yaml"
-    file.write_text(STUDY.format(**{"factor": "fog", "level": "far", place: name}), encoding="utf-8")
-    with pytest.raises(InputError) as error:
-        load_study(file)
-    (line,) = str(error.value).splitlines()
-    assert line.isprintable()
-    assert line.startswith(f"{file}:")
+def test_a_study_with_an_unfit_name_is_refused(tmp_path: Path) -> None:
+    for name in UNFIT:
+        for place in ["factor", "level"]:
+            file = tmp_path / "named.yaml"
+            file.write_text(STUDY.format(**{"factor": "fog", "level": "far", place: name}), encoding="utf-8")
+            with pytest.raises(InputError) as error:
+                load_study(file)
+            (line,) = str(error.value).splitlines()
+            assert line.isprintable()
+            assert line.startswith(f"{file}:")
 
 
 @pytest.mark.parametrize("name", ["Müller", "車両", "a_1.b#2:c", "é"])

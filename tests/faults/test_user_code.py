@@ -230,15 +230,15 @@ FILES = {
 }
 
 
-@pytest.mark.parametrize("kind", ["estimators", "fusion", "advice", "lighting"])
-@pytest.mark.parametrize("name", FILES)
-def test_only_classes_beside_the_scenario_are_methods(folder: Path, name: str, kind: str) -> None:
-    (folder / "borrowed.py").write_text("from collections import OrderedDict\ndef make(): pass\n")
-    (folder / "broken.py").write_text("class Method(:\n")
-    (folder / "short.fog.yaml").write_text(SCENARIO.replace("NAME", "joint_road"))
-    written = f"['{name}']" if kind == "estimators" else f"'{name}'"
-    with pytest.raises(InputError, match=FILES[name]):
-        load_scenario(folder / "short.fog.yaml", [f"{kind}={written}"])
+def test_only_classes_beside_the_scenario_are_methods(folder: Path) -> None:
+    for name, told in FILES.items():
+        for kind in ["estimators", "fusion", "advice", "lighting"]:
+            (folder / "borrowed.py").write_text("from collections import OrderedDict\ndef make(): pass\n")
+            (folder / "broken.py").write_text("class Method(:\n")
+            (folder / "short.fog.yaml").write_text(SCENARIO.replace("NAME", "joint_road"))
+            written = f"['{name}']" if kind == "estimators" else f"'{name}'"
+            with pytest.raises(InputError, match=told):
+                load_scenario(folder / "short.fog.yaml", [f"{kind}={written}"])
 
 
 @pytest.mark.parametrize(

@@ -92,18 +92,15 @@ def simulated_collision_speed(gap: float, speed: float, leader_speed: float) -> 
     return speed - leader_speed if gap <= 0.0 else 0.0
 
 
-@pytest.mark.parametrize(
-    ("gap", "speed", "leader_speed"),
-    [
+def test_potential_collision_speed_is_that_of_a_simulation() -> None:
+    """Hits while the leader brakes, while both do, while neither or one does, on a standing leader, and none."""
+    for gap, speed, leader_speed in [
         *((3.0, 20.0, 20.0), (5.0, 20.0, 20.0), (20.0, 20.0, 18.0), (34.0, 20.0, 18.0), (45.0, 20.0, 18.0)),
         *((5.0, 20.0, 3.0), (20.0, 20.0, 3.0), (45.0, 20.0, 3.0), (80.0, 20.0, 3.0), (10.0, 5.0, 20.0)),
         *((25.0, 20.0, 0.0), (45.0, 20.0, 0.0), (70.0, 20.0, 0.0)),
-    ],
-)
-def test_potential_collision_speed_is_that_of_a_simulation(gap: float, speed: float, leader_speed: float) -> None:
-    """Hits while the leader brakes, while both do, while neither or one does, on a standing leader, and none."""
-    expected = simulated_collision_speed(gap, speed, leader_speed)
-    assert potential_collision_speed(gap, speed, leader_speed, 1.5, 6.0) == pytest.approx(expected, abs=0.02)
+    ]:
+        expected = simulated_collision_speed(gap, speed, leader_speed)
+        assert potential_collision_speed(gap, speed, leader_speed, 1.5, 6.0) == pytest.approx(expected, abs=0.02)
 
 
 def test_an_obstacle_within_the_reaction_distance_is_hit_at_full_speed_and_one_without_end_never() -> None:

@@ -19,9 +19,8 @@ WALL = obstructions_of([structure([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]])])
 """From x = 0 to 10, y = −1 to 1, 3 m high."""
 
 
-@pytest.mark.parametrize(
-    ("eyes", "target", "way"),
-    [
+def test_ways_through_a_wall_by_hand() -> None:
+    for eyes, target, way in [
         ((5.0, -10.0, 1.0), (5.0, 10.0, 1.0), 2.0),  # straight through
         ((-10.0, 0.5, 1.0), (20.0, 0.5, 1.0), 10.0),  # along it
         ((0.0, -2.0, 1.0), (4.0, 2.0, 1.0), 2.0 * math.sqrt(2.0)),  # at 45°
@@ -37,11 +36,9 @@ WALL = obstructions_of([structure([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]])])
         ),  # rises by 1 in 4
         ((5.0, 0.0, 1.0), (5.0, 10.0, 1.0), 1.0),  # begins within
         ((5.0, 0.0, -4.0), (5.0, 0.0, 6.0), 3.0),  # straight up
-    ],
-)
-def test_ways_through_a_wall_by_hand(eyes: tuple[float, ...], target: tuple[float, ...], way: float) -> None:
-    assert WALL.way_through([eyes], [target])[0] == pytest.approx(way, abs=1e-12)
-    assert WALL.hide([eyes], [[target]])[0] == (way > 0.0)
+    ]:
+        assert WALL.way_through([eyes], [target])[0] == pytest.approx(way, abs=1e-12)
+        assert WALL.hide([eyes], [[target]])[0] == (way > 0.0)
 
 
 def test_sight_is_the_same_from_either_end_to_the_bit() -> None:

@@ -34,9 +34,8 @@ def test_a_file_with_the_signs_of_a_pattern_in_its_name_is_that_file(folder: Pat
     assert names(find_source(str(folder / "a[1].png"))) == ["a[1].png"]
 
 
-@pytest.mark.parametrize(
-    ("files", "sequence"),
-    [
+def test_numbers_that_count_on_in_equal_steps_make_a_sequence() -> None:
+    for files, sequence in [
         (["a1.png", "a2.png", "a3.png"], True),
         (["cam2_00010.png", "cam2_00015.png", "cam2_00020.png"], True),
         (["a1.png", "a2.png", "a4.png"], False),
@@ -46,10 +45,8 @@ def test_a_file_with_the_signs_of_a_pattern_in_its_name_is_that_file(folder: Pat
         (["fog.png", "mist.png"], False),
         (["a1.png"], False),
         ([], False),
-    ],
-)
-def test_numbers_that_count_on_in_equal_steps_make_a_sequence(files: list[str], sequence: bool) -> None:
-    assert is_sequence([Path(file) for file in files]) is sequence
+    ]:
+        assert is_sequence([Path(file) for file in files]) is sequence
 
 
 def test_what_was_found_is_told(folder: Path) -> None:

@@ -205,9 +205,8 @@ def test_a_map_that_fogsim_wrote_can_be_read(folder: Path) -> None:
 POINT = feature((24.9, 60.2))
 
 
-@pytest.mark.parametrize(
-    ("features", "members", "told"),
-    [
+def test_maps_that_are_refused(tmp_path: Path) -> None:
+    for features, members, told in [
         ([], {}, "the map has no signs"),
         ([{**POINT, "id": "a"}, {**POINT, "id": "a"}], {}, "two signs have the id 'a'"),
         ([feature((24.9, 60.2), kind=None)], {}, 'feature 0: a sign needs a property "kind"'),
@@ -217,11 +216,9 @@ POINT = feature((24.9, 60.2))
         ([POINT], {"crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::3067"}}}, "is in .urn.*3067"),
         ([POINT], {"coordinates": NET}, "x and y of a SUMO network"),
         ([POINT], {"features": None, "type": "Point"}, "expected a GeoJSON FeatureCollection .*got type 'Point'"),
-    ],
-)
-def test_maps_that_are_refused(tmp_path: Path, features: list[object], members: dict[str, object], told: str) -> None:
-    with pytest.raises(InputError, match=told):
-        load_sign_file(geojson(tmp_path / "map.geojson", *features, **members))
+    ]:
+        with pytest.raises(InputError, match=told):
+            load_sign_file(geojson(tmp_path / "map.geojson", *features, **members))
 
 
 @pytest.mark.parametrize(("text", "told"), [("", ":1: not valid JSON"), ("[]", "got list"), (None, "cannot be read")])
@@ -232,9 +229,8 @@ def test_files_that_are_no_map(tmp_path: Path, text: str | None, told: str) -> N
         load_sign_file(tmp_path / "map.geojson")
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "told"),
-    [
+def test_tracks_that_are_refused(tmp_path: Path) -> None:
+    for name, text, told in [
         ("a.csv", None, "cannot be read"),
         ("a.txt", "", r"ends in \.gpx or \.csv"),
         ("a.csv", "time_s,lat\n", "expected a column longitude or lon, got time_s, lat"),
@@ -246,13 +242,11 @@ def test_files_that_are_no_map(tmp_path: Path, text: str | None, told: str) -> N
         ("a.csv", "time_s,lat,lon\n0,1,2\n1,1,2\n", "never moves"),
         ("a.gpx", "<gpx", ":1: not XML"),
         ("a.gpx", '<gpx><trk><trkseg><trkpt lat="1" lon="2"/></trkseg></trk></gpx>', "point 0 has no <time>"),
-    ],
-)
-def test_tracks_that_are_refused(tmp_path: Path, name: str, text: str | None, told: str) -> None:
-    if text is not None:
-        (tmp_path / name).write_text(text, encoding="utf-8")
-    with pytest.raises(InputError, match=told):
-        load_track(tmp_path / name)
+    ]:
+        if text is not None:
+            (tmp_path / name).write_text(text, encoding="utf-8")
+        with pytest.raises(InputError, match=told):
+            load_track(tmp_path / name)
 
 
 @pytest.mark.parametrize(

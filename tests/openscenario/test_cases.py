@@ -129,9 +129,8 @@ def test_what_would_run_as_something_else_is_refused(name: str, told: str) -> No
         _loaded(CASES / f"{name}.xosc")
 
 
-@pytest.mark.parametrize(
-    ("position", "is_along"),
-    [
+def test_a_vehicle_stands_along_its_lane_or_against_it_or_is_refused(tmp_path: Path) -> None:
+    for position, is_along in [
         ('<LanePosition roadId="7" laneId="-1" s="500"><Orientation type="relative" h="6.28"/></LanePosition>', True),
         ('<LanePosition roadId="7" laneId="-1" s="500"><Orientation type="absolute" h="0"/></LanePosition>', True),
         ('<LanePosition roadId="7" laneId="1" s="500"><Orientation type="absolute" h="3.14"/></LanePosition>', True),
@@ -142,41 +141,34 @@ def test_what_would_run_as_something_else_is_refused(name: str, told: str) -> No
         ('<WorldPosition x="500" y="-1.7" h="0.9"/>', False),
         ('<WorldPosition x="500" y="1.7" h="3.1"/>', True),
         ('<RelativeLanePosition entityRef="Ego" dLane="0" ds="9"><Orientation p="1"/></RelativeLanePosition>', True),
-    ],
-)
-def test_a_vehicle_stands_along_its_lane_or_against_it_or_is_refused(
-    tmp_path: Path, position: str, is_along: bool | None
-) -> None:
-    text = (CASES / "turned_round.xosc").read_text(encoding="utf-8")
-    begin = text.index('<LanePosition roadId="7" laneId="-1" s="500">')
-    old = text[begin : text.index("</LanePosition>", begin) + len("</LanePosition>")]
-    file = _changed(tmp_path, "turned_round", (old, position))
-    if is_along or is_along is None:
-        first = _loaded(file).timeline[0].name
-        assert (first == "Init_off_the_lanes") == (is_along is None)
-    else:
-        with pytest.raises(InputError, match="h: vehicles stand, and drive, along their lanes"):
-            _loaded(file)
+    ]:
+        text = (CASES / "turned_round.xosc").read_text(encoding="utf-8")
+        begin = text.index('<LanePosition roadId="7" laneId="-1" s="500">')
+        old = text[begin : text.index("</LanePosition>", begin) + len("</LanePosition>")]
+        file = _changed(tmp_path, "turned_round", (old, position))
+        if is_along or is_along is None:
+            first = _loaded(file).timeline[0].name
+            assert (first == "Init_off_the_lanes") == (is_along is None)
+        else:
+            with pytest.raises(InputError, match="h: vehicles stand, and drive, along their lanes"):
+                _loaded(file)
 
 
-@pytest.mark.parametrize(
-    ("sun", "lux"),
-    [
+def test_the_sun_is_in_lux(tmp_path: Path) -> None:
+    for sun, lux in [
         ('intensity="0.85" azimuth="3" elevation="-0.2"', 0.85),
         ('intensity="0" azimuth="3" elevation="0.9"', 0.0),
         ('illuminance="900" azimuth="3" elevation="0.05"', 900.0),
         ('intensity="40" azimuth="3" elevation="0.9"', None),
         ('illuminance="0.85" azimuth="3" elevation="0.9"', None),
         ('illuminance="0.5" azimuth="3"', None),
-    ],
-)
-def test_the_sun_is_in_lux(tmp_path: Path, sun: str, lux: float | None) -> None:
-    file = _changed(tmp_path, "sun_between_0_and_1", ('intensity="0.85" azimuth="3" elevation="0.9"', sun))
-    if lux is not None:
-        assert _loaded(file).light.illuminance_lx == lux
-    else:
-        with pytest.raises(InputError, match=r"Sun: (intensity|illuminance): \S+ lx would be night at a sun of"):
-            _loaded(file)
+    ]:
+        file = _changed(tmp_path, "sun_between_0_and_1", ('intensity="0.85" azimuth="3" elevation="0.9"', sun))
+        if lux is not None:
+            assert _loaded(file).light.illuminance_lx == lux
+        else:
+            with pytest.raises(InputError, match=r"Sun: (intensity|illuminance): \S+ lx would be night at a sun of"):
+                _loaded(file)
 
 
 @pytest.mark.parametrize(("intensity", "lux"), [(1.0, 90_164.0), (0.5, 90_164.0 * (1.0 - 0.75 * 0.5**3.4))])

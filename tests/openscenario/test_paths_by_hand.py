@@ -122,15 +122,14 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_the_egos_path_follows_from_the_file(tmp_path: Path, name: str) -> None:
-    action, start, place = CASES[name]
-    begin = {"Ego": f"{lane(50)}\n{speed(10)}", "Slow": f"{lane(90)}\n{speed(0)}"}
-    others = {"Slow": CAR} if start is CLOSE else {}
-    begin = {vehicle: begin[vehicle] for vehicle in ("Ego", *others)}
-    file = write(tmp_path, {"Ego": CAR, **others}, begin, {"Ego": event("e", action, start)}, stop=after(6.0))
-    steps = list(fogsim.run(fogsim.load_scenario(file, QUIET)))
-    assert steps[-1].time == pytest.approx(6.0, abs=0.11)
-    for step in steps:
-        x, y, _ = step.traffic.position[step.traffic.ids.index("Ego")]
-        assert math.dist((x, y), place(step.time)) < 1.0, step.time
+def test_the_egos_path_follows_from_the_file(tmp_path: Path) -> None:
+    for action, start, place in CASES.values():
+        begin = {"Ego": f"{lane(50)}\n{speed(10)}", "Slow": f"{lane(90)}\n{speed(0)}"}
+        others = {"Slow": CAR} if start is CLOSE else {}
+        begin = {vehicle: begin[vehicle] for vehicle in ("Ego", *others)}
+        file = write(tmp_path, {"Ego": CAR, **others}, begin, {"Ego": event("e", action, start)}, stop=after(6.0))
+        steps = list(fogsim.run(fogsim.load_scenario(file, QUIET)))
+        assert steps[-1].time == pytest.approx(6.0, abs=0.11)
+        for step in steps:
+            x, y, _ = step.traffic.position[step.traffic.ids.index("Ego")]
+            assert math.dist((x, y), place(step.time)) < 1.0, step.time

@@ -92,9 +92,8 @@ def test_positions_on_a_route_and_conditions_count_the_junction(tmp_path: Path) 
     assert step.traffic.position[row, :2] == pytest.approx((121.75, 20.0 + 40.0 + 3.7), abs=0.3)
 
 
-@pytest.mark.parametrize(
-    ("routing", "told"),
-    [
+def test_what_cannot_be_driven_is_refused(tmp_path: Path) -> None:
+    for routing, told in [
         (_routing(_route(_on(3, 20), _on(2, 50))), "no way leads from lanes 3_-1 to lanes 2_-1"),
         (_routing(_route(_on(1, 20), _on(1, 10))), "a waypoint lies behind the one before"),
         (_routing(_route(_on(1, 20), _on(3, 10), strategy="random")), "routeStrategy: FogSim has no 'random' here"),
@@ -103,12 +102,10 @@ def test_positions_on_a_route_and_conditions_count_the_junction(tmp_path: Path) 
         (_routing(_route(_on(1, 20), _on_route(NORTH, 10.0))), "a waypoint has a place of its own, not one on a route"),
         (_routing("<TrajectoryRef/>", "FollowTrajectoryAction"), "expected Trajectory or CatalogReference inside"),
         (_routing(FROM_CATALOG), "there is no catalog 'Ways'"),
-    ],
-)
-def test_what_cannot_be_driven_is_refused(tmp_path: Path, routing: str, told: str) -> None:
-    file = write(tmp_path, {"Ego": CAR}, {"Ego": f"{_on(1, 30)}\n{routing}"}, road=FORK)
-    with pytest.raises(InputError, match=rf"RoutingAction/.*{told}"):
-        read_openscenario(file)
+    ]:
+        file = write(tmp_path, {"Ego": CAR}, {"Ego": f"{_on(1, 30)}\n{routing}"}, road=FORK)
+        with pytest.raises(InputError, match=rf"RoutingAction/.*{told}"):
+            read_openscenario(file)
 
 
 def test_a_place_inside_the_junction_is_refused(tmp_path: Path) -> None:

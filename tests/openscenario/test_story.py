@@ -91,23 +91,20 @@ def test_lanes_beyond_the_nearest_oncoming_one_and_a_rate_of_0_are_refused(tmp_p
     assert "does not know this attribute" not in str(refused.value)
 
 
-@pytest.mark.parametrize(("shape", "lasts"), [("linear", 3.5), ("sinusoidal", 0.5 * math.pi * 3.5), ("cubic", 5.25)])
-@pytest.mark.parametrize(
-    "target",
-    [
+def test_a_rate_is_the_greatest_speed_across_and_the_lane_to_the_left_the_oncoming_one(tmp_path: Path) -> None:
+    for target in [
         '<AbsoluteTargetLane value="1"/>',
         '<RelativeTargetLane entityRef="Ego" value="1"/>',
         '<RelativeTargetLane entityRef="Lead" value="1"/>',
-    ],
-)
-def test_a_rate_is_the_greatest_speed_across_and_the_lane_to_the_left_the_oncoming_one(
-    tmp_path: Path, target: str, shape: str, lasts: float
-) -> None:
-    action = _changes_lane(1, "rate", 1.0).replace("cubic", shape).replace('<AbsoluteTargetLane value="1"/>', target)
-    begin = {"Ego": lane(30), "Lead": lane(90)}
-    file = write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Ego": event("leave", action, after(1.0))})
-    done = read_openscenario(file).data["timeline"][-1]["do"]["Ego"]["change_lane"]
-    assert (done["to"], done["duration_s"]) == ("oncoming", pytest.approx(lasts))
+    ]:
+        for shape, lasts in [("linear", 3.5), ("sinusoidal", 0.5 * math.pi * 3.5), ("cubic", 5.25)]:
+            action = (
+                _changes_lane(1, "rate", 1.0).replace("cubic", shape).replace('<AbsoluteTargetLane value="1"/>', target)
+            )
+            begin = {"Ego": lane(30), "Lead": lane(90)}
+            file = write(tmp_path, {"Ego": CAR, "Lead": CAR}, begin, {"Ego": event("leave", action, after(1.0))})
+            done = read_openscenario(file).data["timeline"][-1]["do"]["Ego"]["change_lane"]
+            assert (done["to"], done["duration_s"]) == ("oncoming", pytest.approx(lasts))
 
 
 @pytest.mark.parametrize(("number", "lanes"), [(1, 1), (2, 2), (-1, 1)])

@@ -98,7 +98,7 @@ def installed_wheel(wheel: Path, place: Path) -> tuple[Path, Path]:
     return python, packages
 
 
-@pytest.mark.packaging
+@pytest.mark.nightly
 @pytest.mark.timeout(900)
 def test_the_wheel_runs_the_demo_outside_the_checkout(tmp_path: Path) -> None:
     python, packages = installed_wheel(built_wheel(CHECKOUT, tmp_path), tmp_path / "venv")
@@ -122,7 +122,7 @@ def test_the_wheel_runs_the_demo_outside_the_checkout(tmp_path: Path) -> None:
     assert str(tmp_path) in where
 
 
-@pytest.mark.packaging
+@pytest.mark.nightly
 @pytest.mark.timeout(900)
 @pytest.mark.skipif(usable_kind() is None, reason="no kernels are shipped for this processor")
 def test_a_wheel_with_kernels_needs_not_compile_them(tmp_path: Path) -> None:

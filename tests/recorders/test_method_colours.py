@@ -36,19 +36,18 @@ def lab(colours, sight) -> np.ndarray:
     return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=1)
 
 
-@pytest.mark.parametrize("ground", GROUNDS)
-@pytest.mark.parametrize("sight", SIGHTS)
-def test_colours_are_told_apart_by_every_eye(sight: str, ground: str) -> None:
+def test_colours_are_told_apart_by_every_eye() -> None:
     """2.3 is just noticeable side by side; thin lines apart from one another need several times that."""
-    table, behind, beside = GROUNDS[ground]
-    seen = lab(table, SIGHTS[sight])
-    apart = np.linalg.norm(seen[:, None] - seen, axis=2) + 1e9 * np.eye(len(seen))
-    first = [*range(14), 18, 19]
-    assert apart[np.ix_(first, first)].min() > 18.0
-    assert apart.min() > 13.0
-    assert np.linalg.norm(seen - lab([behind], SIGHTS[sight]), axis=1).min() > 30.0
-    others = np.linalg.norm(seen[: len(ESTIMATORS), None] - lab(beside, SIGHTS[sight]), axis=2)
-    assert others.min() > 16.0
+    for sight in SIGHTS.values():
+        for table, behind, beside in GROUNDS.values():
+            seen = lab(table, sight)
+            apart = np.linalg.norm(seen[:, None] - seen, axis=2) + 1e9 * np.eye(len(seen))
+            first = [*range(14), 18, 19]
+            assert apart[np.ix_(first, first)].min() > 18.0
+            assert apart.min() > 13.0
+            assert np.linalg.norm(seen - lab([behind], sight), axis=1).min() > 30.0
+            others = np.linalg.norm(seen[: len(ESTIMATORS), None] - lab(beside, sight), axis=2)
+            assert others.min() > 16.0
 
 
 @pytest.mark.parametrize("table", [ON_DARK, ON_LIGHT])
@@ -69,10 +68,10 @@ def test_more_methods_than_colours_take_colours_of_no_named_one() -> None:
     assert not {many[name] for name in ESTIMATORS} & {many[f"mine {i}"] for i in range(20)}
 
 
-@pytest.mark.parametrize("method", sorted(ESTIMATORS))
-def test_the_panel_writes_a_method_in_its_colour_wherever_it_stands(method: str) -> None:
-    told = (estimate(method, 100.0), estimate("mine", 90.0))
-    for estimates in (told, told[::-1]):
-        step = dataclasses.replace(make_step(), estimates=estimates)
-        lines = FramePanel().draw(step, step_metrics(step))[156:200, 656:]
-        assert (lines == method_colours([method])[method]).all(axis=-1).sum() > 20
+def test_the_panel_writes_a_method_in_its_colour_wherever_it_stands() -> None:
+    for method in sorted(ESTIMATORS):
+        told = (estimate(method, 100.0), estimate("mine", 90.0))
+        for estimates in (told, told[::-1]):
+            step = dataclasses.replace(make_step(), estimates=estimates)
+            lines = FramePanel().draw(step, step_metrics(step))[156:200, 656:]
+            assert (lines == method_colours([method])[method]).all(axis=-1).sum() > 20

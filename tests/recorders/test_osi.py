@@ -78,17 +78,14 @@ def test_obstacles_and_persons_are_no_vehicles(tmp_path: Path) -> None:
     assert not any(one.HasField("vehicle_classification") for one in objects)
 
 
-@pytest.mark.parametrize(
-    ("visibility", "name"),
-    [
+def test_classes_of_fog_begin_where_osi_has_them() -> None:
+    for visibility, name in [
         (49.9, "DENSE"),
         (50.0, "THICK"),
         (200.0, "LIGHT"),
         (999.0, "LIGHT"),
         (1000.0, "MIST"),
         (math.inf, "EXCELLENT_VISIBILITY"),
-    ],
-)
-def test_classes_of_fog_begin_where_osi_has_them(visibility: float, name: str) -> None:
-    assert fog_class(visibility) == name
-    assert f"FOG_{name}" in EnvironmentalConditions.Fog.keys()  # noqa: SIM118 - no mapping
+    ]:
+        assert fog_class(visibility) == name
+        assert f"FOG_{name}" in EnvironmentalConditions.Fog.keys()  # noqa: SIM118 - no mapping

@@ -107,11 +107,11 @@ def assert_same(renderers: Pair, vehicles: tuple[Batch, ...], camera: Camera, po
     return by_opengl
 
 
-@pytest.mark.parametrize("camera", [LARGE, SMALL, TILTED], ids=["large", "small", "tilted"])
-@pytest.mark.parametrize("station", [20.0, 1700.0, 3000.0], ids=["straight", "curve", "far on"])
-def test_on_the_motorway(motorway: Pair, route: np.ndarray, camera: Camera, station: float) -> None:
-    view = assert_same(motorway, (), camera, pose_at(route, station))
-    assert {0, 1, 2, 3} <= set(np.unique(view.instance))
+def test_on_the_motorway(motorway: Pair, route: np.ndarray) -> None:
+    for station in [20.0, 1700.0, 3000.0]:
+        for camera in [LARGE, SMALL, TILTED]:
+            view = assert_same(motorway, (), camera, pose_at(route, station))
+            assert {0, 1, 2, 3} <= set(np.unique(view.instance))
 
 
 @pytest.mark.parametrize("camera", [LARGE, SMALL], ids=["large", "small"])
@@ -123,12 +123,12 @@ def test_with_a_truck_ahead_and_others_beside(motorway: Pair, route: np.ndarray,
     assert 17 in view.instance
 
 
-@pytest.mark.parametrize("camera", [LARGE, SMALL], ids=["large", "small"])
-@pytest.mark.parametrize("place", [(0.0, 0.0, 0.0), (60.0, -4.0, 0.0), (30.0, 30.0, 2.0)])
-def test_at_junctions_of_a_town(town: Pair, camera: Camera, place: tuple[float, float, float]) -> None:
-    x, y, heading = place
-    view = assert_same(town, (), camera, CameraPose((x, y, 1.38), heading))
-    assert len(np.unique(view.instance)) > 2
+def test_at_junctions_of_a_town(town: Pair) -> None:
+    for place in [(0.0, 0.0, 0.0), (60.0, -4.0, 0.0), (30.0, 30.0, 2.0)]:
+        for camera in [LARGE, SMALL]:
+            x, y, heading = place
+            view = assert_same(town, (), camera, CameraPose((x, y, 1.38), heading))
+            assert len(np.unique(view.instance)) > 2
 
 
 def walls(*distances: float) -> Scene:

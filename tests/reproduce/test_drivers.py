@@ -131,14 +131,13 @@ def test_measures_of_three_vehicles() -> None:
     assert (found.ttc_15, found.ttc_50, found.ttc_below_10) == (2.0, 2.0, 0.5)
 
 
-@pytest.mark.parametrize(("mph", "metres"), [(20, 12), (30, 23), (40, 36), (50, 53), (60, 73), (70, 96)])
-def test_stopping_distances_are_the_highway_codes(mph: float, metres: float) -> None:
-    assert safe_speed(metres, THINKING_TIME, BRAKING) / 0.44704 == pytest.approx(mph, rel=0.02)
+def test_stopping_distances_are_the_highway_codes() -> None:
+    for mph, metres in [(20, 12), (30, 23), (40, 36), (50, 53), (60, 73), (70, 96)]:
+        assert safe_speed(metres, THINKING_TIME, BRAKING) / 0.44704 == pytest.approx(mph, rel=0.02)
 
 
-@pytest.mark.parametrize(
-    ("published", "value", "verdict"),
-    [
+def test_verdicts() -> None:
+    for published, value, verdict in [
         (Size(29.0, 29.0, "km/h"), 37.0, Verdict.INSIDE),
         (Size(29.0, 29.0, "km/h"), 21.0, Verdict.INSIDE),
         (Size(29.0, 29.0, "km/h"), 57.0, Verdict.FACTOR_OF_TWO),
@@ -153,10 +152,8 @@ def test_stopping_distances_are_the_highway_codes(mph: float, metres: float) -> 
         (Sign(rises=True, unit="s"), 0.0, Verdict.WRONG),
         (Sign(rises=False, unit="s", origin=1.0), 0.9, Verdict.RIGHT),
         (Sign(rises=False, unit="s", origin=1.0), 1.0, Verdict.WRONG),
-    ],
-)
-def test_verdicts(published, value: float, verdict: Verdict) -> None:
-    assert published.verdict(value) is verdict
+    ]:
+        assert published.verdict(value) is verdict
 
 
 def made_up(**changed: float) -> Measures:

@@ -52,6 +52,7 @@ def test_the_command_refuses_before_it_works(tmp_path: Path) -> None:
     assert out.read_text(encoding="utf-8") == "mine"
 
 
+@pytest.mark.nightly
 def test_the_evaluation_stands_beside_the_paper() -> None:
     steps: list[tuple[int, int]] = []
     done = reproduce(12, [Setup("small", CAMERA)], 4, fogs=FOGS, watch=lambda step, total: steps.append((step, total)))

@@ -72,22 +72,24 @@ def test_the_distance_of_the_road_is_that_of_its_geometry() -> None:
     assert blocks.shape == (30, 40)
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("most_gain", [2.0, 8.0])
-def test_noise_rises_by_no_more_than_the_bound(method: str, most_gain: float) -> None:
-    rng = np.random.default_rng(2)
-    distance = road_distance(DEEP)[0].astype(np.float64)
-    light = fogged(road(rng), distance)
-    noise = 0.002 * rng.standard_normal(light.shape)
-    given = (K, airlight(DEEP))
-    noisy, calm = (image_of(one, DEEP) for one in (light + noise, light))
-    one, other = (restore_contrast(image, DEEP, *given, method=method, most_gain=most_gain) for image in (noisy, calm))
-    assert one.transmission.min() >= (1.0 - 1e-6) / most_gain
-    sky = distance == FARTHEST
-    difference = (one.image.astype(np.float64) - other.image)[sky].std() / 4095
-    assert difference <= 1.05 * most_gain * 0.002
-    if method == "planar":
-        assert difference < 0.65 * most_gain * 0.002  # what is noise alone is smoothed
+def test_noise_rises_by_no_more_than_the_bound() -> None:
+    for most_gain in [2.0, 8.0]:
+        for method in METHODS:
+            rng = np.random.default_rng(2)
+            distance = road_distance(DEEP)[0].astype(np.float64)
+            light = fogged(road(rng), distance)
+            noise = 0.002 * rng.standard_normal(light.shape)
+            given = (K, airlight(DEEP))
+            noisy, calm = (image_of(one, DEEP) for one in (light + noise, light))
+            one, other = (
+                restore_contrast(image, DEEP, *given, method=method, most_gain=most_gain) for image in (noisy, calm)
+            )
+            assert one.transmission.min() >= (1.0 - 1e-6) / most_gain
+            sky = distance == FARTHEST
+            difference = (one.image.astype(np.float64) - other.image)[sky].std() / 4095
+            assert difference <= 1.05 * most_gain * 0.002
+            if method == "planar":
+                assert difference < 0.65 * most_gain * 0.002  # what is noise alone is smoothed
 
 
 @pytest.mark.parametrize("image", [image_of(np.full((120, 160, 3), 0.4)), image_of(np.full((120, 160), 0.4))])
@@ -107,21 +109,21 @@ def test_fog_that_is_hardly_there_changes_hardly_anything() -> None:
     )  # the soft bound: 2 % of what is not airlight
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("camera", [CAMERA, DEEP, replace(CAMERA, response=Response.LINEAR)])
-@pytest.mark.parametrize("grey", [False, True])
-def test_every_kind_of_image_keeps_its_kind(method: str, camera: Camera, grey: bool) -> None:
-    distance = road_distance(camera)[0].astype(np.float64)
-    image = image_of(fogged(road(np.random.default_rng(4)), distance), camera)
-    image = image[..., 0].copy() if grey else image
-    kept = image.copy()
-    one, other = (restore_contrast(image, camera, K, method=method) for _ in range(2))
-    assert one.image.shape == image.shape
-    assert one.image.dtype == image.dtype
-    assert np.array_equal(one.image, other.image)
-    assert np.array_equal(one.transmission, other.transmission)
-    assert np.array_equal(image, kept)
-    assert one.image.astype(float).std() > 1.1 * image.astype(float).std()
+def test_every_kind_of_image_keeps_its_kind() -> None:
+    for grey in [False, True]:
+        for camera in [CAMERA, DEEP, replace(CAMERA, response=Response.LINEAR)]:
+            for method in METHODS:
+                distance = road_distance(camera)[0].astype(np.float64)
+                image = image_of(fogged(road(np.random.default_rng(4)), distance), camera)
+                image = image[..., 0].copy() if grey else image
+                kept = image.copy()
+                one, other = (restore_contrast(image, camera, K, method=method) for _ in range(2))
+                assert one.image.shape == image.shape
+                assert one.image.dtype == image.dtype
+                assert np.array_equal(one.image, other.image)
+                assert np.array_equal(one.transmission, other.transmission)
+                assert np.array_equal(image, kept)
+                assert one.image.astype(float).std() > 1.1 * image.astype(float).std()
 
 
 def test_images_of_16_bits_without_a_depth_use_all_of_them() -> None:
@@ -179,9 +181,8 @@ def test_the_tone_map_neither_blackens_nor_bleaches() -> None:
 GREY = np.zeros((120, 160), np.uint8)
 
 
-@pytest.mark.parametrize(
-    ("image", "arguments", "told"),
-    [
+def test_mistakes_say_what_is_allowed() -> None:
+    for image, arguments, told in [
         (np.zeros((12, 16), np.uint8), {"extinction": K}, r"16 × 12 pixels, the camera 160 × 120"),
         (
             np.zeros((120, 160, 4), np.uint8),
@@ -197,11 +198,9 @@ GREY = np.zeros((120, 160), np.uint8)
         (GREY, {"extinction": K, "airlight": (1.0, 2.0, 3.0)}, r"airlight must be one pixel value or 1, got 3"),
         (GREY, {"extinction": K, "airlight": (300.0,)}, r"airlight must be brighter than black and at most 255"),
         (GREY, {"extinction": K, "airlight": (math.nan,)}, r"airlight must be brighter"),
-    ],
-)
-def test_mistakes_say_what_is_allowed(image: NDArray[np.uint8], arguments: dict[str, object], told: str) -> None:
-    with pytest.raises(InputError, match=told):
-        restore_contrast(image, CAMERA, **arguments)
+    ]:
+        with pytest.raises(InputError, match=told):
+            restore_contrast(image, CAMERA, **arguments)
 
 
 def test_images_must_have_the_cameras_bits() -> None:

@@ -62,9 +62,8 @@ def test_a_resolved_scenario_is_read_as_what_it_was(tmp_path: Path) -> None:
     assert again.expect["safe"].during == scenario.expect["safe"].during
 
 
-@pytest.mark.parametrize(
-    ("expect", "told"),
-    [
+def test_what_is_refused(tmp_path: Path) -> None:
+    for expect, told in [
         ("a: {never: ego.colision}", "expect.a.never: 'ego.colision': unknown signal 'ego.colision'; did you mean"),
         ("a: {always: ego.speed >= 0}", "expect.a.always: this cannot fail: ego.speed >= 0 is always true"),
         ("a: {always: ego.speed < 0}", "expect.a.always: this cannot pass"),
@@ -95,14 +94,12 @@ def test_a_resolved_scenario_is_read_as_what_it_was(tmp_path: Path) -> None:
         ("a: {metric: minimum_gap_m < 3 kg}", "the unit 'kg' does not fit"),
         ("a: {metric: minimum_gap_m < few}", "expected a number after <, got 'few'"),
         ("a: 3", "expect.a: "),
-    ],
-)
-def test_what_is_refused(tmp_path: Path, expect: str, told: str) -> None:
-    with pytest.raises(InputError) as error:
-        load(tmp_path, f"  {expect}\n")
-    (line,) = str(error.value).splitlines()
-    assert told in line
-    assert line.startswith(f"{tmp_path / 'expecting.fog.yaml'}:9: expect.a")
+    ]:
+        with pytest.raises(InputError) as error:
+            load(tmp_path, f"  {expect}\n")
+        (line,) = str(error.value).splitlines()
+        assert told in line
+        assert line.startswith(f"{tmp_path / 'expecting.fog.yaml'}:9: expect.a")
 
 
 def test_without_frames_and_ego_less_can_be_told(tmp_path: Path) -> None:
@@ -111,9 +108,8 @@ def test_without_frames_and_ego_less_can_be_told(tmp_path: Path) -> None:
         override(scenario, ["renderer=none", "estimators=[]", "expect.a.never=belief.error > 20 %"])
 
 
-@pytest.mark.parametrize(
-    ("written", "value"),
-    [
+def test_metrics_in_their_units(tmp_path: Path) -> None:
+    for written, value in [
         ("traffic_delay_share <= 5 %", 0.05),
         ("minimum_gap_m <= inf", float("inf")),
         ("mean_speed_mps > 72 km/h", 20.0),
@@ -121,12 +117,10 @@ def test_without_frames_and_ego_less_can_be_told(tmp_path: Path) -> None:
         ("belief_median_error_percent < 20", 20.0),
         ("estimators.joint_road.valid_share >= 0.5", 0.5),
         ("ending == arrived", "arrived"),
-    ],
-)
-def test_metrics_in_their_units(tmp_path: Path, written: str, value: float | str) -> None:
-    (check,) = clauses_of(load(tmp_path, f"  a: {{metric: {written}}}\n").expect)
-    assert isinstance(check, MetricCheck)
-    assert check.value == (pytest.approx(value) if isinstance(value, float) else value)
+    ]:
+        (check,) = clauses_of(load(tmp_path, f"  a: {{metric: {written}}}\n").expect)
+        assert isinstance(check, MetricCheck)
+        assert check.value == (pytest.approx(value) if isinstance(value, float) else value)
 
 
 def test_times_may_be_words(tmp_path: Path) -> None:

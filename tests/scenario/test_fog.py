@@ -65,9 +65,8 @@ def test_the_resolved_scenario_says_it_all_again() -> None:
     assert resolved(scenario)["fog"]["top_m"] == "inf"
 
 
-@pytest.mark.parametrize(
-    ("setting", "told"),
-    [
+def test_mistakes_are_told() -> None:
+    for setting, told in [
         ("visibility_m=0", "fog.visibility_m: input should be greater than or equal to 1; got 0"),
         ("visibility_m=.nan", "fog.visibility_m: input should be greater than or equal to 1; got nan"),
         (
@@ -88,12 +87,10 @@ def test_the_resolved_scenario_says_it_all_again() -> None:
         ("ground_albedo=1.2", "fog.ground_albedo: input should be less than or equal to 1"),
         ("airlight=photons", "even fog in a layer on the ground (visibility_m, top_m), not with outside_visibility_m"),
         ("airlight_shading=-0.1", "fog.airlight_shading: input should be greater than or equal to 0"),
-    ],
-)
-def test_mistakes_are_told(setting: str, told: str) -> None:
-    with pytest.raises(InputError) as error:
-        fog(setting)
-    assert told in str(error.value)
+    ]:
+        with pytest.raises(InputError) as error:
+            fog(setting)
+        assert told in str(error.value)
 
 
 def photons(*settings: str) -> FogField:
@@ -126,9 +123,8 @@ def test_drivers_see_vehicles_before_that_level(setting: str, share: float) -> N
     assert sight.airlight_share == pytest.approx(share)
 
 
-@pytest.mark.parametrize(
-    ("settings", "told"),
-    [
+def test_layers_that_photons_do_not_know_are_told() -> None:
+    for settings, told in [
         (("ground_albedo=1.5",), "fog.ground_albedo: input should be less than or equal to 1; got 1.5"),
         (("top_m=17.5",), "fog.top_m must be above the highest point of the road and the camera"),
         (("top_m=1000", "visibility_m=20"), "optical thickness up to 100, got 149.8"),
@@ -136,12 +132,10 @@ def test_drivers_see_vehicles_before_that_level(setting: str, share: float) -> N
         (("top_m=.inf",), "flat land, not with no top"),
         (("patches={correlation_length_m: 60}",), "not with patches"),
         (("changes=[{at_s: 0, base_m: 5, top_m: 90}]",), "not with base_m in changes"),
-    ],
-)
-def test_layers_that_photons_do_not_know_are_told(settings: tuple[str, ...], told: str) -> None:
-    with pytest.raises(InputError) as error:
-        photons(*settings)
-    assert told in str(error.value)
+    ]:
+        with pytest.raises(InputError) as error:
+            photons(*settings)
+        assert told in str(error.value)
 
 
 def test_photons_are_of_daylight() -> None:

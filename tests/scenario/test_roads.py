@@ -51,9 +51,8 @@ def test_footways_lie_beside_the_lanes_that_traffic_keeps(tmp_path: Path) -> Non
     assert there == {f"same_way.there.{place}.0" for place in (0, 3, 4)}
 
 
-@pytest.mark.parametrize(
-    ("road", "told"),
-    [
+def test_footways_that_cannot_be_are_refused(tmp_path: Path) -> None:
+    for road, told in [
         ("{template: motorway, footways: true}", "a motorway has no footways; "),
         ("{template: straight, footway: true}", "road.footway: unknown key; did you mean 'footways'"),
         ("{template: straight, zebra_crossings: [90 m]}", "zebra_crossings go with footways: true"),
@@ -61,12 +60,10 @@ def test_footways_lie_beside_the_lanes_that_traffic_keeps(tmp_path: Path) -> Non
         ("{template: straight, footways: true, zebra_crossings: [90 m], median: 2 m}", "without a median"),
         ("{template: straight, footways: true, zebra_crossings: [90 m, 2 s]}", "the unit 's' does not fit"),
         ("{template: crossing, footways: true, zebra_crossings: [90 m]}", "a crossing has no zebra_crossings_m"),
-    ],
-)
-def test_footways_that_cannot_be_are_refused(tmp_path: Path, road: str, told: str) -> None:
-    with pytest.raises(InputError, match=r"scenario.yaml:2: road") as refused:
-        loaded(tmp_path, f"name: on_foot\nroad: {road}\nfog: {{visibility: 150 m}}\n")
-    assert told in str(refused.value)
+    ]:
+        with pytest.raises(InputError, match=r"scenario.yaml:2: road") as refused:
+            loaded(tmp_path, f"name: on_foot\nroad: {road}\nfog: {{visibility: 150 m}}\n")
+        assert told in str(refused.value)
 
 
 def test_a_road_by_template_is_written_for_sumo(tmp_path: Path) -> None:
@@ -83,9 +80,8 @@ def test_a_road_by_template_is_written_for_sumo(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["cache", "scenario.yaml"]
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "told"),
-    [
+def test_mistakes_are_told_where_they_stand(tmp_path: Path) -> None:
+    for old, new, told in [
         ("template: motorway", "template: motorwy", "unknown road template 'motorwy'"),
         ("540 veh/h", "540 km/h", "scenario.yaml:4: demand.same_way: "),
         ("oncoming: 540", "ramp: 540", "scenario.yaml:4: demand.ramp_vph: the road has no way 'ramp'"),
@@ -98,11 +94,9 @@ def test_a_road_by_template_is_written_for_sumo(tmp_path: Path) -> None:
         ("ahead_of: ego", "ahead_of: ego, behind: ego", "give one of position_m, ahead_of"),
         ("fog:", "traffic: {net: a.net.xml}\nfog:", "give road or traffic.net, not both"),
         ("road:", "# road:", "traffic: this key is missing"),
-    ],
-)
-def test_mistakes_are_told_where_they_stand(tmp_path: Path, old: str, new: str, told: str) -> None:
-    with pytest.raises(InputError, match=told):
-        loaded(tmp_path, TEXT.replace(old, new, 1))
+    ]:
+        with pytest.raises(InputError, match=told):
+            loaded(tmp_path, TEXT.replace(old, new, 1))
 
 
 def test_demand_and_actors_need_a_road(tmp_path: Path) -> None:

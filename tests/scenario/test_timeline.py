@@ -17,9 +17,8 @@ def mistake(entry: str, *settings: str) -> str:
     return str(error.value)
 
 
-@pytest.mark.parametrize(
-    ("do", "told"),
-    [
+def test_mistakes_are_told_with_their_key() -> None:
+    for do, told in [
         ("{lead: {brake: {decelaration: 6 m/s²}}}", "do.lead.brake.decelaration: unknown key; did you mean 'dec"),
         ("{lead: {brakes: {}}}", "do.lead.brakes: unknown key; did you mean 'brake'"),
         ("{lead: {brake: {to: 80 m}}}", "do.lead.brake.to: "),
@@ -63,12 +62,10 @@ def mistake(entry: str, *settings: str) -> str:
         ("{new: {depart: {like: leed, gap: 9 m}}}", "do.leed: there is no vehicle 'leed' in "),
         ("{new: {depart: {like: ego, gap: 9 m}, brake: {}}}", "do.new: depart stands by itself"),
         ("{}", "do: "),
-    ],
-)
-def test_mistakes_are_told_with_their_key(do: str, told: str) -> None:
-    text = mistake(f"{{when: time > 1 s, do: {do}}}")
-    assert f"timeline.0.{told}" in text or (told in text and "timeline.0.do" in text)
-    assert len(text.splitlines()) == 1
+    ]:
+        text = mistake(f"{{when: time > 1 s, do: {do}}}")
+        assert f"timeline.0.{told}" in text or (told in text and "timeline.0.do" in text)
+        assert len(text.splitlines()) == 1
 
 
 def test_mistakes_of_conditions_and_names() -> None:

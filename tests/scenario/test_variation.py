@@ -109,9 +109,8 @@ def test_a_seed_that_is_not_in_the_file_has_draws_of_its_own() -> None:
     assert case == many.cases[7]
 
 
-@pytest.mark.parametrize(
-    ("vary", "told"),
-    [
+def test_mistakes_are_told() -> None:
+    for vary, told in [
         ({"x": []}, "vary.x: needs at least one value"),
         ({"x": [1, 1]}, r"vary.x.1: 1 stands twice"),
         ({"x": [None]}, "vary.x.0: a value is a number, text, true or false; got None"),
@@ -135,11 +134,9 @@ def test_a_seed_that_is_not_in_the_file_has_draws_of_its_own() -> None:
         ({"x": "2 seeds", "y": "3 seeds"}, "vary.y: x has the seeds already"),
         ({"x y": [1]}, "letters, digits"),
         ({"x": "400 seeds", "y": {"from": 1, "to": 400, "step": 1}}, "160,000 runs; at most 100,000"),
-    ],
-)
-def test_mistakes_are_told(vary: dict[str, Any], told: str) -> None:
-    with pytest.raises(InputError, match=told):
-        varied(vary)
+    ]:
+        with pytest.raises(InputError, match=told):
+            varied(vary)
 
 
 def test_mistakes_have_file_and_line(tmp_path: Path) -> None:

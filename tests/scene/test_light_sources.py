@@ -44,34 +44,31 @@ def surfaces(state: TrafficState, surface: Surface) -> np.ndarray:
     return shape.positions[shape.surface == surface] @ transform[:3, :3].T + transform[:3, 3]
 
 
-@pytest.mark.parametrize("kind", SIZES)
-@pytest.mark.parametrize(
-    ("lamp", "surface", "intensity"),
-    [
+def test_lamps_behind_shine_from_their_surfaces() -> None:
+    for lamp, surface, intensity in [
         (Lamp.POSITION, Surface.LAMP_POSITION_REAR, 8.0),
         (Lamp.STOP, Surface.LAMP_STOP, 100.0),
         (Lamp.REAR_FOG, Surface.LAMP_REAR_FOG, 200.0),
         (Lamp.INDICATOR_LEFT, Surface.LAMP_INDICATOR_LEFT, 200.0),
         (Lamp.INDICATOR_RIGHT, Surface.LAMP_INDICATOR_RIGHT, 200.0),
-    ],
-)
-def test_lamps_behind_shine_from_their_surfaces(kind: str, lamp: Lamp, surface: Surface, intensity: float) -> None:
-    state = one(lamp, kind=kind)
-    found = light_sources(state, None, EYE, BEAMS)
-    places = surfaces(state, surface)
-    assert 1 <= len(found.intensity) <= 3
-    for position, area in zip(found.position, found.area, strict=True):
-        nearest = np.linalg.norm(places - position, axis=1).min()
-        assert nearest < 0.35  # from a vertex to the middle of its panel, or between two panels of one lamp
-        assert (position > places.min(axis=0) - 0.01).all()
-        assert (position < places.max(axis=0) + 0.01).all()
-        assert 0.001 < area < 0.0145
-    small = kind == "motorcycle" and intensity == 200.0
-    if not small:
-        assert found.intensity.max() == pytest.approx(intensity, rel=0.35)
-    assert found.intensity.max() <= intensity
-    weights = (0.2126, 0.7152, 0.0722)
-    assert found.colour @ weights == pytest.approx(np.ones(len(found.intensity)))
+    ]:
+        for kind in SIZES:
+            state = one(lamp, kind=kind)
+            found = light_sources(state, None, EYE, BEAMS)
+            places = surfaces(state, surface)
+            assert 1 <= len(found.intensity) <= 3
+            for position, area in zip(found.position, found.area, strict=True):
+                nearest = np.linalg.norm(places - position, axis=1).min()
+                assert nearest < 0.35  # from a vertex to the middle of its panel, or between two panels of one lamp
+                assert (position > places.min(axis=0) - 0.01).all()
+                assert (position < places.max(axis=0) + 0.01).all()
+                assert 0.001 < area < 0.0145
+            small = kind == "motorcycle" and intensity == 200.0
+            if not small:
+                assert found.intensity.max() == pytest.approx(intensity, rel=0.35)
+            assert found.intensity.max() <= intensity
+            weights = (0.2126, 0.7152, 0.0722)
+            assert found.colour @ weights == pytest.approx(np.ones(len(found.intensity)))
 
 
 def test_intensity_over_area_is_the_luminance_of_the_surface() -> None:

@@ -62,9 +62,8 @@ def test_a_scenario_beside_the_study_is_found(tmp_path: Path) -> None:
         load_study(written(tmp_path, f"sumocfg: {config.name}\nego: e\nfactors: {{policy: {{none: [advice=none]}}}}"))
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
+def test_mistakes_are_named_with_their_place(tmp_path: Path) -> None:
+    for change, said in [
         (("factors:", "factor:"), r"mine\.yaml:4: factor: .*did you mean 'factors'"),
         (("advice=none", "advice=non"), r"policy=none, visibility=v60: .*unknown adviser 'non'; did you mean 'none'"),
         (("seeds: 3", "seeds: 0"), r"seeds"),
@@ -81,16 +80,13 @@ def test_a_scenario_beside_the_study_is_found(tmp_path: Path) -> None:
         (("scenario: motorway_fog_bank", "sumocfg: a.sumocfg"), r"there is no file .a.sumocfg"),
         (("scenario: motorway_fog_bank", "scenario: motorway_fog_bank\nego: x"), r"ego: goes with sumocfg"),
         (("fog.visibility_m=60", "fog.visibility_m=sixty"), r"visibility=v60: .*fog\.visibility_m"),
-    ],
-)
-def test_mistakes_are_named_with_their_place(tmp_path: Path, change: tuple[str, str], said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        load_study(written(tmp_path, STUDY.replace(*change, 1)))
+    ]:
+        with pytest.raises(InputError, match=said):
+            load_study(written(tmp_path, STUDY.replace(*change, 1)))
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
+def test_a_factor_is_not_named_like_a_column_of_the_table(tmp_path: Path) -> None:
+    for name in [
         *sorted(FIXED_COLUMNS),
         "ending",
         "duration_s",
@@ -99,11 +95,9 @@ def test_mistakes_are_named_with_their_place(tmp_path: Path, change: tuple[str, 
         "belief_median_error_percent",
         "estimators.joint_road.valid_share",
         "estimators.mine.anything",
-    ],
-)
-def test_a_factor_is_not_named_like_a_column_of_the_table(tmp_path: Path, name: str) -> None:
-    with pytest.raises(InputError, match=rf"mine\.yaml:8: factors\.{name}: .*; choose another$"):
-        load_study(written(tmp_path, STUDY.replace("visibility:\n", f"{name}:\n", 1)))
+    ]:
+        with pytest.raises(InputError, match=rf"mine\.yaml:8: factors\.{name}: .*; choose another$"):
+            load_study(written(tmp_path, STUDY.replace("visibility:\n", f"{name}:\n", 1)))
 
 
 def test_every_metric_of_a_run_is_a_name_that_no_factor_has() -> None:

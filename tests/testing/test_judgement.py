@@ -38,9 +38,8 @@ def judged(verdicts: str, wanted: Verdict = NONE_FAILS) -> Judgement:
     return judgement
 
 
-@pytest.mark.parametrize(
-    ("verdicts", "outcome"),
-    [
+def test_without_a_rate_none_may_fail_and_half_must_show_something() -> None:
+    for verdicts, outcome in [
         ("p", Outcome.PASSED),
         ("f", Outcome.FAILED),
         ("i", Outcome.INCONCLUSIVE),
@@ -50,10 +49,8 @@ def judged(verdicts: str, wanted: Verdict = NONE_FAILS) -> Judgement:
         ("pii", Outcome.INCONCLUSIVE),
         ("fii", Outcome.FAILED),
         ("iii", Outcome.INCONCLUSIVE),
-    ],
-)
-def test_without_a_rate_none_may_fail_and_half_must_show_something(verdicts: str, outcome: Outcome) -> None:
-    assert judged(verdicts).outcome is outcome
+    ]:
+        assert judged(verdicts).outcome is outcome
 
 
 def test_a_rate_is_shown_or_refuted_or_neither() -> None:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from itertools import product
 
 import numpy as np
 import pytest
@@ -76,16 +77,13 @@ def lamps(name: str, belief: Belief, seen: Observation, lit: Lamp = LOW) -> Lamp
     return policy.choose_lamps(belief, seen, 20.0, first).lamps
 
 
-@pytest.mark.parametrize("known", UNINFORMED)
-@pytest.mark.parametrize("seen", SEEN)
-@pytest.mark.parametrize("lit", [LOW, HIGH, FOG])
-@pytest.mark.parametrize("name", FOLLOWING)
-def test_without_information_every_policy_lights_low_beams_at_once(name: str, lit: Lamp, seen: str, known: str) -> None:
-    policy = LIGHTING_POLICIES[name]()
-    if isinstance(policy, VehicleLightingPolicy):
-        assert policy.choose_lamps(UNINFORMED[known], SEEN[seen], 10.0, LampChoice(lit)) == LampChoice(LOW)
-    else:
-        assert policy.lamps(UNINFORMED[known], lit) == LOW
+def test_without_information_every_policy_lights_low_beams_at_once() -> None:
+    for name, lit, seen, known in product(FOLLOWING, (LOW, HIGH, FOG), SEEN.values(), UNINFORMED.values()):
+        policy = LIGHTING_POLICIES[name]()
+        if isinstance(policy, VehicleLightingPolicy):
+            assert policy.choose_lamps(known, seen, 10.0, LampChoice(lit)) == LampChoice(LOW), name
+        else:
+            assert policy.lamps(known, lit) == LOW, name
 
 
 @pytest.mark.parametrize("name", CONSTANT)
@@ -93,9 +91,8 @@ def test_constant_lamps_ask_nothing(name: str) -> None:
     assert {lamps(name, belief, NIGHT) for belief in (IGNORANT, certain_belief(0.05))} == {CONSTANT[name]}
 
 
-@pytest.mark.parametrize(
-    ("belief", "gallen2014", "fog_lamp_rules"),
-    [
+def test_lamps_by_belief_alone_on_a_dark_road() -> None:
+    for belief, gallen2014, fog_lamp_rules in [
         (normal(40.0, 0.1), FOG, FOG),
         # With a quarter of chance or more the visibility is too good for the rear fog lamps, which dazzle.
         (normal(47.0, 0.3), LOW | Lamp.FRONT_FOG, LOW | Lamp.FRONT_FOG),
@@ -104,18 +101,16 @@ def test_constant_lamps_ask_nothing(name: str) -> None:
         (normal(130.0, 0.3), LOW, LOW),
         (AT_LEAST_400, HIGH, LOW),
         (certain_belief(0.0), HIGH, LOW),
-    ],
-)
-def test_lamps_by_belief_alone_on_a_dark_road(belief: Belief, gallen2014: Lamp, fog_lamp_rules: Lamp) -> None:
-    assert lamps("gallen2014", belief, NIGHT) == gallen2014
-    assert lamps("fog_lamp_rules", belief, NIGHT) == fog_lamp_rules
+    ]:
+        assert lamps("gallen2014", belief, NIGHT) == gallen2014
+        assert lamps("fog_lamp_rules", belief, NIGHT) == fog_lamp_rules
 
 
-@pytest.mark.parametrize("seen", sorted(set(SEEN) - {"night"}))
-@pytest.mark.parametrize("name", FOLLOWING)
-def test_no_high_beams_by_day_or_toward_others_whatever_is_believed(name: str, seen: str) -> None:
-    for belief in (AT_LEAST_400, certain_belief(0.0)):
-        assert Lamp.HIGH_BEAM not in lamps(name, belief, SEEN[seen], HIGH)
+def test_no_high_beams_by_day_or_toward_others_whatever_is_believed() -> None:
+    for name in FOLLOWING:
+        for seen in sorted(set(SEEN) - {"night"}):
+            for belief in (AT_LEAST_400, certain_belief(0.0)):
+                assert Lamp.HIGH_BEAM not in lamps(name, belief, SEEN[seen], HIGH)
 
 
 def test_bounds_inform_where_they_leave_little_doubt() -> None:
@@ -141,14 +136,12 @@ def test_beliefs_know_how_old_the_last_evidence_is(name: str) -> None:
     assert fusion.update_at([], 0.0, 0.0).age == math.inf
 
 
-@pytest.mark.parametrize("known", UNINFORMED)
-@pytest.mark.parametrize(
-    "name", [n for n, a in ADVISERS.items() if isinstance(a, type) and issubclass(a, PresentedAdviser)]
-)
-def test_without_information_advice_stays_or_falls_back(name: str, known: str) -> None:
-    previous = SpeedAdvice(17.0)
-    assert ADVISERS[name]().advise(UNINFORMED[known], 36.0, 5.0, previous).speed == 17.0
-    assert ADVISERS[name](fallback=15.0, rounding=0.01, minimum=0.0).advise(
-        UNINFORMED[known], 36.0, 5.0, previous
-    ).speed == pytest.approx(15.0, abs=0.01)
-    assert ADVISERS[name](fallback=40.0).advise(UNINFORMED[known], 36.0, 5.0, previous).speed == math.inf
+def test_without_information_advice_stays_or_falls_back() -> None:
+    for name in [n for n, a in ADVISERS.items() if isinstance(a, type) and issubclass(a, PresentedAdviser)]:
+        for known in UNINFORMED.values():
+            previous = SpeedAdvice(17.0)
+            assert ADVISERS[name]().advise(known, 36.0, 5.0, previous).speed == 17.0
+            assert ADVISERS[name](fallback=15.0, rounding=0.01, minimum=0.0).advise(
+                known, 36.0, 5.0, previous
+            ).speed == pytest.approx(15.0, abs=0.01)
+            assert ADVISERS[name](fallback=40.0).advise(known, 36.0, 5.0, previous).speed == math.inf

@@ -25,9 +25,8 @@ from fogsim.values.result_checks import (
 from tests.recorders.synthetic import make_step
 
 
-@pytest.mark.parametrize(
-    ("value", "message"),
-    [
+def test_estimates() -> None:
+    for value, message in [
         (None, r"^estimator 'mine': update\(\) must be of type fogsim\.values\.Estimate, got None"),
         (0.03, "must be of type"),
         (Estimate("mine", math.nan, 0.1), r"extinction must be a finite number of at least 0 .*; got nan"),
@@ -38,11 +37,9 @@ from tests.recorders.synthetic import make_step
         (Estimate("mine", 0.1, math.inf), "standard_deviation must be .*; got inf"),
         (Estimate("mine", 0.1, 0.1, valid=None), "valid must be True or False"),  # type: ignore[arg-type]  # wrong
         (Estimate("other", 0.1, 0.1), "method must be its name in the registry, 'mine'; got 'other'"),
-    ],
-)
-def test_estimates(value: object, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        checked_estimate("mine", value)
+    ]:
+        with pytest.raises(InputError, match=message):
+            checked_estimate("mine", value)
 
 
 def test_what_cannot_tell_need_not_have_numbers() -> None:
@@ -82,9 +79,8 @@ def test_advice(speed: float) -> None:
     assert checked_command(Command()) == Command()
 
 
-@pytest.mark.parametrize(
-    ("command", "message"),
-    [
+def test_advice_to_others() -> None:
+    for command, message in [
         (Command(advice_reach=math.nan), r"advice_reach must be at least 0 \[m\], got nan"),
         (Command(stretches=[StretchAdvice(20.0)]), "stretches must be a tuple of StretchAdvice; got"),
         (Command(stretches=(20.0,)), r"stretches\[0\] must be of type fogsim\.values\.StretchAdvice, got 20"),
@@ -104,11 +100,9 @@ def test_advice(speed: float) -> None:
             Command(stretches=(StretchAdvice(20.0, Stretch(edges=(1,))),)),
             r"stretch\.edges must be .* ids of edges; got 1",
         ),
-    ],
-)
-def test_advice_to_others(command: Command, message: str) -> None:
-    with pytest.raises(InputError, match=f"^the command.*{message}"):
-        checked_command(command)
+    ]:
+        with pytest.raises(InputError, match=f"^the command.*{message}"):
+            checked_command(command)
 
 
 def test_good_advice_to_others() -> None:

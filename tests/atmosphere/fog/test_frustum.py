@@ -52,12 +52,12 @@ def slow_transmission(field: FogField, view: View, camera: Camera, pose: CameraP
     return np.exp(-brute_force(field, eye, inner, 600) - beyond.reshape(ends.shape))
 
 
-@pytest.mark.parametrize("name", UNEVEN)
-def test_whole_frames_against_brute_force(name: str) -> None:
-    view = black_road(CAMERA, POSE)
-    seen = transmittance(Air(UNEVEN[name]).radiance(view, CAMERA, POSE))[6::12, 6::12]
-    slow = slow_transmission(UNEVEN[name], view, CAMERA, POSE, 12)
-    assert np.sqrt(np.mean(np.square(seen - slow))) <= 0.005
+def test_whole_frames_against_brute_force() -> None:
+    for name in UNEVEN:
+        view = black_road(CAMERA, POSE)
+        seen = transmittance(Air(UNEVEN[name]).radiance(view, CAMERA, POSE))[6::12, 6::12]
+        slow = slow_transmission(UNEVEN[name], view, CAMERA, POSE, 12)
+        assert np.sqrt(np.mean(np.square(seen - slow))) <= 0.005
 
 
 @pytest.mark.parametrize("name", ["bank of ground fog", "all at once"])

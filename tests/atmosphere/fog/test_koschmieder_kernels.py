@@ -47,17 +47,19 @@ def test_a_frame_is_the_closed_form_within_a_quarter_of_a_12_bit_step(visibility
     assert np.abs(seen - exact).max() < 0.25 * 5000.0 / 4095.0
 
 
-@pytest.mark.parametrize("turn", [0.0, 0.3, 1.2, math.pi / 2, 3.0])
-@pytest.mark.parametrize("station", [-200.0, 45.0, 900.0])
-def test_every_direction_through_a_bank_within_a_12_bit_step(turn: float, station: float) -> None:
-    field = FogField(0.002, AIRLIGHT, (FogBank((0.0, 0.0), (1.0, 0.0), 0.0, 1200.0, 90.0, 0.05),), top=80.0)
-    shape = (CAMERA.height, CAMERA.width)
-    distance = np.random.default_rng(3).uniform(1.0, 400.0, shape).astype(np.float32)
-    pose = CameraPose((station, 5.0, 1.38), turn)
-    black = View(np.zeros((*shape, 3), np.float32), distance, np.zeros(shape, np.int32))
-    seen = 1.0 - fogged_radiance(black, field, pose.position, ray_from_pixel(CAMERA, pose))[..., 1] / AIRLIGHT[1]
-    v, u = np.mgrid[0 : CAMERA.height, 0 : CAMERA.width]
-    rays = np.stack((u, v, np.ones_like(u)), axis=-1) @ ray_from_pixel(CAMERA, pose).T
-    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
-    depth = optical_depth(field, pose.position, np.array(pose.position) + distance[..., None] * rays)
-    assert np.abs(seen - np.exp(-depth)).max() < 1.0 / 4095.0
+def test_every_direction_through_a_bank_within_a_12_bit_step() -> None:
+    for station in [-200.0, 45.0, 900.0]:
+        for turn in [0.0, 0.3, 1.2, math.pi / 2, 3.0]:
+            field = FogField(0.002, AIRLIGHT, (FogBank((0.0, 0.0), (1.0, 0.0), 0.0, 1200.0, 90.0, 0.05),), top=80.0)
+            shape = (CAMERA.height, CAMERA.width)
+            distance = np.random.default_rng(3).uniform(1.0, 400.0, shape).astype(np.float32)
+            pose = CameraPose((station, 5.0, 1.38), turn)
+            black = View(np.zeros((*shape, 3), np.float32), distance, np.zeros(shape, np.int32))
+            seen = (
+                1.0 - fogged_radiance(black, field, pose.position, ray_from_pixel(CAMERA, pose))[..., 1] / AIRLIGHT[1]
+            )
+            v, u = np.mgrid[0 : CAMERA.height, 0 : CAMERA.width]
+            rays = np.stack((u, v, np.ones_like(u)), axis=-1) @ ray_from_pixel(CAMERA, pose).T
+            rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+            depth = optical_depth(field, pose.position, np.array(pose.position) + distance[..., None] * rays)
+            assert np.abs(seen - np.exp(-depth)).max() < 1.0 / 4095.0

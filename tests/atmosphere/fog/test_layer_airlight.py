@@ -49,15 +49,15 @@ def seen(field: FogField, eye: float, elevation: float, droplets: str = "moderat
     return float(fogged_radiance(view, field, (0.0, 0.0, eye), ray_map, droplets)[0, 0, 1])
 
 
-@pytest.mark.parametrize("albedo", ALBEDOS)
-@pytest.mark.parametrize("droplets", ["moderate_radiation", "heavy_advection"])
-def test_frames_agree_with_photons(droplets: str, albedo: float) -> None:
-    for row in COUNTS[COUNTS["fog"] == droplets]:
-        drawn = seen(field_of(row["visibility"], row["top"], albedo), row["eye"], row["elevation"], droplets)
-        sky = (1.0 - albedo * row["reflectance"]) / row["transmittance"]
-        counted = row["sky"] * sky + albedo * row["ground"]
-        noise = 3.0 * math.hypot(sky * row["sky_error"], albedo * row["ground_error"])
-        assert abs(drawn - counted) < 0.03 * counted + noise, row
+def test_frames_agree_with_photons() -> None:
+    for droplets in ["moderate_radiation", "heavy_advection"]:
+        for albedo in ALBEDOS:
+            for row in COUNTS[COUNTS["fog"] == droplets]:
+                drawn = seen(field_of(row["visibility"], row["top"], albedo), row["eye"], row["elevation"], droplets)
+                sky = (1.0 - albedo * row["reflectance"]) / row["transmittance"]
+                counted = row["sky"] * sky + albedo * row["ground"]
+                noise = 3.0 * math.hypot(sky * row["sky_error"], albedo * row["ground_error"])
+                assert abs(drawn - counted) < 0.03 * counted + noise, row
 
 
 def even_sky(thickness: float, eye: float, albedo: float, droplets: str) -> NDArray[np.float64]:
@@ -107,17 +107,17 @@ def disort(thickness: float, eye: float, albedo: float, slopes: NDArray[np.float
 
 
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="nanodisort comes ready-made for x86-64 alone")
-@pytest.mark.parametrize("albedo", [0.0, 0.1, 0.5, 1.0])
-@pytest.mark.parametrize("layer", [3, 10, 16, 19, 22, 24, 27])
-def test_the_table_agrees_with_disort(layer: int, albedo: float) -> None:
-    thickness = float(layer_table("moderate_radiation").thickness[layer])
-    slopes = sines()
-    here = np.flatnonzero(np.abs(slopes) > math.sin(math.radians(0.5)))[::3]  # it takes no more than 64
-    for eye in (0.003 * thickness, 0.02 * thickness):
-        ours = even_sky(thickness, eye, albedo, "moderate_radiation")[here]
-        theirs = disort(thickness, eye, albedo, slopes[here])
-        assert np.max(np.abs(ours / theirs - 1.0)[slopes[here] > -0.05]) < (0.02 if thickness > 0.4 else 0.03)
-        assert np.max(np.abs(ours - theirs)) < 0.006
+def test_the_table_agrees_with_disort() -> None:
+    for layer in [3, 10, 16, 19, 22, 24, 27]:
+        for albedo in [0.0, 0.1, 0.5, 1.0]:
+            thickness = float(layer_table("moderate_radiation").thickness[layer])
+            slopes = sines()
+            here = np.flatnonzero(np.abs(slopes) > math.sin(math.radians(0.5)))[::3]  # it takes no more than 64
+            for eye in (0.003 * thickness, 0.02 * thickness):
+                ours = even_sky(thickness, eye, albedo, "moderate_radiation")[here]
+                theirs = disort(thickness, eye, albedo, slopes[here])
+                assert np.max(np.abs(ours / theirs - 1.0)[slopes[here] > -0.05]) < (0.02 if thickness > 0.4 else 0.03)
+                assert np.max(np.abs(ours - theirs)) < 0.006
 
 
 @pytest.mark.parametrize("droplets", list(Droplets))
@@ -208,19 +208,17 @@ def test_an_eye_above_the_layer_and_unknown_layers_are_refused() -> None:
         slant_airlight(field_of(5.0, 250.0, RHO), 1.3, "moderate_radiation")
 
 
-@pytest.mark.parametrize("tilt", [0, 30, 60])
-@pytest.mark.parametrize(
-    ("visibility", "albedo"), [(50.0, 0.0), (100.0, 0.1), (100.0, 0.8), (400.0, 0.1), (400.0, 1.0)]
-)
-def test_surfaces_get_the_light_of_what_they_see(visibility: float, albedo: float, tilt: int) -> None:
+def test_surfaces_get_the_light_of_what_they_see() -> None:
     """Against the radiance of drawn lines of sight, over all that is before a surface tilted up from the vertical."""
-    field, elevation = field_of(visibility, 250.0, albedo), np.radians(np.arange(-89.5, 90.0))
-    light = [seen(field, 0.02, math.degrees(one)) if one > 0 else albedo for one in elevation.tolist()]
-    up, turn = math.sin(math.radians(tilt)), np.radians(np.arange(0.5, 360.0))
-    facing = np.outer(np.sin(elevation), up + 0.0 * turn)
-    facing += np.outer(np.cos(elevation), math.cos(math.radians(tilt)) * np.cos(turn))
-    weight = np.maximum(facing, 0.0) * np.cos(elevation)[:, None]
-    expected = float((np.array(light)[:, None] * weight).sum() / weight.sum())
-    sides = side_light(field, "moderate_radiation")
-    # The sky's brightness does not go by the square of the tilt alone.
-    assert light_share(0.0, 0.0, up, *sides) == pytest.approx(expected, rel=0.02 if tilt == 0 else 0.06)
+    for visibility, albedo in [(50.0, 0.0), (100.0, 0.1), (100.0, 0.8), (400.0, 0.1), (400.0, 1.0)]:
+        for tilt in [0, 30, 60]:
+            field, elevation = field_of(visibility, 250.0, albedo), np.radians(np.arange(-89.5, 90.0))
+            light = [seen(field, 0.02, math.degrees(one)) if one > 0 else albedo for one in elevation.tolist()]
+            up, turn = math.sin(math.radians(tilt)), np.radians(np.arange(0.5, 360.0))
+            facing = np.outer(np.sin(elevation), up + 0.0 * turn)
+            facing += np.outer(np.cos(elevation), math.cos(math.radians(tilt)) * np.cos(turn))
+            weight = np.maximum(facing, 0.0) * np.cos(elevation)[:, None]
+            expected = float((np.array(light)[:, None] * weight).sum() / weight.sum())
+            sides = side_light(field, "moderate_radiation")
+            # The sky's brightness does not go by the square of the tilt alone.
+            assert light_share(0.0, 0.0, up, *sides) == pytest.approx(expected, rel=0.02 if tilt == 0 else 0.06)

@@ -21,11 +21,11 @@ def brute_force(field: FogField, start: np.ndarray, end: np.ndarray, steps: int 
     return float(k.mean() * np.linalg.norm(end - start))
 
 
-@pytest.mark.parametrize("seed", range(12))
-def test_against_brute_force(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    start, end = (rng.uniform((-200, -200, 0), (900, 700, 90)) for _ in range(2))
-    assert optical_depth(FIELD, start, end) == pytest.approx(brute_force(FIELD, start, end), rel=2e-5, abs=1e-7)
+def test_against_brute_force() -> None:
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        start, end = (rng.uniform((-200, -200, 0), (900, 700, 90)) for _ in range(2))
+        assert optical_depth(FIELD, start, end) == pytest.approx(brute_force(FIELD, start, end), rel=2e-5, abs=1e-7)
 
 
 def test_across_the_bank_where_the_station_does_not_change() -> None:

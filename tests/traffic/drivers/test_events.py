@@ -14,9 +14,8 @@ from fogsim.values import Reason, Unplayed, UnplayedEvent
 NOW = Trigger(at_time=0.0, name="now")
 
 
-@pytest.mark.parametrize(
-    ("ahead", "behind", "gap"),
-    [
+def test_a_gap_has_the_sign_of_who_is_ahead() -> None:
+    for ahead, behind, gap in [
         (20.0, None, 15.0),  # a truck of 5 m whose front is 20 m ahead
         (None, 20.0, -16.0),  # its front is 20 m behind that of an ego of 4 m
         (3.0, None, 0.0),
@@ -25,10 +24,8 @@ NOW = Trigger(at_time=0.0, name="now")
         (None, None, None),
         (20.0, 500.0, 15.0),
         (500.0, 20.0, -16.0),
-    ],
-)
-def test_a_gap_has_the_sign_of_who_is_ahead(ahead: float | None, behind: float | None, gap: float | None) -> None:
-    assert signed_gap(ahead, behind, 5.0, 4.0) == gap
+    ]:
+        assert signed_gap(ahead, behind, 5.0, 4.0) == gap
 
 
 def fired_at(wanted: float, gaps: Sequence[float | None]) -> int | None:
@@ -41,9 +38,8 @@ def fired_at(wanted: float, gaps: Sequence[float | None]) -> int | None:
     return None
 
 
-@pytest.mark.parametrize(
-    ("wanted", "gaps", "step"),
-    [
+def test_an_event_begins_when_its_gap_is_reached() -> None:
+    for wanted, gaps, step in [
         (15.0, [30.0, 20.0, 14.0], 2),  # the ego closes in
         (15.0, [-30.0, -5.0, 0.0, 5.0, 16.0], 4),  # overtakes and gets away: not as soon as it is ahead
         (15.0, [-15.0, -10.0, -15.0], None),  # the other side
@@ -56,10 +52,8 @@ def fired_at(wanted: float, gaps: Sequence[float | None]) -> int | None:
         (0.0, [-3.0, 0.0], 1),
         (0.0, [-3.0, 3.0], 1),
         (15.0, [None, None], None),
-    ],
-)
-def test_an_event_begins_when_its_gap_is_reached(wanted: float, gaps: Sequence[float | None], step: int | None) -> None:
-    assert fired_at(wanted, gaps) == step
+    ]:
+        assert fired_at(wanted, gaps) == step
 
 
 def test_of_two_events_that_brake_a_vehicle_the_lower_speed_counts_until_both_are_over() -> None:

@@ -35,10 +35,10 @@ def test_each_head_lamp_that_burns_counts() -> None:
     assert [uses_high_beam(lamps) for lamps in (0, LOW, HIGH, one_dead)] == [False, False, True, True]
 
 
-@pytest.mark.parametrize("visibility", [30.0, 50.0, 100.0, 200.0, 500.0, 1000.0])
-def test_the_veil_is_that_of_the_pictures(visibility: float) -> None:
-    more = own_veil(Lamp.HIGH_BEAM, visibility, 42.0) - own_veil(Lamp.LOW_BEAM, visibility, 42.0)
-    assert high_beam_veil(extinction_from_visibility(visibility)) == pytest.approx(more, rel=0.1)
+def test_the_veil_is_that_of_the_pictures() -> None:
+    for visibility in [30.0, 50.0, 100.0, 200.0, 500.0, 1000.0]:
+        more = own_veil(Lamp.HIGH_BEAM, visibility, 42.0) - own_veil(Lamp.LOW_BEAM, visibility, 42.0)
+        assert high_beam_veil(extinction_from_visibility(visibility)) == pytest.approx(more, rel=0.1)
 
 
 def test_high_beams_show_an_unlit_car_farther_and_the_less_so_the_thicker_the_fog() -> None:

@@ -41,16 +41,14 @@ def test_a_rear_fog_lamp_is_seen_farther_than_a_tail_lamp_and_all_lamps_less_far
     assert reach(DAY, 60.0, fog) < reach(NIGHT, 60.0, fog)
 
 
-@pytest.mark.parametrize("visibility", [40.0, 100.0, 300.0])
-@pytest.mark.parametrize("illuminance", [1000.0, 1e4, 1e5])
-def test_by_day_a_black_vehicle_is_seen_up_to_the_meteorological_visibility(
-    visibility: float, illuminance: float
-) -> None:
+def test_by_day_a_black_vehicle_is_seen_up_to_the_meteorological_visibility() -> None:
     """But for what the own head lamps light of the fog, 0.2 % of the airlight at 1000 lx."""
-    by_head_lamps = math.log1p(HEAD_LAMP_LUMINANCE / airlight_luminance(illuminance)) / math.log(20.0)
-    assert by_head_lamps < 1e-3
-    lost = visibility * (1.0 - by_head_lamps)
-    assert reach(DriverSight(illuminance), visibility, (1.0, 0.0, 0.0)) == pytest.approx(lost, rel=1e-5)
+    for illuminance in [1000.0, 1e4, 1e5]:
+        for visibility in [40.0, 100.0, 300.0]:
+            by_head_lamps = math.log1p(HEAD_LAMP_LUMINANCE / airlight_luminance(illuminance)) / math.log(20.0)
+            assert by_head_lamps < 1e-3
+            lost = visibility * (1.0 - by_head_lamps)
+            assert reach(DriverSight(illuminance), visibility, (1.0, 0.0, 0.0)) == pytest.approx(lost, rel=1e-5)
 
 
 def test_a_light_vehicle_is_lost_sooner() -> None:
@@ -107,16 +105,16 @@ def test_the_brightest_lit_lamp_counts_and_an_unlit_vehicle_has_none() -> None:
     assert rear_intensity(int(Lamp.LOW_BEAM)) == 0.0
 
 
-@pytest.mark.parametrize("visibility", [30.0, 60.0, 120.0, 400.0])
-@pytest.mark.parametrize("what", [UNLIT, LIT, (0.5, 200.0, 0.0)], ids=["unlit", "lit", "rear fog lamp alone"])
-def test_dusk_is_continuous(visibility: float, what: tuple[float, ...]) -> None:
+def test_dusk_is_continuous() -> None:
     """Between illuminances 6 % apart the distance of first sight changes by at most 5 %, and nowhere by a jump."""
-    distances = np.array([reach(DriverSight(lux), visibility, what) for lux in ILLUMINANCES])
-    assert np.abs(np.diff(np.log(distances))).max() < 0.05
-    steepest = int(np.abs(np.diff(np.log(distances))).argmax())
-    fine = np.geomspace(*ILLUMINANCES[steepest : steepest + 2], 101)
-    steps = np.abs(np.diff(np.log([reach(DriverSight(lux), visibility, what) for lux in fine])))
-    assert steps.max() < 2.0 * steps.mean()
+    for what in [UNLIT, LIT, (0.5, 200.0, 0.0)]:
+        for visibility in [30.0, 60.0, 120.0, 400.0]:
+            distances = np.array([reach(DriverSight(lux), visibility, what) for lux in ILLUMINANCES])
+            assert np.abs(np.diff(np.log(distances))).max() < 0.05
+            steepest = int(np.abs(np.diff(np.log(distances))).argmax())
+            fine = np.geomspace(*ILLUMINANCES[steepest : steepest + 2], 101)
+            steps = np.abs(np.diff(np.log([reach(DriverSight(lux), visibility, what) for lux in fine])))
+            assert steps.max() < 2.0 * steps.mean()
 
 
 @pytest.mark.parametrize("visibility", [30.0, 120.0, 400.0])
@@ -128,31 +126,29 @@ def test_an_unlit_body_is_seen_the_farther_the_more_light_there_is_and_lamps_the
     assert lamp[-1] < 0.9 * lamp[0]
 
 
-@pytest.mark.parametrize("illuminance", [0.01, 1.0, 10.0, 1000.0])
-@pytest.mark.parametrize("what", [UNLIT, LIT])
-def test_the_limit_falls_with_distance_and_so_does_sight_with_extinction(
-    illuminance: float, what: tuple[float, ...]
-) -> None:
-    sight = DriverSight(illuminance)
-    limits = [sight.depth_limit(d, *what) for d in np.geomspace(0.1, 1e5, 200)]
-    assert np.all(np.diff(limits) <= 0.0)
-    reaches = [reach(sight, v, what) for v in (20.0, 40.0, 80.0, 160.0, 1000.0)]
-    assert reaches == sorted(reaches)
+def test_the_limit_falls_with_distance_and_so_does_sight_with_extinction() -> None:
+    for what in [UNLIT, LIT]:
+        for illuminance in [0.01, 1.0, 10.0, 1000.0]:
+            sight = DriverSight(illuminance)
+            limits = [sight.depth_limit(d, *what) for d in np.geomspace(0.1, 1e5, 200)]
+            assert np.all(np.diff(limits) <= 0.0)
+            reaches = [reach(sight, v, what) for v in (20.0, 40.0, 80.0, 160.0, 1000.0)]
+            assert reaches == sorted(reaches)
 
 
-@pytest.mark.parametrize("illuminance", [0.01, 1.0, 9.9, 10_000.0])
-@pytest.mark.parametrize("visibility", [30.0, 300.0])
-def test_bounds_hold_and_are_close(illuminance: float, visibility: float) -> None:
-    sight, k = DriverSight(illuminance), extinction_from_visibility(visibility)
-    sure, hidden = sight.sure_distance(k), sight.hidden_distance(k)
-    assert 0.0 <= reach(sight, visibility, LIT) - sight.seen_distance(k, *LIT) <= 0.011
-    white = inherent_contrast((1.0, 1.0, 1.0))
-    assert sure == pytest.approx(reach(sight, visibility, (white, 0.0, 0.0)), abs=0.11)
-    assert hidden == pytest.approx(reach(sight, visibility, (1.0, BRIGHTEST, 1.0)), abs=0.02)
-    for distance in np.linspace(0.1, sure, 50) if sure else ():
-        assert k * distance <= sight.depth_limit(distance, white, 0.0, 0.0)
-    for distance in np.geomspace(hidden, 10.0 * hidden, 50):
-        assert k * distance > sight.depth_limit(distance, 1.0, BRIGHTEST)
+def test_bounds_hold_and_are_close() -> None:
+    for visibility in [30.0, 300.0]:
+        for illuminance in [0.01, 1.0, 9.9, 10_000.0]:
+            sight, k = DriverSight(illuminance), extinction_from_visibility(visibility)
+            sure, hidden = sight.sure_distance(k), sight.hidden_distance(k)
+            assert 0.0 <= reach(sight, visibility, LIT) - sight.seen_distance(k, *LIT) <= 0.011
+            white = inherent_contrast((1.0, 1.0, 1.0))
+            assert sure == pytest.approx(reach(sight, visibility, (white, 0.0, 0.0)), abs=0.11)
+            assert hidden == pytest.approx(reach(sight, visibility, (1.0, BRIGHTEST, 1.0)), abs=0.02)
+            for distance in np.linspace(0.1, sure, 50) if sure else ():
+                assert k * distance <= sight.depth_limit(distance, white, 0.0, 0.0)
+            for distance in np.geomspace(hidden, 10.0 * hidden, 50):
+                assert k * distance > sight.depth_limit(distance, 1.0, BRIGHTEST)
 
 
 def test_bounds_in_clear_air() -> None:

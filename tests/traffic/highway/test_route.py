@@ -95,28 +95,27 @@ def test_a_way_does_not_turn_back() -> None:
 
 
 @pytest.mark.filterwarnings("ignore:.*is out of date. You should consider upgrading:DeprecationWarning")
-@pytest.mark.parametrize("name", ENVIRONMENTS)
-def test_the_egos_place_moves_as_it_drives(name: str) -> None:
+def test_the_egos_place_moves_as_it_drives() -> None:
     """Never back, and no farther than was driven but for cut bends; the ego never rolls back either."""
-    seed, config = ENVIRONMENTS[name]
-    made = gymnasium.make(f"highway_env:{name}", config={**config, "neighbour_vehicles_connected_lanes": True})
-    traffic = HighwayTraffic(made.unwrapped, None)
-    traffic.start(seed)
-    before = traffic.observe()
-    command = Command(SpeedAdvice(80.0 / 3.6))
-    for _ in range(round(10.0 / traffic.step_length)):
-        assert before is not None
-        traffic.advance(command)
-        after = traffic.observe()
-        assert after is not None
-        fastest = max(float(s.state.speed[s.ego]) for s in (before, after))
-        moved = after.route_position - before.route_position
-        assert -1e-9 <= moved <= FASTEST_GAIN * fastest * traffic.step_length + 0.05
-        assert after.state.speed[after.ego] >= -1e-9
-        before = after
-    route = traffic.network()[0].route
-    steps = np.diff(route, axis=0)
-    turns = np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0])))
-    traffic.close()
-    # Some lanes go on beside where they ended, but none behind.
-    assert (np.abs(turns) < math.radians(100.0)).all()
+    for name, (seed, config) in ENVIRONMENTS.items():
+        made = gymnasium.make(f"highway_env:{name}", config={**config, "neighbour_vehicles_connected_lanes": True})
+        traffic = HighwayTraffic(made.unwrapped, None)
+        traffic.start(seed)
+        before = traffic.observe()
+        command = Command(SpeedAdvice(80.0 / 3.6))
+        for _ in range(round(10.0 / traffic.step_length)):
+            assert before is not None
+            traffic.advance(command)
+            after = traffic.observe()
+            assert after is not None
+            fastest = max(float(s.state.speed[s.ego]) for s in (before, after))
+            moved = after.route_position - before.route_position
+            assert -1e-9 <= moved <= FASTEST_GAIN * fastest * traffic.step_length + 0.05
+            assert after.state.speed[after.ego] >= -1e-9
+            before = after
+        route = traffic.network()[0].route
+        steps = np.diff(route, axis=0)
+        turns = np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0])))
+        traffic.close()
+        # Some lanes go on beside where they ended, but none behind.
+        assert (np.abs(turns) < math.radians(100.0)).all()

@@ -25,12 +25,12 @@ def test_who_can_come(tmp_path: Path, vehicle: str) -> None:
     assert not demand.lacks(vehicle)
 
 
-@pytest.mark.parametrize("vehicle", ["egoo", "EGO", "r", "f", "f.3", "f.00", "f.01", "f.-1", "f.", "f.1.0", ".0", "g"])
-def test_who_can_never_come(tmp_path: Path, vehicle: str) -> None:
-    demand = demand_of(tmp_path, VEHICLES, "ego", vehicle)
-    assert demand.lacks(vehicle)
-    assert not demand.lacks("ego")
-    assert demand.names == ("ego", "t", "own", "f.0", "f.2", "g.0")
+def test_who_can_never_come(tmp_path: Path) -> None:
+    for vehicle in ["egoo", "EGO", "r", "f", "f.3", "f.00", "f.01", "f.-1", "f.", "f.1.0", ".0", "g"]:
+        demand = demand_of(tmp_path, VEHICLES, "ego", vehicle)
+        assert demand.lacks(vehicle)
+        assert not demand.lacks("ego")
+        assert demand.names == ("ego", "t", "own", "f.0", "f.2", "g.0")
 
 
 def test_ways_that_are_written_out(tmp_path: Path) -> None:

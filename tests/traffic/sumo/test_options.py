@@ -25,9 +25,8 @@ def test_what_sumo_knows_is_asked_of_it() -> None:
     assert not load_libsumo().isLoaded()
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "told"),
-    [
+def test_what_sumo_would_not_take_is_told_by_its_key() -> None:
+    for name, value, told in [
         ("device.ssm.probabilty", 1, "no such option; did you mean 'device.ssm.probability'"),
         ("seed", 1, "fogsim run --seed"),
         ("n", "a.net.xml", r"traffic\.net"),
@@ -40,11 +39,9 @@ def test_what_sumo_knows_is_asked_of_it() -> None:
         ("device.ssm.probability", True, "must be a number, got True"),
         ("precision", 2.5, "must be a whole number"),
         ("summary-output", True, "must be text, got True"),
-    ],
-)
-def test_what_sumo_would_not_take_is_told_by_its_key(name: str, value: object, told: str) -> None:
-    with pytest.raises(InputError, match=rf"traffic\.sumo_options\.{name}: .*{told}"):
-        with_options(f"={{{name}: {str(value).lower() if isinstance(value, bool) else value}}}")
+    ]:
+        with pytest.raises(InputError, match=rf"traffic\.sumo_options\.{name}: .*{told}"):
+            with_options(f"={{{name}: {str(value).lower() if isinstance(value, bool) else value}}}")
 
 
 def test_options_that_fit_have_no_mistakes() -> None:

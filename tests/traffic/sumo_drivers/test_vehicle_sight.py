@@ -45,9 +45,8 @@ def even(visibility: float) -> FieldAccess:
     return FieldAccess(FogField(extinction_from_visibility(visibility), (3000.0,) * 3))
 
 
-@pytest.mark.parametrize(
-    ("ahead", "left", "turned", "distance", "bearing"),
-    [
+def test_the_line_ends_at_the_nearest_part_whatever_side_it_shows() -> None:
+    for ahead, left, turned, distance, bearing in [
         (35.0, 0.0, 0.0, 30.0, 0.0),  # its rear
         (30.0, 0.0, 180.0, 30.0, 0.0),  # its front
         (30.0, 0.0, 90.0, 29.0, 0.0),  # its side, the nearer one
@@ -55,15 +54,11 @@ def even(visibility: float) -> FieldAccess:
         (30.0, -2.0, -90.0, 29.0, 0.0),  # crossing to the right, its middle before me
         (-20.0, 0.0, 0.0, 20.0, 180.0),  # behind me
         (2.0, 0.0, 0.0, NEAREST, None),  # where I am
-    ],
-)
-def test_the_line_ends_at_the_nearest_part_whatever_side_it_shows(
-    ahead: float, left: float, turned: float, distance: float, bearing: float | None
-) -> None:
-    line = VehicleSight(two_vehicles(ahead, left, turned), even(100.0), DAY).line_of_sight("me", "other")
-    assert line.distance == pytest.approx(distance)
-    if bearing is not None:
-        assert abs(math.degrees(line.bearing)) == pytest.approx(abs(bearing), abs=1e-9)
+    ]:
+        line = VehicleSight(two_vehicles(ahead, left, turned), even(100.0), DAY).line_of_sight("me", "other")
+        assert line.distance == pytest.approx(distance)
+        if bearing is not None:
+            assert abs(math.degrees(line.bearing)) == pytest.approx(abs(bearing), abs=1e-9)
 
 
 def test_the_line_climbs_to_a_vehicle_that_is_higher() -> None:

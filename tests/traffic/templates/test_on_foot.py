@@ -107,9 +107,8 @@ def test_who_steps_out_of_the_fog_is_struck_and_it_is_a_collision(scenario: Path
     assert steps[0].traffic.persons.speed[0] < 0.01
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "told"),
-    [
+def test_mistakes_about_persons_are_told(scenario: Path) -> None:
+    for old, new, told in [
         ("waits: true", "wait: true", "actors.child.wait: unknown key; did you mean 'waits'"),
         ("waits: true", "lane: 1", "a person has no lane; "),
         ("speed: 90 km/h}", "side: left}", "a car has no side; "),
@@ -123,14 +122,12 @@ def test_who_steps_out_of_the_fog_is_struck_and_it_is_a_collision(scenario: Path
             "limit: 80 km/h",
             "struck.yaml:11: actors.child: a person needs a footway",
         ),
-    ],
-)
-def test_mistakes_about_persons_are_told(scenario: Path, old: str, new: str, told: str) -> None:
-    assert old in TEXT
-    scenario.write_text(TEXT.replace(old, new), encoding="utf-8")
-    with pytest.raises(InputError) as refused:
-        fogsim.load_scenario(scenario)
-    assert told in str(refused.value)
+    ]:
+        assert old in TEXT
+        scenario.write_text(TEXT.replace(old, new), encoding="utf-8")
+        with pytest.raises(InputError) as refused:
+            fogsim.load_scenario(scenario)
+        assert told in str(refused.value)
 
 
 def test_persons_per_hour_need_somewhere_to_walk(scenario: Path) -> None:

@@ -4,7 +4,6 @@ import subprocess
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-import pytest
 import sumo
 
 from fogsim.traffic.templates import (
@@ -27,29 +26,27 @@ FLOWS = tuple((way, 0.1) for way in ("same_way", "oncoming", "ramp", "north", "s
 ON_FOOT = ("rural", "crossing")
 
 
-@pytest.mark.parametrize(
-    ("name", "on_foot"), [*((name, False) for name in ROAD_TEMPLATES), *((n, True) for n in ON_FOOT)]
-)
-def test_sumo_plays_it_without_a_warning(name: str, on_foot: bool, tmp_path: Path) -> None:
-    template = ROAD_TEMPLATES[name](**({"footways": True} if on_foot else {}))  # type: ignore[arg-type]
-    slow = Actor("slow", "truck", place=Relation("ego", 40.0), speed=8.0)
-    broken_down = Actor("broken_down", "van", place=60.0, stands=True, lane=-1)
-    standing = [broken_down] if name in ("motorway", "ramp") else []
-    placed = place_actors((Actor("ego", place=120.0, speed=10.0), slow, *standing))
-    layout = template.layout(cuts_around(placed, template.free_length))
-    # Who must let persons go first as well waits longer.
-    share = 0.3 if on_foot else 1.0
-    flows = tuple((way, share * rate) for way, rate in FLOWS if layout.way(way))
-    demand = Demand(flows, usual_mix(name))
-    (tmp_path / "net.xml").write_text(net_text(layout.net), encoding="utf-8")
-    walkers = [Walker("child", position=200.0, crosses_at=292.0)] if name == "crossing" else [Walker("child")]
-    on_feet = (walkers, Footfall(0.01, 0.01, 60.0)) if on_foot else ((), Footfall())
-    (tmp_path / "rou.xml").write_text(routes_text(layout, demand, placed, *on_feet), encoding="utf-8")
-    arguments = ["-n", "net.xml", "-r", "rou.xml", "--end", "60", "--step-length", "0.2", "--no-step-log", "true"]
-    strict = ["--collision.action", "warn", "--collision.check-junctions", "true", "--time-to-teleport", "30"]
-    program = Path(sumo.SUMO_HOME, "bin", "sumo")
-    done = subprocess.run([program, *arguments, *strict], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
+def test_sumo_plays_it_without_a_warning(tmp_path: Path) -> None:
+    for name, on_foot in [*((name, False) for name in ROAD_TEMPLATES), *((n, True) for n in ON_FOOT)]:
+        template = ROAD_TEMPLATES[name](**({"footways": True} if on_foot else {}))  # type: ignore[arg-type]
+        slow = Actor("slow", "truck", place=Relation("ego", 40.0), speed=8.0)
+        broken_down = Actor("broken_down", "van", place=60.0, stands=True, lane=-1)
+        standing = [broken_down] if name in ("motorway", "ramp") else []
+        placed = place_actors((Actor("ego", place=120.0, speed=10.0), slow, *standing))
+        layout = template.layout(cuts_around(placed, template.free_length))
+        # Who must let persons go first as well waits longer.
+        share = 0.3 if on_foot else 1.0
+        flows = tuple((way, share * rate) for way, rate in FLOWS if layout.way(way))
+        demand = Demand(flows, usual_mix(name))
+        (tmp_path / "net.xml").write_text(net_text(layout.net), encoding="utf-8")
+        walkers = [Walker("child", position=200.0, crosses_at=292.0)] if name == "crossing" else [Walker("child")]
+        on_feet = (walkers, Footfall(0.01, 0.01, 60.0)) if on_foot else ((), Footfall())
+        (tmp_path / "rou.xml").write_text(routes_text(layout, demand, placed, *on_feet), encoding="utf-8")
+        arguments = ["-n", "net.xml", "-r", "rou.xml", "--end", "60", "--step-length", "0.2", "--no-step-log", "true"]
+        strict = ["--collision.action", "warn", "--collision.check-junctions", "true", "--time-to-teleport", "30"]
+        program = Path(sumo.SUMO_HOME, "bin", "sumo")
+        done = subprocess.run([program, *arguments, *strict], cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_persons_are_there_from_the_beginning_and_come_by_the_seed(tmp_path: Path) -> None:

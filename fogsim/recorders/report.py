@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import Generic
 
 from fogsim.files.atomic import write_text
-from fogsim.recorders.html_pages import render_page
 from fogsim.recorders.manifest import versions
 from fogsim.recorders.panel.camera_picture import scale_image
 from fogsim.recorders.protocol import AnyStep_contra, Derived, RunInformation
 from fogsim.recorders.report_data import Album, Curves, DecisiveFrames, ReportPicture, SignBook, SignRow
 from fogsim.recorders.report_figures import draw_figures
+from fogsim.recorders.templating import render
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Step
 
@@ -56,7 +56,7 @@ class ReportContent:
 
 def render_report(content: ReportContent) -> str:
     """Render a report as HTML; nothing in it is loaded from elsewhere."""
-    return render_page(
+    return render(
         "run.html",
         title=content.title,
         run=content,

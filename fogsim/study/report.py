@@ -6,7 +6,7 @@ from pathlib import Path
 
 from fogsim.files.atomic import write_text
 from fogsim.metrics import metric_topics
-from fogsim.recorders.html_pages import render_page
+from fogsim.recorders.templating import render
 from fogsim.study.comparison import (
     Difference,
     adjust_p_values,
@@ -111,7 +111,7 @@ def _figures(
 def _page(study: Study, rows: Sequence[Row], found: _Findings, folder: Path) -> str:
     failed = [row for row in rows if row["status"] != "complete"]
     done = [row for row in rows if row["status"] == "complete"]
-    return render_page(
+    return render(
         "study.html",
         title=study.name,
         failed=len(failed),

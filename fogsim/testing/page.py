@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from fogsim.files.atomic import write_text
-from fogsim.recorders.html_pages import data_url, render_page
 from fogsim.recorders.manifest import versions
+from fogsim.recorders.templating import data_url, render
 from fogsim.testing.artefacts import Artefacts
 from fogsim.testing.judgement import Judgement, Outcome
 from fogsim.testing.session import FileOutcome
@@ -43,7 +43,7 @@ class _Clause(NamedTuple):
 
 def write_page(path: Path, content: PageContent) -> None:
     """Write the page; its folder is created if missing."""
-    page = render_page(
+    page = render(
         "tests.html",
         title=f"{_worst(content.outcomes)}: fog tests",
         outcomes=content.outcomes,

@@ -1,14 +1,15 @@
-"""HTML pages from the templates in ``templates``: escaped, and complete in one file."""
+"""Text files from the templates in ``templates``."""
 
 import base64
 import functools
 from pathlib import Path
+from xml.sax.saxutils import quoteattr
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
 
 
-def render_page(template: str, **values: object) -> str:
-    """The page of a template; all text in `values` is escaped."""
+def render(template: str, **values: object) -> str:
+    """The text of a template; in HTML all text in `values` is escaped."""
     return _environment().get_template(template).render(values)
 
 
@@ -21,11 +22,11 @@ def data_url(content: bytes, media_type: str) -> str:
 def _environment() -> Environment:
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).with_name("templates")),
-        autoescape=True,
+        autoescape=select_autoescape(["html"]),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters["data_url"] = data_url
+    environment.filters |= {"data_url": data_url, "quoted": quoteattr}
     return environment

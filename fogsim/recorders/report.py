@@ -3,7 +3,6 @@
 import io
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Generic
 
 from fogsim.files.atomic import write_text
@@ -30,45 +29,6 @@ _UNITS: Mapping[str, str] = {
 
 MOST_SIGNS = 60
 """Maximum number of signs in the report."""
-
-
-@dataclass(frozen=True, slots=True)
-class ReportContent:
-    """Everything that a report shows."""
-
-    # title, description: name and description of the scenario
-    title: str
-    description: str
-    interrupted_at: float | None  # Instant at which the run was cut short [s], None if it was complete
-    recorded: bool  # Whether there was a step
-    not_played: Sequence[str]  # What of the script was not played, a line each
-    # Summary of the run; a key ends in its unit, and a mapping under ``estimators`` has one entry per method
-    metrics: Mapping[str, object]
-    meanings: Mapping[str, str]  # One line on each key
-    topics: Mapping[str, Sequence[str]]  # Keys by topic
-    settings: Mapping[str, str]  # Paragraphs on how the run was set up, by their headings
-    figures: Sequence[tuple[str, bytes]]  # (str, bytes): Caption and PNG of each figure
-    decisive: Sequence[tuple[str, ReportPicture]]  # Captions and camera images of the decisive moments
-    pictures: Sequence[ReportPicture]  # Camera images, spread evenly over the run
-    signs: Sequence[SignRow]  # Signs of the map that were ahead
-    footer: Mapping[str, str]  # Seed and versions
-
-
-def render_report(content: ReportContent) -> str:
-    """Render a report as HTML; nothing in it is loaded from elsewhere."""
-    return render(
-        "run.html",
-        title=content.title,
-        run=content,
-        key_numbers=key_numbers(content.metrics),
-        by_topic=_by_topic(content.metrics, content.topics),
-        most_signs=MOST_SIGNS,
-        label=_label,
-        value=shown_metric,
-        png=_png,
-        caption=_caption,
-    )
-
 
 _KEY_NUMBERS: Sequence[tuple[str, str]] = (
     ("ego_collisions", "collisions of the ego"),
@@ -203,24 +163,32 @@ class StepReport(ABC, Generic[AnyStep_contra]):
         """
         if not self._open:
             return
-        content = ReportContent(
-            title=self._information.title,
-            description=self._information.description,
+        information, metrics = self._information, self._information.summary()
+        text = render(
+            "run.html",
+            title=information.title,
+            description=information.description,
             interrupted_at=None if complete else self._last or 0.0,
             recorded=self._last is not None,
             not_played=self._not_played,
-            metrics=self._information.summary(),
-            meanings=self._information.meanings,
-            topics=self._information.topics,
-            settings=self._information.settings(),
+            key_numbers=key_numbers(metrics),
+            metrics=metrics,
+            meanings=information.meanings,
+            by_topic=_by_topic(metrics, information.topics),
+            settings=information.settings(),
             # Figures take longer than somebody waits who has pressed Ctrl-C.
             figures=self._figures() if self._last is not None and complete else [],
             decisive=self._decisive(),
             pictures=self._pictures(),
             signs=self._signs(),
-            footer=_footnotes(self._information.seed),
+            most_signs=MOST_SIGNS,
+            footer=_footnotes(information.seed),
+            label=_label,
+            value=shown_metric,
+            png=_png,
+            caption=_caption,
         )
-        write_text(self._information.directory.report, render_report(content))
+        write_text(information.directory.report, text)
         self._open = False
 
 

@@ -21,7 +21,7 @@ _DENOMINATORS: Mapping[str | None, tuple[str, float]] = {
 """Metric that a rate's events are divided by, and how much of it is one unit."""
 
 
-class Cell(NamedTuple):
+class TableCell(NamedTuple):
     """A number, or a name with a hint, and small lines below it, the last ones bold."""
 
     text: str
@@ -34,7 +34,7 @@ class Table(NamedTuple):
     """A table whose last columns, as many as `numbers`, hold numbers."""
 
     head: Sequence[str]
-    rows: Sequence[Sequence[str | Cell]]
+    rows: Sequence[Sequence[str | TableCell]]
     numbers: int = 0
 
 
@@ -54,7 +54,7 @@ def main_tables(
         cells = [grid.cell(policy, panel) for policy in grid.policies]
         body = [
             [
-                Cell(metric_words(metric).axis, _first_part(remarks.get(metric)), hint=metric),
+                TableCell(metric_words(metric).axis, _first_part(remarks.get(metric)), hint=metric),
                 *(_mean_cell(study, metric, of_cell.get(cell, []), found.get((metric, cell))) for cell in cells),
             ]
             for metric in metrics
@@ -67,17 +67,17 @@ def _first_part(remark: str | None) -> list[str]:
     return [] if remark is None else [remark.partition(":")[0]]
 
 
-def _mean_cell(study: Study, metric: str, rows: Sequence[Row], one: Difference | None) -> Cell:
+def _mean_cell(study: Study, metric: str, rows: Sequence[Row], one: Difference | None) -> TableCell:
     scale = metric_words(metric).scale
     values = [v for row in rows if (v := number_of(row.get(metric))) is not None]
     text = f"{scale * sum(values) / len(values):.3g}" if values else "–"
     events = _events(event_count(metric, rows))
     if one is None:
-        return Cell(text, events)
+        return TableCell(text, events)
     said = [signed(scale * one.difference)]
     if one.low is not None and one.high is not None:
         said.append(f"({signed(scale * one.low, 2)} … {signed(scale * one.high, 2)})")
-    return Cell(text, events, said) if one.is_shown(study.confidence) else Cell(text, [*events, *said])
+    return TableCell(text, events, said) if one.is_shown(study.confidence) else TableCell(text, [*events, *said])
 
 
 def event_count(metric: str, rows: Sequence[Row]) -> int | None:
@@ -121,7 +121,7 @@ def comparison_table(
         body.append(
             [
                 *(one.metric, *one.levels.values()),
-                *(Cell(f"{mean:.3g}", _events(count)) for mean, count in means),
+                *(TableCell(f"{mean:.3g}", _events(count)) for mean, count in means),
                 *(f"{one.difference:+.3g}", interval),
                 *(_shown(one.p_value), _shown(one.adjusted_p_value), str(one.pairs)),
                 "–" if one.seeds_for_half_width is None else str(one.seeds_for_half_width),

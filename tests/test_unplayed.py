@@ -60,7 +60,7 @@ def test_a_recorded_run_is_whole_before_it_warns(tmp_path: Path) -> None:
     assert (manifest["events_not_fired"], manifest["vehicles_never_seen"]) == ([event], ["veh99"])
     report = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert f"Not played: {event}" in report
-    assert "Not played: vehicle &#x27;veh99&#x27; was never on the road" in report
+    assert "Not played: vehicle &#39;veh99&#39; was never on the road" in report
 
 
 def test_the_command_tells_each_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

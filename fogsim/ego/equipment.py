@@ -49,7 +49,7 @@ from fogsim.values import (
     TrafficSnapshot,
     TrafficState,
 )
-from fogsim.values.fault import FaultKind, Where
+from fogsim.values.fault import FaultKind, SignFault, Where
 from fogsim.values.light import ALL_LAMPS
 from fogsim.values.result_checks import checked_estimate
 from fogsim.values.script import Actions
@@ -180,7 +180,7 @@ class EgoEquipment:
         if self._network is None:
             raise SimulationError("the run has not been started, or is closed")
         road, signs = self._network
-        of_signs = tuple(one.kind for one in faults if one.kind.sensor == "signs")
+        of_signs = tuple(one.kind for one in faults if isinstance(one.kind, SignFault))
         if self._view_renderer is None or of_signs != self._sign_faults:
             if self._view_renderer is not None:
                 self._view_renderer.close()

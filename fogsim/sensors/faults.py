@@ -113,4 +113,4 @@ def check_sign_ids(kinds: Iterable[FaultKind], signs: SignMap) -> None:
         if isinstance(kind, SignsMissing | SignsMoved):
             for name in kind.ids:
                 if name not in known:
-                    raise InputError(f"sensors: signs {kind.name}: there is no sign {name!r}; {suggest(name, known)}")
+                    raise InputError(f"sensors: {kind.name}: there is no sign {name!r}; {suggest(name, known)}")

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
 
 from fogsim.files.atomic import write_text
@@ -12,7 +11,7 @@ from fogsim.scenario.wording.non_defaults import Setting, non_default_settings
 from fogsim.scenario.wording.sentences import SENTENCES
 from fogsim.study.comparison import RESAMPLES
 from fogsim.study.plan import Study, file_digests
-from fogsim.study.report_tables import plain_table
+from fogsim.study.report_tables import Table
 
 _MOST_VARIANTS = 10
 _DISTRIBUTIONS = {"fogsim": "FogSim", "libsumo": "SUMO (libsumo)", "python": "Python"}
@@ -20,26 +19,19 @@ _DISTRIBUTIONS = {"fogsim": "FogSim", "libsumo": "SUMO (libsumo)", "python": "Py
 
 @dataclass(frozen=True, slots=True)
 class Methods:
-    """Paragraphs by their headings, and tables by their captions: the head first."""
+    """Paragraphs by their headings, and tables of text by their captions."""
 
     paragraphs: Mapping[str, str]
-    tables: Mapping[str, Sequence[Sequence[str]]]
+    tables: Mapping[str, Table]
 
     def markdown(self, title: str) -> str:
         """Text of ``methods.md``."""
         parts = [f"# {title}", *(f"**{name}.** {text}" for name, text in self.paragraphs.items())]
-        for caption, (head, *rows) in self.tables.items():
-            lines = [head, ["---"] * len(head), *rows]
-            cells = [[cell.replace("|", "\\|").replace("\n", " ") for cell in row] for row in lines]
+        for caption, table in self.tables.items():
+            lines = [table.head, ["---"] * len(table.head), *table.rows]
+            cells = [[str(cell).replace("|", "\\|").replace("\n", " ") for cell in row] for row in lines]
             parts += [f"## {caption}", "\n".join(f"| {' | '.join(row)} |" for row in cells)]
         return "\n\n".join(parts) + "\n"
-
-    def html(self) -> str:
-        """The same for the report; the tables are folded."""
-        parts = [f"<p><b>{name}.</b> {escape(text)}</p>" for name, text in self.paragraphs.items()]
-        for caption, (head, *rows) in self.tables.items():
-            parts.append(f"<details><summary>{escape(caption)}</summary>{plain_table(head, rows)}</details>")
-        return "\n".join(parts)
 
 
 def write_methods(study: Study, folder: Path) -> Methods:
@@ -66,11 +58,13 @@ def study_methods(study: Study) -> Methods:
     settings = [[key, one.value, one.default or "(required)", one.meaning] for key, one in _common(scenarios).items()]
     digests = dict(item for one in scenarios for item in file_digests(one).items())
     tables = {
-        "Factors": [["factor", "level", "settings"], *levels],
-        "Settings of all runs that differ from FogSim's defaults": [["key", "value", "default", "meaning"], *settings],
-        "Input files": [["file", "SHA-256 (first 20 digits)"], *map(list, digests.items())],
+        "Factors": Table(["factor", "level", "settings"], levels),
+        "Settings of all runs that differ from FogSim's defaults": Table(
+            ["key", "value", "default", "meaning"], settings
+        ),
+        "Input files": Table(["file", "SHA-256 (first 20 digits)"], list(digests.items())),
     }
-    return Methods(paragraphs, {caption: rows for caption, rows in tables.items() if len(rows) > 1})
+    return Methods(paragraphs, {caption: table for caption, table in tables.items() if table.rows})
 
 
 def _software() -> str:

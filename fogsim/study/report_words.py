@@ -1,8 +1,8 @@
 """A study's results in words: significant differences only."""
 
 import math
-from collections.abc import Mapping, Sequence
-from html import escape
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 from fogsim.scenario.wording.sentences import empty_start
 from fogsim.study.comparison import Difference, number_of
@@ -13,18 +13,22 @@ from fogsim.study.report_tables import events_of_both
 from fogsim.study.table import Row, rows_of_cells
 
 
-def summary(study: Study, rows: Sequence[Row], differences: Sequence[Difference], remarks: Mapping[str, str]) -> str:
-    """Summary of the report as HTML, from the differences of the metrics that it shows first."""
+class Summary(NamedTuple):
+    """What the report says first; findings are lists with a title for each combination of the other factors."""
+
+    compared: str
+    warnings: Sequence[str]
+    findings: Sequence[tuple[str, Sequence[str]]]
+    notes: Sequence[str]
+
+
+def summary(
+    study: Study, rows: Sequence[Row], differences: Sequence[Difference], remarks: Mapping[str, str]
+) -> Summary:
+    """Summary of the report, from the differences of the metrics that it shows first."""
     telling = [one for one in differences if one.metric not in remarks]
-    return "\n".join(
-        [
-            "<h2>Summary</h2>",
-            f"<p>{escape(_compared(study, rows))}</p>",
-            *(f'<p class="warning">{escape(line)}</p>' for line in _warnings(study, rows, differences)),
-            *_findings(study, telling),
-            *_doubts(study, telling),
-        ]
-    )
+    warnings = _warnings(study, rows, differences)
+    return Summary(_compared(study, rows), warnings, list(_findings(study, telling)), _doubts(study, telling))
 
 
 def _warnings(study: Study, rows: Sequence[Row], differences: Sequence[Difference]) -> list[str]:
@@ -70,10 +74,9 @@ def _compared(study: Study, rows: Sequence[Row]) -> str:
     )
 
 
-def _findings(study: Study, differences: Sequence[Difference]) -> list[str]:
+def _findings(study: Study, differences: Sequence[Difference]) -> Iterator[tuple[str, list[str]]]:
     """Shown differences of each metric, in a list for each combination of the other factors."""
     grid = Grid(study)
-    lines = []
     for panel, title in grid.panels.items():
         cells = {grid.cell(policy, panel) for policy in grid.policies}
         here = [one for one in differences if tuple(one.levels.values()) in cells]
@@ -83,9 +86,8 @@ def _findings(study: Study, differences: Sequence[Difference]) -> list[str]:
         nothing = [metric_words(metric).label for metric in by_metric if metric not in shown]
         if nothing:
             items.append(f"No difference could be shown in: {', '.join(nothing)}.")
-        heading = f"<h3>{escape(title)}</h3>" if title else ""
-        lines += [heading, "<ul>", *(f"<li>{escape(item)}</li>" for item in items), "</ul>"] if items else []
-    return lines
+        if items:
+            yield title, items
 
 
 def _finding(grid: Grid, metric: str, differences: Sequence[Difference]) -> str:
@@ -116,7 +118,7 @@ def _doubts(study: Study, differences: Sequence[Difference]) -> list[str]:
     """Number of comparisons, and the limits of this number of comparisons and seeds."""
     tested = [one for one in differences if one.p_value is not None]
     if not tested:
-        return ['<p class="note">Nothing was compared.</p>']
+        return ["Nothing was compared."]
     level = 1.0 - study.confidence
     shown = sum(one.is_shown(study.confidence) for one in tested)
     kept = sum(one.is_shown(study.confidence) and (one.adjusted_p_value or 1.0) <= level for one in tested)
@@ -135,7 +137,7 @@ def _doubts(study: Study, differences: Sequence[Difference]) -> list[str]:
         said.append(
             f"Seeds for intervals of ± {study.wanted_interval:.0%} of the baseline's mean everywhere: {needed}."
         )
-    return [f'<p class="note">{escape(line)}</p>' for line in said]
+    return said
 
 
 def _seeds_needed(differences: Sequence[Difference]) -> str:

@@ -19,151 +19,136 @@ class TimeStamp(StrEnum):
 class Blackout:
     """Black frames, each with its own time: the image sensor gives no signal, the link goes on."""
 
-    sensor: ClassVar[str] = "camera"
-    name: ClassVar[str] = "blackout"
+    name: ClassVar[str] = "camera blackout"
 
 
 @dataclass(frozen=True, slots=True)
 class FrozenFrame:
     """One frame again and again, the last before the fault."""
 
-    sensor: ClassVar[str] = "camera"
-    name: ClassVar[str] = "frozen"
+    name: ClassVar[str] = "camera frozen"
     # Whether its time stays that of its exposure, or moves on as if each were new
-    time_stamp: TimeStamp = TimeStamp.DELIVERY
+    time_stamp: TimeStamp
 
 
 @dataclass(frozen=True, slots=True)
 class DroppedFrames:
     """Frames that get lost, each by chance; until the next arrives, the last one is all there is."""
 
-    sensor: ClassVar[str] = "camera"
-    name: ClassVar[str] = "dropped_frames"
-    share: float = 1.0  # Share of frames that get lost, 0 … 1
+    name: ClassVar[str] = "camera dropped_frames"
+    share: float  # Share of frames that get lost, 0 … 1
 
 
 @dataclass(frozen=True, slots=True)
 class Latency:
     """Frames that come late."""
 
-    sensor: ClassVar[str] = "camera"
-    name: ClassVar[str] = "latency"
-    delay: float = 0.3  # From exposure to delivery [s]
-    time_stamp: TimeStamp = TimeStamp.EXPOSURE  # Which of both times the frames bear
+    name: ClassVar[str] = "camera latency"
+    delay: float  # From exposure to delivery [s]
+    time_stamp: TimeStamp  # Which of both times the frames bear
 
 
 @dataclass(frozen=True, slots=True)
 class Miscalibration:
     """A camera that is knocked out of place, or whose lens slips, of which the estimators are told nothing."""
 
-    sensor: ClassVar[str] = "camera"
-    name: ClassVar[str] = "calibration"
+    name: ClassVar[str] = "camera calibration"
     # pitch, roll: what is added to the true angles [rad]
-    pitch: float = 0.0
-    roll: float = 0.0
-    focal_length_ratio: float = 1.0  # True focal length over that before [-]
+    pitch: float
+    roll: float
+    focal_length_ratio: float  # True focal length over that before [-]
 
 
 @dataclass(frozen=True, slots=True)
 class DirtyLens:
     """Dirt on the glass before the camera."""
 
-    sensor: ClassVar[str] = "camera"
-    name: ClassVar[str] = "dirty_lens"
-    coverage: float = 0.1  # Sum of the areas of all blots over that of the glass [-]
-    diameter: float = 0.002  # Median of their diameters [m]
-    albedo: float = 0.3  # Luminance of a blot over the mean of the picture [-]
+    name: ClassVar[str] = "camera dirty_lens"
+    coverage: float  # Sum of the areas of all blots over that of the glass [-]
+    diameter: float  # Median of their diameters [m]
+    albedo: float  # Luminance of a blot over the mean of the picture [-]
 
 
 @dataclass(frozen=True, slots=True)
 class WetLens:
     """Water on the glass before the camera."""
 
-    sensor: ClassVar[str] = "camera"
-    name: ClassVar[str] = "wet_lens"
-    coverage: float = 0.15  # Sum of the areas of all drops over that of the glass [-]
-    diameter: float = 0.003  # Median of their diameters [m]
-    blur: float = math.radians(0.1)  # Standard deviation of the blur by the film between them [rad]
+    name: ClassVar[str] = "camera wet_lens"
+    coverage: float  # Sum of the areas of all drops over that of the glass [-]
+    diameter: float  # Median of their diameters [m]
+    blur: float  # Standard deviation of the blur by the film between them [rad]
 
 
 @dataclass(frozen=True, slots=True)
 class Glare:
     """A small source, such as a low sun, that shines into the camera."""
 
-    sensor: ClassVar[str] = "camera"
-    name: ClassVar[str] = "glare"
-    azimuth: float = 0.0  # Its direction, counterclockwise from the vehicle's axis [rad]
-    elevation: float = math.radians(8.0)  # Its height over the road's plane [rad]
-    illuminance: float = 10_000.0  # What it makes on a surface that faces it, at the camera [lx]
-    haze: float = 1.0  # What the windscreen scatters over what a clean one does [-]
+    name: ClassVar[str] = "camera glare"
+    azimuth: float  # Its direction, counterclockwise from the vehicle's axis [rad]
+    elevation: float  # Its height over the road's plane [rad]
+    illuminance: float  # What it makes on a surface that faces it, at the camera [lx]
+    haze: float  # What the windscreen scatters over what a clean one does [-]
 
 
 @dataclass(frozen=True, slots=True)
 class LeadDropout:
     """A radar that loses the vehicle ahead, in each measurement by chance."""
 
-    sensor: ClassVar[str] = "lead"
-    name: ClassVar[str] = "dropout"
-    share: float = 1.0  # Share of measurements that get lost, 0 … 1
+    name: ClassVar[str] = "lead dropout"
+    share: float  # Share of measurements that get lost, 0 … 1
 
 
 @dataclass(frozen=True, slots=True)
 class LeadBias:
     """A radar that measures wrong."""
 
-    sensor: ClassVar[str] = "lead"
-    name: ClassVar[str] = "bias"
-    distance: float = 0.0  # What is added to the distance [m]
-    relative_speed: float = 0.0  # What is added to the relative speed [m/s]
+    name: ClassVar[str] = "lead bias"
+    distance: float  # What is added to the distance [m]
+    relative_speed: float  # What is added to the relative speed [m/s]
 
 
 @dataclass(frozen=True, slots=True)
 class LeadNoise:
     """A radar that is noisier than it should be."""
 
-    sensor: ClassVar[str] = "lead"
-    name: ClassVar[str] = "noise"
-    factor: float = 10.0  # Its standard deviations over those that it should have [-]
+    name: ClassVar[str] = "lead noise"
+    factor: float  # Its standard deviations over those that it should have [-]
 
 
 @dataclass(frozen=True, slots=True)
 class LeadNarrowView:
     """A radar whose field of view is narrowed, as by snow on its cover."""
 
-    sensor: ClassVar[str] = "lead"
-    name: ClassVar[str] = "narrow_view"
-    field_of_view: float = math.radians(2.0)  # Full angle within which it measures [rad]
+    name: ClassVar[str] = "lead narrow_view"
+    field_of_view: float  # Full angle within which it measures [rad]
 
 
 @dataclass(frozen=True, slots=True)
 class PositionBias:
     """A satellite position next to the true one, as reflections from walls make it."""
 
-    sensor: ClassVar[str] = "gps"
-    name: ClassVar[str] = "position_bias"
+    name: ClassVar[str] = "gps position_bias"
     # east, north: what is added in the world [m]
-    east: float = 0.0
-    north: float = 0.0
+    east: float
+    north: float
     # along, left: what is added in the direction of travel, and to its left [m]
-    along: float = 0.0
-    left: float = 0.0
+    along: float
+    left: float
 
 
 @dataclass(frozen=True, slots=True)
 class HeadingBias:
     """A wrong heading."""
 
-    sensor: ClassVar[str] = "gps"
-    name: ClassVar[str] = "heading_bias"
-    angle: float = 0.0  # What is added, counterclockwise [rad]
+    name: ClassVar[str] = "gps heading_bias"
+    angle: float  # What is added, counterclockwise [rad]
 
 
 @dataclass(frozen=True, slots=True)
 class Outage:
     """No position at all, as in a tunnel."""
 
-    sensor: ClassVar[str] = "gps"
-    name: ClassVar[str] = "outage"
+    name: ClassVar[str] = "gps outage"
 
 
 class Where(StrEnum):
@@ -177,42 +162,38 @@ class Where(StrEnum):
 class SignsMissing:
     """Signs that have gone."""
 
-    sensor: ClassVar[str] = "signs"
-    name: ClassVar[str] = "missing"
-    where: Where = Where.WORLD  # From the world, or from the vehicle's map
-    ids: tuple[str, ...] = ()  # Which; all if empty
+    name: ClassVar[str] = "signs missing"
+    where: Where  # From the world, or from the vehicle's map
+    ids: tuple[str, ...]  # Which; all if empty
 
 
 @dataclass(frozen=True, slots=True)
 class SignsMoved:
     """Signs that are elsewhere."""
 
-    sensor: ClassVar[str] = "signs"
-    name: ClassVar[str] = "moved"
-    where: Where = Where.WORLD  # In the world, or on the vehicle's map
-    ids: tuple[str, ...] = ()  # Which; all if empty
+    name: ClassVar[str] = "signs moved"
+    where: Where  # In the world, or on the vehicle's map
+    ids: tuple[str, ...]  # Which; all if empty
     # along, left, up: how far, seen by those they speak to [m]
-    along: float = 0.0
-    left: float = 0.0
-    up: float = 0.0
+    along: float
+    left: float
+    up: float
 
 
 @dataclass(frozen=True, slots=True)
 class Fouled:
     """A scatterometer with dirt or water on its windows, or an insect in its beam."""
 
-    sensor: ClassVar[str] = "scatterometer"
-    name: ClassVar[str] = "fouled"
+    name: ClassVar[str] = "scatterometer fouled"
     # What it tells over what it should [-]: below 1 by windows that let less light through, above by what scatters
-    factor: float = 0.5
+    factor: float
 
 
 @dataclass(frozen=True, slots=True)
 class NoSignal:
     """A scatterometer that tells nothing."""
 
-    sensor: ClassVar[str] = "scatterometer"
-    name: ClassVar[str] = "no_signal"
+    name: ClassVar[str] = "scatterometer no_signal"
 
 
 CameraFault = Blackout | FrozenFrame | DroppedFrames | Latency | Miscalibration | DirtyLens | WetLens | Glare
@@ -245,7 +226,7 @@ class Fault:
     @property
     def name(self) -> str:
         """Sensor and kind, as ``camera blackout``."""
-        return f"{self.kind.sensor} {self.kind.name}"
+        return self.kind.name
 
 
 @dataclass(frozen=True, slots=True)

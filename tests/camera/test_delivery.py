@@ -47,7 +47,11 @@ def test_frozen_frames_are_the_last_one_before(time_stamp: TimeStamp) -> None:
 
 def test_late_frames_leave_a_gap_first_and_are_overtaken_at_last() -> None:
     late = [2.0, 2.0, 3.0, 4.0, 5.0]
-    assert handed_out(Latency(2.0)) == [*PLAIN[:3], *((time, int(time) + 1) for time in late), *PLAIN[8:]]
+    assert handed_out(Latency(2.0, TimeStamp.EXPOSURE)) == [
+        *PLAIN[:3],
+        *((time, int(time) + 1) for time in late),
+        *PLAIN[8:],
+    ]
     stamped = handed_out(Latency(2.0, TimeStamp.DELIVERY))
     assert stamped[5:8] == [(5.0, 4), (6.0, 5), (7.0, 6)]
 
@@ -62,4 +66,4 @@ def test_frames_get_lost_at_the_rate_that_is_asked_for() -> None:
 
 
 def test_a_camera_that_has_not_yet_handed_out_anything_is_black() -> None:
-    assert handed_out(Latency(2.0), begin=0)[:3] == [(0.0, 0), (0.0, 0), (0.0, 1)]
+    assert handed_out(Latency(2.0, TimeStamp.EXPOSURE), begin=0)[:3] == [(0.0, 0), (0.0, 0), (0.0, 1)]

@@ -8,7 +8,7 @@ import pytest
 from fogsim.camera import FaultyLens
 from fogsim.camera.blots import PUPIL, passed_light, scattered_blots, shared_area
 from fogsim.values import Camera, Fault, RunningFault
-from fogsim.values.fault import DirtyLens, FaultKind, FrozenFrame, Glare, WetLens
+from fogsim.values.fault import DirtyLens, FaultKind, FrozenFrame, Glare, TimeStamp, WetLens
 
 CAMERA = Camera(320, 240, 290.0, (160.0, 120.0), 1.4)
 GREY = np.full((240, 320, 3), 50.0, np.float32)
@@ -53,11 +53,11 @@ def test_a_blot_smaller_than_the_pupil_hides_its_share_of_it_and_is_as_wide() ->
 
 
 def test_faults_of_the_signal_leave_the_light_alone() -> None:
-    assert seen(GREY, FrozenFrame()) is GREY
+    assert seen(GREY, FrozenFrame(TimeStamp.DELIVERY)) is GREY
 
 
 def test_dirt_as_bright_as_the_picture_is_not_seen_before_an_even_scene() -> None:
-    np.testing.assert_allclose(seen(GREY, DirtyLens(albedo=1.0)), GREY, rtol=1e-5)
+    np.testing.assert_allclose(seen(GREY, DirtyLens(0.1, 0.002, 1.0)), GREY, rtol=1e-5)
     dark = seen(GREY, DirtyLens(0.2, 0.004, 0.0))
     assert dark.min() < 0.05 * 50.0
     assert dark.max() == pytest.approx(50.0)
@@ -80,17 +80,17 @@ def test_drops_show_the_scene_upside_down() -> None:
 
 
 def test_dirt_stays_where_it_is_until_it_is_another_fault() -> None:
-    lens, fault = FaultyLens(), RunningFault(Fault(DirtyLens()), 0.0, 9.0, np.random.default_rng(4))
+    lens, fault = FaultyLens(), RunningFault(Fault(DirtyLens(0.1, 0.002, 0.3)), 0.0, 9.0, np.random.default_rng(4))
     first = lens.look_through(GREY, CAMERA, [fault])
     np.testing.assert_array_equal(lens.look_through(GREY, CAMERA, [fault]), first)
     lens.reset()
     np.testing.assert_array_equal(lens.look_through(GREY, CAMERA, [fault]), first)
-    assert not np.array_equal(seen(GREY, DirtyLens(), seed=5), first)
+    assert not np.array_equal(seen(GREY, DirtyLens(0.1, 0.002, 0.3), seed=5), first)
 
 
 def test_a_source_adds_its_illuminance_and_a_veil_that_falls_with_the_angle() -> None:
     camera = Camera(320, 240, 1000.0, (160.0, 120.0), 1.4)
-    fault = RunningFault(Fault(Glare(0.0, 0.0, 1000.0)), 0.0, math.inf, np.random.default_rng(0))
+    fault = RunningFault(Fault(Glare(0.0, 0.0, 1000.0, 1.0)), 0.0, math.inf, np.random.default_rng(0))
     glare = FaultyLens().look_through(np.zeros((240, 320, 3), np.float32), camera, [fault])[..., 0].astype(float)
     # The sun's disc of 0.27° is 4.7 px here; its light over the solid angle of the pixels is its illuminance.
     disc = glare[110:131, 150:171]
@@ -103,7 +103,7 @@ def test_a_source_adds_its_illuminance_and_a_veil_that_falls_with_the_angle() ->
 
 def test_a_source_on_the_left_and_above_is_drawn_there_whatever_the_pitch() -> None:
     camera = Camera(320, 240, 290.0, (160.0, 120.0), 1.4, pitch=math.radians(5.0))
-    glare = Glare(math.radians(10.0), math.radians(4.0), 1000.0)
+    glare = Glare(math.radians(10.0), math.radians(4.0), 1000.0, 1.0)
     fault = RunningFault(Fault(glare), 0.0, math.inf, np.random.default_rng(0))
     bright = FaultyLens().look_through(np.zeros((240, 320, 3), np.float32), camera, [fault])[..., 0]
     row, column = np.unravel_index(int(bright.argmax()), bright.shape)

@@ -1,11 +1,13 @@
 """What faults do to radar, satellite positioning and signs."""
 
 import math
+from typing import get_args
 
 import numpy as np
 import pytest
 
 from fogsim.errors import InputError
+from fogsim.scenario.sensors.faults import AnyFault, FaultSection, fault_of
 from fogsim.sensors import (
     Fix,
     Gps,
@@ -55,13 +57,13 @@ def test_a_radar_loses_its_measurements_at_the_rate_that_is_asked_for() -> None:
     (half,) = running(LeadDropout(0.5))
     lost = np.mean([faulty_lead(MEASURED, [half]) is None for _ in range(400)])
     assert lost == pytest.approx(0.5, abs=0.05)
-    assert faulty_lead(MEASURED, running(LeadDropout())) is None
+    assert faulty_lead(MEASURED, running(LeadDropout(1.0))) is None
 
 
 def test_a_biased_radar_never_measures_less_than_nothing() -> None:
     assert faulty_lead(MEASURED, running(LeadBias(5.0, 1.0))) == LeadMeasurement(45.0, -2.0)
-    assert faulty_lead(MEASURED, running(LeadBias(-50.0))) == LeadMeasurement(0.0, -3.0)
-    assert faulty_lead(None, running(LeadBias(5.0))) is None
+    assert faulty_lead(MEASURED, running(LeadBias(-50.0, 0.0))) == LeadMeasurement(0.0, -3.0)
+    assert faulty_lead(None, running(LeadBias(5.0, 0.0))) is None
 
 
 def test_a_noisier_radar_spreads_as_much_more() -> None:
@@ -104,7 +106,7 @@ def test_signs_go_missing_in_the_world_or_on_the_map() -> None:
     gone = SignsMissing(Where.MAP, ("b",))
     assert [sign.sign_id for sign in faulty_signs(SIGNS, [gone], Where.MAP).signs] == ["a", "c"]
     assert faulty_signs(SIGNS, [gone], Where.WORLD) == SIGNS
-    assert faulty_signs(SIGNS, [SignsMissing()], Where.WORLD) == SignMap()
+    assert faulty_signs(SIGNS, [SignsMissing(Where.WORLD, ())], Where.WORLD) == SignMap()
 
 
 def test_signs_are_moved_as_seen_by_those_they_speak_to() -> None:
@@ -114,4 +116,11 @@ def test_signs_are_moved_as_seen_by_those_they_speak_to() -> None:
 
 def test_a_sign_that_is_not_there_cannot_be_missing() -> None:
     with pytest.raises(InputError, match="signs missing: there is no sign 'bb'; did you mean 'b'"):
-        check_sign_ids([SignsMissing(ids=("bb",))], SIGNS)
+        check_sign_ids([SignsMissing(Where.WORLD, ("bb",))], SIGNS)
+
+
+@pytest.mark.parametrize("section", get_args(get_args(AnyFault)[0]), ids=lambda one: one.__name__)
+def test_each_section_makes_the_fault_that_it_names(section: type[FaultSection]) -> None:
+    (name,) = get_args(section.model_fields["fault"].annotation)
+    written = section(fault=name)
+    assert fault_of(written).name == f"{written.sensor} {name}"

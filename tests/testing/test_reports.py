@@ -124,4 +124,4 @@ def test_the_page_has_what_failed_with_plot_and_video(outcomes: list[FileOutcome
     assert "SUMO has ended &lt;here&gt;" in text
     assert "3 passed, " not in text
     assert "1 failed, 1 inconclusive, 1 error; 5 runs of 3 files in 4.0 s" in text
-    assert "fogsim test &#x27;with, comma/a0.fog.yaml&#x27; --case run=1" in text
+    assert "fogsim test &#39;with, comma/a0.fog.yaml&#39; --case run=1" in text

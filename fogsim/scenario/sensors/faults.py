@@ -1,11 +1,13 @@
 """The keys of a scenario file about what is wrong with the ego's sensors, the camera among them, and when."""
 
 import math
-from typing import Annotated, Literal
+from collections.abc import Callable
+from typing import Annotated, ClassVar, Literal, Unpack
 
-from pydantic import Field
+from pydantic import ConfigDict, Field
 
 from fogsim.scenario.section import Id, Number, Period, Place, Section, Share, Time
+from fogsim.units.quantities import UNIT_OF_SUFFIX
 from fogsim.values.fault import (
     Blackout,
     DirtyLens,
@@ -41,9 +43,14 @@ SmallAngle = Annotated[Number, Field(ge=-10, le=10)]
 Speed = Annotated[Number, Field(ge=-140, le=140)]
 """A speed, or a difference of speeds [m/s]."""
 
+_OF_ALL = frozenset(("at_s", "for_s", "sensor", "fault"))
+"""Keys that are not of what is wrong."""
+
 
 class FaultSection(Section):
-    """A fault of a sensor."""
+    """A fault of a sensor; `kind` is its value, whose fields are the keys without their units."""
+
+    _kind: ClassVar[Callable[..., FaultKind]]
 
     at_s: Time = 0.0
     """When it begins: time after the beginning of the run, or of the entry of the timeline that orders it."""
@@ -51,9 +58,19 @@ class FaultSection(Section):
     for_s: Period | None = None
     """How long it lasts; if not given, to the end of the run."""
 
+    def __init_subclass__(cls, kind: Callable[..., FaultKind] | None = None, **options: Unpack[ConfigDict]) -> None:
+        super().__init_subclass__(**options)
+        if kind is not None:
+            cls._kind = kind
+
     def in_si(self) -> FaultKind:
         """What is wrong, in SI units."""
-        raise NotImplementedError
+        values: dict[str, object] = {}
+        for key in type(self).model_fields.keys() - _OF_ALL:
+            stem, _, unit = key.rpartition("_")
+            value = getattr(self, key)
+            values[stem if unit in UNIT_OF_SUFFIX else key] = math.radians(value) if unit == "deg" else value
+        return self._kind(**values)
 
 
 class CameraFaultSection(FaultSection):
@@ -63,18 +80,14 @@ class CameraFaultSection(FaultSection):
     """Sensor that the fault is of."""
 
 
-class CameraBlackout(CameraFaultSection):
+class CameraBlackout(CameraFaultSection, kind=Blackout):
     """Black frames."""
 
     fault: Literal["blackout"]
     """`blackout`: black frames, each with its own time."""
 
-    def in_si(self) -> FaultKind:
-        """What is wrong, in SI units."""
-        return Blackout()
 
-
-class CameraFrozen(CameraFaultSection):
+class CameraFrozen(CameraFaultSection, kind=FrozenFrame):
     """One frame again and again."""
 
     fault: Literal["frozen"]
@@ -83,12 +96,8 @@ class CameraFrozen(CameraFaultSection):
     time_stamp: TimeStamp = TimeStamp.DELIVERY
     """Time that the frame bears: that of its `exposure`, or of each `delivery`, as if it were new."""
 
-    def in_si(self) -> FaultKind:
-        """What is wrong, in SI units."""
-        return FrozenFrame(self.time_stamp)
 
-
-class CameraDroppedFrames(CameraFaultSection):
+class CameraDroppedFrames(CameraFaultSection, kind=DroppedFrames):
     """Frames that get lost."""
 
     fault: Literal["dropped_frames"]
@@ -97,12 +106,8 @@ class CameraDroppedFrames(CameraFaultSection):
     share: Share = 1.0
     """Share that gets lost."""
 
-    def in_si(self) -> FaultKind:
-        """What is wrong, in SI units."""
-        return DroppedFrames(self.share)
 
-
-class CameraLatency(CameraFaultSection):
+class CameraLatency(CameraFaultSection, kind=Latency):
     """Frames that come late."""
 
     fault: Literal["latency"]
@@ -113,10 +118,6 @@ class CameraLatency(CameraFaultSection):
 
     time_stamp: TimeStamp = TimeStamp.EXPOSURE
     """Which of both times they bear: `exposure` or `delivery`."""
-
-    def in_si(self) -> FaultKind:
-        """What is wrong, in SI units."""
-        return Latency(self.delay_s, self.time_stamp)
 
 
 class CameraCalibration(CameraFaultSection):
@@ -140,7 +141,7 @@ class CameraCalibration(CameraFaultSection):
         return Miscalibration(math.radians(self.pitch_deg), math.radians(self.roll_deg), ratio)
 
 
-class CameraDirtyLens(CameraFaultSection):
+class CameraDirtyLens(CameraFaultSection, kind=DirtyLens):
     """Dirt on the glass."""
 
     fault: Literal["dirty_lens"]
@@ -155,12 +156,8 @@ class CameraDirtyLens(CameraFaultSection):
     albedo: Share = 0.3
     """Luminance of a blot over the mean of the picture."""
 
-    def in_si(self) -> FaultKind:
-        """What is wrong, in SI units."""
-        return DirtyLens(self.coverage, self.diameter_m, self.albedo)
 
-
-class CameraWetLens(CameraFaultSection):
+class CameraWetLens(CameraFaultSection, kind=WetLens):
     """Water on the glass."""
 
     fault: Literal["wet_lens"]
@@ -175,12 +172,8 @@ class CameraWetLens(CameraFaultSection):
     blur_deg: Annotated[Number, Field(ge=0, le=5)] = 0.1
     """Standard deviation of the blur by the film between them."""
 
-    def in_si(self) -> FaultKind:
-        """What is wrong, in SI units."""
-        return WetLens(self.coverage, self.diameter_m, math.radians(self.blur_deg))
 
-
-class CameraGlare(CameraFaultSection):
+class CameraGlare(CameraFaultSection, kind=Glare):
     """A low sun, or another small source, that shines into the camera."""
 
     fault: Literal["glare"]
@@ -198,11 +191,6 @@ class CameraGlare(CameraFaultSection):
     haze: Annotated[Number, Field(ge=0, le=1000)] = 1.0
     """What the windscreen scatters over what a clean one does; a dirty one has 10 and more."""
 
-    def in_si(self) -> FaultKind:
-        """What is wrong, in SI units."""
-        azimuth, elevation = math.radians(self.azimuth_deg), math.radians(self.elevation_deg)
-        return Glare(azimuth, elevation, self.illuminance_lx, self.haze)
-
 
 class LeadFaultSection(FaultSection):
     """A fault of the radar."""
@@ -211,7 +199,7 @@ class LeadFaultSection(FaultSection):
     """Sensor that the fault is of."""
 
 
-class LeadDropoutSection(LeadFaultSection):
+class LeadDropoutSection(LeadFaultSection, kind=LeadDropout):
     """A radar that loses the vehicle ahead."""
 
     fault: Literal["dropout"]
@@ -220,12 +208,8 @@ class LeadDropoutSection(LeadFaultSection):
     share: Share = 1.0
     """Share that gets lost."""
 
-    def in_si(self) -> FaultKind:
-        """What is wrong, in SI units."""
-        return LeadDropout(self.share)
 
-
-class LeadBiasSection(LeadFaultSection):
+class LeadBiasSection(LeadFaultSection, kind=LeadBias):
     """A radar that measures wrong."""
 
     fault: Literal["bias"]
@@ -237,12 +221,8 @@ class LeadBiasSection(LeadFaultSection):
     relative_speed_mps: Speed = 0.0
     """What is added to the relative speed."""
 
-    def in_si(self) -> FaultKind:
-        """What is wrong, in SI units."""
-        return LeadBias(self.distance_m, self.relative_speed_mps)
 
-
-class LeadNoiseSection(LeadFaultSection):
+class LeadNoiseSection(LeadFaultSection, kind=LeadNoise):
     """A radar that is noisier."""
 
     fault: Literal["noise"]
@@ -251,12 +231,8 @@ class LeadNoiseSection(LeadFaultSection):
     factor: Annotated[Number, Field(ge=0, le=1000)] = 10.0
     """How many times as large."""
 
-    def in_si(self) -> FaultKind:
-        """What is wrong, in SI units."""
-        return LeadNoise(self.factor)
 
-
-class LeadNarrowViewSection(LeadFaultSection):
+class LeadNarrowViewSection(LeadFaultSection, kind=LeadNarrowView):
     """A radar that sees less to the sides."""
 
     fault: Literal["narrow_view"]
@@ -264,10 +240,6 @@ class LeadNarrowViewSection(LeadFaultSection):
 
     field_of_view_deg: Annotated[Number, Field(ge=0.1, le=360)] = 2.0
     """Full angle that is left."""
-
-    def in_si(self) -> FaultKind:
-        """What is wrong, in SI units."""
-        return LeadNarrowView(math.radians(self.field_of_view_deg))
 
 
 class GpsFaultSection(FaultSection):
@@ -277,7 +249,7 @@ class GpsFaultSection(FaultSection):
     """Sensor that the fault is of."""
 
 
-class GpsPositionBias(GpsFaultSection):
+class GpsPositionBias(GpsFaultSection, kind=PositionBias):
     """A position next to the true one."""
 
     fault: Literal["position_bias"]
@@ -295,12 +267,8 @@ class GpsPositionBias(GpsFaultSection):
     left_m: Place = 0.0
     """How far to its left."""
 
-    def in_si(self) -> FaultKind:
-        """What is wrong, in SI units."""
-        return PositionBias(self.east_m, self.north_m, self.along_m, self.left_m)
 
-
-class GpsHeadingBias(GpsFaultSection):
+class GpsHeadingBias(GpsFaultSection, kind=HeadingBias):
     """A wrong heading."""
 
     fault: Literal["heading_bias"]
@@ -309,20 +277,12 @@ class GpsHeadingBias(GpsFaultSection):
     angle_deg: Angle = 0.0
     """What is added, counterclockwise."""
 
-    def in_si(self) -> FaultKind:
-        """What is wrong, in SI units."""
-        return HeadingBias(math.radians(self.angle_deg))
 
-
-class GpsOutage(GpsFaultSection):
+class GpsOutage(GpsFaultSection, kind=Outage):
     """No position."""
 
     fault: Literal["outage"]
     """`outage`: no position, as in a tunnel, and so no signs ahead."""
-
-    def in_si(self) -> FaultKind:
-        """What is wrong, in SI units."""
-        return Outage()
 
 
 class SignFaultSection(FaultSection):
@@ -338,18 +298,14 @@ class SignFaultSection(FaultSection):
     """Which signs; all if not given."""
 
 
-class SignsMissingSection(SignFaultSection):
+class SignsMissingSection(SignFaultSection, kind=SignsMissing):
     """Signs that have gone."""
 
     fault: Literal["missing"]
     """`missing`: signs have gone."""
 
-    def in_si(self) -> FaultKind:
-        """What is wrong, in SI units."""
-        return SignsMissing(self.where, self.ids)
 
-
-class SignsMovedSection(SignFaultSection):
+class SignsMovedSection(SignFaultSection, kind=SignsMoved):
     """Signs that are elsewhere."""
 
     fault: Literal["moved"]
@@ -364,10 +320,6 @@ class SignsMovedSection(SignFaultSection):
     up_m: Place = 0.0
     """How far up."""
 
-    def in_si(self) -> FaultKind:
-        """What is wrong, in SI units."""
-        return SignsMoved(self.where, self.ids, self.along_m, self.left_m, self.up_m)
-
 
 class ScatterometerFaultSection(FaultSection):
     """A fault of the scatterometer."""
@@ -376,7 +328,7 @@ class ScatterometerFaultSection(FaultSection):
     """Sensor that the fault is of."""
 
 
-class ScatterometerFouled(ScatterometerFaultSection):
+class ScatterometerFouled(ScatterometerFaultSection, kind=Fouled):
     """A scatterometer with dirty windows."""
 
     fault: Literal["fouled"]
@@ -385,20 +337,12 @@ class ScatterometerFouled(ScatterometerFaultSection):
     factor: Annotated[Number, Field(ge=0, le=1000)] = 0.5
     """What it tells over what it should; below 1 it tells of thinner fog."""
 
-    def in_si(self) -> FaultKind:
-        """What is wrong, in SI units."""
-        return Fouled(self.factor)
 
-
-class ScatterometerNoSignal(ScatterometerFaultSection):
+class ScatterometerNoSignal(ScatterometerFaultSection, kind=NoSignal):
     """A scatterometer that tells nothing."""
 
     fault: Literal["no_signal"]
     """`no_signal`: it tells nothing."""
-
-    def in_si(self) -> FaultKind:
-        """What is wrong, in SI units."""
-        return NoSignal()
 
 
 AnyFault = Annotated[

@@ -12,8 +12,8 @@ from fogsim.estimators.repairs import Repair
 from fogsim.linear_algebra import matrix_product
 from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
-from fogsim.vision.lines.edges import Edges, edge_map, smoothed
 from fogsim.vision.light.luminance import linear_pixels
+from fogsim.vision.lines.edges import Edges, edge_map, smoothed
 from fogsim.vision.lines.horizon import Horizon
 from fogsim.vision.lines.lane_lines import hough_lines, published_vanishing_point
 from fogsim.vision.lines.road_lines import seen_horizon

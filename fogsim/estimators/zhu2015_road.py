@@ -12,8 +12,8 @@ from fogsim.estimators.negru2013_band import fog_limits, fog_slope
 from fogsim.estimators.repairs import Repair
 from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
-from fogsim.vision.lines.edges import Edges, edge_map, smoothed
 from fogsim.vision.light.luminance import linear_pixels
+from fogsim.vision.lines.edges import Edges, edge_map, smoothed
 from fogsim.vision.lines.horizon import Horizon, calibrated_horizon
 from fogsim.vision.lines.lane_lines import LaneLine, hough_lines, longest_pair, published_vanishing_point
 from fogsim.vision.lines.road_lines import seen_horizon

@@ -150,9 +150,9 @@ def _weighed(rows: RowData, camera: Camera, horizon: Horizon, earlier: DayFit | 
 
 
 def _posterior(grid: "_Grid", chosen: NDArray[np.bool_], kept: Ints, none: float) -> DayFit:
-    """Posterior over cells and hypotheses: where fog may be all surfaces are tried, where it still may be all responses.
+    """Posterior over cells and hypotheses.
 
-    Responses are tried over the surfaces that suit.
+    Where fog may be, all surfaces are tried; where it still may be, all responses over the surfaces that suit.
     """
     prior = grid.of_horizon[:, None] + grid.likely
     tried = np.array([(0, int(s)) for s in np.flatnonzero(grid.surfaces)])

@@ -16,9 +16,9 @@ from fogsim.jit import kernel
 Floats = NDArray[np.float64]
 
 AIRLIGHT, ROAD, SHEEN, VIGNETTING, STRAY, SKY, SHIFT, DARKENING, WET, OTHER_SKY, TONE, NEAR_TONE, COLUMNS = range(13)
-"""Columns: airlight, road, sheen at grazing angles, shade of the lens, stray light, a sky's brightness higher up, a small
-shift of the horizon; how the airlight darkens downward, mirror image of the sky on a wet road, a sky that is not the
-airlight's, two shapes of local tone mapping; and their number. The light itself is in one column more."""
+"""Columns: airlight, road, sheen at grazing angles, shade of the lens, stray light, a sky's brightness higher up, a
+small shift of the horizon; how the airlight darkens downward, mirror image of the sky on a wet road, a sky that is not
+the airlight's, two shapes of local tone mapping; and their number. The light itself is in one column more."""
 
 COMMON = DARKENING
 """How many of the columns, the first, have the same deviations under all lights."""

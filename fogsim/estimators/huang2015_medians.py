@@ -7,25 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.estimators.negru2013_band import fog_limits, fog_slope
 from fogsim.estimators.repairs import Repair
 from fogsim.linear_algebra import matrix_product
 from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
+from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.lines.edges import Edges, edge_map, smoothed
-from fogsim.vision.lines.horizon import Horizon, weighted_mean
-from fogsim.vision.lines.lane_lines import (
-    CLEAR_OF_VANISHING_POINT,
-    hough_lines,
-    lane_vanishing_point,
-    published_vanishing_point,
-    refined_lines,
-)
+from fogsim.vision.lines.horizon import Horizon
+from fogsim.vision.lines.lane_lines import hough_lines, published_vanishing_point
+from fogsim.vision.lines.road_lines import seen_horizon
 from fogsim.vision.region.corridor import corridor_curve, hide_vehicle
-from fogsim.vision.region.inflection import steepest_slope
 from fogsim.vision.region.law import slants, transmittance
 from fogsim.vision.region.profile import RoadCurve
 from fogsim.vision.region.road_image import CannotTellError, RoadImage
-from fogsim.vision.region.road_region import constant_limits, cumulative_limits, grow_region, region_medians
+from fogsim.vision.region.road_region import constant_limits, grow_region, region_medians
 
 Floats = NDArray[np.float64]
 
@@ -50,16 +46,6 @@ WIDER, TRIED = 2.0, 121
 
 DISAGREEMENT = math.radians(1.0)
 """Largest difference between the horizons of lane lines and of the calibration [rad]; the thesis names no number."""
-
-SIMILARITY = 0.25
-"""Steepest fog in contrasts of road to airlight a row; a silhouette takes at least 0.34 [-]."""
-
-LOWEST, STEEPEST = math.radians(25.0), math.radians(80.0)
-"""Angles to the rows of lines that are refined [rad]: nearer to the rows edges are many columns wide, steeper ones are
-poles and sides of vehicles."""
-
-BENT_ROAD = 0.2
-"""Deviation of the row where lane lines meet from the horizon, for roads bend and undulate [px]."""
 
 NEARER = 2.0
 """Ratio of the heights below the horizon of the two rows whose medians are compared [-]."""
@@ -95,7 +81,7 @@ class Huang2015Repair(Repair):
     SUBPIXEL_HORIZON = (
         "subpixel_horizon",
         "the two longest lines are whole Hough cells (1 px, 1°), and count or do not",
-        "both lines are fitted to a fraction of a pixel, and their intersection weighed against the calibration",
+        "lines within the pixel, weighed against the calibration",
     )
     SCALED_ROWS = (
         "scaled_rows",
@@ -144,22 +130,18 @@ def grown_medians(
 ) -> MedianRows:
     """Grow the region and take the medians of its rows."""
     blurred = smoothed(road.luminance)
-    rows = blurred.shape[0]
-    below = np.arange(rows, dtype=np.float64) + (road.first_row - assumed.row)
-    slope = np.minimum(steepest_slope(below, road.airlight), SIMILARITY * road.contrast).astype(np.float32)
+    slope = fog_slope(road, assumed)
     edges = edge_map(blurred, slope if Huang2015Repair.FOG_DRAWS_NO_EDGES in repairs else np.zeros_like(slope))
     if edges.threshold > road.contrast:
         raise CannotTellError("noise or texture drowns the contrast of road and airlight")
     if Huang2015Repair.GROWTH_BY_FOG in repairs:
-        steps = (slope + edges.threshold).astype(np.float32)
-        limits = cumulative_limits(steps, SIMILARITY * road.contrast + edges.threshold)
-        region = grow_region(blurred, edges.pixels, limits)
+        region = grow_region(blurred, edges.pixels, fog_limits(road, edges, slope))
     else:
-        region = grow_region(blurred, edges.pixels, constant_limits(rows, STEP, STEP, FROM_MEDIAN))
+        region = grow_region(blurred, edges.pixels, constant_limits(slope.size, STEP, STEP, FROM_MEDIAN))
         medians = region_medians(road.luminance, region)
         region[np.abs(road.luminance - medians.luminance[:, None]) > FROM_MEDIAN] = 0
     hidden = hide_vehicle(region, road, camera, lead) if Huang2015Repair.LEAD_LEFT_OUT in repairs else 0.0
-    horizon, axis = _horizon(edges, blurred, road, camera, assumed, repairs)
+    horizon, axis = _horizon(edges, road, camera, assumed, repairs)
     own_lane = Huang2015Repair.OWN_LANE in repairs
     curve = corridor_curve(road, region, horizon.row, axis, camera, own_lane=own_lane, hidden=hidden)
     seen = np.flatnonzero(curve.weight > 0.0)
@@ -169,31 +151,18 @@ def grown_medians(
 
 
 def _horizon(
-    edges: Edges,
-    blurred: NDArray[np.float32],
-    road: RoadImage,
-    camera: Camera,
-    assumed: Horizon,
-    repairs: AbstractSet[Huang2015Repair],
+    edges: Edges, road: RoadImage, camera: Camera, assumed: Horizon, repairs: AbstractSet[Huang2015Repair]
 ) -> tuple[Horizon, float]:
     """Horizon, and column of the two longest lines' vanishing point if it agrees with the calibration's."""
     column = camera.principal_point[0]
-    most = DISAGREEMENT * camera.focal_length
-    if Huang2015Repair.SUBPIXEL_HORIZON not in repairs:
-        below = math.ceil(camera.horizon_row) - road.first_row + 1
-        point = published_vanishing_point(hough_lines(edges.pixels, below, math.radians(1.0)))
-        if point is None or abs(point.row + road.first_row - camera.horizon_row) > most:
-            return assumed, column
-        return Horizon(point.row + road.first_row, assumed.standard_deviation), column
-    clear = min(CLEAR_OF_VANISHING_POINT, 0.08 * camera.height)
-    first = math.ceil(assumed.row - road.first_row + clear)
-    lines = refined_lines(hough_lines(edges.pixels, first, LOWEST, 1, STEEPEST), edges.pixels, blurred, first)
-    expected = (column, assumed.row - road.first_row)
-    point = lane_vanishing_point(lines, expected, min(max(5.0 * assumed.standard_deviation, 2.0), most))
-    if point is None:
+    if Huang2015Repair.SUBPIXEL_HORIZON in repairs:
+        horizon, seen = seen_horizon(linear_pixels(road.level, camera), camera, assumed)
+        return horizon, column if seen is None else seen.column
+    below = math.ceil(camera.horizon_row) - road.first_row + 1
+    point = published_vanishing_point(hough_lines(edges.pixels, below, math.radians(1.0)), road.first_row)
+    if point is None or abs(point.row - camera.horizon_row) > DISAGREEMENT * camera.focal_length:
         return assumed, column
-    seen = Horizon(point.row + road.first_row, math.hypot(point.row_deviation, BENT_ROAD))
-    return weighted_mean(assumed, seen), point.column
+    return Horizon(point.row, assumed.standard_deviation), column
 
 
 def first_extinctions(curve: RoadCurve, luminance: Floats, repairs: AbstractSet[Huang2015Repair]) -> Floats:

@@ -65,14 +65,6 @@ def image_confidence(extinction: float, distance: Floats | float, reference: flo
     return np.asarray(np.exp(-2.0 * extinction * (np.asarray(distance, np.float64) - reference)))
 
 
-def variance_ratio_extinction(near_distance: float, near: float, far_distance: float, far: float) -> float:
-    """Extinction from two variances of one thing's picture: k = ln(σ₁² / σ₂²) / (2 (d₂ − d₁)) (eq. 4.15) [1/m].
-
-    Takes `near_distance`, `far_distance` [m].
-    """
-    return 0.5 * math.log(near / far) / (far_distance - near_distance)
-
-
 @dataclass(frozen=True, slots=True)
 class RatioTable:
     """Mean ratios of variances by difference of range (huang2015 table 4.2, after the ± 50 % rule)."""

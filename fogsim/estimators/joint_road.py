@@ -245,7 +245,7 @@ class JointRoad:
     ) -> UnevenFit | str:
         """Fit of the road that is free up to a depth, or why there is none that is to be believed."""
         curves = self._curves(pixels, sky, free)
-        whole, told = curves, free
+        whole, tracked = curves, free
         if is_full := self._left.is_due(time):
             self._left = Left()
         left = self._left
@@ -258,7 +258,7 @@ class JointRoad:
         fit, curves, free = self._with_other_lanes(own, pixels, curves, sky, priors, free)
         self._earlier.append((curves, sky))
         # What even fog takes for an obstacle behind a tracked vehicle may be denser fog: it is not left out here.
-        curves = whole if math.isfinite(told) else curves
+        curves = whole if math.isfinite(tracked) else curves
         # Where a sag or crest is not quite followed, the road fades as in fog that changes along the way.
         uneven = even_fog(fit, self._geometry)
         is_full = is_full or not left.suffices(fit)
@@ -266,7 +266,7 @@ class JointRoad:
             seen = self._averaged(curves, sky)
             hidden = HiddenCourse(self._straight, self._camera, course)
             uneven = fit_uneven(seen, self._geometry, priors[0], own, fit, hidden)
-        why = self._doubt(uneven, sky, curves, free, told)
+        why = self._rejection_reason(uneven, sky, curves, free, tracked)
         if is_full:
             self._left = Left() if why or uneven.even < 1.0 else left_by(time, fit)
         return why or uneven
@@ -286,13 +286,13 @@ class JointRoad:
         """
         if self._earlier.maxlen or is_sure(own, curves) or is_ramp(curves, self._geometry, self._camera):
             return ""
-        whole, told, camera = self._geometry, self._horizon, self._camera
-        divided = divided_road(pixels, curves, whole, camera, priors, told, sky.noise, free)
+        whole, stated, camera = self._geometry, self._horizon, self._camera
+        divided = divided_road(pixels, curves, whole, camera, priors, stated, sky.noise, free)
         if divided is None:
             return ""
         self._geometry, self._shaded = divided.geometry, divided.share
         uneven = even_fog(divided.fit, divided.geometry)
-        why, k = self._doubt(uneven, sky, divided.curves, free, free), uneven.fit.extinction
+        why, k = self._rejection_reason(uneven, sky, divided.curves, free, free), uneven.fit.extinction
         if not why:
             return uneven
         self._geometry, self._shaded = whole, 0.0
@@ -350,7 +350,7 @@ class JointRoad:
         self._before.append((time, math.log(max(extinction, LEAST_DEVIATION))))
         return min(CHANGING * float(np.std([logarithm for _, logarithm in self._before])), MOST_CHANGE)
 
-    def _doubt(self, uneven: UnevenFit, sky: Sky, curves: StripCurves, free: float, told: float) -> str:
+    def _rejection_reason(self, uneven: UnevenFit, sky: Sky, curves: StripCurves, free: float, tracked: float) -> str:
         """Say why a fit is not to be believed; empty if it is."""
         fit = uneven.fit
         if fit.road >= (1.0 - LEAST_CONTRAST) * fit.airlight or fit.road >= 0.98 * sky.luminance:
@@ -361,7 +361,7 @@ class JointRoad:
             return "the road ahead is hidden, or is none"
         if why := no_road(fit, curves, self._geometry, self._camera):
             return why
-        return _too_little_seen(uneven, told)
+        return _too_little_seen(uneven, tracked)
 
     def _is_hidden(self, fit: JointFit, curves: StripCurves, free: float) -> bool:
         """Whether too little of the own lane, as far as it is free, fits a road."""
@@ -400,10 +400,10 @@ class JointRoad:
         )
 
 
-def _too_little_seen(uneven: UnevenFit, told: float) -> str:
-    """Say why too little is seen of a road that is told to be free up to a depth; empty if it is enough."""
+def _too_little_seen(uneven: UnevenFit, tracked: float) -> str:
+    """Say why too little is seen of a road that a tracked vehicle leaves free up to a depth; empty if it is enough."""
     fit = uneven.fit
-    if math.isinf(told) and fit.extinction > CLEAR and uneven.reach * fit.extinction < LEAST_DEPTH:
+    if math.isinf(tracked) and fit.extinction > CLEAR and uneven.reach * fit.extinction < LEAST_DEPTH:
         return "something hides all lanes, or shade lies on them"
     deviation = math.hypot(_deviation(fit), _unevenness(uneven) * fit.extinction)
     if fit.extinction < SURE_OF_FOG * deviation and fit.extinction + 2.0 * deviation > CLEAR:

@@ -206,7 +206,7 @@ class LeadContrast:
         if reason or fit is None:
             return Estimate.invalid(self.method, reason or "the track is too short yet", **found)
         found["misfit"] = fit.misfit
-        reason = _doubt(fit, road)
+        reason = _rejection_reason(fit, road)
         if reason:
             return Estimate.invalid(self.method, reason, **found)
         reach = float(self._track.likely_distances().max()) + self._setback
@@ -254,7 +254,7 @@ def _span(distance: NDArray[np.float64], weight: NDArray[np.float64]) -> float:
     return math.sqrt(12.0 * float((weight * (distance - mean) ** 2).sum() / weight.sum()))
 
 
-def _doubt(fit: DecayFit, road: RoadFall | None) -> str:
+def _rejection_reason(fit: DecayFit, road: RoadFall | None) -> str:
     if fit.misfit > MAX_MISFIT or fit.extinction < -SURELY * fit.deviation:
         return "the contrast does not fall with the range as Duntley's law has it"
     if fit.deviation > WORST * fit.extinction and fit.extinction + 2.0 * fit.deviation > CLEAR:

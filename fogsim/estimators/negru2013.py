@@ -31,9 +31,8 @@ from fogsim.vision.lines.horizon import (
     PitchDeviation,
     ScaleDeviation,
     calibrated_horizon,
-    weighted_mean,
 )
-from fogsim.vision.lines.road_lines import road_vanishing_point
+from fogsim.vision.lines.road_lines import seen_horizon
 from fogsim.vision.lines.vanishing_point import VanishingPoint
 from fogsim.vision.region.curve_checks import check_law, detection_limit, fog_or_clear, seen_up_to
 from fogsim.vision.region.inflection import (
@@ -354,12 +353,8 @@ class Negru2013:
         if not self._looks_for_lines:
             return self._assumed, straight_ahead
         if Negru2013Repair.SUBPIXEL_HORIZON in self._repairs:
-            seen = road_vanishing_point(pixels, self._camera, self._assumed)
-            return (
-                (self._assumed, straight_ahead)
-                if seen is None
-                else (weighted_mean(self._assumed, seen.horizon), seen.column)
-            )
+            horizon, seen = seen_horizon(pixels, self._camera, self._assumed)
+            return horizon, straight_ahead if seen is None else seen.column
         guess = (straight_ahead - road.first_column, self._assumed.row - road.first_row)
         reach = max(REACH * self._camera.focal_length, 8.0)
         point = consensus_vanishing_point(edges.gradient, edges.pixels, guess, reach)

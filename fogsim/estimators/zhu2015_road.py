@@ -12,17 +12,11 @@ from fogsim.estimators.negru2013_band import fog_limits, fog_slope
 from fogsim.estimators.repairs import Repair
 from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
+from fogsim.vision.light.luminance import linear_pixels
 from fogsim.vision.lines.edges import Edges, edge_map, smoothed
-from fogsim.vision.lines.horizon import Horizon, calibrated_horizon, weighted_mean
-from fogsim.vision.lines.lane_lines import (
-    CLEAR_OF_VANISHING_POINT,
-    LaneLine,
-    hough_lines,
-    lane_vanishing_point,
-    longest_pair,
-    published_vanishing_point,
-    refined_lines,
-)
+from fogsim.vision.lines.horizon import Horizon, calibrated_horizon
+from fogsim.vision.lines.lane_lines import LaneLine, hough_lines, longest_pair, published_vanishing_point
+from fogsim.vision.lines.road_lines import seen_horizon
 from fogsim.vision.region.corridor import corridor_curve, hide_vehicle
 from fogsim.vision.region.curve_checks import check_law, detection_limit, fog_or_clear, is_clear, seen_up_to
 from fogsim.vision.region.law import extinction_deviation
@@ -34,16 +28,6 @@ from fogsim.vision.region.steepest import fog_of_steepest_rows, highest_place, s
 
 LOWEST_ANGLE = math.radians(10.0)
 """Angle to the rows below which a line is no lane line (zhu2015 section 3.2) [rad]."""
-
-SURE_LOWEST, SURE_STEEPEST = math.radians(25.0), math.radians(80.0)
-"""The same for lines that are refined, and where poles and sides of vehicles begin [rad]: the edge of a line nearer to
-the rows is many columns wide."""
-
-LINES = 8
-"""Lines of either half that are refined."""
-
-BENT_ROAD = 0.2
-"""Deviation of the row where lane lines meet from the horizon, for roads bend and undulate [px]."""
 
 REACH = 0.7
 """Rows to either side over which the steepest slope is taken, over those below the horizon [-]."""
@@ -95,7 +79,7 @@ class Zhu2015Repair(Repair):
     SUBPIXEL_HORIZON = (
         "subpixel_horizon",
         "the intersection of whole Hough cells (1 px, 1°) is the horizon",
-        "lines are fitted to a fraction of a pixel, and their intersection weighed against the calibration",
+        "lines within the pixel, weighed against the calibration",
     )
     OWN_LANE = (
         "own_lane",
@@ -124,7 +108,7 @@ class SeenRoad:
     horizon: Horizon  # From the lane lines where they meet, else from the calibration; in rows of the whole image
     region: NDArray[np.uint8]  # (rows, cols) uint8: The grown region
     vanishing_point: tuple[float, float] | None  # Column and row [px]
-    lines: tuple[LaneLine, ...]  # The lane lines that were looked at, in rows of `image`
+    lines: tuple[LaneLine, ...]  # The published method's lane lines, in rows of `image`
     hidden: float = 0.0  # Half of what a tracked vehicle hides of the width of the image [px]; 0 without one
 
 
@@ -144,25 +128,18 @@ def seen_road(
     edges = edge_map(blurred, slope if Zhu2015Repair.FOG_DRAWS_NO_EDGES in repairs else np.zeros_like(slope))
     if edges.threshold > road.contrast:
         raise CannotTellError("noise or texture drowns the contrast of road and airlight")
+    lines = hough_lines(edges.pixels, math.ceil(assumed.row - road.first_row) + 1, LOWEST_ANGLE)
     if Zhu2015Repair.SUBPIXEL_HORIZON in repairs:
-        lines = _sure_lines(edges, blurred, road, camera, assumed)
-        expected = (camera.principal_point[0], assumed.row - road.first_row)
-        point = lane_vanishing_point(lines, expected, max(5.0 * assumed.standard_deviation, 2.0))
+        horizon, point = seen_horizon(linear_pixels(road.level, camera), camera, assumed)
     else:
-        lines = hough_lines(edges.pixels, math.ceil(assumed.row - road.first_row) + 1, LOWEST_ANGLE)
-        point = published_vanishing_point(lines)
+        point = published_vanishing_point(lines, road.first_row)
+        horizon = assumed if point is None else point.horizon
     blocked = edges.pixels
     if Zhu2015Repair.OWN_LANE not in repairs:
         blocked = blocked | _outside_lines(lines, blocked.shape)
     region = grow_region(blurred, blocked, _limits(slope, road, edges, growth, repairs))
     hidden = hide_vehicle(region, road, camera, lead) if Zhu2015Repair.LEAD_LEFT_OUT in repairs else 0.0
-    horizon = assumed
-    if point is not None:
-        horizon = Horizon(point.row + road.first_row, point.row_deviation)
-        if Zhu2015Repair.SUBPIXEL_HORIZON in repairs:
-            bent = Horizon(horizon.row, math.hypot(point.row_deviation, BENT_ROAD))
-            horizon = weighted_mean(assumed, bent)
-    where = None if point is None else (point.column, point.row + road.first_row)
+    where = None if point is None else (point.column, point.row)
     return SeenRoad(road, horizon, region, where, tuple(lines), hidden)
 
 
@@ -187,15 +164,6 @@ def _outside_lines(lines: Sequence[LaneLine], shape: tuple[int, ...]) -> NDArray
     rows, cols = np.arange(shape[0])[:, None], np.arange(shape[1])
     left, right = (line.offset + line.slope * rows for line in pair)
     return ((cols < left) | (cols > right)).astype(np.uint8)
-
-
-def _sure_lines(
-    edges: Edges, blurred: NDArray[np.float32], road: RoadImage, camera: Camera, assumed: Horizon
-) -> list[LaneLine]:
-    clear = min(CLEAR_OF_VANISHING_POINT, 0.08 * camera.height)
-    first = math.ceil(assumed.row - road.first_row + clear)
-    lines = hough_lines(edges.pixels, first, SURE_LOWEST, LINES, SURE_STEEPEST)
-    return refined_lines(lines, edges.pixels, blurred, first)
 
 
 def inflection_rows(road: SeenRoad) -> NDArray[np.float64]:

@@ -92,14 +92,14 @@ def test_lamps_by_night_are_refused(render, road) -> None:
 def test_likelihood_of_a_loss_is_at_the_contrast_over_the_threshold() -> None:
     """k d = ln(C0 / C_t): at 80 m with C0 of about 0.64 and a threshold of 2 % some 0.043 1/m."""
     learnt = LossLikelihood()
-    assert learnt.told() is None
+    assert learnt.result() is None
     for distance in (70.0, 75.0, 78.0, 82.0, 85.0, 90.0):
         learnt.learn(distance, 0.02, 1.0, found=distance < 80.0)
-    told = learnt.told()
-    assert isinstance(told, tuple)
-    assert told[0] == pytest.approx(math.log(math.exp(-0.45) / 0.02) / 80.0, rel=0.1)
+    found = learnt.result()
+    assert isinstance(found, tuple)
+    assert found[0] == pytest.approx(math.log(math.exp(-0.45) / 0.02) / 80.0, rel=0.1)
     learnt.fade(50.0)
-    assert learnt.told() is None
+    assert learnt.result() is None
 
 
 def test_what_contradicts_is_believed_after_some_looks() -> None:
@@ -107,12 +107,12 @@ def test_what_contradicts_is_believed_after_some_looks() -> None:
     learnt = LossLikelihood()
     for _ in range(50):
         learnt.learn(70.0, 0.02, 1.0, found=True)
-    before = learnt.told()
+    before = learnt.result()
     assert isinstance(before, ExtinctionBounds)
     assert before.least == 0.0
     for _ in range(4):
         learnt.learn(70.0, 0.02, 1.0, found=False)
-    after = learnt.told()
+    after = learnt.result()
     assert isinstance(after, ExtinctionBounds)
     assert after.most == math.inf
     assert after.least > 0.0
@@ -123,4 +123,4 @@ def test_vehicles_that_contradict_each_other_tell_nothing() -> None:
     learnt.learn(100.0, 0.02, 2.0, found=True)
     learnt.meet_another()
     learnt.learn(60.0, 0.02, 2.0, found=False)
-    assert learnt.told() is None
+    assert learnt.result() is None

@@ -9,18 +9,11 @@ from fogsim.estimators.huang2015_ratios import (
     image_confidence,
     published_extinction,
     ratio_table,
-    variance_ratio_extinction,
 )
 from fogsim.values.estimate import NORMAL_90_PERCENT
 
 LN20 = np.log(20.0)
 AWAY = np.arange(25.0, 91.0, 5.0)
-
-
-def test_variance_ratio_is_eq_4_15():
-    k = 0.02
-    near, far = 900.0, 900.0 * np.exp(-2 * k * 30.0)
-    assert variance_ratio_extinction(25.0, near, 55.0, far) == pytest.approx(k)
 
 
 def test_table_4_2_gives_the_thesis_its_visibility():

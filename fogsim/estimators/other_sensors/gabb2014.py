@@ -216,11 +216,11 @@ class Gabb2014:
         self._learnt.learn(depth, seen.threshold, weight, found=seen.found)
 
     def _estimate(self, note: str, found: dict[str, object]) -> Estimate:
-        told = self._learnt.told()
-        if isinstance(told, tuple):
+        result = self._learnt.result()
+        if isinstance(result, tuple):
             if note:
                 found["note"] = note
-            extinction, deviation, reach = told
+            extinction, deviation, reach = result
             return Estimate(self.method, extinction, deviation, diagnostics=found, reach=reach)
         reason = note or "the vehicle ahead has not been seen to disappear or to come out of the fog"
-        return Estimate(self.method, 0.0, math.inf, valid=False, diagnostics={"reason": reason, **found}, bounds=told)
+        return Estimate(self.method, 0.0, math.inf, valid=False, diagnostics={"reason": reason, **found}, bounds=result)

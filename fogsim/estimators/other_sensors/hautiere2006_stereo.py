@@ -111,11 +111,11 @@ class Hautiere2006Stereo:
             return Estimate.invalid(self.method, why)
         edges = seen_edges(image, second, self._camera, right.baseline, VISIBLE)
         classes = contrast_classes(edges, self._scale(right), self._deviation, FARTHEST)
-        told = [one for one in classes if one.contrast >= TRUSTED]
-        told = [one for one in told if one.distance >= min(NEAR, 0.5 * told[-1].distance)]
-        if not told:
+        sure = [one for one in classes if one.contrast >= TRUSTED]
+        sure = [one for one in sure if one.distance >= min(NEAR, 0.5 * sure[-1].distance)]
+        if not sure:
             return Estimate.invalid(self.method, "nothing that both cameras show has contrast")
-        return self._estimate(classes, told)
+        return self._estimate(classes, sure)
 
     def _why_no_day(self, image: Pixels, observation: Observation) -> str:
         """Say why the pictures show no road by day; empty if they do."""
@@ -126,9 +126,9 @@ class Hautiere2006Stereo:
     def _scale(self, right: SecondView) -> float:
         return self._camera.focal_length * right.baseline
 
-    def _estimate(self, classes: list[ContrastClass], told: list[ContrastClass]) -> Estimate:
+    def _estimate(self, classes: list[ContrastClass], sure: list[ContrastClass]) -> Estimate:
         """By classes of distances, and those of them whose contrasts are no noise."""
-        fit, last = fit_decay(told), max(classes, key=lambda one: one.distance)
+        fit, last = fit_decay(sure), max(classes, key=lambda one: one.distance)
         found: dict[str, object] = {
             "visible_distance": last.distance,
             "intrinsic_contrast": fit.intrinsic,
@@ -137,7 +137,7 @@ class Hautiere2006Stereo:
         if self._as_published:
             k = OPTICAL_DEPTH_AT_VISIBILITY / last.distance
             return Estimate(self.method, k, k * max(last.relative_deviation, 0.2), diagnostics=found)
-        farthest = told[-1].distance
+        farthest = sure[-1].distance
         deviation = math.hypot(fit.standard_deviation, LEAST_DEVIATION * fit.extinction)
         if fit.extinction * farthest < DEEP_ENOUGH:
             return self._nothing_far_enough(fit, deviation, farthest, found)

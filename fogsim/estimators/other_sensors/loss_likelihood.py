@@ -87,7 +87,7 @@ class LossLikelihood:
         most = joint.max()
         return np.asarray(self._past + most + np.log(np.exp(joint - most).sum(axis=1)))
 
-    def told(self) -> tuple[float, float, float] | ExtinctionBounds | None:
+    def result(self) -> tuple[float, float, float] | ExtinctionBounds | None:
         """What all looks tell: k, its standard deviation and how far they reached [1/m, 1/m, m]; bounds; or nothing."""
         learnt = self._learnt()
         likelihood = np.exp(learnt - learnt.max())

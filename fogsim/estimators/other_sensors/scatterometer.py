@@ -79,19 +79,21 @@ class Scatterometer:
             number from 0 on.
         """
         self._check.image_of(observation)
-        told = observation.scattering
-        if told is None:
+        scattering = observation.scattering
+        if scattering is None:
             why = "no forward-scatter sensor tells of the fog here: sensors.scatterometer puts one on the vehicle"
             return Estimate.invalid(self.method, why)
-        if not 0.0 <= told < math.inf:
-            raise InputError(f"Observation.scattering must be a finite extinction coefficient ≥ 0 [1/m], got {told!r}")
-        change = self._change(observation.time, told)
-        deviation = math.hypot(self._deviation * told, change, LEAST_DEVIATION)
-        return Estimate(self.method, told, deviation, diagnostics={"change": change}, reach=REACH)
+        if not 0.0 <= scattering < math.inf:
+            raise InputError(
+                f"Observation.scattering must be a finite extinction coefficient ≥ 0 [1/m], got {scattering!r}"
+            )
+        change = self._change(observation.time, scattering)
+        deviation = math.hypot(self._deviation * scattering, change, LEAST_DEVIATION)
+        return Estimate(self.method, scattering, deviation, diagnostics={"change": change}, reach=REACH)
 
-    def _change(self, time: float, told: float) -> float:
+    def _change(self, time: float, scattering: float) -> float:
         """By how much the value has changed since one averaging time ago, at the least since the first [1/m]."""
-        self._values.append((time, told))
+        self._values.append((time, scattering))
         while len(self._values) > 1 and self._values[1][0] <= time - self._averaging_time:
             self._values.popleft()
-        return abs(told - self._values[0][1])
+        return abs(scattering - self._values[0][1])

@@ -232,14 +232,14 @@ class Belaroussi2015:
     def _add(self, track: SignTrack, first_seen: float, measured: OperatingRange) -> None:
         confidence = 1.0 if self._as_published else track.confidence
         if self._as_published:
-            told: tuple[float, float] | None = measured.visibility_by_cubic(first_seen), 0.0
+            result: tuple[float, float] | None = measured.visibility_by_cubic(first_seen), 0.0
         elif track.unseen_before is None:
             # Who sees a sign at the first look may have been able to see it before: no first detection.
-            told = None
+            result = None
         else:
-            told = measured.visibility_at(first_seen)
-        if told is not None and math.isfinite(told[0]) and told[0] > 0.0:
-            self._seen.append(_Seen(*told, confidence, self._time, self._way))
+            result = measured.visibility_at(first_seen)
+        if result is not None and math.isfinite(result[0]) and result[0] > 0.0:
+            self._seen.append(_Seen(*result, confidence, self._time, self._way))
         elif first_seen > measured.reach[1]:
             self._least = measured.farthest, self._time
 

@@ -56,7 +56,7 @@ class SignWatch:
         """Forget all signs."""
         self._tracks.reset()
         self._lost = 0
-        self._told = False
+        self._has_signs = False
 
     @property
     def tracks(self) -> tuple[SignTrack, ...]:
@@ -70,7 +70,7 @@ class SignWatch:
         if len(set(ids)) < len(ids):
             twice = next(one for one in ids if ids.count(one) > 1)
             raise InputError(f"the ids of a map's signs must differ, got {twice!r} twice; its value names one sign")
-        self._told = self._told or bool(sightings)
+        self._has_signs = self._has_signs or bool(sightings)
         setback = observation.camera_setback if self._setback is None else self._setback
         signs = project_sightings(sightings, self._camera, setback, self._deviation)
         sky, night = self._daylight(image, observation.lead) if signs else (None, "")
@@ -104,7 +104,7 @@ class SignWatch:
                 f"none of the last {self._lost} signs was found where the map has it: the map may be in another "
                 "coordinate frame, or the camera be told wrongly"
             )
-        return "" if self._told else "the map tells of no sign ahead; sensors.sign_reach_m and the map decide that"
+        return "" if self._has_signs else "the map tells of no sign ahead; sensors.sign_reach_m and the map decide that"
 
 
 def sign_looks(watched: Watched, tracks: Iterable[SignTrack]) -> tuple[SignLook, ...]:

@@ -26,6 +26,9 @@ are from the day model; chosen on pool 0 of `benchmarks/camera_kinds.py` [-]."""
 CONTRAST = 300.0
 """Lower end of the day model's visibility from which on its road keeps enough contrast for the air to be clear [m]."""
 
+THINNEST = extinction_from_visibility(CLEAR)
+"""Extinction up to which fog counts as thin [1/m]."""
+
 UNCONFIRMED = "the rest of the image does not confirm the fog that the road's brightness shows"
 NOT_CLEAR = "nothing that fog would hide is seen far away: the air may be clear or not"
 
@@ -77,31 +80,23 @@ class Confirmation:
         return replace(own, standard_deviation=deviation, common_deviation=math.hypot(common, last.relative))
 
     def _compared(self, own: Estimate, level: NDArray[Any], free: float, time: float) -> _Outcome:
-        half, limit = NORMAL_90_PERCENT * own.standard_deviation, extinction_from_visibility(CLEAR)
         fit = fit_free_road(np.ascontiguousarray(level), self._camera, self._horizon, free)
         day = verdict_of(fit, self._scale)
-        has_contrast = day.is_clear or (day.is_road and day.interval[0] > CONTRAST)
-        # Thin fog may be none, where clear air shows.
-        is_thin = own.extinction <= half or own.extinction + half <= limit
-        is_thin = is_thin or (has_contrast and agree(own.visibility_interval, day.interval))
-        is_open = not day.shows_fog and is_thin
-        if day.shows_fog:
-            reason = STANDS_OUT if self._stands_out(level, own.extinction - half) else _contradiction(own, day)
-        elif is_open:
-            reason = "" if has_contrast or self._stands_out(level, limit) else NOT_CLEAR
-        else:
-            reason = UNCONFIRMED
-        least, most = (0.0, extinction_from_visibility(day.interval[0]) if has_contrast else limit)
-        if not is_open:
-            least, most = day.least, day.most
-        more = _beyond(half, max(own.extinction - least, most - own.extinction))
-        if day.shows_fog:
-            # Behind a vehicle it sees less than the method, and is off by as much as it is unsure.
-            unsure = day.deviation if math.isfinite(free) else 0.0
-            off = math.sqrt(max((day.median - own.extinction) ** 2 - unsure**2, 0.0))
-            more = min(more, math.hypot(off, MODEL_DEVIATION * own.extinction))
+        is_open = not day.shows_fog and _is_thin(own, day)
+        reason = self._rejection_reason(own, level, day, is_open=is_open)
+        more = _added_deviation(own, day, is_open=is_open, is_behind=math.isfinite(free))
         relative, absolute = (more / own.extinction, 0.0) if own.extinction > 0.0 else (0.0, more)
         return _Outcome(time, own.visibility_interval, reason, relative, absolute)
+
+    def _rejection_reason(self, own: Estimate, level: NDArray[Any], day: DayVerdict, *, is_open: bool) -> str:
+        """Say why an estimate does not count; empty if it does."""
+        if day.shows_fog:
+            least = own.extinction - NORMAL_90_PERCENT * own.standard_deviation
+            return STANDS_OUT if self._stands_out(level, least) else _contradiction(own, day)
+        if not is_open:
+            return UNCONFIRMED
+        shows_clear = _has_contrast(day) or self._stands_out(level, THINNEST)
+        return "" if shows_clear else NOT_CLEAR
 
     def _stands_out(self, level: NDArray[Any], extinction: float) -> bool:
         return stands_out(level, self._camera, self._horizon, extinction)
@@ -113,6 +108,33 @@ def without_far_objects(own: Estimate, image: NDArray[Any], camera: Camera, hori
     if not own.valid or not least > 0.0 or not stands_out(levelled(image, camera), camera, horizon, least):
         return own
     return refused(own, STANDS_OUT)
+
+
+def _has_contrast(day: DayVerdict) -> bool:
+    return day.is_clear or (day.is_road and day.interval[0] > CONTRAST)
+
+
+def _is_thin(own: Estimate, day: DayVerdict) -> bool:
+    """Whether the fog of an estimate is thin, and may be none where clear air shows."""
+    half = NORMAL_90_PERCENT * own.standard_deviation
+    is_thin = own.extinction <= half or own.extinction + half <= THINNEST
+    return is_thin or (_has_contrast(day) and agree(own.visibility_interval, day.interval))
+
+
+def _added_deviation(own: Estimate, day: DayVerdict, *, is_open: bool, is_behind: bool) -> float:
+    """Deviation to add to an estimate's, so that its interval has what the day model leaves open [1/m].
+
+    A road behind a vehicle is seen less far by the day model, which then is off by as much as it is unsure.
+    """
+    half, least, most = NORMAL_90_PERCENT * own.standard_deviation, day.least, day.most
+    if is_open:
+        least, most = 0.0, extinction_from_visibility(day.interval[0]) if _has_contrast(day) else THINNEST
+    more = _beyond(half, max(own.extinction - least, most - own.extinction))
+    if not day.shows_fog:
+        return more
+    unsure = day.deviation if is_behind else 0.0
+    off = math.sqrt(max((day.median - own.extinction) ** 2 - unsure**2, 0.0))
+    return min(more, math.hypot(off, MODEL_DEVIATION * own.extinction))
 
 
 def _beyond(half: float, wider: float) -> float:

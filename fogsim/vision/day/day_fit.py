@@ -38,9 +38,12 @@ HORIZON_SHARE = 0.6
 SHARP = 0.03
 """Change of the signal within four rows from which on the horizon is where it is steepest, as one more choice [-]."""
 
-FIRST_WORTHWHILE, WORTHWHILE = 14.0, 10.0
+FIRST_WORTHWHILE, WORTHWHILE = 14.0, 8.0
 """Logarithms of the evidence below the best at which a visibility is not tried under other horizons and surfaces, and
 under other responses [-]."""
+
+MANY = 20
+"""Visibilities of a horizon from which on other responses are tried at every second one: no fog shows."""
 
 FINE = 0.01
 """Step of the posterior [ln m]."""
@@ -116,7 +119,7 @@ def fit_day(
         if int((bins.first > horizon.row).sum()) < FEWEST_BINS:
             return _nothing_seen(camera)
     rows = read_rows(pixels, bins, camera, horizon.row)
-    fit = replace(_weighed(rows, camera, horizon, earlier), doubt=_doubt(rows, camera, horizon, claimed))
+    fit = replace(_weighed(rows, camera, horizon, earlier), doubt=_contradiction(rows, camera, horizon, claimed))
     if earlier is None:
         return fit
     return replace(fit, responses=earlier.responses, response_deviation=earlier.response_deviation)
@@ -130,63 +133,83 @@ def fit_free_road(image: NDArray[Any], camera: Camera, horizon: Horizon, free: f
 
 
 def _weighed(rows: RowData, camera: Camera, horizon: Horizon, earlier: DayFit | None) -> DayFit:
-    responses, surfaces = np.log(curves_of(camera).chance), np.log(SURFACES.chance)
-    ends = rows.cuts.size - 2
-    lights = np.log(np.append(lights_chances(ends), [CUT_CHANCE] * ends))
-    logs, extinctions, likely = _visibilities()
-    at, of_horizon = _horizons(rows, horizon)
-    grid = _Grid(rows, camera, horizon.row, HORIZON_SHARE * horizon.standard_deviation)
-    cells = np.stack(np.meshgrid(at, extinctions, indexing="ij"), axis=-1)
-    prior = of_horizon[:, None] + likely
-    # A first look, at every second visibility under the middle horizon.
-    whole = grid.evidence(np.concatenate([cells[1, ::2], cells[:, 0]]), USUAL, ALL)[:, 0]
-    none = float(np.logaddexp(np.logaddexp.reduce(whole[-at.size :, ALL.size] + of_horizon), rows.none))
-    whole = np.delete(whole[: -at.size], ALL.size, axis=1) + lights
-    of_light = np.logaddexp.reduce(whole + likely[::2, None], axis=0)
-    if ends and of_light[ALL.size :].max() > of_light[: ALL.size].max():
+    """Posterior of the visibility by all rows, or by those above a bonnet, where one is likelier than none."""
+    grid = _Grid(rows, camera, horizon, earlier)
+    # A first look, at every second visibility under the middle horizon; where no road begins, there is none.
+    whole = grid.evidence(np.concatenate([grid.cells[1, ::2], grid.cells[:, 0]]), USUAL, ALL)[:, 0]
+    heights = len(grid.cells)
+    none = float(np.logaddexp(np.logaddexp.reduce(whole[-heights:, ALL.size] + grid.of_horizon), rows.none))
+    whole = np.delete(whole[:-heights], ALL.size, axis=1) + grid.lights + grid.likely[::2, None]
+    of_light = np.logaddexp.reduce(whole, axis=0)
+    if grid.lights.size > ALL.size and of_light[ALL.size :].max() > of_light[: ALL.size].max():
         return _weighed(_ended(rows, 1 + int(np.argmax(of_light[ALL.size :]))), camera, horizon, earlier)
     kept = np.flatnonzero(of_light[: ALL.size] > of_light.max() - SUITS)
-    likely_responses, likely_surfaces = _left(earlier, responses.size)
-    some = np.logaddexp.reduce(whole, axis=1)
-    others = OTHERS[likely_responses[OTHERS[:, 0]] & likely_surfaces[OTHERS[:, 1]]]
-    if len(others):
-        tried_first = np.logaddexp.reduce(grid.evidence(cells[1, ::2], others, kept) + lights[kept], axis=2)
-        some = np.maximum(some, tried_first.max(axis=1))
-    some += likely[::2]
-    chosen = np.zeros(prior.shape, np.bool_)
+    some, chosen = np.logaddexp.reduce(whole, axis=1), np.zeros(grid.cells.shape[:2], np.bool_)
     chosen[:, ::2] = some > some.max() - FIRST_WORTHWHILE
-    chosen = _wider(chosen, 2)
-    # Where fog may be, all surfaces; where it still may be, all responses over the surfaces that suit.
-    left = np.flatnonzero(likely_surfaces)
-    tried = [(0, int(s)) for s in left]
-    found = _scattered(grid.evidence(cells[chosen], np.array(tried), kept) + lights[kept], chosen)
-    found += (prior[:, :, None] + surfaces[left])[:, :, :, None]
-    good = np.logaddexp.reduce(found, axis=(2, 3))
-    chosen &= _wider(good > good.max() - WORTHWHILE, 1)
-    of_surface = np.logaddexp.reduce(found[chosen], axis=(0, 2))
-    suit = [int(s) for s, cost in zip(left, of_surface, strict=True) if cost > of_surface.max() - SUITS]
-    pairs = np.array(tried + [(r, s) for s in suit for r in range(1, responses.size) if likely_responses[r]])
-    more = pairs[len(tried) :]
-    each = grid.evidence(cells[chosen], more, kept) + lights[kept] + prior[chosen][:, None, None]
-    each += surfaces[more[:, 1]][:, None]
-    each = np.concatenate([found[chosen], each], axis=1) + responses[pairs[:, 0]][:, None]
+    return _posterior(grid, _wider(chosen, 2), kept, none)
+
+
+def _posterior(grid: "_Grid", chosen: NDArray[np.bool_], kept: Ints, none: float) -> DayFit:
+    """Posterior over cells and hypotheses.
+
+    Where fog may be, all surfaces are tried; where it still may be, all responses over the surfaces that suit.
+    """
+    prior = grid.of_horizon[:, None] + grid.likely
+    tried = np.array([(0, int(s)) for s in np.flatnonzero(grid.surfaces)])
+    each = grid.hypotheses(chosen, tried, kept, prior)
+    good = np.full(chosen.shape, UNLIKELY)
+    good[chosen] = np.logaddexp.reduce(each, axis=(1, 2))
+    still = chosen & _wider(good > good.max() - WORTHWHILE, 1)
+    each = each[still[chosen]]
+    of_surface = np.logaddexp.reduce(each, axis=(0, 2))
+    suit = tried[of_surface > of_surface.max() - SUITS, 1]
+    more = np.array([(r, int(s)) for s in suit for r in np.flatnonzero(grid.responses) if r])
+    # What another response changes, changes little from one visibility to the next.
+    half = _thinned(still)
+    changed = grid.hypotheses(half, more, kept, prior) - each[half[still]][:, np.searchsorted(tried[:, 1], more[:, 1])]
+    each = np.concatenate(
+        [each, each[:, np.searchsorted(tried[:, 1], more[:, 1])] + _between(half, still, changed)], axis=1
+    )
+    pairs, rows = np.concatenate([tried, more]), grid.rows
     chance = np.logaddexp.reduce(each, axis=2)
-    fine, posterior, evidence = _interpolated(logs, chosen, chance)
-    weight = np.exp(chance - np.logaddexp.reduce(chance, axis=None)).sum(axis=0)
+    fine, posterior, evidence = _interpolated(grid.logs, still, chance)
+    weight = np.exp(chance - np.logaddexp.reduce(chance, axis=None))
     sky = rows.noise[0, : rows.cuts[0]]
     return DayFit(
         log_visibility=fine,
         chance=posterior,
         fog_over_none=evidence - none,
-        responses=_sums(pairs[:, 0], weight, responses.size),
-        surfaces=_sums(pairs[:, 1], weight, surfaces.size),
+        responses=_sums(pairs[:, 0], weight.sum(axis=0), grid.responses.size),
+        surfaces=_sums(pairs[:, 1], weight.sum(axis=0), grid.surfaces.size),
         lights=_sums(kept, _shares(each), ALL.size),
         clipped=float(np.mean(sky <= 0.0)) if sky.size else 0.0,
         brightest=float(rows.level[0]),
-        response_deviation=_apart(np.log(cells[chosen][:, 1]), chance, pairs[:, 0]),
+        response_deviation=_apart(np.log(grid.cells[still][:, 1]), weight, pairs[:, 0]),
         obstacle=grid.obstacle,
         contrast=float(rows.light[0, rows.cuts[0] :].max() - rows.light[0, -1]) / float(rows.level[0]),
     )
+
+
+def _thinned(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(h, v) bool: cells without every second visibility whose neighbours are among them, where they are many."""
+    some = cells.copy()
+    inner = cells[:, :-2:2] & cells[:, 2::2] & (cells.sum(axis=1, keepdims=True) > MANY)
+    some[:, 1 : 2 * inner.shape[1] : 2] &= ~inner
+    return some
+
+
+def _between(known: NDArray[np.bool_], cells: NDArray[np.bool_], values: Floats) -> Floats:
+    """Values of all cells, linear between the visibilities at which they are known (`values` (known, …))."""
+    out, start = [], 0
+    for here, wanted in zip(known, cells, strict=True):
+        at = np.flatnonzero(here)
+        if at.size:
+            own, start = values[start : start + at.size], start + at.size
+            place = np.interp(np.flatnonzero(wanted), at, np.arange(at.size))
+            low = np.minimum(place.astype(np.int64), max(at.size - 2, 0))
+            part = (place - low).reshape(-1, *(1,) * (values.ndim - 1))
+            out.append((1.0 - part) * own[low] + part * own[np.minimum(low + 1, at.size - 1)])
+    return np.concatenate(out)
 
 
 def _left(earlier: DayFit | None, count: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -207,13 +230,6 @@ def _wider(cells: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
     return wide
 
 
-def _scattered(values: Floats, chosen: NDArray[np.bool_]) -> Floats:
-    """(h, v, …) float64: values of the chosen cells in the place of each; the others are unlikely."""
-    out = np.full((*chosen.shape, *values.shape[1:]), UNLIKELY)
-    out[chosen] = values
-    return out
-
-
 def _visibilities() -> tuple[Floats, Floats, Floats]:
     """Logarithms of visibilities, extinctions, and logarithms of their chances."""
     logs = np.linspace(NEAREST, FARTHEST, math.ceil((FARTHEST - NEAREST) / STEP) + 1)
@@ -224,11 +240,11 @@ def _visibilities() -> tuple[Floats, Floats, Floats]:
     return logs, extinctions, likely
 
 
+LOG_SURFACES = np.log(SURFACES.chance)
+"""Logarithms of the surfaces' chances."""
+
 USUAL = np.zeros((1, 2), np.int64)
 """The stated response and the usual surface."""
-
-OTHERS = np.array([(0, 1), (0, 2), (0, 3), (0, 4), (0, 5), (2, 0), (4, 0)])
-"""Responses and surfaces of a first look."""
 
 HARDLY, LIKELY = 0.03, 2
 """Probability below which a surface is not tried in later images of a drive [-], and how many responses are, besides
@@ -247,23 +263,37 @@ do not let it be much brighter."""
 
 
 class _Grid:
-    """What all evaluations of one image have in common."""
+    """What all evaluations of one image have in common, cells of horizons and visibilities among it."""
 
-    def __init__(self, rows: RowData, camera: Camera, horizon: float, shift: float) -> None:
-        self._rows, self._shift = rows, shift
-        self._lens = _lens_of(camera)
-        self._surfaces = np.column_stack([SURFACES.albedo, SURFACES.hidden])
-        self.obstacle = camera.focal_length * camera.mount_height / max(_step(rows) - horizon, 1.0)
-        self._surfaces[np.isnan(self._surfaces)] = self.obstacle
+    def __init__(self, rows: RowData, camera: Camera, horizon: Horizon, earlier: DayFit | None) -> None:
+        self.rows, self._lens = rows, _lens_of(camera)
+        self._shift = HORIZON_SHARE * horizon.standard_deviation
+        curves = curves_of(camera)
+        self._chances = np.log(curves.chance)
+        ends = rows.cuts.size - 2
+        self.lights = np.log(np.append(lights_chances(ends), [CUT_CHANCE] * ends))
+        self.responses, self.surfaces = _left(earlier, curves.chance.size)
+        at, self.of_horizon = _horizons(rows, horizon)
+        self.logs, extinctions, self.likely = _visibilities()
+        self.cells = np.stack(np.meshgrid(at, extinctions, indexing="ij"), axis=-1)
+        self._laws = np.column_stack([SURFACES.albedo, SURFACES.hidden])
+        self.obstacle = camera.focal_length * camera.mount_height / max(_step(rows) - horizon.row, 1.0)
+        self._laws[np.isnan(self._laws)] = self.obstacle
+
+    def hypotheses(self, chosen: NDArray[np.bool_], tried: Ints, lights: Ints, prior: Floats) -> Floats:
+        """(c, t, m) float64: logarithms of the evidence of hypotheses with their chances (`prior` (h, v))."""
+        chance = self._chances[tried[:, 0]] + LOG_SURFACES[tried[:, 1]]
+        found = self.evidence(self.cells[chosen], tried, lights) + self.lights[lights]
+        return np.asarray(found + (prior[chosen][:, None] + chance)[:, :, None])
 
     def evidence(self, cells: Floats, tried: Ints, lights: Ints) -> Floats:
         """(c, t, m) float64: see `evidence_grid`; under all lights there also are roads that end sooner."""
         laws = np.stack([LIGHTS.mean, LIGHTS.deviation])[:, lights]
-        laws[1, :, AIRLIGHT] *= CLIPPED_AIRLIGHT if self._rows.least_airlight.any() else 1.0
-        cuts = self._rows.cuts.size - 1 if lights is ALL else 0
+        laws[1, :, AIRLIGHT] *= CLIPPED_AIRLIGHT if self.rows.least_airlight.any() else 1.0
+        cuts = self.rows.cuts.size - 1 if lights is ALL else 0
         out = np.empty((len(cells), len(tried), lights.size + cuts))
         places = np.ascontiguousarray(cells)
-        evidence_grid(self._rows, self._lens, places, tried, self._surfaces, laws, lights.size, self._shift, out)
+        evidence_grid(self.rows, self._lens, places, tried, self._laws, laws, self._shift, out)
         return np.where(np.isfinite(out), out, UNLIKELY)
 
 
@@ -314,9 +344,9 @@ def _ended(rows: RowData, cut: int) -> RowData:
     )
 
 
-def _doubt(rows: RowData, camera: Camera, horizon: Horizon, extinction: float) -> float:
+def _contradiction(rows: RowData, camera: Camera, horizon: Horizon, extinction: float) -> float:
     """How much contrast across the road speaks against an extinction, at the horizon that suits it best."""
-    columns, place = np.empty((rows.first.size, COLUMNS)), np.empty((rows.first.size, 5))
+    columns, place = np.empty((rows.first.size, COLUMNS + 1)), np.empty((rows.first.size, 5))
     logs = []
     for row in horizon.row + horizon.standard_deviation * np.array([-1.0, 0.0, 1.0]):
         fill_columns(rows.first, rows.last, float(row), _lens_of(camera), extinction, math.inf, columns, place)
@@ -357,9 +387,8 @@ def _edge(rows: RowData, horizon: Horizon) -> float | None:
     return edge if abs(edge - horizon.row) < 3.0 * horizon.standard_deviation else None
 
 
-def _apart(logs: Floats, chance: Floats, response: Ints) -> float:
-    """Standard deviation of the mean logarithm among responses."""
-    weight = np.exp(chance - np.logaddexp.reduce(chance, axis=None))
+def _apart(logs: Floats, weight: Floats, response: Ints) -> float:
+    """Standard deviation of the mean logarithm among responses (`logs` (c,), `weight` (c, pairs))."""
     of_each = _sums(response, weight.sum(axis=0), int(response.max()) + 1)
     means = _sums(response, (weight * logs[:, None]).sum(axis=0), of_each.size) / np.maximum(of_each, 1e-12)
     mean = float((of_each * means).sum())

@@ -1,15 +1,18 @@
 """Evidence of hypotheses about an image's rows: the columns' factors integrated over normal priors."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
-from fogsim.vision.day.row_filters import road_pass, sky_pass
+from fogsim.vision.day.row_filters import road_pass, road_steps, sky_pass
 from fogsim.vision.day.row_kernels import (
     AIRLIGHT,
     COLUMNS,
+    COMMON,
+    DARKENING,
     FARTHEST,
     OTHER_SKY,
     ROAD,
@@ -37,108 +40,159 @@ def log_normal_share(value: float) -> float:
     return -0.5 * value * value - math.log(-value * math.sqrt(2.0 * math.pi))
 
 
-@kernel
-def factored(
-    gram: Floats, mean: Floats, deviation: Floats, used: NDArray[np.int64], low: Floats, right: Floats
-) -> float:
-    """Cholesky's factor of the columns' posterior precision, in deviations of their priors.
+class Law(NamedTuple):
+    """Normal priors of the columns' factors, and which columns have one, airlight and road first."""
 
-    Returns the sum of squares that is left, and twice the logarithm of the factor's determinant. Takes `used` (m,)
-    int64, `low` (m, m), `right` (m,).
-    """
-    square = gram[COLUMNS, COLUMNS]
-    for a in range(used.size):
+    mean: Floats
+    deviation: Floats
+    used: NDArray[np.int64]
+
+
+class Factor(NamedTuple):
+    """Cholesky's factor of the factors' posterior precision, in deviations of their priors, and what comes of it."""
+
+    low: Floats  # (COLUMNS, COLUMNS)
+    right: Floats  # (COLUMNS,): low⁻¹ of the right-hand side
+    square: Floats  # (COLUMNS,): What each row adds to the sum of squares, with twice the logarithm of its pivot
+    ends: Floats  # (COLUMNS, 2): low⁻¹ of airlight's and road's deviations
+
+
+@kernel
+def no_factor() -> Factor:
+    """Room for a factor."""
+    return Factor(np.empty((COLUMNS, COLUMNS)), np.empty(COLUMNS), np.empty(COLUMNS), np.empty((COLUMNS, 2)))
+
+
+@kernel
+def _factor(gram: Floats, law: Law, first: int, out: Factor) -> None:
+    """Rows of the factor from some on."""
+    mean, deviation, used = law
+    for a in range(first, used.size):
         i = used[a]
         total = gram[i, COLUMNS]
         for j in used:
             total -= gram[min(i, j), max(i, j)] * mean[j]
-        square -= mean[i] * (gram[i, COLUMNS] + total)
+        out.square[a] = -mean[i] * (gram[i, COLUMNS] + total)
         total *= deviation[i]
-        for b in range(a + 1):
+        airlight, road = deviation[i] if a == 0 else 0.0, deviation[i] if a == 1 else 0.0
+        for b in range(a):
             entry = deviation[i] * deviation[used[b]] * gram[used[b], i]
             for c in range(b):
-                entry -= low[a, c] * low[b, c]
-            low[a, b] = math.sqrt(entry + 1.0) if a == b else entry / low[b, b]
+                entry -= out.low[a, c] * out.low[b, c]
+            entry /= out.low[b, b]
+            out.low[a, b] = entry
+            total -= entry * out.right[b]
+            airlight -= entry * out.ends[b, 0]
+            road -= entry * out.ends[b, 1]
+        square = deviation[i] ** 2 * gram[i, i] + 1.0
         for c in range(a):
-            total -= low[a, c] * right[c]
-        right[a] = total / low[a, a]
-        square += 2.0 * math.log(low[a, a]) - right[a] * right[a]
-    return float(square)
+            square -= out.low[a, c] ** 2
+        pivot = math.sqrt(square)
+        out.low[a, a], out.right[a] = pivot, total / pivot
+        out.ends[a, 0], out.ends[a, 1] = airlight / pivot, road / pivot
+        out.square[a] += math.log(square) - out.right[a] ** 2
 
 
 @kernel
-def solved(low: Floats, at: int, value: float, out: Floats) -> None:
-    """Solve low · out = value in one place and zero elsewhere (`low` (m, m), `out` (m,))."""
-    out[:] = 0.0
-    out[at] = value / low[at, at]
-    for a in range(at + 1, out.size):
-        total = 0.0
-        for c in range(at, a):
-            total -= low[a, c] * out[c]
-        out[a] = total / low[a, a]
+def evidence(gram: Floats, half: float, law: Law, least_airlight: float, first: int, room: Factor) -> float:
+    """Logarithm of the density of the light under normal priors of the columns' factors.
 
-
-@kernel
-def evidence(gram: Floats, half: float, mean: Floats, deviation: Floats, least_airlight: float) -> float:
-    """Logarithm of the density of the light under normal priors of the columns' factors."""
-    used = np.flatnonzero(deviation > 0.0)
-    low, right = np.empty((used.size, used.size)), np.empty(used.size)
-    square = factored(gram, mean, deviation, used, low, right)
+    Rows of the factor before the first are those of the call before.
+    """
+    _factor(gram, law, first, room)
     # Airlight and road are the first columns: the road reflects something, and less than the airlight.
-    of_airlight, of_road = np.empty(used.size), np.empty(used.size)
-    solved(low, 0, deviation[AIRLIGHT], of_airlight)
-    solved(low, 1, deviation[ROAD], of_road)
-    airlight, road, apart = mean[AIRLIGHT], mean[ROAD], MOST_ALBEDO * mean[AIRLIGHT] - mean[ROAD]
+    airlight, road = law.mean[AIRLIGHT], law.mean[ROAD]
+    apart, square = MOST_ALBEDO * airlight - road, gram[COLUMNS, COLUMNS]
     a_square, r_square, d_square = 0.0, 0.0, 0.0
-    for a in range(used.size):
-        both = MOST_ALBEDO * of_airlight[a] - of_road[a]
-        airlight += of_airlight[a] * right[a]
-        road += of_road[a] * right[a]
-        apart += both * right[a]
-        a_square += of_airlight[a] * of_airlight[a]
-        r_square += of_road[a] * of_road[a]
+    for a in range(law.used.size):
+        of_airlight, of_road, right = room.ends[a, 0], room.ends[a, 1], room.right[a]
+        both = MOST_ALBEDO * of_airlight - of_road
+        square += room.square[a]
+        airlight += of_airlight * right
+        road += of_road * right
+        apart += both * right
+        a_square += of_airlight * of_airlight
+        r_square += of_road * of_road
         d_square += both * both
     result = -0.5 * square - half
     result += log_normal_share(road / math.sqrt(r_square)) + log_normal_share(apart / math.sqrt(d_square))
     if least_airlight > 0.0:
         result += log_normal_share((airlight - least_airlight) / math.sqrt(a_square + 1e-6))
-    return result
+    return float(result)
+
+
+class Laws(NamedTuple):
+    """Laws of the factors under all responses and lights."""
+
+    # mean, deviation (r, m, COLUMNS); used (m, COLUMNS) int64, of which so many count; count (m,) int64
+    mean: Floats
+    deviation: Floats
+    used: NDArray[np.int64]
+    count: NDArray[np.int64]
 
 
 @kernel
-def of_lights(
-    rows: RowData, response: int, lights: Floats, many: int, shift: float, sky_gram: Floats, sky_half: float,
-    grams: Floats, halves: Floats, out: Floats,
+def _laws_of(lights: Floats, levels: Floats, shift: float) -> Laws:
+    """Laws under responses of some levels of light (`lights` (2, m, COLUMNS), `levels` (r,), `shift` [px])."""
+    many = lights.shape[1]
+    mean, deviation = np.empty((levels.size, many, COLUMNS)), np.empty((levels.size, many, COLUMNS))
+    used, count = np.zeros((many, COLUMNS), np.int64), np.zeros(many, np.int64)
+    for r in range(levels.size):
+        mean[r], deviation[r] = lights[0] * levels[r], lights[1] * levels[r]
+    mean[:, :, SHIFT], deviation[:, :, SHIFT] = 0.0, shift
+    for j in range(many):
+        for i in range(COLUMNS):
+            if deviation[0, j, i] > 0.0:
+                used[j, count[j]] = i
+                count[j] += 1
+    return Laws(mean, deviation, used, count)
+
+
+@kernel
+def _of_lights(
+    rows: RowData, response: int, laws: Laws, sky_gram: Floats, sky_half: float, grams: Floats, halves: Floats,
+    room: Factor, out: Floats,
 ) -> None:  # fmt: skip
     """Evidence of one response and surface under each light, and of a road that ends at a cut (`out` (m,))."""
-    mean, deviation, gram = np.empty(COLUMNS), np.empty(COLUMNS), np.empty((COLUMNS + 1, COLUMNS + 1))
-    level, last = rows.level[response], rows.cuts.size - 1
+    many, last, before = laws.count.size, rows.cuts.size - 1, -1.0
+    gram = grams[last] + sky_gram
     for j in range(out.size):
         cut, which = (last, j) if j < many else (j - many, 0)
-        for i in range(COLUMNS):
-            mean[i], deviation[i] = lights[0, which, i] * level, lights[1, which, i] * level
-        mean[SHIFT], deviation[SHIFT] = 0.0, shift
-        for a in range(COLUMNS + 1):
-            for b in range(a, COLUMNS + 1):
-                gram[a, b] = grams[cut, a, b] + sky_gram[a, b]
-        least = rows.least_airlight[response] if deviation[OTHER_SKY] == 0.0 else 0.0
-        out[j] = rows.free[cut] + evidence(gram, halves[cut] + sky_half, mean, deviation, least)
+        if j >= many:
+            gram = grams[cut] + sky_gram
+        used = laws.used[which, : laws.count[which]]
+        law = Law(laws.mean[response, which], laws.deviation[response, which], used)
+        least = rows.least_airlight[response] if law.deviation[OTHER_SKY] == 0.0 else 0.0
+        # What lights have in common is factored once.
+        first = COMMON if j < many and law.mean[DARKENING] == before else 0
+        before = law.mean[DARKENING]
+        out[j] = rows.free[cut] + evidence(gram, halves[cut] + sky_half, law, least, first, room)
+
+
+@kernel
+def _jacobians(rows: RowData) -> Floats:
+    """(r, n + 1) float64: logarithm of how light changes with the signals of all bins before each."""
+    out = np.zeros((rows.slope.shape[0], rows.first.size + 1))
+    for r in range(out.shape[0]):
+        for i in range(rows.first.size):
+            out[r, i + 1] = out[r, i] + (math.log(rows.slope[r, i]) if rows.noise[r, i] > 0.0 else 0.0)
+    return out
 
 
 @kernel
 def evidence_grid(
     rows: RowData, lens: Floats, cells: Floats, tried: NDArray[np.int64],
-    surfaces: Floats, lights: Floats, many: int, shift: float, out: Floats,
+    surfaces: Floats, lights: Floats, shift: float, out: Floats,
 ) -> None:  # fmt: skip
     """Logarithm of the evidence of cells, pairs of a response and a surface, and lights or cuts.
 
     Takes `lens` (3,), `cells` (c, 2) [1/m], `tried` (t, 2) int64, `surfaces` (s, 4) [m], `shift` [px], `out` (c, t, m).
     """
-    n = rows.first.size
-    columns, place = np.empty((n, COLUMNS)), np.empty((n, 5))
+    n, last = rows.first.size, rows.cuts.size - 1
+    columns, place, steps = np.empty((n, COLUMNS + 1)), np.empty((n, 5)), np.empty((n, 8))
     grams, halves = np.empty((rows.cuts.size, COLUMNS + 1, COLUMNS + 1)), np.empty(rows.cuts.size)
-    sky_gram, albedo, hide = np.zeros((COLUMNS + 1, COLUMNS + 1)), np.empty(3), np.empty(2)
-    shared, jacobian, of_road = np.empty(n), np.zeros(n + 1), np.empty(n)
+    sky_gram, hide, room = np.zeros((COLUMNS + 1, COLUMNS + 1)), np.empty(2), no_factor()
+    jacobian, laws = _jacobians(rows), _laws_of(lights, rows.level, shift)
     for c in range(cells.shape[0]):
         horizon, extinction = cells[c, 0], cells[c, 1]
         size = 0
@@ -151,21 +205,17 @@ def evidence_grid(
             if hidden != before:
                 fill_columns(rows.first, rows.last, horizon, lens, extinction, hidden, columns, place)
                 across = contrast_across(rows.contrast, place, size)
+                if t == 0:
+                    steps = road_steps(place, rows.noise[0], size)
                 before = hidden
-            noise, slope = rows.noise[r], rows.slope[r]
-            for i in range(n):
-                jacobian[i + 1] = jacobian[i] + (math.log(slope[i]) if noise[i] > 0.0 else 0.0)
-                shared[i] = SHARED_NOISE * slope[i]
-                of_road[i] = noise[i] if i >= size else 0.0
-                columns[i, SHIFT] = rows.by_row[r, i]
+            columns[:, SHIFT], columns[:, COLUMNS] = rows.by_row[r], rows.light[r]
             sky_gram[:] = 0.0
             hide[0] = surfaces[s, 2] * level * math.exp(-extinction * hidden) if hidden < FARTHEST else 0.0
             hide[1] = HIGHEST_OBSTACLE
-            sky_half = sky_pass(rows.light[r], slope, noise, columns, place, size, hide, sky_gram)
-            for j in range(3):
-                albedo[j] = surfaces[s, j] * level
-            road_pass(rows.light[r], of_road, shared, columns, place, albedo, hidden, rows.cuts, grams, halves)
-            of_lights(rows, r, lights, many, shift, sky_gram, sky_half, grams, halves, out[c, t])
+            sky_half = sky_pass(rows.slope[r], rows.noise[r], columns, place, size, hide, sky_gram)
+            shared, albedo = SHARED_NOISE * rows.slope[r], surfaces[s, :3] * level
+            road_pass(rows.noise[r], shared, columns, place, steps, albedo, hidden, rows.cuts, grams, halves)
+            _of_lights(rows, r, laws, sky_gram, sky_half, grams, halves, room, out[c, t])
             for j in range(out.shape[2]):
-                cut = rows.cuts.size - 1 if j < many else j - many
-                out[c, t, j] += jacobian[max(rows.cuts[cut], size)] + across
+                cut = last if j < lights.shape[1] else j - lights.shape[1]
+                out[c, t, j] += jacobian[r, max(rows.cuts[cut], size)] + across

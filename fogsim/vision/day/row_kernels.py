@@ -15,10 +15,13 @@ from fogsim.jit import kernel
 
 Floats = NDArray[np.float64]
 
-AIRLIGHT, ROAD, DARKENING, SHEEN, WET, VIGNETTING, TONE, NEAR_TONE, STRAY, SKY, SHIFT, OTHER_SKY, COLUMNS = range(13)
-"""Columns: airlight, road, how the airlight darkens downward, sheen at grazing angles, mirror image of the sky on a wet
-road, shade of the lens, two shapes of local tone mapping, stray light, a sky's brightness higher up,
-a small shift of the horizon, a sky that is not the airlight's; and their number."""
+AIRLIGHT, ROAD, SHEEN, VIGNETTING, STRAY, SKY, SHIFT, DARKENING, WET, OTHER_SKY, TONE, NEAR_TONE, COLUMNS = range(13)
+"""Columns: airlight, road, sheen at grazing angles, shade of the lens, stray light, a sky's brightness higher up, a
+small shift of the horizon; how the airlight darkens downward, mirror image of the sky on a wet road, a sky that is not
+the airlight's, two shapes of local tone mapping; and their number. The light itself is in one column more."""
+
+COMMON = DARKENING
+"""How many of the columns, the first, have the same deviations under all lights."""
 
 DARKENING_ANGLE, SHEEN_ANGLE, SKY_ANGLE = 0.064, 0.06, 0.3
 """Angles over which airlight darkens downward, sheen fades and a sky's brightness changes [rad]."""
@@ -75,7 +78,7 @@ def fill_columns(
     first: Floats, last: Floats, horizon: float, lens: Floats, extinction: float, hidden: float,
     columns: Floats, place: Floats,
 ) -> None:  # fmt: skip
-    """Columns of all bins, and where each lies.
+    """Columns of all bins but for the shift and the light, and where each lies.
 
     Takes `first`, `last` (n,), `lens` (3,) [px], [m], `extinction` [1/m], `hidden` [m], `place` (n, 5) [m], [px],
     [rad].

@@ -259,12 +259,12 @@ def _add_equation(
     line: int,
     slope: float,
     plane: float,
-    told: tuple[float, float],
+    datum: tuple[float, float],
     normal: Floats,
     gradient: Floats,
 ) -> None:
     """Add the equation of one point, of a residual and a weight."""
-    (residual, weight), s = told, SLOPE + line
+    (residual, weight), s = datum, SLOPE + line
     for a in range(SLOPE):
         by_a = weight * derivative[a] * (slope if ROW <= a < BEND else 1.0)
         gradient[a] += by_a * residual

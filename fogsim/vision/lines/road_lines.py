@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fogsim.values.camera import Camera
 from fogsim.vision.light.pixel_kernels import LinearPixels
-from fogsim.vision.lines.horizon import Horizon
+from fogsim.vision.lines.horizon import Horizon, weighted_mean
 from fogsim.vision.lines.road_line_kernels import (
     LEAST_POINTS,
     LEAST_TURN,
@@ -90,6 +90,12 @@ def road_vanishing_point(image: LinearPixels, camera: Camera, horizon: Horizon) 
     """
     seen = seen_lines(image, camera, horizon)
     return None if seen is None else vanishing_point_of(seen, camera, horizon)
+
+
+def seen_horizon(image: LinearPixels, camera: Camera, assumed: Horizon) -> tuple[Horizon, VanishingPoint | None]:
+    """The assumed horizon weighed with the point in which the road's lines meet, and that point; None without any."""
+    point = road_vanishing_point(image, camera, assumed)
+    return (assumed if point is None else weighted_mean(assumed, point.horizon)), point
 
 
 def vanishing_point_of(seen: SeenLines, camera: Camera, horizon: Horizon) -> VanishingPoint | None:

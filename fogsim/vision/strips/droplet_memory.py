@@ -40,5 +40,5 @@ class DropletMemory:
         moved = 0.0 if self._time is None else max(speed * (time - self._time), 0.0)
         self._time = time
         beforehand, kept = np.log(DROPLET_CHANCES), math.exp(-moved / LASTS)
-        told = min(moved / OTHER_ROAD, 1.0) * np.maximum(logarithms, -MOST)
-        self._logarithms = beforehand + kept * (self._logarithms - beforehand) + told
+        learnt = min(moved / OTHER_ROAD, 1.0) * np.maximum(logarithms, -MOST)
+        self._logarithms = beforehand + kept * (self._logarithms - beforehand) + learnt

@@ -75,7 +75,7 @@ def divided_road(
     geometry: StripGeometry,
     camera: Camera,
     priors: Priors,
-    told: Horizon,
+    stated: Horizon,
     noise: float,
     free: float,
 ) -> DividedRoad | None:
@@ -86,7 +86,7 @@ def divided_road(
     levels = shade_levels(pixels, curves, geometry, priors[0], noise)
     if levels is None:
         return None
-    stated_too = (*_seen_or_stated(priors[0], told, camera), *priors[1:])
+    stated_too = (*_seen_or_stated(priors[0], stated, camera), *priors[1:])
     some, laid = _divided(pixels, curves, geometry, levels, noise, camera, free)
     near = JointFit(levels.extinction, 0.0, levels.airlight, priors[0].shift, levels.lit, 1.0, NOTHING, NOTHING)
     fit = fit_jointly(some, laid, stated_too, near)
@@ -114,10 +114,10 @@ def shade_levels(
     return fit_levels(pieces, bins, around, prior, noise, True)
 
 
-def _seen_or_stated(prior: JointPrior, told: Horizon, camera: Camera) -> tuple[JointPrior, JointPrior]:
-    """Prior with the seen horizon, and that with the told one."""
+def _seen_or_stated(prior: JointPrior, stated: Horizon, camera: Camera) -> tuple[JointPrior, JointPrior]:
+    """Prior with the seen horizon, and that with the stated one."""
     seen = prior._replace(cost=-2.0 * math.log((1.0 - MISLED) / prior.shift_deviation))
-    shift, deviation = told.row - camera.horizon_row, told.standard_deviation
+    shift, deviation = stated.row - camera.horizon_row, stated.standard_deviation
     return seen, prior._replace(
         shift=shift, shift_deviation=deviation, cost=-2.0 * math.log(MISLED / max(deviation, prior.shift_deviation))
     )

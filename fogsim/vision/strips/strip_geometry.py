@@ -14,9 +14,6 @@ Floats = NDArray[np.float64]
 LANES = ((-1.4, 1.4), (-4.9, -2.1), (2.1, 4.9))
 """Sides of the strips to the right of the vehicle's axis [m]: the own lane's middle, and those of its neighbours."""
 
-HALF_ROAD = 2.5
-"""How far to either side of the vehicle's axis a band is surely road [m]."""
-
 WHOLE_ROWS = 28.0
 """Rows below the horizon up to which every row is a bin of its own [px]; from there bins grow with the distance."""
 
@@ -55,7 +52,8 @@ class StripGeometry:
 
 def strip_geometry(camera: Camera, nearest: float, lanes: tuple[tuple[float, float], ...] = LANES) -> StripGeometry:
     """Lay strips over the image of a camera (`nearest` [px], `lanes` (float, float) [m])."""
-    first, last = _row_bins(camera, nearest, camera.height - 1)
+    top = max(math.ceil(camera.horizon_row + nearest), 0)
+    first, last = strip_kernels.row_bins(camera.horizon_row, top, camera.height - 1, WHOLE_ROWS)
     below: Floats = 0.5 * (first + last).astype(np.float64) - camera.horizon_row
     u0 = camera.principal_point[0]
     # A lateral offset x at depth z, seen from a camera that looks down, is α x / z columns off the axis.
@@ -69,20 +67,6 @@ def strip_geometry(camera: Camera, nearest: float, lanes: tuple[tuple[float, flo
 def laid_along(geometry: StripGeometry, left: Floats, right: Floats, camera: Camera) -> StripGeometry:
     """Lay strips between other columns on the same bins of rows (`left`, `right` (strips, n))."""
     return _laid(geometry.first, geometry.last, *_inside(left, right, camera.width), camera)
-
-
-def band_geometry(camera: Camera, nearest: float, columns: tuple[int, int], rows: tuple[int, int]) -> StripGeometry:
-    """Take a vertical band of the image, as far as it is road, for the only strip.
-
-    Takes `nearest` [px], `columns`, `rows` (int, int).
-    """
-    first, last = _row_bins(camera, max(nearest, rows[0] - camera.horizon_row), rows[1])
-    below: Floats = 0.5 * (first + last).astype(np.float64) - camera.horizon_row
-    u0, focal = camera.principal_point[0], camera.focal_length
-    # Far away even a narrow band is wider than the road.
-    reach = HALF_ROAD * focal / camera.row_distance * below[None, :]
-    left, right = np.maximum(columns[0] - 0.5, u0 - reach), np.minimum(columns[1] + 0.5, u0 + reach)
-    return _laid(first, last, left, right, camera)
 
 
 def _laid(
@@ -123,8 +107,3 @@ def _squared_tangent(left: Floats, right: Floats, below: Floats, camera: Camera)
 def _across(values: Floats) -> Floats:
     """Mean across strips by Simpson's rule: near, a lane is wide."""
     return np.asarray((values[0] + 4.0 * values[1] + values[2]) / 6.0)
-
-
-def _row_bins(camera: Camera, nearest: float, bottom: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    top = max(math.ceil(camera.horizon_row + nearest), 0)
-    return strip_kernels.row_bins(camera.horizon_row, top, bottom, WHOLE_ROWS)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fogsim.values import Camera
-from fogsim.vision.strips.strip_geometry import HALF_ROAD, LANES, WHOLE_ROWS, band_geometry, strip_geometry
+from fogsim.vision.strips.strip_geometry import LANES, WHOLE_ROWS, strip_geometry
 
 CAMERA = Camera(640, 480, 577.0, (300.0, 250.0), 1.4, np.radians(3.0))
 
@@ -71,11 +71,3 @@ def test_what_is_mostly_outside_the_image_is_left_out():
     only = geometry.only([0, 2])
     assert np.array_equal(only.left, geometry.left[[0, 2]])
     assert np.array_equal(only.distance, geometry.distance)
-
-
-def test_a_band_is_no_wider_than_the_road():
-    band = band_geometry(CAMERA, 2.0, (280, 340), (224, 470))
-    assert band.last[0] == 470
-    assert band.left[0, 0] == 279.5
-    far = band.right[0, -1] - band.left[0, -1]
-    assert far == pytest.approx(2.0 * HALF_ROAD * CAMERA.focal_length / band.distance[-1])

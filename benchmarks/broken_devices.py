@@ -7,8 +7,6 @@ one fails nowhere.
     python benchmarks/broken_devices.py [--json] [--docs] [--all] [-j 2] [--devices …] [--scenarios FILES …]
 """
 
-import argparse
-import json
 import math
 import multiprocessing
 import sys
@@ -20,7 +18,7 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from docs_table import write_table
+from harness import ROOT, Row, lines_of, parse_options, publish
 
 from fogsim.errors import InputError
 from fogsim.scenario import build
@@ -31,8 +29,6 @@ from fogsim.values import Belief, Estimate, Lamp, Observation, SpeedAdvice
 from fogsim.values.belief import certain_belief
 
 SOUND = "none: the sound device"
-
-ROOT = Path(__file__).resolve().parent.parent
 
 
 @dataclass
@@ -183,17 +179,7 @@ def clear(estimate: Estimate) -> Estimate:
 
 @dataclass(frozen=True)
 class Device:
-    """A broken device.
-
-    Attributes
-    ----------
-    part : str
-        Function of `fogsim.scenario.build` whose result is broken; empty for none.
-    broken : callable
-        What takes the place of the sound part.
-    settings : tuple of str
-        Overrides of the scenario.
-    """
+    """A broken device: the function of `fogsim.scenario.build` whose result is replaced, by what, and overrides."""
 
     part: str = ""
     broken: Callable[[Any], Any] = lambda sound: sound
@@ -243,7 +229,7 @@ def tests_with(files: Iterable[Path], device: Device) -> Iterator[FogTest]:
             print(f"{file}: {str(error).splitlines()[0]}", file=sys.stderr)
 
 
-def measure(name: str, files: Sequence[Path], *, goes_on: bool) -> dict[str, Any]:
+def measure(name: str, files: Sequence[Path], *, goes_on: bool) -> Row:
     """Record of a device: in which scenarios which expectations fail, or are inconclusive alone."""
     device = DEVICES[name]
     failed: dict[str, list[str]] = {}
@@ -279,35 +265,32 @@ def told(caught: dict[str, list[str]]) -> str:
     return "; ".join(f"{scenario}: {', '.join(names)}" for scenario, names in caught.items()) or "–"
 
 
-def table(records: Sequence[dict[str, Any]]) -> str:
+def table(records: Sequence[Row]) -> list[str]:
     """The records as a table."""
-    lines = ["| device | fails | only inconclusive | cases run |", "|---|---|---|---|"]
-    for record in records:
-        fails, unsure = told(record["failed"]), told(record["only_inconclusive"])
-        lines.append(f"| {record['device']} | {fails} | {unsure} | {record['cases']} of {record['cases_in_all']} |")
-    return "\n".join(lines)
+    rows = (
+        (one["device"], told(one["failed"]), told(one["only_inconclusive"]), f"{one['cases']} of {one['cases_in_all']}")
+        for one in records
+    )
+    return lines_of(("device", "fails", "only inconclusive", "cases run"), rows)
 
 
 def main() -> int:
     """Run and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", action="store_true", help="print records")
-    parser.add_argument("--docs", action="store_true", help="put the table into docs/reference/tests.md")
-    parser.add_argument("--all", action="store_true", help="all scenarios, also after the first that fails")
-    parser.add_argument("-j", type=int, default=1, help="devices at once")
-    parser.add_argument("--devices", nargs="+", choices=DEVICES, default=list(DEVICES))
-    parser.add_argument("--scenarios", nargs="+", default=[ROOT / "scenarios"], help="files, folders or names")
-    asked = parser.parse_args()
-    files = find_files(asked.scenarios)
-    work = partial(measure, files=files, goes_on=asked.all)
-    if asked.j == 1:
-        records = [work(name) for name in asked.devices]
+    given = parse_options(
+        __doc__,
+        docs=("reference/tests.md", "broken devices"),
+        all=(False, "all scenarios, also after the first that fails"),
+        j=(1, "devices at once"),
+        devices=(list(DEVICES), "which", DEVICES),
+        scenarios=([str(ROOT / "scenarios")], "files, folders or names"),
+    )
+    work = partial(measure, files=find_files(given.scenarios), goes_on=given.all)
+    if given.j == 1:
+        records = [work(name) for name in given.devices]
     else:
-        with multiprocessing.get_context("fork").Pool(asked.j, maxtasksperchild=1) as pool:
-            records = pool.map(work, asked.devices, chunksize=1)
-    print(json.dumps(records) if asked.json else table(records))
-    if asked.docs:
-        write_table("reference/tests.md", "broken devices", [table(records)])
+        with multiprocessing.get_context("fork").Pool(given.j, maxtasksperchild=1) as pool:
+            records = pool.map(work, given.devices, chunksize=1)
+    publish(given, records, table(records))
     wrong = [one["device"] for one in records if bool(one["failed"]) == (one["device"] == SOUND)]
     for name in wrong:
         print(f"not as it should be: {name}", file=sys.stderr)

@@ -16,9 +16,7 @@ fastest says something.
         [--samples 2 ...] [--frames 60] [--repeat 5]
 """
 
-import argparse
 import itertools
-import json
 import math
 import statistics
 import time
@@ -26,7 +24,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from docs_table import write_table
+from harness import Row, lines_of, parse_options, publish
 from numpy.typing import NDArray
 
 import fogsim
@@ -142,15 +140,7 @@ class Timed:
 
 
 class Case:
-    """One renderer in one light at one size, ready to take frames.
-
-    Parameters
-    ----------
-    key : Key
-        Renderer, light, size, and samples a pixel side.
-    network : RoadNetwork
-        The roads.
-    """
+    """One renderer in one light at one size, ready to take frames."""
 
     def __init__(self, key: Key, network: RoadNetwork) -> None:
         described = scenario(*key)
@@ -185,7 +175,7 @@ def triangles(network: RoadNetwork, state: TrafficState) -> int:
     return len(scene.ground.faces) + sum(len(scene.shapes[b.shape].faces) * len(b.transforms) for b in copies)
 
 
-def measure(cases: dict[Key, Case], frames: int, repeat: int) -> Iterator[dict[str, Any]]:
+def measure(cases: dict[Key, Case], frames: int, repeat: int) -> Iterator[Row]:
     """A record for each case."""
     spent: dict[Key, list[NDArray[np.float64]]] = {key: [] for key in cases}
     for one in cases.values():
@@ -198,7 +188,7 @@ def measure(cases: dict[Key, Case], frames: int, repeat: int) -> Iterator[dict[s
         yield record(key, runs)
 
 
-def record(key: Key, runs: list[NDArray[np.float64]]) -> dict[str, Any]:
+def record(key: Key, runs: list[NDArray[np.float64]]) -> Row:
     """One record: repetitions (frames, stages) [ms] of a case."""
     renderer, light, size, samples = key
     width, height = map(int, size.split("x"))
@@ -214,61 +204,40 @@ def record(key: Key, runs: list[NDArray[np.float64]]) -> dict[str, Any]:
     } | {f"ms_{name}": round(float(value), 3) for name, value in zip(STAGES, stages, strict=True)}
 
 
-def table(records: list[dict[str, Any]]) -> list[str]:
+def table(records: list[Row]) -> list[str]:
     """Lines of the table of docs/benchmarks/performance.md: the fastest frames [ms] by day and night."""
     shown = [one for one in records if one["light"] in ("day", "night") and one["samples"] == 1]
     cells = {(one["renderer"], f"{one['light']} {one['width']}×{one['height']}"): one["ms_min"] for one in shown}
     cases = list(dict.fromkeys(case for _, case in cells))
-    lines = [f"| | {' | '.join(cases)} |", "|---" * (len(cases) + 1) + "|"]
+    rows = []
     for renderer, told in (("cpu", "cpu"), ("opengl", "opengl on llvmpipe")):
         values = [cells.get((renderer, case), math.nan) for case in cases]
-        lines.append(f"| {told} | {' | '.join(f'{one:.1f}' if one < 9.95 else f'{one:.0f}' for one in values)} |")
-    return lines
+        rows.append((told, *(f"{one:.1f}" if one < 9.95 else f"{one:.0f}" for one in values)))
+    return lines_of(("", *cases), rows)
 
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/benchmarks/performance.md")
-    parser.add_argument("--renderer", action="append", choices=RENDERERS, help="default: all")
-    parser.add_argument("--light", action="append", choices=LIGHTS, help="default: all")
-    parser.add_argument("--size", action="append", help="camera WIDTHxHEIGHT (default 160x120 and 640x480)")
-    parser.add_argument("--samples", action="append", type=int, help="samples a pixel side (default 1)")
-    parser.add_argument("--frames", type=int, default=60, help="frames a repetition")
-    parser.add_argument("--repeat", type=int, default=5, help="repetitions")
-    arguments = parser.parse_args()
-    keys = list(
-        itertools.product(
-            arguments.renderer or RENDERERS,
-            arguments.light or LIGHTS,
-            arguments.size or ["160x120", "640x480"],
-            arguments.samples or [1],
-        )
+    given = parse_options(
+        __doc__,
+        docs=("benchmarks/performance.md", "frames"),
+        renderer=(list(RENDERERS), "which", RENDERERS),
+        light=(list(LIGHTS), "which", LIGHTS),
+        size=(["160x120", "640x480"], "cameras, WIDTHxHEIGHT"),
+        samples=([1], "samples a pixel side"),
+        frames=(60, "frames a repetition"),
+        repeat=(5, "repetitions"),
     )
     network = read_network()
-    cases = {key: Case(key, network) for key in keys}
-    shared = {"triangles": triangles(network, cases[keys[0]].traffic[0]), "vehicles": VEHICLES, "signs": SIGNS}
-    records = [one | shared for one in measure(cases, arguments.frames, arguments.repeat)]
+    cases = {
+        key: Case(key, network) for key in itertools.product(given.renderer, given.light, given.size, given.samples)
+    }
+    traffic = next(iter(cases.values())).traffic[0]
+    shared = {"triangles": triangles(network, traffic), "vehicles": VEHICLES, "signs": SIGNS}
+    records = [one | shared for one in measure(cases, given.frames, given.repeat)]
     for one in cases.values():
         one.close()
-    if arguments.docs:
-        write_table("benchmarks/performance.md", "frames", table(records))
-    if arguments.json:
-        print(json.dumps(records, indent=2))
-        return
-    print(f"{shared['triangles']} triangles, {VEHICLES} vehicles, {SIGNS} signs; milliseconds a frame")
-    print(
-        f"{'renderer':10}{'light':7}{'size':>9}{'samples':>9}{'median':>9}{'min':>9}"
-        + "".join(f"{name:>9}" for name in STAGES)
-    )
-    for one in records:
-        size = f"{one['width']}x{one['height']}"
-        figures = [one[f"ms_{name}"] for name in ("median", "min", *STAGES)]
-        print(
-            f"{one['renderer']:10}{one['light']:7}{size:>9}{one['samples']:9}"
-            + "".join(f"{value:9.2f}" for value in figures)
-        )
+    publish(given, records, docs=table(records))
 
 
 if __name__ == "__main__":

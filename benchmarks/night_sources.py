@@ -7,13 +7,12 @@ at exposures and strengths of lamps that the calibration did not see; ``--part s
 Constants were chosen on ``--pool 1`` and 2; what is reported is of 7.
 """
 
-import argparse
-import json
 import math
 import time
 from collections.abc import Callable
 
 import numpy as np
+from harness import Row, parse_options, publish
 
 from fogsim.calibration.halo_calibration import measure_halo_threshold, random_scene
 from fogsim.calibration.staged_night import NightRoad, NightScene, NightVehicle
@@ -29,10 +28,9 @@ UNSEEN = ((0.4, 0.6), (1.6, 2.2))
 """Exposures, and strengths of lamps, outside what the calibration draws."""
 
 LOW = Lamp.POSITION | Lamp.LOW_BEAM
-Record = dict[str, object]
 
 
-def halo_records(camera: Camera, pool: int, scenes: int) -> list[Record]:
+def halo_records(camera: Camera, pool: int, scenes: int) -> list[Row]:
     """How often fog is seen, picture by picture, in clear air and in fog."""
     measured = measure_halo_threshold(camera, seed=0)
     counts: dict[tuple[str, float], list[int]] = {}
@@ -65,9 +63,9 @@ def halo_records(camera: Camera, pool: int, scenes: int) -> list[Record]:
     ]
 
 
-def speed_records() -> list[Record]:
+def speed_records() -> list[Row]:
     """Processor time of a picture of 1280×800, the median of many on the worst of some scenes."""
-    out: list[Record] = []
+    out: list[Row] = []
     with NightRoad(PAPERS_CAMERA) as road:
         for name, scene in (
             ("street lamps and traffic", NightScene(10.0, _traffic(), street_lamps=True)),
@@ -105,25 +103,15 @@ def _milliseconds(call: Callable[[], object], times: int = 30) -> float:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--part", choices=("halos", "speed"), default="halos", help="what is measured")
-    parser.add_argument("--pool", type=int, default=7, help="which scenes")
-    parser.add_argument("--count", type=int, default=80, help="scenes")
-    parser.add_argument("--small", action="store_true", help="pictures of 640×480 in place of 1280×800")
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    arguments = parser.parse_args()
-    camera = SMALL_CAMERA if arguments.small else PAPERS_CAMERA
-    match arguments.part:
-        case "halos":
-            found = halo_records(camera, arguments.pool, arguments.count)
-        case _:
-            found = speed_records()
-    if arguments.json:
-        print(json.dumps(found, indent=2))
-        return
-    print("| " + " | ".join(found[0]) + " |\n" + "|---" * len(found[0]) + "|")
-    for one in found:
-        print("| " + " | ".join("–" if value is None else str(value) for value in one.values()) + " |")
+    given = parse_options(
+        __doc__,
+        part=("halos", "what is measured", ("halos", "speed")),
+        pool=(7, "which scenes"),
+        count=(80, "scenes"),
+        small=(False, "pictures of 640×480 in place of 1280×800"),
+    )
+    camera = SMALL_CAMERA if given.small else PAPERS_CAMERA
+    publish(given, halo_records(camera, given.pool, given.count) if given.part == "halos" else speed_records())
 
 
 if __name__ == "__main__":

@@ -32,21 +32,16 @@ slowly, so short runs show more. Also where each reset has another road what is 
 the resident set grows more, which is no memory in use: probably free memory scattered among scenes of all sizes.
 """
 
-import argparse
 import ctypes
-import functools
-import json
-import multiprocessing
 import os
-import statistics
-import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import gymnasium
 import numpy as np
+from harness import Row, apart, median, parse_options, publish, timed
 
 import fogsim
 import fogsim_envs  # noqa: F401 - registers the environments
@@ -125,7 +120,7 @@ PARTS: dict[str, Part] = {
     "sumo": sumo,
     "traffic": traffic,
     "episodes": episodes,
-    **{part: functools.partial(environment, env_id=env_id) for part, env_id in ENVIRONMENTS.items()},
+    **{part: partial(environment, env_id=env_id) for part, env_id in ENVIRONMENTS.items()},
 }
 
 
@@ -153,49 +148,46 @@ def heap_kib() -> float | None:
     return float(figures.uordblks + figures.hblkhd) / 1024
 
 
-def measure(part: str, resets: int, size: str) -> dict[str, Any]:
+def growth(work: Callable[[int], object], times: int) -> tuple[float, float | None]:
+    """Growth of the resident set and of the allocator's memory [KiB] for each time, the first quarter not counted."""
+    warm_up = max(1, times // 4)
+    for number in range(warm_up):
+        work(number)
+    resident, heap = resident_kib(), heap_kib()
+    for number in range(warm_up, times):
+        work(number)
+    heap_now, counted = heap_kib(), max(1, times - warm_up)
+    grown = round((resident_kib() - resident) / counted, 5)
+    return grown, None if heap is None or heap_now is None else round((heap_now - heap) / counted, 5)
+
+
+def measure(part: str, resets: int, size: str) -> Row:
     """One record."""
-    warm_up = max(1, resets // 4)
-    spent, resident, heap = [], 0.0, None
+    spent: list[float] = []
     with PARTS[part](size) as reset:
-        for index in range(resets):
-            if index == warm_up:
-                resident, heap = resident_kib(), heap_kib()
-            started = time.perf_counter()
-            reset(index)
-            spent.append(1e3 * (time.perf_counter() - started))
-        counted, heap_now = resets - warm_up, heap_kib()
-        grown = (resident_kib() - resident) / counted
-        grown_heap = None if heap is None or heap_now is None else round((heap_now - heap) / counted, 2)
+        grown, grown_heap = growth(lambda seed: spent.append(timed(partial(reset, seed))[1]), resets)
+    counted = spent[max(1, resets // 4) :]
     return {
         "part": part,
         "env": ENVIRONMENTS.get(part),
         "resets": resets,
-        "ms_median": round(statistics.median(spent[warm_up:]), 1),
-        "ms_max": round(max(spent[warm_up:]), 1),
+        "ms_median": median(counted, 1),
+        "ms_max": round(max(counted), 1),
         "growth_kib_per_reset": round(grown, 2),
-        "heap_growth_kib_per_reset": grown_heap,
+        "heap_growth_kib_per_reset": None if grown_heap is None else round(grown_heap, 2),
     }
 
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--resets", type=int, default=200, help="how many resets")
-    parser.add_argument("--size", default="64x48", help="camera WIDTHxHEIGHT")
-    parser.add_argument("--part", action="append", choices=PARTS, help="what is reset (default: all)")
-    arguments = parser.parse_args()
-    records = []
-    for part in arguments.part or PARTS:
-        # A process each: there is one libsumo in a process, and memory of one part must not count for the next.
-        with multiprocessing.get_context("spawn").Pool(1) as pool:
-            records.append(pool.apply(measure, (part, arguments.resets, arguments.size)))
-    if arguments.json:
-        print(json.dumps(records, indent=2))
-        return
-    for record in records:
-        print("\n".join(f"{key:26} {value}" for key, value in record.items() if value is not None), end="\n\n")
+    given = parse_options(
+        __doc__,
+        resets=(200, "how many resets"),
+        size=("64x48", "camera WIDTHxHEIGHT"),
+        part=(list(PARTS), "what is reset", PARTS),
+    )
+    # A process each: there is one libsumo in a process, and memory of one part must not count for the next.
+    publish(given, [apart(measure, part, given.resets, given.size) for part in given.part])
 
 
 if __name__ == "__main__":

@@ -19,10 +19,8 @@ The simulation is a .sumocfg with SUMO's own defaults, which FogSim's own scenar
 ``--blind`` leaves perception and speed choice out; ``--profile`` tells where the time of the whole steps goes.
 """
 
-import argparse
 import cProfile
 import dataclasses
-import json
 import pstats
 import statistics
 import tempfile
@@ -30,6 +28,7 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from harness import parse_options, publish
 from traffic_town import town_configuration
 
 from fogsim.atmosphere import FieldAccess
@@ -197,28 +196,22 @@ def summary(blocks: Sequence[Block]) -> dict[str, float]:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--vehicles", action="append", type=int, help="vehicles (default 20, 100, 500 and 2000)")
-    parser.add_argument("--network", action="append", choices=[*CONFIGURATIONS], help="which (default both)")
-    parser.add_argument("--visibility", type=float, default=100.0, help="V_met [m]")
-    parser.add_argument("--profile", action="store_true", help="tell where the time goes, and no ratio to be trusted")
-    parser.add_argument("--seconds", type=float, default=10.0, help="time to measure for each number")
-    parser.add_argument("--blind", action="store_true", help="leave perception and speed choice out")
-    arguments = parser.parse_args()
-    counts = arguments.vehicles or [20, 100, 500, 2000]
-    profile = cProfile.Profile() if arguments.profile else None
+    given = parse_options(
+        __doc__,
+        vehicles=([20, 100, 500, 2000], "vehicles"),
+        network=(list(CONFIGURATIONS), "which", CONFIGURATIONS),
+        visibility=(100.0, "V_met [m]"),
+        profile=(False, "tell where the time goes, and no ratio to be trusted"),
+        seconds=(10.0, "time to measure for each number"),
+        blind=(False, "leave perception and speed choice out"),
+    )
+    profile = cProfile.Profile() if given.profile else None
     records = []
-    for network in arguments.network or [*CONFIGURATIONS]:
-        task = Task(network, arguments.seconds, arguments.visibility, arguments.blind)
-        records += [{"network": network, "vehicles": n, **measure(task, n, profile)} for n in counts]
-    if arguments.json:
-        print(json.dumps(records, indent=2))
-        return
-    print("  ".join(f"{key:>13}" for key in records[0]))
-    for record in records:
-        print("  ".join(f"{value:>13}" for value in record.values()))
-    if profile is not None:
+    for network in given.network:
+        task = Task(network, given.seconds, given.visibility, given.blind)
+        records += [{"network": network, "vehicles": n, **measure(task, n, profile)} for n in given.vehicles]
+    publish(given, records)
+    if profile is not None and not given.json:
         pstats.Stats(profile).sort_stats("tottime").print_stats(40)
 
 

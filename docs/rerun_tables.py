@@ -6,9 +6,9 @@
     python docs/rerun_tables.py --all         # every table but the studies, changed or not
 
 Names are those of docs/measured_tables.py. The other options do not measure. Run the same command again to resume:
-finished measurements are noted in runs/tables/progress.json, and long commands keep their own results. A command that
-fails leaves its tables as they were and does not stop the others. Logs are runs/tables/NAME.log; what moved is in
-runs/tables/moved.md and moved.json.
+finished measurements are stamped, and long commands keep their own results. A command that fails leaves its tables as
+they were and does not stop the others. Logs are runs/tables/NAME.log; what moved is in runs/tables/moved.md and
+moved.json.
 """
 
 import argparse
@@ -85,7 +85,7 @@ def main(root: Path = ROOT, measurements: tuple[Measurement, ...] = MEASUREMENTS
                 stamps.write(one, stamps.checkout().files(one.rests_on), None)
         stamps.write_pages()
     else:
-        return rerun(Round(stamps, sys.argv[1:], Console(stderr=True)), chosen)
+        return rerun(Round(stamps, Console(stderr=True)), chosen)
     return 0
 
 

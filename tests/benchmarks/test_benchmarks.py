@@ -107,13 +107,11 @@ def records(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
             ("--renderers", "4", "--frames", "8", "--renderer", "cpu"),
             {"growth_kib_per_renderer", "growth_kib_per_1000_frames"},
         ),
-        ("air.py", ("--repeat", "2"), {"fog", "lamps", "changing", "width", "height", "ms_median", "ms_min", "ms_max"}),
         (
             "grades.py",
             ("--visibility", "100", "--duration", "1", "--drawings", "1"),
             {"V_met", "road", "method", "frames", "valid", "bias", "median", "p95", "held"},
         ),
-        ("sign_map.py", ("--size", "64x48", "--steps", "2"), {"camera", "signs", "step_ms", "sign_map_ms"}),
         ("traffic.py", ("--vehicles", "20", "--seconds", "1"), {"vehicles", "ms_sumo", "ms_total", "ratio"}),
     ],
 )

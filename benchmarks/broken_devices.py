@@ -31,12 +31,16 @@ from fogsim.values.belief import certain_belief
 SOUND = "none: the sound device"
 
 
+Update = Callable[[Any, Observation], Estimate]
+"""What a broken estimator makes of the sound one and an observation."""
+
+
 @dataclass
 class Estimator:
-    """An estimator with `told` in place of what it says."""
+    """An estimator with another update."""
 
     sound: Any
-    told: Callable[[Estimate], Estimate]
+    broken: Update
 
     @property
     def method(self) -> str:
@@ -48,47 +52,40 @@ class Estimator:
         self.sound.reset()
 
     def update(self, observation: Observation) -> Estimate:
-        """Say something else."""
-        return self.told(self.sound.update(observation))
+        """Update in another way."""
+        return self.broken(self.sound, observation)
 
 
-@dataclass
-class LastValue(Estimator):
-    """An estimator that repeats its last value where it cannot tell."""
+class LastValue:
+    """Repeats the last value where there is no estimate."""
 
-    told: Callable[[Estimate], Estimate] = lambda estimate: estimate
-    last: Estimate | None = None
+    def __init__(self) -> None:
+        self._last: Estimate | None = None
 
-    def update(self, observation: Observation) -> Estimate:
-        """Say what it said before."""
-        estimate: Estimate = self.sound.update(observation)
-        if estimate.valid or self.last is None:
-            self.last = estimate
-        return self.last
-
-
-@dataclass
-class WithoutSigns(Estimator):
-    """An estimator that is told of no sign."""
-
-    told: Callable[[Estimate], Estimate] = lambda estimate: estimate
-
-    def update(self, observation: Observation) -> Estimate:
-        """Say what is seen without the map."""
-        return self.sound.update(replace(observation, signs=()))
+    def __call__(self, sound: Any, observation: Observation) -> Estimate:
+        """Return the last value, or the new one."""
+        estimate: Estimate = sound.update(observation)
+        if estimate.valid or self._last is None:
+            self._last = estimate
+        return self._last
 
 
-@dataclass
-class TrustsTheMap(Estimator):
-    """An estimator that takes every sign of the map for seen: it never says less than the way to the farthest."""
+def without_signs(sound: Any, observation: Observation) -> Estimate:
+    """Estimate without the map's signs."""
+    estimate: Estimate = sound.update(replace(observation, signs=()))
+    return estimate
 
-    told: Callable[[Estimate], Estimate] = lambda estimate: estimate
 
-    def update(self, observation: Observation) -> Estimate:
-        """Say that it sees as far as the map goes, or farther."""
-        estimate: Estimate = self.sound.update(observation)
-        farthest = max((sign.distance for sign in observation.signs), default=0.0)
-        return scaled(max(farthest / estimate.visibility, 1.0), estimate) if estimate.valid else estimate
+def trusts_the_map(sound: Any, observation: Observation) -> Estimate:
+    """Take every sign of the map for seen: no less than the way to the farthest is reported."""
+    estimate: Estimate = sound.update(observation)
+    farthest = max((sign.distance for sign in observation.signs), default=0.0)
+    return scaled(max(farthest / estimate.visibility, 1.0), estimate) if estimate.valid else estimate
+
+
+def changed(change: Callable[[Estimate], Estimate]) -> Update:
+    """Change estimates."""
+    return lambda sound, observation: change(sound.update(observation))
 
 
 @dataclass
@@ -203,12 +200,12 @@ DEVICES = {
     "adviser 30 % too fast": Device("adviser", partial(Adviser, advised=fast_advice)),
     "adviser holds its first advice": Device("adviser", partial(Adviser, advised=first_advice)),
     "advice 5 s late": Device("adviser", lambda sound: Adviser(sound, LateAdvice())),
-    "estimator 30 % too far": Device("estimators", partial(Estimator, told=partial(scaled, 1.3))),
-    "estimator 30 % too near": Device("estimators", partial(Estimator, told=partial(scaled, 0.7))),
-    "estimator always says clear": Device("estimators", partial(Estimator, told=clear)),
-    "estimator repeats its last value": Device("estimators", LastValue),
-    "estimator trusts the sign map": Device("estimators", TrustsTheMap),
-    "estimator has no sign map": Device("estimators", WithoutSigns),
+    "estimator 30 % too far": Device("estimators", partial(Estimator, broken=changed(partial(scaled, 1.3)))),
+    "estimator 30 % too near": Device("estimators", partial(Estimator, broken=changed(partial(scaled, 0.7)))),
+    "estimator always says clear": Device("estimators", partial(Estimator, broken=changed(clear))),
+    "estimator repeats its last value": Device("estimators", lambda sound: Estimator(sound, LastValue())),
+    "estimator trusts the sign map": Device("estimators", partial(Estimator, broken=trusts_the_map)),
+    "estimator has no sign map": Device("estimators", partial(Estimator, broken=without_signs)),
     "fusion never widens": Device("fusion", NeverWidens),
     "no fog lamps": Device("lighting_policy", NoFogLamps),
     "camera frozen for 5 s, time and again": Device(settings=camera_fault("fault: frozen, time_stamp: delivery")),

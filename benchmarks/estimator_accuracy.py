@@ -81,14 +81,7 @@ def road(
 
 
 def measure_unit(
-    unit: Unit,
-    scenes: int,
-    draws: int,
-    seed: int,
-    forms: tuple[str, ...],
-    pitch: float,
-    surface: str,
-    repairs: float,
+    unit: Unit, scenes: int, draws: int, seed: int, forms: tuple[str, ...], pitch: float, surface: str, repairs: float
 ) -> list[Row]:
     """Every fog, exposure and form of one instant under one camera."""
     number, index = unit

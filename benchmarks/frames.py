@@ -21,34 +21,36 @@ import math
 import statistics
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import staging
 from harness import Row, lines_of, parse_options, publish
 from numpy.typing import NDArray
 
-import fogsim
 from fogsim.camera import mounted_pose
 from fogsim.ego.view_rendering import ViewRenderer
 from fogsim.scenario import Scenario, build
 from fogsim.scene import build_scene, vehicle_batches
-from fogsim.traffic.road.network import read_net, road_network
-from fogsim.values import Lamp, RoadNetwork, Sign, SignMap, TrafficState
+from fogsim.values import Lamp, TrafficState
 
-ROUTE = ("approach", "bank", "exit")
-LANES = (-3.75, 0.0, 3.75)  # to the left of the route, which is the middle lane [m]
 VEHICLES, SIGNS, START, STEP, ROUND = 30, 10, 400.0, 2.5, 20
-SIZES = {  # length, width and height [m]
-    "car": (4.5, 1.8, 1.5),
-    "van": (5.9, 2.0, 2.6),
-    "truck": (16.5, 2.5, 4.0),
-    "bus": (12.0, 2.55, 3.2),
-    "motorcycle": (2.1, 0.8, 1.5),
-}
 KINDS = ("car", "car", "truck", "car", "van", "car", "bus", "car", "car", "motorcycle")
 LIGHTS = {"day": 10_000.0, "night": 0.5, "photons": 10_000.0}  # [lx]; the last with the airlight of photons
 Key = tuple[str, str, str, int]
 """Renderer, light, size and samples a pixel side of a case."""
+
+LIT = Lamp.POSITION | Lamp.LOW_BEAM | Lamp.REAR_FOG
+LANES = (-3.75, 0.0, 3.75)  # to the left of the route, which is the middle lane [m]
+SHOT = staging.Shot(
+    "",
+    station=START,
+    vehicles=tuple(staging.Vehicle(KINDS[n % len(KINDS)], 12.0 + 8.0 * n, LANES[n % 3], LIT) for n in range(VEHICLES)),
+    boards=tuple(staging.Board("speed_limit", 65.0 + 25.0 * n, -6.0, 80.0, 0.75) for n in range(SIGNS)),
+    lamps=LIT,
+)
+"""What is drawn."""
 
 RENDERERS = ("opengl", "cpu")
 STAGES = ("scene", "render", "air", "camera")
@@ -56,66 +58,10 @@ STAGES = ("scene", "render", "air", "camera")
 
 def scenario(renderer: str, light: str, size: str, samples: int) -> Scenario:
     """The scenario with homogeneous fog and a camera of a given size and antialiasing."""
-    width, height = size.split("x")
-    camera = (f"camera.width={width}", f"camera.height={height}", f"camera.samples={samples}")
     airlight = "photons" if light == "photons" else "koschmieder"
-    lit = (
-        f"fog={{visibility_m: 100, airlight: {airlight}}}",
-        f"light.illuminance_lx={LIGHTS[light]}",
-        f"renderer={renderer}",
-    )
-    return fogsim.load_scenario("motorway_fog_bank", [*camera, *lit])
-
-
-def read_network() -> RoadNetwork:
-    """Roads of the scenario."""
-    described = fogsim.load_scenario("motorway_fog_bank")
-    net = build.traffic_setup(described).net
-    if net is None:
-        raise ValueError("the scenario motorway_fog_bank has no net")
-    return road_network(read_net(net), ROUTE)
-
-
-def place(route: NDArray[np.float64], station: float, left: float) -> tuple[NDArray[np.float64], float]:
-    """Point next to the route and the direction there."""
-    stations = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(route[:, :2], axis=0), axis=1))))
-    here, ahead = (np.array([np.interp(s, stations, route[:, i]) for i in range(3)]) for s in (station, station + 1.0))
-    heading = math.atan2(ahead[1] - here[1], ahead[0] - here[0])
-    return here + left * np.array([-math.sin(heading), math.cos(heading), 0.0]), heading
-
-
-def signs_beside(route: NDArray[np.float64]) -> SignMap:
-    """Signs to the right of the road."""
-    signs = []
-    for number in range(SIGNS):
-        (x, y, z), heading = place(route, START + 65.0 + 25.0 * number, -6.0)
-        signs.append(Sign(f"sign {number}", "speed_limit", 80 / 3.6, (x, y, z + 2.2), heading, 0.75))
-    return SignMap(tuple(signs))
-
-
-def traffic_at(route: NDArray[np.float64], travelled: float) -> TrafficState:
-    """The ego and the vehicles ahead of it, all of which have travelled as far."""
-    kinds = ["car", *(KINDS[number % len(KINDS)] for number in range(VEHICLES))]
-    stations = [0.0, *(12.0 + 8.0 * number + SIZES[kind][0] for number, kind in enumerate(kinds[1:]))]
-    lanes = [0.0, *(LANES[number % 3] for number in range(VEHICLES))]
-    places = [place(route, START + travelled + s, lane) for s, lane in zip(stations, lanes, strict=True)]
-    n, lit = len(kinds), Lamp.POSITION | Lamp.LOW_BEAM | Lamp.REAR_FOG
-    size = np.array([SIZES[kind] for kind in kinds])
-    return TrafficState(
-        time=0.0,
-        ids=tuple(f"vehicle {number}" for number in range(n)),
-        types=tuple(kinds),
-        position=np.array([position for position, _ in places]),
-        heading=np.array([heading for _, heading in places]),
-        speed=np.full(n, 25.0),
-        acceleration=np.zeros(n),
-        length=size[:, 0],
-        width=size[:, 1],
-        height=size[:, 2],
-        lane=("",) * n,
-        lamps=np.full(n, int(lit), np.int32),
-        paint=np.random.default_rng(1).uniform(0.05, 0.6, (n, 3)),
-    )
+    settings = (f"camera.samples={samples}", f"light.illuminance_lx={LIGHTS[light]}")
+    width, height = map(int, size.split("x"))
+    return staging.scenario((*settings, f"fog={{visibility_m: 100, airlight: {airlight}}}"), renderer, (width, height))
 
 
 class Timed:
@@ -142,12 +88,13 @@ class Timed:
 class Case:
     """One renderer in one light at one size, ready to take frames."""
 
-    def __init__(self, key: Key, network: RoadNetwork) -> None:
-        described = scenario(*key)
+    def __init__(self, key: Key) -> None:
+        described, roads = scenario(*key), staging.network("motorway")
         camera, setback = build.camera(described), build.camera_mount(described).setback
-        self._view_renderer = ViewRenderer(described, network, signs_beside(network.route))
+        self._view_renderer = ViewRenderer(described, roads, staging.signs(roads.route, SHOT))
         self._camera_sensor, self._rng = build.camera_sensor(described), np.random.default_rng(1)
-        self.traffic = [traffic_at(network.route, STEP * number) for number in range(ROUND)]
+        shots = [replace(SHOT, station=START + STEP * number) for number in range(ROUND)]
+        self.traffic = [staging.traffic(roads.route, shot) for shot in shots]
         self.poses = [mounted_pose(camera, one.position[0], float(one.heading[0]), setback) for one in self.traffic]
         self._render = self._view_renderer._renderer = Timed(self._view_renderer._renderer, "render")
         self._air = self._view_renderer._air = Timed(self._view_renderer._air, "radiance")
@@ -168,9 +115,10 @@ class Case:
         self._view_renderer.close()
 
 
-def triangles(network: RoadNetwork, state: TrafficState) -> int:
+def triangles(state: TrafficState) -> int:
     """Number of triangles in the scene at full detail, the vehicles' among them."""
-    scene = build_scene(network, signs_beside(network.route), np.random.default_rng(1))
+    roads = staging.network("motorway")
+    scene = build_scene(roads, staging.signs(roads.route, SHOT), np.random.default_rng(1))
     copies = (*scene.scenery, *vehicle_batches(state, 0))
     return len(scene.ground.faces) + sum(len(scene.shapes[b.shape].faces) * len(b.transforms) for b in copies)
 
@@ -228,12 +176,9 @@ def main() -> None:
         frames=(60, "frames a repetition"),
         repeat=(5, "repetitions"),
     )
-    network = read_network()
-    cases = {
-        key: Case(key, network) for key in itertools.product(given.renderer, given.light, given.size, given.samples)
-    }
-    traffic = next(iter(cases.values())).traffic[0]
-    shared = {"triangles": triangles(network, traffic), "vehicles": VEHICLES, "signs": SIGNS}
+    cases = {key: Case(key) for key in itertools.product(given.renderer, given.light, given.size, given.samples)}
+    shown = triangles(next(iter(cases.values())).traffic[0])
+    shared = {"triangles": shown, "vehicles": VEHICLES, "signs": SIGNS}
     records = [one | shared for one in measure(cases, given.frames, given.repeat)]
     for one in cases.values():
         one.close()

@@ -15,14 +15,7 @@ from fogsim.metrics.estimation import Errors
 from fogsim.units import extinction_from_visibility
 
 SCENARIOS = {
-    "papers_by_day": (
-        "negru2013",
-        "zhu2015",
-        "huang2015_rough",
-        "huang2015_lead",
-        "huang2015",
-        "belaroussi2015",
-    ),
+    "papers_by_day": ("negru2013", "zhu2015", "huang2015_rough", "huang2015_lead", "huang2015", "belaroussi2015"),
     "rural_night_alone": ("gallen2014_veil",),
     "rural_night_oncoming": ("gallen2014", "gallen2014_halo"),
 }
@@ -54,11 +47,7 @@ def _judged(errors: Errors, bounds: list[bool]) -> Row:
     found = errors.result()
     names = ("count", "valid_share", "median_error_percent", "p95_error_percent", "coverage_share")
     share = len(bounds) / errors.asked if errors.asked else 0.0
-    return {
-        **{name: found[name] for name in names},
-        "bounds_share": share,
-        "bounds_hold": mean(bounds),
-    }
+    return {**{name: found[name] for name in names}, "bounds_share": share, "bounds_hold": mean(bounds)}
 
 
 def docs_table(found: list[Row]) -> list[str]:

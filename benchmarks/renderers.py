@@ -7,16 +7,13 @@ the resident set, and of what the C library's allocator has handed out and not g
 from scattered free memory.
 
     python benchmarks/renderers.py [--json] [--renderers 200] [--frames 10000] [--renderer cpu ...]
-
-Found with 200 renderers and 10,000 frames (llvmpipe of Mesa 22.3, 2-core Linux machine busy with other work), growth of
-resident set / allocator: "cpu" 0.56 / 0.07 KiB per renderer, 0.0 / 0.0 KiB per 1000 frames; "opengl" 30 / 0.07 and
-729 / 0.0. Mesa's resident set settles slowly, by about 5 MiB in all: with 20,000 frames 0.3 KiB per 1000 are left.
 """
 
 import numpy as np
-from frames import RENDERERS, Case, read_network, scenario, signs_beside
+from frames import RENDERERS, SHOT, Case, scenario
 from harness import Row, apart, parse_options, publish
 from resets import growth
+from staging import network, signs
 
 from fogsim.render import make_renderer
 from fogsim.scenario import build
@@ -27,10 +24,10 @@ SIZES = ("160x120", "320x240")
 
 def soak(renderer: str, renderers: int, frames: int) -> Row:
     """One record."""
-    network = read_network()
-    scene = build_scene(network, signs_beside(network.route), np.random.default_rng(1))
+    roads = network("motorway")
+    scene = build_scene(roads, signs(roads.route, SHOT), np.random.default_rng(1))
     cameras = [build.camera(scenario(renderer, "day", size, 1)) for size in SIZES]
-    cases = [Case((renderer, "day", size, 1), network) for size in SIZES]
+    cases = [Case((renderer, "day", size, 1)) for size in SIZES]
     vehicles, pose = vehicle_batches(cases[0].traffic[0], 0), cases[0].poses[0]
 
     def make_and_close(_: int) -> None:

@@ -12,24 +12,6 @@ tells a leak from scattered free memory.
     python benchmarks/resets.py [--json] [--resets 200] [--size 64x48] [--part environment …]
 
 The soak test is ``python benchmarks/resets.py --resets 1000``.
-
-Found with libsumo 1.28 on a 2-core Linux machine, growth per reset of resident set / allocator:
-
-    sumo         1000 resets   1.6 KiB / 1.8 KiB
-    traffic       750 resets   2.1 KiB / 1.7 KiB   (counted from the 250th on)
-    environment  1000 resets   3.1 KiB / 2.1 KiB
-
-    highway      1500 resets   8.2 KiB / 3.1 KiB   (no Python object is left; bare highway-v0 has 3.6)
-
-    episodes     1000 resets   1.4 KiB / 1.4 KiB
-    advisory-v1  1000 resets  12.7 KiB / 1.4 KiB
-    fast-v1      1000 resets   3.4 KiB / 1.4 KiB
-    highway-v1    240 resets  none     / none      (counted from the 60th on)
-
-So most of what grows is SUMO's own ``load``, below 2 KiB each whether the seed changes or not, some 2 MiB in 1000
-resets; our stages, the scene, the renderer and the estimators add at most 0.5 KiB to it. The resident set settles
-slowly, so short runs show more. Also where each reset has another road what is not given back is what ``load`` keeps;
-the resident set grows more, which is no memory in use: probably free memory scattered among scenes of all sizes.
 """
 
 import ctypes

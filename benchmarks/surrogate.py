@@ -10,12 +10,13 @@ each light and each class of visibility with 30 estimates or more.
 """
 
 import itertools
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from harness import Row, parse_options, publish
+from harness import Row, lines_of, parse_options, publish
 from numpy.typing import NDArray
 from scipy.stats import ks_2samp, norm
 
@@ -189,10 +190,29 @@ def compare(real: list[list[Record]], drawn: list[list[Record]]) -> list[Row]:
     return records
 
 
+def shown(record: Row) -> tuple[str, ...]:
+    """A record in cells of the docs' table."""
+    above, far = record["visibility_to_m"], record["distance"]
+    ratio = (
+        "–"
+        if far is None
+        else " / ".join(f"{math.exp(record[k]):.2f}" for k in ("median_error", "surrogate_median_error"))
+    )
+    return (
+        record["light"],
+        f"{record['visibility_from_m']:.0f} … " + ("∞" if above is None else f"{above:.0f}") + " m",
+        str(record["estimates"]),
+        f"{100 * record['valid_share']:.0f} / {100 * record['surrogate_valid_share']:.0f} %",
+        ratio,
+        "–" if far is None else f"{far:.2f}",
+    )
+
+
 def main() -> None:
     """Run it from the command line."""
     given = parse_options(
         __doc__,
+        docs=("reference/environments.md", "surrogate"),
         episodes=(60, "how many"),
         split=("test", "of which", ("train", "test")),
         fit=(False, "write the table again, by the split train"),
@@ -200,7 +220,10 @@ def main() -> None:
     runs = list(episodes(given.episodes, "train" if given.fit else given.split))
     if given.fit:
         MEASURED.write_text(fit(runs, runs[0][0].estimate.method).as_json() + "\n", encoding="utf-8")
-    publish(given, compare(runs, redrawn(runs, SurrogateTable.load())))
+    records = compare(runs, redrawn(runs, SurrogateTable.load()))
+    ratio = "median k / true k: real / drawn"
+    heads = ("light", "visibility ahead", "estimates", "valid: real / drawn", ratio, "KS distance")
+    publish(given, records, docs=lines_of(heads, map(shown, records)))
 
 
 if __name__ == "__main__":

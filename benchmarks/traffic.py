@@ -11,7 +11,8 @@ Times are the processor's, medians over blocks [ms]. ``ratio`` is the median of 
 quarter of them lie below ``ratio_low``, a quarter above ``ratio_high``. ``ratio_quiet`` is that of the least times of
 either kind, which other work on the machine disturbs least. ``ms_state`` is the share of the reading.
 
-The simulation is a .sumocfg with SUMO's own defaults, which FogSim's own scenarios share.
+The simulation is a .sumocfg with SUMO's own defaults, which FogSim's own scenarios share. The town needs SUMO's
+netgenerate and netconvert (eclipse-sumo); without them only the motorway is measured.
 
     python benchmarks/traffic.py [--json] [--network town] [--vehicles 20 --vehicles 100 …] [--seconds 10] [--blind]
         [--visibility 100] [--profile]
@@ -29,7 +30,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from harness import parse_options, publish
-from traffic_town import town_configuration
+from traffic_town import has_programs, town_configuration
 
 from fogsim.atmosphere import FieldAccess
 from fogsim.scenario import build
@@ -199,12 +200,14 @@ def main() -> None:
     given = parse_options(
         __doc__,
         vehicles=([20, 100, 500, 2000], "vehicles"),
-        network=(list(CONFIGURATIONS), "which", CONFIGURATIONS),
+        network=(list(CONFIGURATIONS) if has_programs() else ["motorway"], "which", CONFIGURATIONS),
         visibility=(100.0, "V_met [m]"),
         profile=(False, "tell where the time goes, and no ratio to be trusted"),
         seconds=(10.0, "time to measure for each number"),
         blind=(False, "leave perception and speed choice out"),
     )
+    if "town" in given.network and not has_programs():
+        given.error("--network town needs SUMO's netgenerate and netconvert: pip install eclipse-sumo")
     profile = cProfile.Profile() if given.profile else None
     records = []
     for network in given.network:

@@ -60,7 +60,6 @@ def main(root: Path = ROOT, measurements: tuple[Measurement, ...] = MEASUREMENTS
         ("--stamp", "record tables as measured by the code as it is now"),
     ):
         parser.add_argument(option, action="store_true", help=meaning)
-    parser.add_argument("--commit", help="with --stamp: by the code of this commit")
     given = parser.parse_args()
     if unknown := [name for name in given.names if name not in names]:
         parser.error(f"no tables are called {', '.join(unknown)}; there are {', '.join(names)}")
@@ -79,10 +78,7 @@ def main(root: Path = ROOT, measurements: tuple[Measurement, ...] = MEASUREMENTS
         say(listed(stamps, chosen, with_files=given.list))
     elif given.page or given.stamp:
         for one in chosen if given.stamp else ():
-            if given.commit:
-                stamps.write_from_commit(one, given.commit)
-            else:
-                stamps.write(one, stamps.checkout().files(one.rests_on), None)
+            stamps.write(one, stamps.checkout().files(one.rests_on), None)
         stamps.write_pages()
     else:
         return rerun(Round(stamps, Console(stderr=True)), chosen)

@@ -25,9 +25,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import staging
 from harness import Row, lines_of, parse_options, publish
 from numpy.typing import NDArray
+from staging import Board, Shot, Vehicle, network, signs, traffic
+from staging import scenario as staged
 
 from fogsim.camera import mounted_pose
 from fogsim.ego.view_rendering import ViewRenderer
@@ -43,11 +44,11 @@ Key = tuple[str, str, str, int]
 
 LIT = Lamp.POSITION | Lamp.LOW_BEAM | Lamp.REAR_FOG
 LANES = (-3.75, 0.0, 3.75)  # to the left of the route, which is the middle lane [m]
-SHOT = staging.Shot(
+SHOT = Shot(
     "",
     station=START,
-    vehicles=tuple(staging.Vehicle(KINDS[n % len(KINDS)], 12.0 + 8.0 * n, LANES[n % 3], LIT) for n in range(VEHICLES)),
-    boards=tuple(staging.Board("speed_limit", 65.0 + 25.0 * n, -6.0, 80.0, 0.75) for n in range(SIGNS)),
+    vehicles=tuple(Vehicle(KINDS[n % len(KINDS)], 12.0 + 8.0 * n, LANES[n % 3], LIT) for n in range(VEHICLES)),
+    boards=tuple(Board("speed_limit", 65.0 + 25.0 * n, -6.0, 80.0, 0.75) for n in range(SIGNS)),
     lamps=LIT,
 )
 """What is drawn."""
@@ -61,7 +62,7 @@ def scenario(renderer: str, light: str, size: str, samples: int) -> Scenario:
     airlight = "photons" if light == "photons" else "koschmieder"
     settings = (f"camera.samples={samples}", f"light.illuminance_lx={LIGHTS[light]}")
     width, height = map(int, size.split("x"))
-    return staging.scenario((*settings, f"fog={{visibility_m: 100, airlight: {airlight}}}"), renderer, (width, height))
+    return staged((*settings, f"fog={{visibility_m: 100, airlight: {airlight}}}"), renderer, (width, height))
 
 
 class Timed:
@@ -89,12 +90,12 @@ class Case:
     """One renderer in one light at one size, ready to take frames."""
 
     def __init__(self, key: Key) -> None:
-        described, roads = scenario(*key), staging.network("motorway")
+        described, roads = scenario(*key), network("motorway")
         camera, setback = build.camera(described), build.camera_mount(described).setback
-        self._view_renderer = ViewRenderer(described, roads, staging.signs(roads.route, SHOT))
+        self._view_renderer = ViewRenderer(described, roads, signs(roads.route, SHOT))
         self._camera_sensor, self._rng = build.camera_sensor(described), np.random.default_rng(1)
         shots = [replace(SHOT, station=START + STEP * number) for number in range(ROUND)]
-        self.traffic = [staging.traffic(roads.route, shot) for shot in shots]
+        self.traffic = [traffic(roads.route, shot) for shot in shots]
         self.poses = [mounted_pose(camera, one.position[0], float(one.heading[0]), setback) for one in self.traffic]
         self._render = self._view_renderer._renderer = Timed(self._view_renderer._renderer, "render")
         self._air = self._view_renderer._air = Timed(self._view_renderer._air, "radiance")
@@ -117,8 +118,8 @@ class Case:
 
 def triangles(state: TrafficState) -> int:
     """Number of triangles in the scene at full detail, the vehicles' among them."""
-    roads = staging.network("motorway")
-    scene = build_scene(roads, staging.signs(roads.route, SHOT), np.random.default_rng(1))
+    roads = network("motorway")
+    scene = build_scene(roads, signs(roads.route, SHOT), np.random.default_rng(1))
     copies = (*scene.scenery, *vehicle_batches(state, 0))
     return len(scene.ground.faces) + sum(len(scene.shapes[b.shape].faces) * len(b.transforms) for b in copies)
 

@@ -17,18 +17,13 @@ Constants were chosen on pool 0 (other seeds, banks and cameras); pool 1 is what
     python benchmarks/belief.py [--json] [--docs] [--pool 1]
 """
 
-import argparse
-import json
 import math
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from functools import partial
 
 import numpy as np
-from docs_table import write_table
-from rich.console import Console
-from rich.progress import track
+from harness import Row, lines_of, mean, median, parse_options, progress, publish, quantile, timed
 
 import fogsim
 from fogsim.fusion import DatedFusion, make
@@ -46,8 +41,6 @@ PLACES = (50.0, 100.0, 200.0, 400.0)
 LEAD, DELAY, REPORT_DEVIATION = 300.0, 1.0, 0.1
 BANK_START, ENTERED, SETTLING = 1300.0, 60.0, 5.0
 FUSIONS = ("mixture_filter", "grid_filter", "field_filter", "reported")
-
-Row = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,10 +144,9 @@ def follow(name: str, seen: list[Seen], found: Found, seed: int) -> None:
     fusion = DatedFusion(make("field_filter" if name == "reported" else name))
     inside: float | None = None
     for number, one in enumerate(seen):
-        started = time.perf_counter()
         heard = reports(seen, number, rng) if name == "reported" else ()
-        belief = fusion.update_at(one.estimates, one.time, one.place, heard)
-        found.spent.append(1e3 * (time.perf_counter() - started))
+        belief, spent = timed(partial(fusion.update_at, one.estimates, one.time, one.place, heard))
+        found.spent.append(spent)
         judge(one, belief, found)
         if one.place >= BANK_START + ENTERED and one.ahead > FOG:
             inside = one.time if inside is None else inside
@@ -179,56 +171,46 @@ def records(found: dict[tuple[str, str], Found], pool: int) -> Iterator[Row]:
     """A record for each kind of drive and fusion."""
     for (kind, name), one in together(found).items():
         row: Row = {"pool": pool, "drive": kind, "fusion": name, "steps": len(one.spent)}
-        row |= {"median_pct": float(np.median(one.errors)), "p95_pct": float(np.quantile(one.errors, 0.95))}
-        row |= {"coverage": float(np.mean(one.held)), "ms": float(np.median(one.spent))}
+        row |= {"median_pct": median(one.errors), "p95_pct": quantile(one.errors, 0.95)}
+        row |= {"coverage": mean(one.held), "ms": median(one.spent)}
         if one.here:
             errors, held = zip(*one.here, strict=True)
-            row |= {"here_pct": float(np.median(errors)), "here_p95_pct": float(np.quantile(errors, 0.95))}
-            row["here_coverage"] = float(np.mean(held))
+            row |= {"here_pct": median(errors), "here_p95_pct": quantile(errors, 0.95), "here_coverage": mean(held)}
         if kind == "bank":
-            row["entered_pct"] = float(np.median(one.entered))
+            row["entered_pct"] = median(one.entered)
         for place, told in sorted(one.places.items()):
             errors, held = zip(*told, strict=True)
-            row |= {f"at_{place:.0f}_pct": float(np.median(errors)), f"at_{place:.0f}_coverage": float(np.mean(held))}
+            row |= {f"at_{place:.0f}_pct": median(errors), f"at_{place:.0f}_coverage": mean(held)}
         yield row
 
 
-def table(rows: list[Row]) -> Iterator[str]:
+def table(rows: list[Row]) -> list[str]:
     """Lines of the table."""
-    places = [f"{place:.0f}" for place in PLACES]
     told = "median / p95 % (held)"
-    yield f"| drive | fusion | ahead, {told} | here, {told} | entered, % | {' | '.join(f'at {p} m' for p in places)} |"
-    yield f"|---|---|---|---|---|{'---|' * len(places)}"
-    for row in rows:
-        ahead = f"{row['median_pct']:.1f} / {row['p95_pct']:.0f} ({row['coverage']:.2f})"
-        here = (
-            f"{row['here_pct']:.1f} / {row['here_p95_pct']:.0f} ({row['here_coverage']:.2f})"
-            if "here_pct" in row
-            else ""
-        )
-        entered = f"{row['entered_pct']:.0f}" if "entered_pct" in row else ""
-        there = (
-            f"{row[f'at_{p}_pct']:.0f} ({row[f'at_{p}_coverage']:.2f})" if f"at_{p}_pct" in row else "" for p in places
-        )
-        yield f"| {row['drive']} | {row['fusion']} | {ahead} | {here} | {entered} | {' | '.join(there)} |"
+    heads = ("drive", "fusion", f"ahead, {told}", f"here, {told}", "entered, %", *(f"at {p:.0f} m" for p in PLACES))
+    return lines_of(heads, map(_cells, rows))
+
+
+def _cells(row: Row) -> list[str]:
+    ahead = f"{row['median_pct']:.1f} / {row['p95_pct']:.0f} ({row['coverage']:.2f})"
+    told = "here_pct" in row
+    here = f"{row['here_pct']:.1f} / {row['here_p95_pct']:.0f} ({row['here_coverage']:.2f})" if told else ""
+    places = [f"at_{place:.0f}" for place in PLACES]
+    there = (f"{row[f'{at}_pct']:.0f} ({row[f'{at}_coverage']:.2f})" if f"{at}_pct" in row else "" for at in places)
+    entered = f"{row['entered_pct']:.0f}" if "entered_pct" in row else ""
+    return [row["drive"], row["fusion"], ahead, here, entered, *there]
 
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/explanation/belief.md")
-    parser.add_argument("--pool", type=int, choices=(0, 1), default=1, help="0: constants chosen on it")
-    arguments = parser.parse_args()
+    given = parse_options(__doc__, docs=("explanation/belief.md", "belief"), pool=1)
     found: dict[tuple[str, str], Found] = {}
-    for drive in track(list(drives(arguments.pool)), "drives", console=Console(stderr=True)):
+    for drive in progress(list(drives(given.pool)), "drives"):
         seen = taken(drive)
         for name in FUSIONS:
             follow(name, seen, found.setdefault((drive.kind, name), Found()), drive.seed)
-    rows = list(records(found, arguments.pool))
-    if arguments.docs:
-        write_table("explanation/belief.md", "belief", table(rows))
-    print(json.dumps(rows, indent=2) if arguments.json else "\n".join(table(rows)))
+    rows = list(records(found, given.pool))
+    publish(given, rows, table(rows))
 
 
 if __name__ == "__main__":

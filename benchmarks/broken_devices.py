@@ -7,8 +7,6 @@ one fails nowhere.
     python benchmarks/broken_devices.py [--json] [--docs] [--all] [-j 2] [--devices …] [--scenarios FILES …]
 """
 
-import argparse
-import json
 import math
 import multiprocessing
 import sys
@@ -20,7 +18,7 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from docs_table import write_table
+from harness import ROOT, Row, lines_of, parse_options, publish
 
 from fogsim.errors import InputError
 from fogsim.scenario import build
@@ -32,15 +30,17 @@ from fogsim.values.belief import certain_belief
 
 SOUND = "none: the sound device"
 
-ROOT = Path(__file__).resolve().parent.parent
+
+Update = Callable[[Any, Observation], Estimate]
+"""What a broken estimator makes of the sound one and an observation."""
 
 
 @dataclass
 class Estimator:
-    """An estimator with `told` in place of what it says."""
+    """An estimator with another update."""
 
     sound: Any
-    told: Callable[[Estimate], Estimate]
+    broken: Update
 
     @property
     def method(self) -> str:
@@ -52,47 +52,40 @@ class Estimator:
         self.sound.reset()
 
     def update(self, observation: Observation) -> Estimate:
-        """Say something else."""
-        return self.told(self.sound.update(observation))
+        """Update in another way."""
+        return self.broken(self.sound, observation)
 
 
-@dataclass
-class LastValue(Estimator):
-    """An estimator that repeats its last value where it cannot tell."""
+class LastValue:
+    """Repeats the last value where there is no estimate."""
 
-    told: Callable[[Estimate], Estimate] = lambda estimate: estimate
-    last: Estimate | None = None
+    def __init__(self) -> None:
+        self._last: Estimate | None = None
 
-    def update(self, observation: Observation) -> Estimate:
-        """Say what it said before."""
-        estimate: Estimate = self.sound.update(observation)
-        if estimate.valid or self.last is None:
-            self.last = estimate
-        return self.last
-
-
-@dataclass
-class WithoutSigns(Estimator):
-    """An estimator that is told of no sign."""
-
-    told: Callable[[Estimate], Estimate] = lambda estimate: estimate
-
-    def update(self, observation: Observation) -> Estimate:
-        """Say what is seen without the map."""
-        return self.sound.update(replace(observation, signs=()))
+    def __call__(self, sound: Any, observation: Observation) -> Estimate:
+        """Return the last value, or the new one."""
+        estimate: Estimate = sound.update(observation)
+        if estimate.valid or self._last is None:
+            self._last = estimate
+        return self._last
 
 
-@dataclass
-class TrustsTheMap(Estimator):
-    """An estimator that takes every sign of the map for seen: it never says less than the way to the farthest."""
+def without_signs(sound: Any, observation: Observation) -> Estimate:
+    """Estimate without the map's signs."""
+    estimate: Estimate = sound.update(replace(observation, signs=()))
+    return estimate
 
-    told: Callable[[Estimate], Estimate] = lambda estimate: estimate
 
-    def update(self, observation: Observation) -> Estimate:
-        """Say that it sees as far as the map goes, or farther."""
-        estimate: Estimate = self.sound.update(observation)
-        farthest = max((sign.distance for sign in observation.signs), default=0.0)
-        return scaled(max(farthest / estimate.visibility, 1.0), estimate) if estimate.valid else estimate
+def trusts_the_map(sound: Any, observation: Observation) -> Estimate:
+    """Take every sign of the map for seen: no less than the way to the farthest is reported."""
+    estimate: Estimate = sound.update(observation)
+    farthest = max((sign.distance for sign in observation.signs), default=0.0)
+    return scaled(max(farthest / estimate.visibility, 1.0), estimate) if estimate.valid else estimate
+
+
+def changed(change: Callable[[Estimate], Estimate]) -> Update:
+    """Change estimates."""
+    return lambda sound, observation: change(sound.update(observation))
 
 
 @dataclass
@@ -183,17 +176,7 @@ def clear(estimate: Estimate) -> Estimate:
 
 @dataclass(frozen=True)
 class Device:
-    """A broken device.
-
-    Attributes
-    ----------
-    part : str
-        Function of `fogsim.scenario.build` whose result is broken; empty for none.
-    broken : callable
-        What takes the place of the sound part.
-    settings : tuple of str
-        Overrides of the scenario.
-    """
+    """A broken device: the function of `fogsim.scenario.build` whose result is replaced, by what, and overrides."""
 
     part: str = ""
     broken: Callable[[Any], Any] = lambda sound: sound
@@ -217,12 +200,12 @@ DEVICES = {
     "adviser 30 % too fast": Device("adviser", partial(Adviser, advised=fast_advice)),
     "adviser holds its first advice": Device("adviser", partial(Adviser, advised=first_advice)),
     "advice 5 s late": Device("adviser", lambda sound: Adviser(sound, LateAdvice())),
-    "estimator 30 % too far": Device("estimators", partial(Estimator, told=partial(scaled, 1.3))),
-    "estimator 30 % too near": Device("estimators", partial(Estimator, told=partial(scaled, 0.7))),
-    "estimator always says clear": Device("estimators", partial(Estimator, told=clear)),
-    "estimator repeats its last value": Device("estimators", LastValue),
-    "estimator trusts the sign map": Device("estimators", TrustsTheMap),
-    "estimator has no sign map": Device("estimators", WithoutSigns),
+    "estimator 30 % too far": Device("estimators", partial(Estimator, broken=changed(partial(scaled, 1.3)))),
+    "estimator 30 % too near": Device("estimators", partial(Estimator, broken=changed(partial(scaled, 0.7)))),
+    "estimator always says clear": Device("estimators", partial(Estimator, broken=changed(clear))),
+    "estimator repeats its last value": Device("estimators", lambda sound: Estimator(sound, LastValue())),
+    "estimator trusts the sign map": Device("estimators", partial(Estimator, broken=trusts_the_map)),
+    "estimator has no sign map": Device("estimators", partial(Estimator, broken=without_signs)),
     "fusion never widens": Device("fusion", NeverWidens),
     "no fog lamps": Device("lighting_policy", NoFogLamps),
     "camera frozen for 5 s, time and again": Device(settings=camera_fault("fault: frozen, time_stamp: delivery")),
@@ -243,7 +226,7 @@ def tests_with(files: Iterable[Path], device: Device) -> Iterator[FogTest]:
             print(f"{file}: {str(error).splitlines()[0]}", file=sys.stderr)
 
 
-def measure(name: str, files: Sequence[Path], *, goes_on: bool) -> dict[str, Any]:
+def measure(name: str, files: Sequence[Path], *, goes_on: bool) -> Row:
     """Record of a device: in which scenarios which expectations fail, or are inconclusive alone."""
     device = DEVICES[name]
     failed: dict[str, list[str]] = {}
@@ -279,35 +262,32 @@ def told(caught: dict[str, list[str]]) -> str:
     return "; ".join(f"{scenario}: {', '.join(names)}" for scenario, names in caught.items()) or "–"
 
 
-def table(records: Sequence[dict[str, Any]]) -> str:
+def table(records: Sequence[Row]) -> list[str]:
     """The records as a table."""
-    lines = ["| device | fails | only inconclusive | cases run |", "|---|---|---|---|"]
-    for record in records:
-        fails, unsure = told(record["failed"]), told(record["only_inconclusive"])
-        lines.append(f"| {record['device']} | {fails} | {unsure} | {record['cases']} of {record['cases_in_all']} |")
-    return "\n".join(lines)
+    rows = (
+        (one["device"], told(one["failed"]), told(one["only_inconclusive"]), f"{one['cases']} of {one['cases_in_all']}")
+        for one in records
+    )
+    return lines_of(("device", "fails", "only inconclusive", "cases run"), rows)
 
 
 def main() -> int:
     """Run and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", action="store_true", help="print records")
-    parser.add_argument("--docs", action="store_true", help="put the table into docs/reference/tests.md")
-    parser.add_argument("--all", action="store_true", help="all scenarios, also after the first that fails")
-    parser.add_argument("-j", type=int, default=1, help="devices at once")
-    parser.add_argument("--devices", nargs="+", choices=DEVICES, default=list(DEVICES))
-    parser.add_argument("--scenarios", nargs="+", default=[ROOT / "scenarios"], help="files, folders or names")
-    asked = parser.parse_args()
-    files = find_files(asked.scenarios)
-    work = partial(measure, files=files, goes_on=asked.all)
-    if asked.j == 1:
-        records = [work(name) for name in asked.devices]
+    given = parse_options(
+        __doc__,
+        docs=("reference/tests.md", "broken devices"),
+        all=(False, "all scenarios, also after the first that fails"),
+        j=(1, "devices at once"),
+        devices=(list(DEVICES), "which", DEVICES),
+        scenarios=([str(ROOT / "scenarios")], "files, folders or names"),
+    )
+    work = partial(measure, files=find_files(given.scenarios), goes_on=given.all)
+    if given.j == 1:
+        records = [work(name) for name in given.devices]
     else:
-        with multiprocessing.get_context("fork").Pool(asked.j, maxtasksperchild=1) as pool:
-            records = pool.map(work, asked.devices, chunksize=1)
-    print(json.dumps(records) if asked.json else table(records))
-    if asked.docs:
-        write_table("reference/tests.md", "broken devices", [table(records)])
+        with multiprocessing.get_context("fork").Pool(given.j, maxtasksperchild=1) as pool:
+            records = pool.map(work, given.devices, chunksize=1)
+    publish(given, records, table(records))
     wrong = [one["device"] for one in records if bool(one["failed"]) == (one["device"] == SOUND)]
     for name in wrong:
         print(f"not as it should be: {name}", file=sys.stderr)

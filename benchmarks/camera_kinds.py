@@ -19,7 +19,6 @@ an upper end: below 1000 m, in views that are no lane anywhere. No constant is c
 The second form reads photographs of the user: the CSV has the columns `file` and `visibility_m` (inf: clear).
 """
 
-import argparse
 import csv
 import itertools
 import math
@@ -29,12 +28,10 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from docs_table import lines_of, write_table
+from harness import parse_options, progress, publish
 from numpy.typing import NDArray
 from photograph_pictures import photograph
 from PIL import Image
-from rich.console import Console
-from rich.progress import track
 
 from fogsim.estimators import make
 from fogsim.offline import load_calibration
@@ -372,17 +369,18 @@ def show(folder: Path) -> None:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--images", type=int, default=4, help="photographs of each kind")
-    parser.add_argument("--pool", type=int, choices=(0, 1), default=POOL, help="0 to choose constants on")
-    parser.add_argument("--methods", nargs="+", default=["joint_road"])
-    parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS), metavar="KIND", help=", ".join(KINDS))
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/explanation/estimators.md")
-    parser.add_argument("--show", type=Path, help="folder to write pictures into, without measuring")
-    parser.add_argument("--photographs", type=Path, help="folder of the user's own photographs")
-    parser.add_argument("--measured", type=Path, help="CSV of their measured visibility")
-    parser.add_argument("--camera", type=Path, help="their camera")
-    given = parser.parse_args()
+    given = parse_options(
+        __doc__,
+        docs=("explanation/estimators.md", "camera kinds"),
+        pool=POOL,
+        images=(4, "photographs of each kind"),
+        methods=(["joint_road"], "estimators"),
+        kinds=(list(KINDS), "which kinds", KINDS),
+        show=(Path, "folder to write pictures into, without measuring"),
+        photographs=(Path, "folder of the user's own photographs"),
+        measured=(Path, "CSV of their measured visibility"),
+        camera=(Path, "their camera"),
+    )
     if given.show:
         show(given.show)
         return
@@ -391,17 +389,14 @@ def main() -> None:
     else:
         sets = {name: list(frames(KINDS[name], name, given.images, given.pool)) for name in given.kinds}
     rows, whole = [], dict[str, list[Found]]()
-    for name, some in track(sets.items(), "kinds", console=Console(stderr=True)):
+    for name, some in progress(sets.items(), "kinds"):
         most = CLEAR if name not in KINDS or KINDS[name].lane else math.inf
         for method in given.methods:
             found = estimates(method, some, most)
             whole.setdefault(method, []).extend(found)
-            rows.append((name, f"`{method}`", *summary(found).values()))
-    rows += [("all", f"`{method}`", *summary(found).values()) for method, found in whole.items()]
-    header = ("kind", "method", "valid", "median/p95, %", "hold", "wrong", "false")
-    Console().print("\n".join(lines_of(header, rows)), soft_wrap=True, markup=False)
-    if given.docs:
-        write_table("explanation/estimators.md", "camera kinds", lines_of(header, rows))
+            rows.append({"kind": name, "method": f"`{method}`", **summary(found)})
+    rows += [{"kind": "all", "method": f"`{method}`", **summary(found)} for method, found in whole.items()]
+    publish(given, rows)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ It measures the FogSim of the Python that runs it: away from the checkout, that 
     python benchmarks/cold_start.py [--json] [--repeat 3] [--scenario motorway_fog_bank ...]
 """
 
-import argparse
 import json
 import os
 import platform
@@ -22,17 +21,15 @@ import time
 from pathlib import Path
 from typing import Any
 
+from harness import parse_options
+
 SCENARIOS = ("motorway_fog_bank", "night_motorway_fog")
 
 
 def main() -> None:
     """Measure, and print a table or JSON."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true")
-    parser.add_argument("--repeat", type=int, default=3)
-    parser.add_argument("--scenario", action="append")
-    told = parser.parse_args()
-    records = [record for name in told.scenario or SCENARIOS for record in measured(name, told.repeat)]
+    told = parse_options(__doc__, repeat=(3, "repetitions"), scenario=(list(SCENARIOS), "which"))
+    records = [record for name in told.scenario for record in measured(name, told.repeat)]
     if told.json:
         print(json.dumps({"machine": machine(), "records": records}, indent=2))
         return

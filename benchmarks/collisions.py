@@ -16,15 +16,14 @@ as they enter, and complies without delay). Protocols:
 Collisions of the whole run count. Intervals are 95 % bootstrap intervals of the mean over seeds.
 """
 
-import argparse
-import json
+import itertools
 import math
 import tempfile
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from harness import ROOT, Row, mean, parse_options, publish
 
 import fogsim
 from fogsim.atmosphere import FieldAccess
@@ -39,7 +38,7 @@ FILLING, STANDING = 120, 90
 SECONDS = {"from_the_beginning": 240, "full_road": 160}
 """Time of a run by protocol [s]."""
 
-DEMAND = Path(__file__).resolve().parents[1] / "scenarios" / "motorway_fog_bank" / "motorway.rou.xml"
+DEMAND = ROOT / "scenarios" / "motorway_fog_bank" / "motorway.rou.xml"
 
 
 def early_ego(folder: Path) -> Path:
@@ -92,7 +91,7 @@ def one_run(visibility: float, protocol: str, oracle: bool, speed_choice: str, s
         return collisions
 
 
-def measure(visibility: float, protocol: str, oracle: bool, speed_choice: str, seeds: int) -> dict[str, Any]:
+def measure(visibility: float, protocol: str, oracle: bool, speed_choice: str, seeds: int) -> Row:
     """One record over all seeds."""
     runs = [one_run(visibility, protocol, oracle, speed_choice, seed) for seed in range(seeds)]
     counts = np.array([len(run) for run in runs])
@@ -109,31 +108,21 @@ def measure(visibility: float, protocol: str, oracle: bool, speed_choice: str, s
         "collisions_low": round(float(np.percentile(means, 2.5)), 3),
         "collisions_high": round(float(np.percentile(means, 97.5)), 3),
         "runs_with_collision": int((counts > 0).sum()),
-        "impact_speed_mean": round(float(np.mean(impacts)), 2) if impacts else None,
+        "impact_speed_mean": mean(impacts, 2),
     }
 
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--seeds", type=int, default=20, help="seeds for each visibility and policy")
-    parser.add_argument("--visibility", type=float, action="append", help="visibility [m] (default 60 and 1000)")
-    parser.add_argument("--protocol", choices=SECONDS, action="append", help="when advice begins (default both)")
-    parser.add_argument("--speed-choice", default="unaffected", help="how fast drivers drive in fog by themselves")
-    arguments = parser.parse_args()
-    records = [
-        measure(visibility, protocol, oracle, arguments.speed_choice, arguments.seeds)
-        for visibility in arguments.visibility or [60.0, 1000.0]
-        for protocol in arguments.protocol or SECONDS
-        for oracle in (False, True)
-    ]
-    if arguments.json:
-        print(json.dumps(records, indent=2))
-        return
-    print("  ".join(f"{key:>19}" for key in records[0]))
-    for record in records:
-        print("  ".join(f"{'-' if value is None else value!s:>19}" for value in record.values()))
+    given = parse_options(
+        __doc__,
+        seeds=(20, "seeds for each visibility and policy"),
+        visibility=([60.0, 1000.0], "visibilities [m]"),
+        protocol=(list(SECONDS), "when advice begins", SECONDS),
+        speed_choice=("unaffected", "how fast drivers drive in fog by themselves"),
+    )
+    cases = itertools.product(given.visibility, given.protocol, (False, True))
+    publish(given, [measure(*case, given.speed_choice, given.seeds) for case in cases])
 
 
 if __name__ == "__main__":

@@ -6,12 +6,11 @@ was gained over dark signs in the same episodes, too; half an hour for 30 episod
     python benchmarks/corridor.py [--episodes 6] [--json] [--policy rule …]
 """
 
-import argparse
-import json
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from harness import Row, lines_of, parse_options, publish
 
 from fogsim.units import KMH_PER_MPS
 from fogsim_envs import Evaluation, evaluate
@@ -24,49 +23,46 @@ def always(kmh: float) -> Callable[[Any, Any], int]:
     return lambda _observation, _info: level_of(kmh / KMH_PER_MPS)
 
 
-POLICIES: dict[str, Any] = {
-    **{name: name for name in SIGN_BASELINES},
-    "40 km/h": always(40.0),
-    "80 km/h": always(80.0),
-}
+POLICIES: dict[str, Any] = {**{name: name for name in SIGN_BASELINES}, "40 km/h": always(40.0), "80 km/h": always(80.0)}
 
 
-def record(name: str, found: Evaluation, dark: Evaluation) -> dict[str, Any]:
+def record(name: str, found: Evaluation, dark: Evaluation) -> Row:
     """Figures of a policy."""
     gain, gain_low, gain_high = found.minus(dark)
     terms = {term: float(np.mean([one.terms[term] for one in found.episodes])) for term in found.episodes[0].terms}
-    figures = {
-        "return": found.mean,
-        "low": found.low,
-        "high": found.high,
-        "gain": gain,
-        "gain_low": gain_low,
-        "gain_high": gain_high,
-        "collided": found.struck,
-        **terms,
-    }
+    figures = {"return": found.mean, "low": found.low, "high": found.high}
+    figures |= {"gain": gain, "gain_low": gain_low, "gain_high": gain_high, "collided": found.struck, **terms}
     return {"policy": name, "episodes": len(found.episodes), **{key: round(one, 2) for key, one in figures.items()}}
+
+
+TERMS = ("delay", "overdriving", "conflict", "collision")
+
+
+def cells(record: Row) -> tuple[str, ...]:
+    """A record in cells of the docs' table."""
+    returned = f"{record['return']:.1f} ({record['low']:.1f} … {record['high']:.1f})"
+    gain = f"{record['gain']:+.1f} ({record['gain_low']:+.1f} … {record['gain_high']:+.1f})"
+    terms = (f"{record[term]:.1f}" for term in TERMS)
+    return (record["policy"], returned, gain, f"{100 * record['collided']:.0f} %", *terms)
 
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--episodes", type=int, default=6)
-    parser.add_argument("--policy", action="append", choices=POLICIES, help="which policy (default: all)")
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    asked = parser.parse_args()
+    given = parse_options(
+        __doc__,
+        docs=("reference/environments.md", "returns fogsim/FogCorridor-v1"),
+        episodes=(6, "episodes"),
+        policy=(list(POLICIES), "which policies", POLICIES),
+    )
     env = parallel_env(split="test")
-    seeds = range(asked.episodes)
+    seeds = range(given.episodes)
     dark = evaluate("none", env, seeds)
-    records = []
-    for name in asked.policy or POLICIES:
-        found = dark if name == "none" else evaluate(POLICIES[name], env, seeds)
-        records.append(record(name, found, dark))
-        if not asked.json:
-            print(*(f"{key} {value}" for key, value in records[-1].items()), sep="  ", flush=True)
+    found = {name: dark if name == "none" else evaluate(POLICIES[name], env, seeds) for name in given.policy}
     env.close()
-    if asked.json:
-        print(json.dumps(records, indent=2))
+    records = [record(name, one, dark) for name, one in found.items()]
+    heads = ("policy", "return", "gain over dark signs", "episodes with collisions", *TERMS)
+    best = sorted(records, key=lambda one: -one["return"])
+    publish(given, records, docs=lines_of(heads, map(cells, best)))
 
 
 if __name__ == "__main__":

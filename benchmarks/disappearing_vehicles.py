@@ -18,19 +18,13 @@ Constants were chosen on pool 0 (other cameras and vehicles); pool 1 is what is 
     python benchmarks/disappearing_vehicles.py [--json] [--docs] [--pool 1]
 """
 
-import argparse
-import json
 import math
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
-from docs_table import write_table
+from harness import Row, lines_of, mean, median, parse_options, progress, publish, quantile, timed
 from lead_accuracy import CAMERAS, OTHERS, SETBACK, VEHICLES
-from rich.console import Console
-from rich.progress import track
 
 from fogsim.calibration.staged_road import StagedVehicle, road_renderer
 from fogsim.estimators import make
@@ -44,8 +38,6 @@ POOLS = ((tuple(CAMERAS)[1:3], VEHICLES), (tuple(CAMERAS)[::3], OTHERS))
 RANGES = np.arange(12.0, 200.1, 2.5)
 LEVELS = (120.0, 200.0, 255.0)
 SWAY, MISALIGNED, RANGE_NOISE, SPEED_NOISE = math.radians(0.07), math.radians(0.1), 0.25, 0.1
-
-Row = dict[str, Any]
 
 
 @dataclass(slots=True)
@@ -106,9 +98,8 @@ def follow(renderer: Renderer, drive: Drive, found: dict[float, Found]) -> None:
 
 def judged(estimator: Estimator, seen: Observation, visibility: float, found: Found) -> Estimate:
     """One update, held against the truth."""
-    started = time.perf_counter()
-    estimate = estimator.update(seen)
-    found.spent.append(1e3 * (time.perf_counter() - started))
+    estimate, spent = timed(lambda: estimator.update(seen))
+    found.spent.append(spent)
     found.updates += 1
     low, high = estimate.visibility_interval
     if estimate.valid:
@@ -137,50 +128,44 @@ def record(visibility: str, found: Found, pool: int) -> Row:
         "visibility": visibility,
         "updates": found.updates,
         "bounds_share": len(found.held) / found.updates,
-        "bounds_hold": float(np.mean(found.held)) if found.held else None,
-        "at_least_over_v": float(np.median(found.least)) if found.least else None,
+        "bounds_hold": mean(found.held),
+        "at_least_over_v": median(found.least),
         "valid_share": len(found.errors) / found.updates,
-        "median_pct": float(np.median(found.errors)) if found.errors else None,
-        "p95_pct": float(np.quantile(found.errors, 0.95)) if found.errors else None,
-        "coverage": float(np.mean(found.covered)) if found.covered else None,
+        "median_pct": median(found.errors),
+        "p95_pct": quantile(found.errors, 0.95),
+        "coverage": mean(found.covered),
         "drives": len(found.first),
         "drives_share": len(first) / len(found.first),
-        "first_median_pct": float(np.median(first)) if first else None,
-        "ms": float(np.median(found.spent)),
+        "first_median_pct": median(first),
+        "ms": median(found.spent),
     }
 
 
-def table(rows: list[Row]) -> Iterator[str]:
-    """Lines of the table."""
-    names = ("updates", "bounds", "held", "at least", "estimates", "median/p95, %", "held", "drives", "first", "ms")
-    yield f"| V_met, m | {' | '.join(names)} |"
-    yield "|---|---|---|---|---|---|---|---|---|---|---|"
-    for row in rows:
-        share = [f"{100.0 * row[key]:.0f} %" for key in ("bounds_share", "valid_share", "drives_share")]
-        keys = ("bounds_hold", "at_least_over_v", "coverage")
-        told = ["–" if row[key] is None else f"{row[key]:.2f}" for key in keys]
-        error = "–" if row["median_pct"] is None else f"{row['median_pct']:.0f}/{row['p95_pct']:.0f}"
-        first = "–" if row["first_median_pct"] is None else f"{row['first_median_pct']:.0f} %"
-        cells = (row["visibility"], str(row["updates"]), share[0], *told[:2], share[1], error, told[2], share[2], first)
-        yield f"| {' | '.join(cells)} | {row['ms']:.1f} |"
+HEADS = ("V_met, m", "updates", "bounds", "held", "at least")
+HEADS += ("estimates", "median/p95, %", "held", "drives", "first", "ms")
+
+
+def cells(row: Row) -> tuple[str, ...]:
+    """A record in cells of the table."""
+    bounds, valid, drives = (f"{100.0 * row[key]:.0f} %" for key in ("bounds_share", "valid_share", "drives_share"))
+    keys = ("bounds_hold", "at_least_over_v", "coverage")
+    hold, least, covered = ("–" if row[key] is None else f"{row[key]:.2f}" for key in keys)
+    error = "–" if row["median_pct"] is None else f"{row['median_pct']:.0f}/{row['p95_pct']:.0f}"
+    first = "–" if row["first_median_pct"] is None else f"{row['first_median_pct']:.0f} %"
+    head = (row["visibility"], str(row["updates"]), bounds, hold, least)
+    return (*head, valid, error, covered, drives, first, f"{row['ms']:.1f}")
 
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/benchmarks/estimators.md")
-    parser.add_argument("--pool", type=int, choices=(0, 1), default=1, help="0: constants chosen on it")
-    arguments = parser.parse_args()
+    given = parse_options(__doc__, docs=("benchmarks/estimators.md", "disappearing vehicles"), pool=1)
     found = {visibility: Found() for visibility in VISIBILITIES}
     with road_renderer() as renderer:
-        for drive in track(list(drives(arguments.pool)), "drives", console=Console(stderr=True)):
+        for drive in progress(list(drives(given.pool)), "drives"):
             follow(renderer, drive, found)
-    rows = [record(f"{visibility:g}", one, arguments.pool) for visibility, one in found.items()]
-    rows.append(record("all", together(found), arguments.pool))
-    if arguments.docs:
-        write_table("benchmarks/estimators.md", "disappearing vehicles", table(rows))
-    print(json.dumps(rows, indent=2) if arguments.json else "\n".join(table(rows)))
+    rows = [record(f"{visibility:g}", one, given.pool) for visibility, one in found.items()]
+    rows.append(record("all", together(found), given.pool))
+    publish(given, rows, lines_of(HEADS, map(cells, rows)))
 
 
 if __name__ == "__main__":

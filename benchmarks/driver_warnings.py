@@ -13,15 +13,12 @@ seeds (101 to 106, and 301 to 308 of even fog).
 """
 
 import argparse
-import json
 import statistics
-import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
-from docs_table import lines_of, write_table
+from harness import Kept, Row, lines_of, parse_options, progress, publish
 
 import fogsim
 from fogsim.metrics import RunMetrics
@@ -45,8 +42,6 @@ fusion: field_filter
 advice: {method: stopping_sight_distance, parameters: {reaction_time: 2.0, deceleration: 3.4}}
 """
 """Camera, estimators, fusion and advice are those of the demo."""
-
-Row = dict[str, Any]
 
 
 def drives(seeds: int, number: int) -> Iterator[tuple[str, int, int]]:
@@ -74,25 +69,15 @@ def measure(about: str, visibility: int, seed: int, road: Path) -> Row:
     }
 
 
-def rows(arguments: argparse.Namespace) -> list[Row]:
+def rows(given: argparse.Namespace) -> list[Row]:
     """What was kept, and what is measured now."""
-    keep: Path | None = arguments.keep
-    lines = keep.read_text(encoding="utf-8").splitlines() if keep and keep.exists() else []
-    known = {(row["about"], row["visibility_m"], row["seed"]): row for row in map(json.loads, lines)}
-    found = []
+    kept, plan = Kept(given.keep, "driver_warnings"), list(drives(given.seeds, given.drives))
     with tempfile.TemporaryDirectory() as folder:
         road = Path(folder) / "scenario.yaml"
         road.write_text(ROAD, encoding="utf-8")
-        for drive in drives(arguments.seeds, arguments.drives):
-            row = known.get(drive)
-            if row is None:
-                row = measure(*drive, road)
-                print(json.dumps(row), file=sys.stderr)
-                if keep:
-                    with keep.open("a", encoding="utf-8") as file:
-                        file.write(json.dumps(row) + "\n")
-            found.append(row)
-    return found
+        for drive in progress([one for one in plan if one not in kept.results], "drives"):
+            kept.add(drive, measure(*drive, road))
+    return [kept.results[drive] for drive in plan]
 
 
 def records(measured: Sequence[Row]) -> Iterator[Row]:
@@ -158,17 +143,15 @@ def table(found: Sequence[Row]) -> list[str]:
 
 def main() -> None:
     """Print the records, or a table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true")
-    parser.add_argument("--docs", action="store_true", help="write the table into docs/explanation/belief.md")
-    parser.add_argument("--seeds", type=int, default=20, help="drives into the bank")
-    parser.add_argument("--drives", type=int, default=6, help="drives of 10 min in each even fog")
-    parser.add_argument("--keep", type=Path, help="file in which to keep what is measured, and from which to go on")
-    arguments = parser.parse_args()
-    found = list(records(rows(arguments)))
-    print(json.dumps(found, indent=1) if arguments.json else "\n".join(table(found)))
-    if arguments.docs:
-        write_table("explanation/belief.md", "warnings", table(found))
+    given = parse_options(
+        __doc__,
+        docs=("explanation/belief.md", "warnings"),
+        seeds=(20, "drives into the bank"),
+        drives=(6, "drives of 10 min in each even fog"),
+        keep=(Path, "file in which to keep what is measured, and from which to go on"),
+    )
+    found = list(records(rows(given)))
+    publish(given, found, table(found))
 
 
 if __name__ == "__main__":

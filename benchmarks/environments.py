@@ -20,6 +20,7 @@ import gymnasium
 import highway_env  # noqa: F401 - registers the peer
 import numpy as np
 from gymnasium import spaces
+from harness import Row, parse_options, publish
 
 import fogsim_envs  # noqa: F401 - registers the environments
 
@@ -95,7 +96,7 @@ def worker_ratio(env_id: str, kwargs: dict[str, Any], steps: int, action: Any, r
     return round(statistics.median(ratios), 3)
 
 
-def measure(arguments: argparse.Namespace, env_id: str, peer: Env) -> dict[str, Any]:
+def measure(arguments: argparse.Namespace, env_id: str, peer: Env) -> Row:
     """One record for one environment."""
     env: Env = gymnasium.make(env_id, **arguments.kwargs)
     action, peer_action = middle(env.action_space), middle(peer.action_space)
@@ -119,39 +120,31 @@ def measure(arguments: argparse.Namespace, env_id: str, peer: Env) -> dict[str, 
         "reset_other_ms": reset_ms(env, [None, arguments.other], arguments.resets) if arguments.other else None,
     }
     env.close()
-    if arguments.workers:
+    if not arguments.no_workers:
         record["worker_ratio"] = worker_ratio(env_id, arguments.kwargs, arguments.steps, action, arguments.repeat)
     return record
 
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--env", action="append", metavar="ID", help="environment (default fogsim/FogAdvisory-v0)")
-    parser.add_argument("--kwargs", type=json.loads, default={}, metavar="JSON", help="arguments of the environments")
-    parser.add_argument("--steps", type=int, default=100, help="steps a repetition")
-    parser.add_argument("--repeat", type=int, default=3, help="repetitions")
-    parser.add_argument("--resets", type=int, default=5, help="resets of each kind")
-    parser.add_argument(
-        "--other",
-        type=json.loads,
-        default={"overrides": ["drivers.reaction_time_s=1.5"]},
-        metavar="JSON",
-        help="options of a reset that make it another scenario; null for none",
+    given = parse_options(
+        __doc__,
+        env=(["fogsim/FogAdvisory-v0"], "ids of environments"),
+        kwargs=("{}", "arguments of the environments, as JSON"),
+        steps=(100, "steps a repetition"),
+        repeat=(3, "repetitions"),
+        resets=(5, "resets of each kind"),
+        other=(
+            '{"overrides": ["drivers.reaction_time_s=1.5"]}',
+            "options of a reset that make it another scenario, as JSON; null for none",
+        ),
+        no_workers=(False, "leave processes out"),
     )
-    parser.add_argument("--no-workers", dest="workers", action="store_false", help="leave processes out")
-    arguments = parser.parse_args()
+    given.kwargs, given.other = json.loads(given.kwargs), json.loads(given.other)
     peer: Env = gymnasium.make(PEER_ID)
-    records = [measure(arguments, env_id, peer) for env_id in arguments.env or ["fogsim/FogAdvisory-v0"]]
+    records = [measure(given, env_id, peer) for env_id in given.env]
     peer.close()
-    if arguments.json:
-        print(json.dumps(records, indent=2))
-        return
-    for record in records:
-        for key, value in record.items():
-            print(f"{key:16} {value}")
-        print()
+    publish(given, records)
 
 
 if __name__ == "__main__":

@@ -21,23 +21,17 @@ zhu2015's four classes, `class_off_edge_share` that of frames whose visibility i
 
 import argparse
 import dataclasses
-import json
 import math
 import os
-import sys
-import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from functools import cache
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from docs_table import write_table
 from estimator_scenes import CAMERAS, Drive, Road, camera, drive, photograph, with_leader, without_leader
-from estimator_tables import BINS, TIMED, Row, records, tables
-from rich.console import Console
-from rich.progress import track
+from estimator_tables import BINS, TIMED, records, tables
+from harness import Kept, Row, parse_options, progress, publish, timed
 
 from fogsim.estimators import ESTIMATORS, make
 from fogsim.estimators.zhu2015 import zhu_category
@@ -61,9 +55,7 @@ def look(form: str, told: Camera, seen: Observation) -> Row:
     if (told.width, told.height) == TIMED:
         # The first call has made room and compiled.
         estimator.reset()
-        started = time.perf_counter()
-        estimator.update(seen)
-        spent = 1e3 * (time.perf_counter() - started)
+        _, spent = timed(lambda: estimator.update(seen))
     return {
         "form": form,
         "valid": found.valid,
@@ -89,14 +81,7 @@ def road(
 
 
 def measure_unit(
-    unit: Unit,
-    scenes: int,
-    draws: int,
-    seed: int,
-    forms: tuple[str, ...],
-    pitch: float,
-    surface: str,
-    repairs: float,
+    unit: Unit, scenes: int, draws: int, seed: int, forms: tuple[str, ...], pitch: float, surface: str, repairs: float
 ) -> list[Row]:
     """Every fog, exposure and form of one instant under one camera."""
     number, index = unit
@@ -128,61 +113,40 @@ def forms_of(methods: list[str]) -> tuple[str, ...]:
     return tuple(form for both in forms for form in both)
 
 
-def measure(arguments: argparse.Namespace) -> list[Row]:
+def measure(given: argparse.Namespace) -> list[Row]:
     """All rows: what is kept already, and the rest."""
-    forms = forms_of(arguments.methods)
-    settings = [arguments.scenes, arguments.draws, arguments.seed, forms, arguments.pitch_deviation]
-    settings += [arguments.surface, arguments.repairs]
-    known = kept(arguments.keep, settings)
-    units = [(number, index) for index in range(arguments.scenes) for number in range(arguments.cameras)]
-    rows = [row for unit in units for row in known.get(unit, [])]
-    missing = [unit for unit in units if unit not in known]
-    with ProcessPoolExecutor(arguments.workers, get_context("spawn")) as pool:
+    settings = [given.scenes, given.draws, given.seed, forms_of(given.methods), given.pitch_deviation]
+    settings += [given.surface, given.repairs]
+    kept = Kept(given.keep, settings)
+    units = [(number, index) for index in range(given.scenes) for number in range(given.cameras)]
+    missing = [unit for unit in units if unit not in kept.results]
+    rows = [row for unit in units for row in kept.results.get(unit, [])]
+    with ProcessPoolExecutor(given.workers, get_context("spawn")) as pool:
         running = {pool.submit(measure_unit, unit, *settings): unit for unit in missing}
-        console = Console(stderr=True)
-        for done in track(as_completed(running), "instants × cameras", len(missing), console=console):
+        for done in progress(as_completed(running), "instants × cameras", len(missing)):
+            kept.add(running[done], done.result())
             rows += done.result()
-            if arguments.keep:
-                with arguments.keep.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps([running[done], done.result()]) + "\n")
     return rows
-
-
-def kept(path: Path | None, settings: list[Any]) -> dict[Unit, list[Row]]:
-    """What an earlier call with the same settings has measured; begins the file if there is none."""
-    if path is None:
-        return {}
-    if not path.exists():
-        path.write_text(json.dumps(settings) + "\n", encoding="utf-8")
-    # What an interrupted call has written in part does not count.
-    whole = path.read_text(encoding="utf-8").rpartition("\n")[0] + "\n"
-    path.write_text(whole, encoding="utf-8")
-    first, *lines = whole.splitlines()
-    if json.loads(first) != json.loads(json.dumps(settings)):
-        sys.exit(f"--keep {path}: it was measured with other arguments: {first}")
-    return {tuple(unit): rows for unit, rows in map(json.loads, lines)}
 
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the tables of docs/benchmarks/estimators.md")
-    parser.add_argument("--methods", nargs="+", default=list(METHODS), help="estimators of single frames")
-    parser.add_argument("--pitch-deviation", type=float, default=0.1, help="deviation of the told pitch [deg]")
-    parser.add_argument("--cameras", type=int, default=len(CAMERAS), help="how many of the cameras")
-    parser.add_argument("--scenes", type=int, default=12, help="instants of the drive")
-    parser.add_argument("--draws", type=int, default=4, help="visibilities by bin, instant and camera, on average")
-    parser.add_argument("--workers", type=int, default=min(2, os.cpu_count() or 1), help="processes")
-    parser.add_argument("--surface", choices=list(RoadSurface), default=USUAL_PAVEMENT.surface, help="of the roads")
-    parser.add_argument("--repairs", type=float, default=USUAL_PAVEMENT.repairs, help="older and newer stretches")
-    parser.add_argument("--keep", type=Path, help="file in which to keep what is measured, and from which to go on")
-    parser.add_argument("--seed", type=int, default=1)
-    arguments = parser.parse_args()
-    found = list(records(measure(arguments)))
-    if arguments.docs:
-        write_table("benchmarks/estimators.md", "accuracy", [tables(found)])
-    print(json.dumps(found, indent=2) if arguments.json else tables(found))
+    given = parse_options(
+        __doc__,
+        docs=("benchmarks/estimators.md", "accuracy"),
+        methods=(list(METHODS), "estimators of single frames"),
+        pitch_deviation=(0.1, "deviation of the told pitch [deg]"),
+        cameras=(len(CAMERAS), "how many of the cameras"),
+        scenes=(12, "instants of the drive"),
+        draws=(4, "visibilities by bin, instant and camera, on average"),
+        workers=(min(2, os.cpu_count() or 1), "processes"),
+        surface=(str(USUAL_PAVEMENT.surface), "of the roads", RoadSurface),
+        repairs=(USUAL_PAVEMENT.repairs, "older and newer stretches"),
+        keep=(Path, "file in which to keep what is measured, and from which to go on"),
+        seed=(1, "of the drive"),
+    )
+    found = list(records(measure(given)))
+    publish(given, found, [tables(found)])
 
 
 if __name__ == "__main__":

@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterator
 from itertools import pairwise
 from typing import Any
 
-import numpy as np
 from estimator_scenes import CAMERAS
+from harness import Row, lines_of, mean, median, quantile
 
 from fogsim.estimators.zhu2015 import zhu_category
 from fogsim.units import extinction_from_visibility
@@ -17,13 +17,6 @@ EDGES, OFF_EDGE = (100.0, 300.0, 1000.0), 0.05
 LEADS = ("absent", "untold", "told")
 MIDDLE = (50.0, 400.0)  # visibilities of the table of conditions [m]
 TIMED = (688, 515)
-
-Row = dict[str, Any]
-
-
-def share(values: list[bool]) -> float | None:
-    """Mean of truths; None if there are none."""
-    return round(float(np.mean(values)), 3) if values else None
 
 
 def record(table: str, form: str, lead: str, condition: str, visibility: str, rows: list[Row]) -> Row:
@@ -48,12 +41,12 @@ def record(table: str, form: str, lead: str, condition: str, visibility: str, ro
         "condition": condition,
         "visibility": visibility,
         "frames": len(rows),
-        "valid_share": share([row["valid"] for row in rows]),
-        "median_pct": round(float(np.median(errors)), 2) if errors else None,
-        "p95_pct": round(float(np.percentile(errors, 95)), 2) if errors else None,
-        "coverage": share(covered),
-        "class_share": share(right),
-        "class_off_edge_share": share([hit for hit, off in zip(right, off_edge, strict=True) if off]),
+        "valid_share": mean([row["valid"] for row in rows], 3),
+        "median_pct": median(errors, 2),
+        "p95_pct": quantile(errors, 0.95, 2),
+        "coverage": mean(covered, 3),
+        "class_share": mean(right, 3),
+        "class_off_edge_share": mean([hit for hit, off in zip(right, off_edge, strict=True) if off], 3),
         "ms": round(min(times), 2) if times else None,
     }
 
@@ -102,13 +95,12 @@ CONDITIONS: dict[str, Callable[[Row], str]] = {
 
 def crossed(own: list[Row], across: str, cell: Callable[[Row], str]) -> str:
     """Table with a line for each method and lead, and a column for each value of one key."""
-    columns = {one[across]: one["frames"] for one in own}
-    lines = ["| method | lead | " + " | ".join(f"{name} (n = {n})" for name, n in columns.items()) + " |"]
-    lines += ["|" + "---|" * (len(columns) + 2)]
+    counts = {one[across]: one["frames"] for one in own}
+    rows = []
     for (form, lead), cells in grouped(own, "method", "lead"):
         known = {one[across]: cell(one) for one in cells}
-        lines.append(f"| {form} | {lead} | " + " | ".join(known.get(name, "–") for name in columns) + " |")
-    return "\n".join(lines)
+        rows.append((form, lead, *(known.get(name, "–") for name in counts)))
+    return "\n".join(lines_of(("method", "lead", *(f"{name} (n = {n})" for name, n in counts.items())), rows))
 
 
 def cell_of(*keys: str) -> Callable[[Row], str]:

@@ -19,70 +19,35 @@ percentile. Several fogs are laid on one drawing: a cell of 120 images at `--ima
 with more images.
 """
 
-import argparse
-import json
-import sys
 from pathlib import Path
 
-from docs_table import write_table
-from rich.console import Console
-from rich.progress import track
-from target_pictures import KINDS, Row, measure_unit
+from harness import Kept, Row, parse_options, progress, publish
+from target_pictures import KINDS, measure_unit
 from target_tables import records, table
-
-Unit = tuple[str, int]
-"""Kind of a drawing, and its number."""
 
 
 def measure(images: int, seed: int, keep: Path | None) -> list[Row]:
     """Rows of all drawings: what is kept already, and the rest."""
-    known = kept(keep, seed)
-    units = [(kind, number) for kind in KINDS for number in range(images)]
-    missing = [unit for unit in units if unit not in known]
-    for unit in track(missing, "drawings", console=Console(stderr=True)):
-        known[unit] = measure_unit(*unit, seed)
-        if keep:
-            with keep.open("a", encoding="utf-8") as file:
-                file.write(json.dumps([unit, known[unit]]) + "\n")
-    return [row for unit in units for row in known[unit]]
-
-
-def kept(path: Path | None, seed: int) -> dict[Unit, list[Row]]:
-    """What an earlier call with the same seed has measured; begins the file if there is none."""
-    if path is None:
-        return {}
-    if not path.exists():
-        path.write_text(json.dumps({"seed": seed}) + "\n", encoding="utf-8")
-    # What an interrupted call has written in part does not count.
-    whole = path.read_text(encoding="utf-8").rpartition("\n")[0] + "\n"
-    path.write_text(whole, encoding="utf-8")
-    first, *lines = whole.splitlines()
-    if json.loads(first) != {"seed": seed}:
-        sys.exit(f"--keep {path}: it was measured with another seed: {first}")
-    return {(kind, number): rows for (kind, number), rows in map(json.loads, lines)}
-
-
-def some(text: str) -> int:
-    """A whole number of at least 1."""
-    if (number := int(text)) < 1:
-        raise argparse.ArgumentTypeError(f"at least 1 is needed, got {text}")
-    return number
+    kept, units = Kept(keep, {"seed": seed}), [(kind, number) for kind in KINDS for number in range(images)]
+    for unit in progress([unit for unit in units if unit not in kept.results], "drawings"):
+        kept.add(unit, measure_unit(*unit, seed))
+    return [row for unit in units for row in kept.results[unit]]
 
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/benchmarks/estimators.md")
-    parser.add_argument("--images", type=some, default=24, help="drawings of each kind")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--keep", type=Path, help="file in which to keep what is measured, and from which to go on")
-    arguments = parser.parse_args()
-    rows = measure(arguments.images, arguments.seed, arguments.keep)
-    found = list(records(rows, ["--images", str(arguments.images), "--seed", str(arguments.seed)]))
-    if arguments.docs:
-        write_table("benchmarks/estimators.md", "targets", [table(found)])
-    print(json.dumps(found, indent=2) if arguments.json else table(found))
+    given = parse_options(
+        __doc__,
+        docs=("benchmarks/estimators.md", "targets"),
+        images=(24, "drawings of each kind"),
+        seed=(0, "of the drawings"),
+        keep=(Path, "file in which to keep what is measured, and from which to go on"),
+    )
+    if given.images < 1:
+        given.error(f"--images: at least 1 is needed, got {given.images}")
+    rows = measure(given.images, given.seed, given.keep)
+    found = list(records(rows, ["--images", str(given.images), "--seed", str(given.seed)]))
+    publish(given, found, table(found))
 
 
 if __name__ == "__main__":

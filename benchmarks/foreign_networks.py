@@ -12,11 +12,9 @@ own (``--sumocfg``). First SUMO alone, then FogSim with an ego and its camera of
 the simulated time, seconds of the clock and of the processor, and the memory that each process had at most.
 """
 
-import argparse
 import gzip
 import importlib.util
 import itertools
-import json
 import multiprocessing
 import resource
 import subprocess
@@ -32,6 +30,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import sumo
+from harness import parse_options, publish
 
 import fogsim
 from fogsim.scenario import scenario_from_config
@@ -55,17 +54,7 @@ ROAD_USERS = (*["car"] * 10, *["van"] * 2, *["truck"] * 2, "bus", "motorcycle", 
 
 
 class Files(NamedTuple):
-    """What a simulation is made of.
-
-    Attributes
-    ----------
-    net : Path
-        Network.
-    routes, additional : tuple of Path
-        Traffic, and what stands next to the road.
-    begin : float
-        When it begins [s].
-    """
+    """A simulation: network, traffic, what stands next to the road, and when it begins [s]."""
 
     net: Path
     routes: tuple[Path, ...]
@@ -73,168 +62,86 @@ class Files(NamedTuple):
     begin: float = 0.0
 
 
-class Network(NamedTuple):
-    """A network with traffic.
-
-    Attributes
-    ----------
-    name, told : str
-        Its name, and what it is.
-    make : callable
-        Gives the files; writes what there is to write into a folder, for a number of vehicles an hour and a time [s].
-    """
-
-    name: str
-    told: str
-    make: Callable[[Path, float, float], Files]
+Make = Callable[[Path, float, float], Files]
+"""Gives the files of a simulation, some of them written into a folder, for vehicles an hour and a time [s]."""
 
 
-def generated(*options: str, pedestrians: bool = False) -> Callable[[Path, float, float], Files]:
+def generated(*options: str, pedestrians: bool = False) -> Make:
     """A network by netgenerate, with mixed traffic from anywhere to anywhere."""
 
     def make(folder: Path, per_hour: float, seconds: float) -> Files:
-        net = folder / "town.net.xml"
         walking = ["--sidewalks.guess", "--crossings.guess"] if pedestrians else []
-        program = HOME / "bin" / "netgenerate"
-        subprocess.run([program, *options, *walking, "--seed", "1", "-o", net], check=True, capture_output=True)
+        _run("netgenerate", *options, *walking, "--seed", "1", "-o", net := folder / "town.net.xml")
         return Files(net, (trips(folder, net, per_hour, seconds, pedestrians=pedestrians),))
 
     return make
 
 
-def game(net: str, *routes: str, additional: Sequence[str] = (), begin: float = 0.0) -> Callable[..., Files]:
+def mixed(net: Path, through: str = "") -> Make:
+    """A network with mixed traffic of ours, all of it through its first roundabout if asked."""
+    return lambda folder, per_hour, seconds: Files(net, (trips(folder, net, per_hour, seconds, through=through),))
+
+
+def game(folder: str, net: str, routes: str, additional: str = "", begin: float = 0.0) -> Make:
     """One of SUMO's games, with its own traffic."""
-
-    def make(_folder: Path, _per_hour: float, _seconds: float) -> Files:
-        return Files(
-            GAMES / net, tuple(GAMES / name for name in routes), tuple(GAMES / name for name in additional), begin
-        )
-
-    return make
+    home = GAMES / folder
+    files = (tuple(home / name for name in names.split()) for names in (routes, additional))
+    found = Files(home / net, *files, begin)
+    return lambda *_: found
 
 
-def mixed(net: Path, through: str = "") -> Callable[[Path, float, float], Files]:
-    """A network with mixed traffic of ours, all of it through an edge if one is named."""
-
-    def make(folder: Path, per_hour: float, seconds: float) -> Files:
-        return Files(net, (trips(folder, net, per_hour, seconds, through=through),))
-
-    return make
-
-
-def sumo_rl(net: str, routes: str, begin: float = 0.0) -> Callable[..., Files]:
+def sumo_rl(name: str, routes: str, begin: float = 0.0) -> Make:
     """One of sumo-rl's networks, with its own traffic."""
 
-    def make(_folder: Path, _per_hour: float, _seconds: float) -> Files:
+    def make(*_: object) -> Files:
         found = importlib.util.find_spec("sumo_rl")
         if found is None or not found.submodule_search_locations:
             raise ModuleNotFoundError("sumo_rl is not installed: pip install sumo-rl")
         home = Path(found.submodule_search_locations[0], "nets")
-        return Files(home / net, (home / routes,), begin=begin)
+        return Files(home / f"{name}.net.xml", (home / f"{routes}.rou.xml",), begin=begin)
 
     return make
 
 
 _TOWN = ("--default.lanenumber", "2", "--default-junction-type", "traffic_light", "--default.speed", "13.89")
-_A10 = [f"A10KW/osm.{kind}.rou.xml" for kind in ("passenger", "truck", "passenger_mw", "truck_mw")]
+_SLOW = ("--default.speed", "8.33", "--default-junction-type", "right_before_left")
+_SINGLE = "2way-single-intersection/single-intersection"
 
-NETWORKS = (
-    Network(
-        "grid",
-        "netgenerate: 5 × 5 junctions with lights, two lanes, pedestrians and their crossings",
-        generated("--grid", "--grid.number", "5", "--grid.length", "150", *_TOWN, pedestrians=True),
+NETWORKS: dict[str, Make] = {
+    "grid": generated("--grid", "--grid.number", "5", "--grid.length", "150", *_TOWN, pedestrians=True),
+    "spider": generated("--spider", "--spider.arm-number", "7", "--spider.circle-number", "4", *_TOWN),
+    "random": generated("--rand", "--rand.iterations", "80", "--tls.guess", "--tls.guess.threshold", "40"),
+    "left_hand": generated("--grid", "--grid.number", "4", "--lefthand", "--default.lanenumber", "2"),
+    "right_before_left": generated("--grid", "--grid.number", "5", *_SLOW),
+    "roundabout": mixed(GAMES / "A10KW" / "osm.net.xml", through="roundabout"),
+    # The crossing of the German guidelines.
+    "rilsa": mixed(RILSA / "rilsa1.net.xml"),
+    # Three trains, sixteen rail signals, stops.
+    "rail": game("rail_demo", "net.net.xml", "input_routes.rou.xml", "stops.add.xml"),
+    "motorway_junction": game(
+        "A10KW", "osm.net.xml", "osm.passenger.rou.xml osm.truck.rou.xml osm.passenger_mw.rou.xml osm.truck_mw.rou.xml"
     ),
-    Network(
-        "spider",
-        "netgenerate: seven arms and four rings, lights",
-        generated("--spider", "--spider.arm-number", "7", "--spider.circle-number", "4", *_TOWN),
+    # A measured crossing with cars, trucks, bicycles and pedestrians.
+    "crossing": game(
+        "fokr_bs_demo",
+        "fokr_bs.net.xml.gz",
+        "15_16_bicycle.trips.xml 15_16_ped.trips.xml 15_16_veh.trips.xml.gz",
+        "vtypes_default.add.xml signalPlan.add.xml",
+        begin=54_000.0,
     ),
-    Network(
-        "random",
-        "netgenerate: random, some junctions with lights, the others by priority",
-        generated("--rand", "--rand.iterations", "80", "--tls.guess", "--tls.guess.threshold", "40"),
-    ),
-    Network(
-        "left_hand",
-        "netgenerate: left-hand traffic, right-of-way by priority, two lanes",
-        generated("--grid", "--grid.number", "4", "--lefthand", "--default.lanenumber", "2"),
-    ),
-    Network(
-        "right_before_left",
-        "netgenerate: a town where who comes from the right goes first",
-        generated(
-            "--grid", "--grid.number", "5", "--default.speed", "8.33", "--default-junction-type", "right_before_left"
-        ),
-    ),
-    Network(
-        "roundabout",
-        "eclipse-sumo, A10KW: all traffic through the roundabout beside the motorway",
-        mixed(GAMES / "A10KW" / "osm.net.xml", through="roundabout"),
-    ),
-    Network("rilsa", "eclipse-sumo, RiLSA1: the crossing of the German guidelines", mixed(RILSA / "rilsa1.net.xml")),
-    Network(
-        "rail",
-        "eclipse-sumo, rail_demo: three trains, sixteen rail signals, stops",
-        game("rail_demo/net.net.xml", "rail_demo/input_routes.rou.xml", additional=["rail_demo/stops.add.xml"]),
-    ),
-    Network(
-        "motorway_junction",
-        "eclipse-sumo, A10KW: motorway junction with trucks, from OpenStreetMap",
-        game("A10KW/osm.net.xml", *_A10),
-    ),
-    Network(
-        "crossing",
-        "eclipse-sumo, fokr_bs_demo: a measured crossing with cars, trucks, bicycles and pedestrians",
-        game(
-            "fokr_bs_demo/fokr_bs.net.xml.gz",
-            *[f"fokr_bs_demo/15_16_{who}" for who in ("bicycle.trips.xml", "ped.trips.xml", "veh.trips.xml.gz")],
-            additional=["fokr_bs_demo/vtypes_default.add.xml", "fokr_bs_demo/signalPlan.add.xml"],
-            begin=54_000.0,
-        ),
-    ),
-    Network(
-        "corridor",
-        "eclipse-sumo, corridor: three junctions with lights in a row",
-        game("corridor/corridor.net.xml", "corridor/corridor.rou.xml"),
-    ),
-    Network(
-        "cologne",
-        "sumo-rl, RESCO cologne1: a junction of Cologne at 7 o'clock",
-        sumo_rl("RESCO/cologne1/cologne1.net.xml", "RESCO/cologne1/cologne1.rou.xml", begin=25_200.0),
-    ),
-    Network(
-        "two_way",
-        "sumo-rl: a single junction with lights",
-        sumo_rl(
-            "2way-single-intersection/single-intersection.net.xml",
-            "2way-single-intersection/single-intersection-gen.rou.xml",
-        ),
-    ),
-)
+    # Three junctions with lights in a row.
+    "corridor": game("corridor", "corridor.net.xml", "corridor.rou.xml"),
+    # A junction of Cologne at 7 o'clock.
+    "cologne": sumo_rl("RESCO/cologne1/cologne1", "RESCO/cologne1/cologne1", begin=25_200.0),
+    "two_way": sumo_rl(_SINGLE, f"{_SINGLE}-gen"),
+}
 
 
 def trips(
     folder: Path, net: Path, per_hour: float, seconds: float, *, pedestrians: bool = False, through: str = ""
 ) -> Path:
-    """Write traffic that drives from anywhere to anywhere; SUMO looks for the ways.
-
-    Parameters
-    ----------
-    folder : Path
-        Where to.
-    net : Path
-        The network.
-    per_hour : float
-        Vehicles an hour.
-    seconds : float
-        As long as they depart [s].
-    pedestrians : bool
-        Whether there are people on foot, too: one for each three vehicles.
-    through : str
-        ``roundabout`` for traffic that drives through the network's first one.
-    """
-    rng = np.random.default_rng(1)
-    root = _root(net)
+    """Write traffic from anywhere to anywhere, and a person on foot for three vehicles; SUMO looks for the ways."""
+    rng, root = np.random.default_rng(1), _root(net)
     usable, ring = _edges(root)
     rows = [f'<vType id="{name}" {told}/>' for name, told in TYPES.items()]
     users = [user for user in ROAD_USERS if usable[user]]
@@ -250,8 +157,7 @@ def trips(
         )
         if pedestrians and number % 3 == 0:
             rows.append(f'<person id="walker{number}" depart="{depart:.1f}"><walk from={start} to={end}/></person>')
-    path = folder / "town.rou.xml"
-    path.write_text(f"<routes>{''.join(rows)}</routes>", encoding="utf-8")
+    _write(path := folder / "town.rou.xml", "routes", rows)
     return path
 
 
@@ -286,17 +192,7 @@ def _lane(root: ET.Element, edge: str) -> str:
 
 
 def write_configuration(folder: Path, files: Files, fcd: str) -> Path:
-    """A configuration that also writes where everyone is in each second, in full precision.
-
-    Parameters
-    ----------
-    folder : Path
-        Where to.
-    files : Files
-        What the simulation is made of.
-    fcd : str
-        Name of that file.
-    """
+    """A configuration that also writes where everyone is in each second, in full precision, to a file of a name."""
     options = {
         "net-file": files.net,
         "route-files": ",".join(map(str, files.routes)),
@@ -310,8 +206,7 @@ def write_configuration(folder: Path, files: Files, fcd: str) -> Path:
         "xml-validation": "never",
     }
     rows = "".join(f"<{key} value={quoteattr(str(value))}/>" for key, value in options.items() if str(value))
-    path = folder / "town.sumocfg"
-    path.write_text(f"<configuration><input>{rows}</input></configuration>", encoding="utf-8")
+    _write(path := folder / "town.sumocfg", "configuration", [f"<input>{rows}</input>"])
     return path
 
 
@@ -460,38 +355,33 @@ def with_ego(config: Path, ego: str, overrides: Sequence[str]) -> dict[str, obje
 
 def main() -> None:
     """Build or take the large scenario, run it, and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--sumocfg", type=Path, help="a configuration of your own, in place of the town")
-    parser.add_argument("--ego", default="any", help="id of the ego, or any")
-    parser.add_argument("--blocks", type=int, default=30, help="junctions along each side of the town")
-    parser.add_argument("--per-hour", type=float, default=3000.0, help="vehicles an hour in the town")
-    parser.add_argument("--seconds", type=float, default=3600.0, help="simulated time")
-    parser.add_argument(
-        "--sublane", type=float, default=0.3, help="SUMO's lateral resolution in the town [m]; 0 for none"
+    given = parse_options(
+        __doc__,
+        sumocfg=(Path, "a configuration of your own, in place of the town"),
+        ego=("any", "id of the ego, or any"),
+        blocks=(30, "junctions along each side of the town"),
+        per_hour=(3000.0, "vehicles an hour in the town"),
+        seconds=(3600.0, "simulated time"),
+        sublane=(0.3, "SUMO's lateral resolution in the town [m]; 0 for none"),
+        step=(0.5, "SUMO's step [s]"),
+        visibility=(100.0, "V_met [m]"),
+        renderer=("cpu", "what draws; none for no frames"),
     )
-    parser.add_argument("--step", type=float, default=0.5, help="SUMO's step [s]")
-    parser.add_argument("--visibility", type=float, default=100.0, help="V_met [m]")
-    parser.add_argument("--renderer", default="cpu", help="what draws; none for no frames")
-    arguments = parser.parse_args()
-    size = Size(arguments.blocks, arguments.per_hour, arguments.seconds, arguments.sublane)
+    size = Size(given.blocks, given.per_hour, given.seconds, given.sublane)
     sees = ["camera.width=160", "camera.height=120", "estimators=[joint_road]"]
     overrides = [
-        *clock_settings(arguments.step, 1.0, 1.0),
-        f"fog.visibility_m={arguments.visibility}",
-        f"duration_s={arguments.seconds}",
-        f"renderer={arguments.renderer}",
-        *(["estimators=[]"] if arguments.renderer == "none" else sees),
+        *clock_settings(given.step, 1.0, 1.0),
+        f"fog.visibility_m={given.visibility}",
+        f"duration_s={given.seconds}",
+        f"renderer={given.renderer}",
+        *(["estimators=[]"] if given.renderer == "none" else sees),
     ]
     with tempfile.TemporaryDirectory() as folder, multiprocessing.get_context("spawn").Pool(1) as process:
-        config = arguments.sumocfg or large_town(Path(folder), size)
-        records = [{"run": "files", **sizes(config.parent)}] if arguments.sumocfg is None else []
-        records.append(sumo_alone(config, arguments.step))
-        records.append(process.apply(with_ego, (config, arguments.ego, overrides)))
-    if arguments.json:
-        print(json.dumps(records, indent=2))
-    for record in [] if arguments.json else records:
-        print("  ".join(f"{key} {value}" for key, value in record.items()))
+        config = given.sumocfg or large_town(Path(folder), size)
+        records = [{"run": "files", **sizes(config.parent)}] if given.sumocfg is None else []
+        records.append(sumo_alone(config, given.step))
+        records.append(process.apply(with_ego, (config, given.ego, overrides)))
+    publish(given, records)
 
 
 def sizes(folder: Path) -> dict[str, object]:

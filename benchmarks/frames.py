@@ -16,41 +16,42 @@ fastest says something.
         [--samples 2 ...] [--frames 60] [--repeat 5]
 """
 
-import argparse
 import itertools
-import json
 import math
 import statistics
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from docs_table import write_table
+from harness import Row, lines_of, parse_options, publish
 from numpy.typing import NDArray
+from staging import Board, Shot, Vehicle, network, signs, traffic
+from staging import scenario as staged
 
-import fogsim
 from fogsim.camera import mounted_pose
 from fogsim.ego.view_rendering import ViewRenderer
 from fogsim.scenario import Scenario, build
 from fogsim.scene import build_scene, vehicle_batches
-from fogsim.traffic.road.network import read_net, road_network
-from fogsim.values import Lamp, RoadNetwork, Sign, SignMap, TrafficState
+from fogsim.values import Lamp, TrafficState
 
-ROUTE = ("approach", "bank", "exit")
-LANES = (-3.75, 0.0, 3.75)  # to the left of the route, which is the middle lane [m]
 VEHICLES, SIGNS, START, STEP, ROUND = 30, 10, 400.0, 2.5, 20
-SIZES = {  # length, width and height [m]
-    "car": (4.5, 1.8, 1.5),
-    "van": (5.9, 2.0, 2.6),
-    "truck": (16.5, 2.5, 4.0),
-    "bus": (12.0, 2.55, 3.2),
-    "motorcycle": (2.1, 0.8, 1.5),
-}
 KINDS = ("car", "car", "truck", "car", "van", "car", "bus", "car", "car", "motorcycle")
 LIGHTS = {"day": 10_000.0, "night": 0.5, "photons": 10_000.0}  # [lx]; the last with the airlight of photons
 Key = tuple[str, str, str, int]
 """Renderer, light, size and samples a pixel side of a case."""
+
+LIT = Lamp.POSITION | Lamp.LOW_BEAM | Lamp.REAR_FOG
+LANES = (-3.75, 0.0, 3.75)  # to the left of the route, which is the middle lane [m]
+SHOT = Shot(
+    "",
+    station=START,
+    vehicles=tuple(Vehicle(KINDS[n % len(KINDS)], 12.0 + 8.0 * n, LANES[n % 3], LIT) for n in range(VEHICLES)),
+    boards=tuple(Board("speed_limit", 65.0 + 25.0 * n, -6.0, 80.0, 0.75) for n in range(SIGNS)),
+    lamps=LIT,
+)
+"""What is drawn."""
 
 RENDERERS = ("opengl", "cpu")
 STAGES = ("scene", "render", "air", "camera")
@@ -58,66 +59,10 @@ STAGES = ("scene", "render", "air", "camera")
 
 def scenario(renderer: str, light: str, size: str, samples: int) -> Scenario:
     """The scenario with homogeneous fog and a camera of a given size and antialiasing."""
-    width, height = size.split("x")
-    camera = (f"camera.width={width}", f"camera.height={height}", f"camera.samples={samples}")
     airlight = "photons" if light == "photons" else "koschmieder"
-    lit = (
-        f"fog={{visibility_m: 100, airlight: {airlight}}}",
-        f"light.illuminance_lx={LIGHTS[light]}",
-        f"renderer={renderer}",
-    )
-    return fogsim.load_scenario("motorway_fog_bank", [*camera, *lit])
-
-
-def read_network() -> RoadNetwork:
-    """Roads of the scenario."""
-    described = fogsim.load_scenario("motorway_fog_bank")
-    net = build.traffic_setup(described).net
-    if net is None:
-        raise ValueError("the scenario motorway_fog_bank has no net")
-    return road_network(read_net(net), ROUTE)
-
-
-def place(route: NDArray[np.float64], station: float, left: float) -> tuple[NDArray[np.float64], float]:
-    """Point next to the route and the direction there."""
-    stations = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(route[:, :2], axis=0), axis=1))))
-    here, ahead = (np.array([np.interp(s, stations, route[:, i]) for i in range(3)]) for s in (station, station + 1.0))
-    heading = math.atan2(ahead[1] - here[1], ahead[0] - here[0])
-    return here + left * np.array([-math.sin(heading), math.cos(heading), 0.0]), heading
-
-
-def signs_beside(route: NDArray[np.float64]) -> SignMap:
-    """Signs to the right of the road."""
-    signs = []
-    for number in range(SIGNS):
-        (x, y, z), heading = place(route, START + 65.0 + 25.0 * number, -6.0)
-        signs.append(Sign(f"sign {number}", "speed_limit", 80 / 3.6, (x, y, z + 2.2), heading, 0.75))
-    return SignMap(tuple(signs))
-
-
-def traffic_at(route: NDArray[np.float64], travelled: float) -> TrafficState:
-    """The ego and the vehicles ahead of it, all of which have travelled as far."""
-    kinds = ["car", *(KINDS[number % len(KINDS)] for number in range(VEHICLES))]
-    stations = [0.0, *(12.0 + 8.0 * number + SIZES[kind][0] for number, kind in enumerate(kinds[1:]))]
-    lanes = [0.0, *(LANES[number % 3] for number in range(VEHICLES))]
-    places = [place(route, START + travelled + s, lane) for s, lane in zip(stations, lanes, strict=True)]
-    n, lit = len(kinds), Lamp.POSITION | Lamp.LOW_BEAM | Lamp.REAR_FOG
-    size = np.array([SIZES[kind] for kind in kinds])
-    return TrafficState(
-        time=0.0,
-        ids=tuple(f"vehicle {number}" for number in range(n)),
-        types=tuple(kinds),
-        position=np.array([position for position, _ in places]),
-        heading=np.array([heading for _, heading in places]),
-        speed=np.full(n, 25.0),
-        acceleration=np.zeros(n),
-        length=size[:, 0],
-        width=size[:, 1],
-        height=size[:, 2],
-        lane=("",) * n,
-        lamps=np.full(n, int(lit), np.int32),
-        paint=np.random.default_rng(1).uniform(0.05, 0.6, (n, 3)),
-    )
+    settings = (f"camera.samples={samples}", f"light.illuminance_lx={LIGHTS[light]}")
+    width, height = map(int, size.split("x"))
+    return staged((*settings, f"fog={{visibility_m: 100, airlight: {airlight}}}"), renderer, (width, height))
 
 
 class Timed:
@@ -142,22 +87,15 @@ class Timed:
 
 
 class Case:
-    """One renderer in one light at one size, ready to take frames.
+    """One renderer in one light at one size, ready to take frames."""
 
-    Parameters
-    ----------
-    key : Key
-        Renderer, light, size, and samples a pixel side.
-    network : RoadNetwork
-        The roads.
-    """
-
-    def __init__(self, key: Key, network: RoadNetwork) -> None:
-        described = scenario(*key)
+    def __init__(self, key: Key) -> None:
+        described, roads = scenario(*key), network("motorway")
         camera, setback = build.camera(described), build.camera_mount(described).setback
-        self._view_renderer = ViewRenderer(described, network, signs_beside(network.route))
+        self._view_renderer = ViewRenderer(described, roads, signs(roads.route, SHOT))
         self._camera_sensor, self._rng = build.camera_sensor(described), np.random.default_rng(1)
-        self.traffic = [traffic_at(network.route, STEP * number) for number in range(ROUND)]
+        shots = [replace(SHOT, station=START + STEP * number) for number in range(ROUND)]
+        self.traffic = [traffic(roads.route, shot) for shot in shots]
         self.poses = [mounted_pose(camera, one.position[0], float(one.heading[0]), setback) for one in self.traffic]
         self._render = self._view_renderer._renderer = Timed(self._view_renderer._renderer, "render")
         self._air = self._view_renderer._air = Timed(self._view_renderer._air, "radiance")
@@ -178,14 +116,15 @@ class Case:
         self._view_renderer.close()
 
 
-def triangles(network: RoadNetwork, state: TrafficState) -> int:
+def triangles(state: TrafficState) -> int:
     """Number of triangles in the scene at full detail, the vehicles' among them."""
-    scene = build_scene(network, signs_beside(network.route), np.random.default_rng(1))
+    roads = network("motorway")
+    scene = build_scene(roads, signs(roads.route, SHOT), np.random.default_rng(1))
     copies = (*scene.scenery, *vehicle_batches(state, 0))
     return len(scene.ground.faces) + sum(len(scene.shapes[b.shape].faces) * len(b.transforms) for b in copies)
 
 
-def measure(cases: dict[Key, Case], frames: int, repeat: int) -> Iterator[dict[str, Any]]:
+def measure(cases: dict[Key, Case], frames: int, repeat: int) -> Iterator[Row]:
     """A record for each case."""
     spent: dict[Key, list[NDArray[np.float64]]] = {key: [] for key in cases}
     for one in cases.values():
@@ -198,7 +137,7 @@ def measure(cases: dict[Key, Case], frames: int, repeat: int) -> Iterator[dict[s
         yield record(key, runs)
 
 
-def record(key: Key, runs: list[NDArray[np.float64]]) -> dict[str, Any]:
+def record(key: Key, runs: list[NDArray[np.float64]]) -> Row:
     """One record: repetitions (frames, stages) [ms] of a case."""
     renderer, light, size, samples = key
     width, height = map(int, size.split("x"))
@@ -214,61 +153,37 @@ def record(key: Key, runs: list[NDArray[np.float64]]) -> dict[str, Any]:
     } | {f"ms_{name}": round(float(value), 3) for name, value in zip(STAGES, stages, strict=True)}
 
 
-def table(records: list[dict[str, Any]]) -> list[str]:
+def table(records: list[Row]) -> list[str]:
     """Lines of the table of docs/benchmarks/performance.md: the fastest frames [ms] by day and night."""
     shown = [one for one in records if one["light"] in ("day", "night") and one["samples"] == 1]
     cells = {(one["renderer"], f"{one['light']} {one['width']}×{one['height']}"): one["ms_min"] for one in shown}
     cases = list(dict.fromkeys(case for _, case in cells))
-    lines = [f"| | {' | '.join(cases)} |", "|---" * (len(cases) + 1) + "|"]
+    rows = []
     for renderer, told in (("cpu", "cpu"), ("opengl", "opengl on llvmpipe")):
         values = [cells.get((renderer, case), math.nan) for case in cases]
-        lines.append(f"| {told} | {' | '.join(f'{one:.1f}' if one < 9.95 else f'{one:.0f}' for one in values)} |")
-    return lines
+        rows.append((told, *(f"{one:.1f}" if one < 9.95 else f"{one:.0f}" for one in values)))
+    return lines_of(("", *cases), rows)
 
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/benchmarks/performance.md")
-    parser.add_argument("--renderer", action="append", choices=RENDERERS, help="default: all")
-    parser.add_argument("--light", action="append", choices=LIGHTS, help="default: all")
-    parser.add_argument("--size", action="append", help="camera WIDTHxHEIGHT (default 160x120 and 640x480)")
-    parser.add_argument("--samples", action="append", type=int, help="samples a pixel side (default 1)")
-    parser.add_argument("--frames", type=int, default=60, help="frames a repetition")
-    parser.add_argument("--repeat", type=int, default=5, help="repetitions")
-    arguments = parser.parse_args()
-    keys = list(
-        itertools.product(
-            arguments.renderer or RENDERERS,
-            arguments.light or LIGHTS,
-            arguments.size or ["160x120", "640x480"],
-            arguments.samples or [1],
-        )
+    given = parse_options(
+        __doc__,
+        docs=("benchmarks/performance.md", "frames"),
+        renderer=(list(RENDERERS), "which", RENDERERS),
+        light=(list(LIGHTS), "which", LIGHTS),
+        size=(["160x120", "640x480"], "cameras, WIDTHxHEIGHT"),
+        samples=([1], "samples a pixel side"),
+        frames=(60, "frames a repetition"),
+        repeat=(5, "repetitions"),
     )
-    network = read_network()
-    cases = {key: Case(key, network) for key in keys}
-    shared = {"triangles": triangles(network, cases[keys[0]].traffic[0]), "vehicles": VEHICLES, "signs": SIGNS}
-    records = [one | shared for one in measure(cases, arguments.frames, arguments.repeat)]
+    cases = {key: Case(key) for key in itertools.product(given.renderer, given.light, given.size, given.samples)}
+    shown = triangles(next(iter(cases.values())).traffic[0])
+    shared = {"triangles": shown, "vehicles": VEHICLES, "signs": SIGNS}
+    records = [one | shared for one in measure(cases, given.frames, given.repeat)]
     for one in cases.values():
         one.close()
-    if arguments.docs:
-        write_table("benchmarks/performance.md", "frames", table(records))
-    if arguments.json:
-        print(json.dumps(records, indent=2))
-        return
-    print(f"{shared['triangles']} triangles, {VEHICLES} vehicles, {SIGNS} signs; milliseconds a frame")
-    print(
-        f"{'renderer':10}{'light':7}{'size':>9}{'samples':>9}{'median':>9}{'min':>9}"
-        + "".join(f"{name:>9}" for name in STAGES)
-    )
-    for one in records:
-        size = f"{one['width']}x{one['height']}"
-        figures = [one[f"ms_{name}"] for name in ("median", "min", *STAGES)]
-        print(
-            f"{one['renderer']:10}{one['light']:7}{size:>9}{one['samples']:9}"
-            + "".join(f"{value:9.2f}" for value in figures)
-        )
+    publish(given, records, docs=table(records))
 
 
 if __name__ == "__main__":

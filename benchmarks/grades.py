@@ -12,8 +12,6 @@ all of them on the drive.
                                 [--drawings 4]
 """
 
-import argparse
-import json
 import math
 import sys
 from collections.abc import Iterable, Iterator
@@ -24,8 +22,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "pictures"))
 
-from docs_table import write_table
 from flat_road import Road, photograph, scan
+from harness import Row, lines_of, mean, median, parse_options, publish, quantile
 from target_pictures import CAMERAS, PITCH_DEVIATION
 
 import fogsim
@@ -116,7 +114,7 @@ def draw_bends(visibilities: list[float], seed: int, drawings: int) -> dict[tupl
     return found
 
 
-def record(visibility: float, kind: str, method: str, found: Iterable[Found | None]) -> dict[str, object]:
+def record(visibility: float, kind: str, method: str, found: Iterable[Found | None]) -> Row:
     """One row of the table."""
     asked = list(found)
     told = np.array([one for one in asked if one is not None and math.isfinite(one[0])]).reshape(-1, 3)
@@ -128,55 +126,46 @@ def record(visibility: float, kind: str, method: str, found: Iterable[Found | No
         "method": method,
         "frames": len(asked),
         "valid": round(len(told) / len(asked), 2),
-        "bias": round(float(np.median(error)), 1) if len(told) else None,
-        "median": round(float(np.median(np.abs(error))), 1) if len(told) else None,
-        "p95": round(float(np.quantile(np.abs(error), 0.95)), 1) if len(told) else None,
-        "held": round(float(held.mean()), 2) if len(told) else None,
+        "bias": median(error, 1),
+        "median": median(np.abs(error), 1),
+        "p95": quantile(np.abs(error), 0.95, 1),
+        "held": mean(held, 2),
     }
 
 
-def write_docs(records: list[dict[str, object]]) -> None:
-    """Put the table into the docs: median/p95 and share held, by road and visibility."""
+def table(records: list[Row]) -> list[str]:
+    """Lines of the docs' table: median/p95 and share held, by road and visibility."""
     methods, visibilities = (*METHODS, "belief"), sorted({row["V_met"] for row in records}, key=str)
-    roads = dict.fromkeys(str(row["road"]) for row in sorted(records, key=lambda row: "bend" in str(row["road"])))
-    lines = [f"| road | V_met | {' | '.join(methods)} |", f"|---|---|{'---|' * len(methods)}"]
-    for road in roads:
+    rows = []
+    for road in dict.fromkeys(str(row["road"]) for row in sorted(records, key=lambda row: "bend" in str(row["road"]))):
         for visibility in visibilities:
             told = {row["method"]: row for row in records if (row["road"], row["V_met"]) == (road, visibility)}
             cells = (
                 f"{row['median']}/{row['p95']} ({row['held']})" if (row := told.get(method)) and row["held"] else ""
                 for method in methods
             )
-            lines.append(f"| {road} | {visibility:.0f} m | {' | '.join(cells)} |")
-    write_table("benchmarks/estimators.md", "grades", lines)
+            rows.append((road, f"{visibility:.0f} m", *cells))
+    return lines_of(("road", "V_met", *methods), rows)
 
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--visibility", action="append", type=float, help="V_met [m] (default 100, 200 and 500)")
-    parser.add_argument("--seed", type=int, default=1, help="seed of the drive")
-    parser.add_argument("--duration", type=float, default=180.0, help="longest simulated time [s]")
-    parser.add_argument("--drawings", type=int, default=4, help="drawings of each bend and camera")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/benchmarks/estimators.md")
-    arguments = parser.parse_args()
-    visibilities = arguments.visibility or [100.0, 200.0, 300.0, 500.0]
+    given = parse_options(
+        __doc__,
+        docs=("benchmarks/estimators.md", "grades"),
+        visibility=([100.0, 200.0, 300.0, 500.0], "V_met [m]"),
+        seed=(1, "seed of the drive"),
+        duration=(180.0, "longest simulated time [s]"),
+        drawings=(4, "drawings of each bend and camera"),
+    )
     records = [
         record(visibility, kind, method, found)
-        for visibility in visibilities
-        for (kind, method), found in sorted(drive(visibility, arguments.seed, arguments.duration).items())
+        for visibility in given.visibility
+        for (kind, method), found in sorted(drive(visibility, given.seed, given.duration).items())
     ]
-    bends = draw_bends(visibilities, arguments.seed, arguments.drawings)
-    records += [record(visibility, kind, method, found) for (visibility, kind, method), found in bends.items()]
-    if arguments.docs:
-        write_docs(records)
-    if arguments.json:
-        print(json.dumps(records, indent=2))
-        return
-    print("  ".join(f"{key:>10}" for key in records[0]))
-    for row in records:
-        print("  ".join(f"{value!s:>10}" for value in row.values()))
+    bends = draw_bends(given.visibility, given.seed, given.drawings)
+    records += [record(*key, found) for key, found in bends.items()]
+    publish(given, records, docs=table(records))
 
 
 if __name__ == "__main__":

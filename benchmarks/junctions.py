@@ -15,7 +15,6 @@ vehicles of the first road that brake harder than 4.5 m/s², in 1000 crossings.
 
 import argparse
 import itertools
-import json
 import math
 import statistics
 import tempfile
@@ -24,6 +23,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from harness import ROOT, parse_options, publish
 
 from fogsim.atmosphere import FieldAccess
 from fogsim.traffic import AfterCollision, DriverSetup, DriverSight, TrafficSetup, libsumo_traffic
@@ -32,7 +32,7 @@ from fogsim.traffic.sumo.link import Api
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Command, FogField
 
-NET = Path(__file__).resolve().parents[1] / "tests" / "data" / "crossing" / "priority.net.xml"
+NET = ROOT / "tests" / "data" / "crossing" / "priority.net.xml"
 STEP = 0.1
 MAJOR_FLOW, MINOR_FLOW = 700.0, 200.0
 """Vehicles an hour."""
@@ -47,17 +47,7 @@ SHORT_GAP = 5.0
 
 @dataclass
 class Crossings:
-    """What was seen of all seeds.
-
-    Attributes
-    ----------
-    accepted, refused : list of float
-        Gaps [s].
-    impacts : list of float
-        Impact speeds of collisions [m/s].
-    crossings, hard : int
-        Vehicles of the second road that have crossed; vehicles of the first one that have braked hard.
-    """
+    """Gaps accepted and refused [s], impact speeds [m/s], vehicles that have crossed and that have braked hard."""
 
     accepted: list[float] = field(default_factory=list)
     refused: list[float] = field(default_factory=list)
@@ -189,21 +179,15 @@ def measure(visibility: float, arguments: argparse.Namespace) -> dict[str, float
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--visibility", action="append", type=float, help="V_met [m] (default inf, 60 and 20)")
-    parser.add_argument("--seeds", type=int, default=5, help="seeds 1, 2, …")
-    parser.add_argument("--minutes", type=float, default=30.0, help="simulated time of each seed")
-    parser.add_argument("--speed-choice", default="unaffected", help="how drivers choose their speed in fog")
-    parser.add_argument("--see-through-fog", action="store_true", help="SUMO's own drivers")
-    arguments = parser.parse_args()
-    records = [measure(visibility, arguments) for visibility in arguments.visibility or [math.inf, 60.0, 20.0]]
-    if arguments.json:
-        print(json.dumps(records, indent=2))
-        return
-    print("  ".join(f"{key:>{max(len(key), 6)}}" for key in records[0]))
-    for record in records:
-        print("  ".join(f"{value!s:>{max(len(key), 6)}}" for key, value in record.items()))
+    given = parse_options(
+        __doc__,
+        visibility=([math.inf, 60.0, 20.0], "V_met [m]"),
+        seeds=(5, "seeds 1, 2, …"),
+        minutes=(30.0, "simulated time of each seed"),
+        speed_choice=("unaffected", "how drivers choose their speed in fog"),
+        see_through_fog=(False, "SUMO's own drivers"),
+    )
+    publish(given, [measure(visibility, given) for visibility in given.visibility])
 
 
 if __name__ == "__main__":

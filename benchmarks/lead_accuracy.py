@@ -14,15 +14,14 @@ frame, of estimates that are valid and see fog; `bias_pct` is the median of (V_e
 """
 
 import argparse
-import json
 import math
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
-from docs_table import write_table
+from harness import Row, columns, mean, median, parse_options, publish, quantile, timed
 
 from fogsim.calibration.staged_road import StagedVehicle, road_renderer
 from fogsim.estimators import make
@@ -77,7 +76,7 @@ class Fog:
     levels: float
     estimators: dict[str, Any]
     latest: dict[str, Estimate]
-    seconds: dict[str, float]
+    spent: dict[str, float]
 
 
 def fogs(arguments: argparse.Namespace, camera: Camera, first: int) -> list[Fog]:
@@ -123,9 +122,8 @@ def follow(
 def look(fog: Fog, seen: Observation) -> None:
     """Show a frame to every estimator."""
     for name, estimator in fog.estimators.items():
-        started = time.perf_counter()
-        fog.latest[name] = estimator.update(seen)
-        fog.seconds[name] += time.perf_counter() - started
+        fog.latest[name], spent = timed(partial(estimator.update, seen))
+        fog.spent[name] += spent
 
 
 def sequences(arguments: argparse.Namespace) -> Iterator[dict[str, Any]]:
@@ -140,10 +138,10 @@ def sequences(arguments: argparse.Namespace) -> Iterator[dict[str, Any]]:
                 for fog in seen:
                     for name, estimate in fog.latest.items():
                         told = {"camera": camera_name, "vehicle": vehicle_name, "airlight": f"{fog.levels:g}"}
-                        yield {"method": name, **told, **outcome(fog, estimate, fog.seconds[name] / frames)}
+                        yield {"method": name, **told, **outcome(fog, estimate, fog.spent[name] / frames)}
 
 
-def outcome(fog: Fog, estimate: Estimate, seconds: float) -> dict[str, Any]:
+def outcome(fog: Fog, estimate: Estimate, spent: float) -> Row:
     """One sequence's error."""
     truth = extinction_from_visibility(fog.visibility)
     sees = estimate.valid and estimate.extinction > 0
@@ -152,7 +150,7 @@ def outcome(fog: Fog, estimate: Estimate, seconds: float) -> dict[str, Any]:
         "valid": estimate.valid,
         "error": 100.0 * (estimate.visibility / fog.visibility - 1.0) if sees else None,
         "covered": abs(estimate.extinction - truth) <= NORMAL_90_PERCENT * estimate.standard_deviation,
-        "ms": 1e3 * seconds,
+        "ms": spent,
     }
 
 
@@ -167,11 +165,11 @@ def record(rows: list[dict[str, Any]], **told: str) -> dict[str, Any]:
         "vehicle": "all",
         **told,
         "sequences": len(rows),
-        "median_pct": round(float(np.median(np.abs(errors))), 2) if errors else None,
-        "p95_pct": round(float(np.percentile(np.abs(errors), 95)), 2) if errors else None,
-        "bias_pct": round(float(np.median(errors)), 2) if errors else None,
+        "median_pct": median(np.abs(errors), 2),
+        "p95_pct": quantile(np.abs(errors), 0.95, 2),
+        "bias_pct": median(errors, 2),
         "valid_share": round(len(valid) / len(rows), 3),
-        "coverage": round(float(np.mean([row["covered"] for row in valid])), 3) if valid else None,
+        "coverage": mean([row["covered"] for row in valid], 3),
         "ms": round(min(row["ms"] for row in rows), 2),
     }
 
@@ -194,42 +192,31 @@ def measure(arguments: argparse.Namespace) -> list[dict[str, Any]]:
     return records
 
 
-def table(records: list[dict[str, Any]]) -> str:
-    """Records as a table of the docs."""
-    lines = ["| " + " | ".join(records[0]) + " |", "|" + "---|" * len(records[0])]
-    lines += ["| " + " | ".join("–" if v is None else str(v) for v in r.values()) + " |" for r in records]
-    return "\n".join(lines)
-
-
-def write_docs(records: list[dict[str, Any]]) -> None:
-    """Write the docs' tables: one by visibility, and one by what else changes."""
+def tables(records: list[Row]) -> list[str]:
+    """Lines of the docs' tables: one by visibility, and one by what else changes."""
     parts = ("airlight", "camera", "vehicle")
     whole = [{k: v for k, v in r.items() if k not in parts} for r in records if all(r[p] == "all" for p in parts)]
     apart = [r for r in records if any(r[p] != "all" for p in parts) and "published" not in r["method"]]
-    write_table("benchmarks/estimators.md", "lead accuracy", [table(whole), "", table(apart)])
+    return [*columns(whole), "", *columns(apart)]
 
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the tables of docs/benchmarks/estimators.md")
-    parser.add_argument("--methods", nargs="+", default=list(METHODS), choices=list(METHODS), help="what is measured")
-    parser.add_argument("--cameras", type=int, default=3, help="how many of the cameras")
-    parser.add_argument("--vehicles", type=int, default=len(VEHICLES), help="how many of the vehicles")
-    parser.add_argument("--others", action="store_true", help="four other vehicles, an estate among them")
-    parser.add_argument("--step", type=float, default=2.5, help="change of range between frames [m]")
-    parser.add_argument("--range-noise", type=float, default=0.25, help="deviation of the told range [m]")
-    parser.add_argument("--sway", type=float, default=0.07, help="deviation of the own vehicle's pitch [deg]")
-    parser.add_argument(
-        "--pitch-deviation", type=float, default=0.1, help="deviation of the told pitch, constant over a sequence [deg]"
+    given = parse_options(
+        __doc__,
+        docs=("benchmarks/estimators.md", "lead accuracy"),
+        methods=(list(METHODS), "what is measured", METHODS),
+        cameras=(3, "how many of the cameras"),
+        vehicles=(len(VEHICLES), "how many of the vehicles"),
+        others=(False, "four other vehicles, an estate among them"),
+        step=(2.5, "change of range between frames [m]"),
+        range_noise=(0.25, "deviation of the told range [m]"),
+        sway=(0.07, "deviation of the own vehicle's pitch [deg]"),
+        pitch_deviation=(0.1, "deviation of the told pitch, constant over a sequence [deg]"),
+        seed=(1, "of the sequences"),
     )
-    parser.add_argument("--seed", type=int, default=1)
-    arguments = parser.parse_args()
-    records = measure(arguments)
-    if arguments.docs:
-        write_docs(records)
-    print(json.dumps(records, indent=2) if arguments.json else table(records))
+    records = measure(given)
+    publish(given, records, docs=tables(records))
 
 
 if __name__ == "__main__":

@@ -12,7 +12,6 @@ so that what else the machine does slows both: their ratio holds where speeds do
 
 import argparse
 import cProfile
-import json
 import pstats
 import statistics
 import subprocess
@@ -24,6 +23,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from harness import Row, parse_options, publish
 
 import fogsim_envs  # noqa: F401 - registers the environments
 
@@ -84,7 +84,7 @@ def stage_shares(env: gymnasium.Env[Any, Any], steps: int, action: Callable[[], 
     return shares
 
 
-def measure(size: str, steps: int, repeat: int, peer: gymnasium.Env[Any, Any] | None) -> dict[str, Any]:
+def measure(size: str, steps: int, repeat: int, peer: gymnasium.Env[Any, Any] | None) -> Row:
     """One record for one camera size."""
     env = make_env(size)
     cruise = np.array([7, 1])
@@ -102,8 +102,7 @@ def measure(size: str, steps: int, repeat: int, peer: gymnasium.Env[Any, Any] | 
         "steps_per_s_min": round(min(own), 2),
         "steps_per_s_max": round(max(own), 2),
         "frames_per_s": round(statistics.median(own) * frames, 1),
-        "share": stage_shares(env, steps, lambda: cruise),
-    }
+    } | {f"share_{stage}": share for stage, share in stage_shares(env, steps, lambda: cruise).items()}
     if other:
         record |= {
             "peer": PEER_ID,
@@ -137,7 +136,7 @@ def duration(process: "subprocess.Popen[str]", task: str) -> float:
     return float(process.stdout.readline())
 
 
-def compare(size: str, steps: int, repeat: int, other: Path) -> dict[str, Any]:
+def compare(size: str, steps: int, repeat: int, other: Path) -> Row:
     """One record of this checkout's time for a step over another's."""
     here = Path(__file__).resolve()
     processes = [
@@ -174,41 +173,28 @@ def compare(size: str, steps: int, repeat: int, other: Path) -> dict[str, Any]:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--peer", action="store_true", help=f"also measure {PEER_ID}, alternately")
-    parser.add_argument("--size", action="append", help="camera WIDTHxHEIGHT (default 160x120 and 640x480)")
-    parser.add_argument("--steps", type=int, default=60, help="environment steps a repetition")
-    parser.add_argument("--repeat", type=int, default=3, help="repetitions")
-    parser.add_argument("--against", type=Path, metavar="DIRECTORY", help="compare with another checkout, step by step")
-    parser.add_argument("--answer", metavar="SIZE", help=argparse.SUPPRESS)
-    arguments = parser.parse_args()
-    if arguments.answer:
-        answer(arguments.answer)
+    given = parse_options(
+        __doc__,
+        peer=(False, f"also measure {PEER_ID}, alternately"),
+        size=(["160x120", "640x480"], "cameras, WIDTHxHEIGHT"),
+        steps=(60, "environment steps a repetition"),
+        repeat=(3, "repetitions"),
+        against=(Path, "checkout to compare with, step by step"),
+        answer=(str, argparse.SUPPRESS),
+    )
+    if given.answer:
+        answer(given.answer)
         return
-    if arguments.against and not (arguments.against / ".venv/bin/python").exists():
-        parser.error(f"--against must be a checkout that is installed in its .venv, got {arguments.against}")
-    peer = None
-    if arguments.peer:
-        import highway_env  # noqa: F401, PLC0415 - registers the peer
-
-        peer = gymnasium.make(PEER_ID)
-    sizes = arguments.size or ["160x120", "640x480"]
-    if arguments.against:
-        records = [compare(size, arguments.steps, arguments.repeat, arguments.against.resolve()) for size in sizes]
+    if given.against:
+        if not (given.against / ".venv/bin/python").exists():
+            given.error(f"--against must be a checkout that is installed in its .venv, got {given.against}")
+        records = [compare(size, given.steps, given.repeat, given.against.resolve()) for size in given.size]
     else:
-        records = [measure(size, arguments.steps, arguments.repeat, peer) for size in sizes]
-    if arguments.json:
-        flat = [
-            {k: v for k, v in r.items() if k != "share"} | {f"share_{k}": v for k, v in r.get("share", {}).items()}
-            for r in records
-        ]
-        print(json.dumps(flat, indent=2))
-        return
-    for record in records:
-        for key, value in record.items():
-            print(f"{key:16} {value}")
-        print()
+        if given.peer:
+            import highway_env  # noqa: F401, PLC0415 - registers the peer
+        peer = gymnasium.make(PEER_ID) if given.peer else None
+        records = [measure(size, given.steps, given.repeat, peer) for size in given.size]
+    publish(given, records)
 
 
 if __name__ == "__main__":

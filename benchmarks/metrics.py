@@ -16,15 +16,13 @@ own step, where nothing is left out between two steps that are measured. Times a
 ``--profile`` tells where the metrics' time goes, by metric.
 """
 
-import argparse
-import json
+import itertools
 import statistics
 import tempfile
-import time
-from collections.abc import Callable
 from pathlib import Path
 
-from traffic import CONFIGURATIONS
+from harness import Row, parse_options, publish
+from traffic import CONFIGURATIONS, timed
 
 from fogsim.loop import run
 from fogsim.metrics import METRICS, RunMetrics
@@ -47,16 +45,7 @@ RUNS = {
 """Camera period [s] and settings of each kind of run."""
 
 
-def timed(call: Callable[[], object]) -> float:
-    """Milliseconds of the processor that a call takes."""
-    started = time.thread_time_ns()
-    call()
-    return 1e-6 * (time.thread_time_ns() - started)
-
-
-def measure(
-    network: str, frames: str, vehicles: int, seconds: float, size: int, *, profiled: bool
-) -> dict[str, float | str]:
+def measure(network: str, frames: str, vehicles: int, seconds: float, size: int, *, profiled: bool) -> Row:
     """One record of so many seconds of simulated time, in blocks of so many steps."""
     period, settings = RUNS[frames]
     blocks: list[tuple[float, float]] = []
@@ -118,31 +107,22 @@ def by_metric(network: str, vehicles: int) -> dict[str, float]:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--network", choices=[*CONFIGURATIONS], default="motorway", help="where they drive")
-    parser.add_argument("--vehicles", action="append", type=int, help="vehicles (default 100)")
-    parser.add_argument("--frames", action="append", choices=[*RUNS], help="which runs (default all)")
-    parser.add_argument("--seconds", type=float, default=200.0, help="simulated time of each run")
-    parser.add_argument("--block", type=int, default=BLOCK, help="steps in a block")
-    parser.add_argument("--profiles", action="store_true", help="with the profiles that a study keeps")
-    parser.add_argument("--profile", action="store_true", help="tell the cost of each metric alone")
-    arguments = parser.parse_args()
-    counts = arguments.vehicles or [100]
-    if arguments.profile:
-        records: list[dict[str, float | str]] = [{"vehicles": n, **by_metric(arguments.network, n)} for n in counts]
-    else:
-        kinds, size = arguments.frames or [*RUNS], arguments.block
-        records = [
-            measure(arguments.network, kind, n, arguments.seconds, size, profiled=arguments.profiles)
-            for n in counts
-            for kind in kinds
-        ]
-    if arguments.json:
-        print(json.dumps(records, indent=2))
+    given = parse_options(
+        __doc__,
+        network=("motorway", "where they drive", CONFIGURATIONS),
+        vehicles=([100], "vehicles"),
+        frames=(list(RUNS), "which runs", RUNS),
+        seconds=(200.0, "simulated time of each run"),
+        block=(BLOCK, "steps in a block"),
+        profiles=(False, "with the profiles that a study keeps"),
+        profile=(False, "tell the cost of each metric alone"),
+    )
+    if given.profile:
+        publish(given, [{"vehicles": n, **by_metric(given.network, n)} for n in given.vehicles])
         return
-    for record in records:
-        print("  ".join(f"{key} {value}" for key, value in record.items()))
+    cases = itertools.product(given.vehicles, given.frames)
+    fixed = (given.seconds, given.block)
+    publish(given, [measure(given.network, kind, n, *fixed, profiled=given.profiles) for n, kind in cases])
 
 
 if __name__ == "__main__":

@@ -14,10 +14,8 @@ of the run. Networks of packages that are not installed are left out, and named.
 if one in clear air is not the same. Traffic of the netgenerate networks: ``--per-hour`` vehicles.
 """
 
-import argparse
 import hashlib
 import itertools
-import json
 import math
 import multiprocessing
 import sys
@@ -29,9 +27,10 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from foreign_networks import NETWORKS, Network, write_configuration
+from foreign_networks import NETWORKS, write_configuration
+from harness import Row, parse_options, publish
 
 from fogsim.atmosphere import FieldAccess
 from fogsim.scenario import build
@@ -47,9 +46,6 @@ SEED = 1
 AIRLIGHT = (3000.0, 3000.0, 3000.0)
 FCD = "fcd.xml"
 CLEAR = "inf m"
-BY_NAME = {network.name: network for network in NETWORKS}
-
-Record = dict[str, Any]
 
 
 class Task(NamedTuple):
@@ -146,14 +142,14 @@ def digest(path: Path) -> str:
     return total.hexdigest()
 
 
-def measure(network: Network, task: Task) -> list[Record]:
+def measure(network: str, task: Task) -> list[Row]:
     """Records of one network."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         try:
-            files = network.make(folder, task.per_hour, task.seconds)
+            files = NETWORKS[network](folder, task.per_hour, task.seconds)
         except ModuleNotFoundError as missing:
-            return [{"network": network.name, "left_out": str(missing)}]
+            return [{"network": network, "left_out": str(missing)}]
         config = write_configuration(folder, files, FCD)
         began = time.process_time()
         link, ego = run_alone(config, task)
@@ -165,16 +161,16 @@ def measure(network: Network, task: Task) -> list[Record]:
             try:
                 link = run_in_fog(config, task, ego, visibility)
             except Exception:  # noqa: BLE001 - whatever goes wrong is what is looked for
-                rows.append({"network": network.name, "run": told, "error": traceback.format_exc()})
+                rows.append({"network": network, "run": told, "error": traceback.format_exc()})
                 continue
             rows.append({**record(network, told, link, began), "same": digest(folder / FCD) == alone})
     return rows
 
 
-def record(network: Network, run: str, link: CountingLink, began: float) -> Record:
+def record(network: str, run: str, link: CountingLink, began: float) -> Row:
     """What a run has brought."""
     return {
-        "network": network.name,
+        "network": network,
         "run": run,
         "vehicles": link.vehicles,
         "collisions": link.collisions,
@@ -183,7 +179,7 @@ def record(network: Network, run: str, link: CountingLink, began: float) -> Reco
     }
 
 
-def measured(networks: Sequence[Network], task: Task, jobs: int) -> Iterator[Record]:
+def measured(networks: Sequence[str], task: Task, jobs: int) -> Iterator[Row]:
     """Records of networks, each run in a process of its own, so that what ends one ends no other; 0 jobs: in this."""
     if not jobs:
         for network in networks:
@@ -194,46 +190,35 @@ def measured(networks: Sequence[Network], task: Task, jobs: int) -> Iterator[Rec
             yield from records
 
 
-def measure_apart(task: Task, network: Network) -> list[Record]:
+def measure_apart(task: Task, network: str) -> list[Row]:
     """Records of a network, measured in a process of its own."""
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
         try:
-            return pool.submit(measure_named, network.name, task).result()
+            return pool.submit(measure, network, task).result()
         except BrokenProcessPool as end:
-            return [{"network": network.name, "error": f"{network.name}: {end!r}"}]
+            return [{"network": network, "error": f"{network}: {end!r}"}]
 
 
-def measure_named(name: str, task: Task) -> list[Record]:
-    """Records of the network of a name."""
-    return measure(BY_NAME[name], task)
-
-
-def failed(record: Record) -> bool:
+def failed(record: Row) -> bool:
     """Whether a run has failed, or was not the same in clear air."""
     return "error" in record or (record.get("run") == CLEAR and not record["same"])
 
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--seconds", type=float, default=600.0, help="simulated time of each run")
-    parser.add_argument("--step", type=float, default=0.2, help="SUMO's step [s]")
-    parser.add_argument("--per-hour", type=float, default=1500.0, help="vehicles an hour where the traffic is ours")
-    parser.add_argument("--visibilities", nargs="+", type=float, default=[math.inf, 100.0, 30.0], help="V_met [m]")
-    parser.add_argument("--networks", nargs="+", choices=[*BY_NAME], default=[*BY_NAME], help="which (default all)")
-    parser.add_argument("--jobs", type=int, default=1, help="networks at once, each in a process of its own")
-    parser.add_argument("--one-process", action="store_true", help="all in this process: quicker, and a crash ends all")
-    arguments = parser.parse_args()
-    task = Task(arguments.seconds, arguments.step, arguments.per_hour, tuple(arguments.visibilities))
-    jobs = 0 if arguments.one_process else arguments.jobs
-    records = []
-    for record in measured([BY_NAME[name] for name in arguments.networks], task, jobs):
-        records.append(record)
-        if not arguments.json:
-            print(record.get("error", "  ".join(f"{key} {value}" for key, value in record.items())), flush=True)
-    if arguments.json:
-        print(json.dumps(records, indent=2))
+    given = parse_options(
+        __doc__,
+        seconds=(600.0, "simulated time of each run"),
+        step=(0.2, "SUMO's step [s]"),
+        per_hour=(1500.0, "vehicles an hour where the traffic is ours"),
+        visibilities=([math.inf, 100.0, 30.0], "V_met [m]"),
+        networks=(list(NETWORKS), "which", NETWORKS),
+        jobs=(1, "networks at once, each in a process of its own"),
+        one_process=(False, "all in this process: quicker, and a crash ends all"),
+    )
+    task = Task(given.seconds, given.step, given.per_hour, tuple(given.visibilities))
+    records = list(measured(given.networks, task, 0 if given.one_process else given.jobs))
+    publish(given, records)
     sys.exit(any(map(failed, records)))
 
 

@@ -12,16 +12,13 @@ one beam is not among those of pool 0.
     python benchmarks/night_estimators.py [--json] [--docs] [--pool 1] [--images 40] [--part all]
 """
 
-import argparse
 import functools
-import json
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from docs_table import lines_of, write_table
+from harness import Row, lines_of, parse_options, progress, publish, timed
 from photon_nights import SETBACK as PHOTON_SETBACK
 from photon_nights import Night, beam_named, drawn_nights
 
@@ -143,14 +140,13 @@ def record(label: dict[str, Any], found: list[tuple[float, Estimate]]) -> dict[s
 def drawn_records(pool: int, count: int) -> list[dict[str, Any]]:
     """Errors in FogSim's own images, in fog and in clear air apart."""
     records = []
-    for label, variant in VARIANTS.items():
+    for label, variant in progress(VARIANTS.items(), "drawn"):
         seen = list(looks(variant, pool, count))
         for name, (method, options) in METHODS.items():
             found = [(v, make(method, assumed, **options).update(one)) for v, assumed, one in seen]
             for air, chosen in (("fog", np.isfinite), ("clear", np.isinf)):
                 labels = {"method": name, "not as usual": label, "air": air}
                 records.append(record(labels, [(v, one) for v, one in found if chosen(v)]))
-                print(*records[-1].values(), flush=True)
     return records
 
 
@@ -168,7 +164,6 @@ def photon_records(pool: int, count: int) -> list[dict[str, Any]]:
             if lux[0] <= one.illuminance <= lux[1] and fog[0] <= one.visibility <= fog[1]
         ]
         records.append(record(labels, chosen))
-        print(*records[-1].values(), flush=True)
     return records
 
 
@@ -183,45 +178,36 @@ def milliseconds() -> dict[str, float]:
         image = road.photograph(radiance, 1.0, np.random.default_rng(0))
     spent = {}
     for name, lux in (("night", DARK), ("dusk", 1.0)):
-        light, times = LightMeasurement(lux), []
-        seen = Observation(image, lamps=Lamp.LOW_BEAM, camera_setback=SETBACK, light=light)
-        estimator = make("night_road", TOLD)
-        for _ in range(21):
-            started = time.perf_counter()
-            estimator.update(seen)
-            times.append(time.perf_counter() - started)
-        spent[name] = round(1e3 * float(np.median(times[1:])), 1)
+        seen = Observation(image, lamps=Lamp.LOW_BEAM, camera_setback=SETBACK, light=LightMeasurement(lux))
+        update = functools.partial(make("night_road", TOLD).update, seen)
+        times = [timed(update)[1] for _ in range(21)]
+        spent[name] = round(float(np.median(times[1:])), 1)
     return spent
 
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print records as JSON")
-    parser.add_argument("--docs", action="store_true", help="write the tables of docs/explanation/night.md")
-    parser.add_argument("--pool", type=int, default=1)
-    parser.add_argument("--images", type=int, default=40, help="of each variant; 0.4 times that by photons")
-    parser.add_argument("--part", choices=("all", "drawn", "photons"), default="all")
-    asked = parser.parse_args()
-    drawn = [] if asked.part == "photons" else drawn_records(asked.pool, asked.images)
-    photons = [] if asked.part == "drawn" else photon_records(asked.pool, round(0.4 * asked.images))
+    given = parse_options(
+        __doc__,
+        docs=("explanation/night.md", "night-estimators"),
+        pool=1,
+        images=(40, "of each variant; 0.4 times that by photons"),
+        part=("all", "which images", ("all", "drawn", "photons")),
+    )
+    drawn = [] if given.part == "photons" else drawn_records(given.pool, given.images)
+    photons = [] if given.part == "drawn" else photon_records(given.pool, round(0.4 * given.images))
     times = milliseconds()
-    print(times)
-    if asked.json:
-        print(json.dumps([*photons, *drawn, {"ms_640x480": times}], indent=2))
-    if asked.docs:
-        write_docs(photons, drawn, times)
+    publish(given, [*photons, *drawn, {"ms_640x480": times}], tables(photons, drawn, times))
 
 
-def write_docs(photons: list[dict[str, Any]], drawn: list[dict[str, Any]], times: dict[str, float]) -> None:
-    """Write the tables of docs/explanation/night.md."""
+def tables(photons: list[Row], drawn: list[Row], times: dict[str, float]) -> list[str]:
+    """Lines of the tables of docs/explanation/night.md."""
     parts: list[str] = []
     for records, heads in ((photons, ("beam", "light [lx]", "V_met [m]")), (drawn, ("method", "not as usual", "air"))):
         keys = [*heads, *COLUMNS]
         rows = [["–" if one[key] is None else f"{one[key]}" for key in keys] for one in records]
         parts += [*lines_of([*heads, *COLUMNS.values()], rows), ""]
-    parts.append(f"An image of 640×480 pixels takes {times['night']} ms by night and {times['dusk']} ms at dusk.")
-    write_table("explanation/night.md", "night-estimators", parts)
+    return [*parts, f"An image of 640×480 pixels takes {times['night']} ms by night and {times['dusk']} ms at dusk."]
 
 
 if __name__ == "__main__":

@@ -15,15 +15,13 @@ shares of 90 % intervals of images and of informed beliefs that hold the truth.
     python benchmarks/night_lamps.py [--json] [--docs] [--seeds 3] [--policy gallen2014] [--choose]
 """
 
-import argparse
-import json
 from collections.abc import Iterator
 from itertools import pairwise
 from types import ModuleType
 from typing import Any
 
 import numpy as np
-from docs_table import lines_of, write_table
+from harness import Row, lines_of, parse_options, progress, publish
 
 import fogsim
 from fogsim import estimators, fusion
@@ -83,7 +81,7 @@ def drive(scenario: str, visibility: str, policy: str, informed_by: str, seed: i
     return list(fogsim.run(loaded, seed=seed))
 
 
-def record(scenario: str, visibility: str, policy: str, seeds: int) -> dict[str, Any]:
+def record(scenario: str, visibility: str, policy: str, seeds: int) -> Row:
     """What was found in the pairs of runs of a case."""
     count = differ = informed = both = oracles = uninformed = 0
     for seed in range(seeds):
@@ -118,14 +116,12 @@ def drives_to_choose_from() -> Iterator[list[Step]]:
             yield list(fogsim.run(fogsim.load_scenario(scenario, overrides), seed=CHOICE_SEED))[::3]
 
 
-def choice_row(drives: list[list[Step]]) -> list[str]:
+def choice_row(drives: list[list[Step]]) -> Row:
     """What the estimator and the fusion make of the drives, with their constants as they are."""
     answers, beliefs, ratios, valid = [], [], [], 0
     for steps in drives:
-        estimator, filter_ = (
-            estimators.make("night_road", steps[0].observation.frame.camera),
-            fusion.make("grid_filter"),
-        )
+        estimator = estimators.make("night_road", steps[0].observation.frame.camera)
+        filter_ = fusion.make("grid_filter")
         for step in steps:
             truth, found = step.truth.visibility_ahead, estimator.update(step.observation)
             belief = filter_.update([found], step.time)
@@ -138,64 +134,57 @@ def choice_row(drives: list[list[Step]]) -> list[str]:
                 beliefs.append(belief.visibility_quantile(0.05) <= truth <= belief.visibility_quantile(0.95))
     count = sum(map(len, drives))
     shares = [valid / count, (len(answers) - valid) / count, np.median(ratios), np.mean(answers), np.mean(beliefs)]
-    return [f"{share:.2f}" for share in shares]
+    names = ("valid", "bounded", "ratio", "holds", "belief holds")
+    return {name: f"{share:.2f}" for name, share in zip(names, shares, strict=True)}
 
 
-def choices() -> list[str]:
-    """Lines of the table of constants."""
+def choices() -> list[Row]:
+    """A record of each value of each constant."""
     drives, rows = list(drives_to_choose_from()), []
     for module, name, values in CHOICES:
         chosen = getattr(module, name)
-        for value in values:
+        for value in progress(values, name):
             setattr(module, name, value)
             shown = value[True] if isinstance(value, dict) else value
-            rows.append([name, f"{shown}{' (chosen)' if value == chosen else ''}", *choice_row(drives)])
-            print(*rows[-1], flush=True)
+            head = {"constant": name, "value": f"{shown}{' (chosen)' if value == chosen else ''}"}
+            rows.append({**head, **choice_row(drives)})
         setattr(module, name, chosen)
-    return lines_of(["constant", "value", "valid", "bounded", "ratio", "holds", "belief holds"], rows)
+    return rows
 
 
-def docs_table(found: list[dict[str, Any]]) -> list[str]:
+def docs_table(found: list[Row]) -> list[str]:
     """Lines of the table of docs/explanation/night.md."""
-    heads = ["scenario", "V_met", "frames", "informed [%]", "differs [%]", "high beams [%]", "uninformed"]
-    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+    rows = []
     for one in found:
         high = "–" if one["high_beams_pct"] is None else f"{one['high_beams_pct']:.0f}"
-        lines.append(
-            f"| {one['scenario']} | {one['visibility']} | {one['frames']} | {one['informed_pct']:.0f} "
-            f"| {one['differs_pct']:.1f} | {high} | {one['uninformed_lit']} |"
-        )
+        cells = (f"{one['informed_pct']:.0f}", f"{one['differs_pct']:.1f}", high, str(one["uninformed_lit"]))
+        rows.append((one["scenario"], one["visibility"], str(one["frames"]), *cells))
     clear_of_limits = [one for one in found if one["visibility"] not in AT_LIMITS]
     for label, chosen in (("all", found), ("all but 100 and 120 m", clear_of_limits)):
         frames = sum(one["frames"] for one in chosen)
         differ = sum(one["differs_pct"] * one["frames"] for one in chosen) / frames
         uninformed = sum(one["uninformed_lit"] for one in chosen)
-        lines.append(f"| {label} | | {frames} | | {differ:.1f} | | {uninformed} |")
-    return lines
+        rows.append((label, "", str(frames), "", f"{differ:.1f}", "", str(uninformed)))
+    heads = ("scenario", "V_met", "frames", "informed [%]", "differs [%]", "high beams [%]", "uninformed")
+    return lines_of(heads, rows)
 
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/explanation/night.md")
-    parser.add_argument("--seeds", type=int, default=3, help="pairs of runs of each case")
-    parser.add_argument("--policy", choices=sorted(LIGHTING_POLICIES), default="gallen2014")
-    parser.add_argument("--choose", action="store_true", help="print what the constants do in the pool of choice")
-    arguments = parser.parse_args()
-    if arguments.choose:
-        lines = choices()
-        if arguments.docs:
-            write_table("explanation/night.md", "night choices", lines)
+    given = parse_options(
+        __doc__,
+        docs=("explanation/night.md", "night lamps"),
+        seeds=(3, "pairs of runs of each case"),
+        policy=("gallen2014", "policy", sorted(LIGHTING_POLICIES)),
+        choose=(False, "print what the constants do in the pool of choice"),
+    )
+    if given.choose:
+        given.table = ("explanation/night.md", "night choices")
+        publish(given, choices())
         return
-    found = [
-        record(scenario, visibility, arguments.policy, arguments.seeds)
-        for scenario, visibilities in CASES.items()
-        for visibility in visibilities
-    ]
-    if arguments.docs:
-        write_table("explanation/night.md", "night lamps", docs_table(found))
-    print(json.dumps(found, indent=2) if arguments.json else "\n".join(docs_table(found)))
+    cases = [(scenario, visibility) for scenario, seen in CASES.items() for visibility in seen]
+    found = [record(*case, given.policy, given.seeds) for case in progress(cases, "cases")]
+    publish(given, found, docs_table(found))
 
 
 if __name__ == "__main__":

@@ -1,24 +1,21 @@
 """Fog by the halos about lamps of others, told from clear nights.
 
-For docs/explanation/night.md:
+For docs/explanation/night.md: a threshold is calibrated on one pool of scenes and fog counted on another, also at
+exposures and strengths of lamps that the calibration did not see. Constants were chosen on ``--pool 1`` and 2; what is
+reported is of 7.
 
-``python benchmarks/night_sources.py --part halos`` calibrates a threshold on one pool of scenes and counts on another,
-at exposures and strengths of lamps that the calibration did not see; ``--part speed`` takes the time.
-Constants were chosen on ``--pool 1`` and 2; what is reported is of 7.
+    python benchmarks/night_sources.py [--json] [--pool 7] [--count 80] [--small]
 """
 
-import argparse
-import json
 import math
-import time
-from collections.abc import Callable
 
 import numpy as np
+from harness import Row, parse_options, publish
 
 from fogsim.calibration.halo_calibration import measure_halo_threshold, random_scene
-from fogsim.calibration.staged_night import NightRoad, NightScene, NightVehicle
-from fogsim.estimators.night.halos import HaloWatch, largest_sharpness, mean_steepness
-from fogsim.values import Camera, Lamp, Response
+from fogsim.calibration.staged_night import NightRoad
+from fogsim.estimators.night.halos import largest_sharpness, mean_steepness
+from fogsim.values import Camera, Response
 from fogsim.vision.sources.halo_profile import halos_of
 from fogsim.vision.sources.source_tree import source_tree
 
@@ -28,11 +25,8 @@ VISIBILITIES = (math.inf, 300.0, 200.0, 150.0, 100.0, 70.0, 50.0)
 UNSEEN = ((0.4, 0.6), (1.6, 2.2))
 """Exposures, and strengths of lamps, outside what the calibration draws."""
 
-LOW = Lamp.POSITION | Lamp.LOW_BEAM
-Record = dict[str, object]
 
-
-def halo_records(camera: Camera, pool: int, scenes: int) -> list[Record]:
+def halo_records(camera: Camera, pool: int, scenes: int) -> list[Row]:
     """How often fog is seen, picture by picture, in clear air and in fog."""
     measured = measure_halo_threshold(camera, seed=0)
     counts: dict[tuple[str, float], list[int]] = {}
@@ -65,65 +59,15 @@ def halo_records(camera: Camera, pool: int, scenes: int) -> list[Record]:
     ]
 
 
-def speed_records() -> list[Record]:
-    """Processor time of a picture of 1280×800, the median of many on the worst of some scenes."""
-    out: list[Record] = []
-    with NightRoad(PAPERS_CAMERA) as road:
-        for name, scene in (
-            ("street lamps and traffic", NightScene(10.0, _traffic(), street_lamps=True)),
-            ("traffic", NightScene(10.0, _traffic())),
-            ("nobody", NightScene(10.0)),
-        ):
-            for visibility, light in zip(
-                (math.inf, 200.0, 50.0), road.radiances(scene, (math.inf, 200.0, 50.0)), strict=True
-            ):
-                image = road.photograph(light, 1.0, np.random.default_rng(0))
-                watch = HaloWatch()
-                out.append(
-                    {
-                        "scene": name,
-                        "V_met [m]": visibility if math.isfinite(visibility) else "clear",
-                        "halos [ms]": _milliseconds(lambda watch=watch, image=image: watch.look(image)),
-                    }
-                )
-    return out
-
-
-def _traffic() -> tuple[NightVehicle, ...]:
-    return NightVehicle(40.0, 0.1, LOW | Lamp.REAR_FOG), NightVehicle(60.0, 3.5, LOW, oncoming=True)
-
-
-def _milliseconds(call: Callable[[], object], times: int = 30) -> float:
-    call()
-    spent = []
-    for _ in range(times):
-        started = time.process_time()
-        call()
-        spent.append(time.process_time() - started)
-    return round(1e3 * float(np.median(spent)), 2)
-
-
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--part", choices=("halos", "speed"), default="halos", help="what is measured")
-    parser.add_argument("--pool", type=int, default=7, help="which scenes")
-    parser.add_argument("--count", type=int, default=80, help="scenes")
-    parser.add_argument("--small", action="store_true", help="pictures of 640×480 in place of 1280×800")
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    arguments = parser.parse_args()
-    camera = SMALL_CAMERA if arguments.small else PAPERS_CAMERA
-    match arguments.part:
-        case "halos":
-            found = halo_records(camera, arguments.pool, arguments.count)
-        case _:
-            found = speed_records()
-    if arguments.json:
-        print(json.dumps(found, indent=2))
-        return
-    print("| " + " | ".join(found[0]) + " |\n" + "|---" * len(found[0]) + "|")
-    for one in found:
-        print("| " + " | ".join("–" if value is None else str(value) for value in one.values()) + " |")
+    given = parse_options(
+        __doc__,
+        pool=(7, "which scenes"),
+        count=(80, "scenes"),
+        small=(False, "pictures of 640×480 in place of 1280×800"),
+    )
+    publish(given, halo_records(SMALL_CAMERA if given.small else PAPERS_CAMERA, given.pool, given.count))
 
 
 if __name__ == "__main__":

@@ -8,31 +8,20 @@ whether there is fog and gives a bound, not a visibility: `bounds` is the share 
     python benchmarks/paper_methods.py [--json] [--docs] [--seeds 3]
 """
 
-import argparse
-import json
-from typing import Any
-
-from docs_table import write_table
+from harness import Row, lines_of, mean, parse_options, publish
 
 import fogsim
 from fogsim.metrics.estimation import Errors
 from fogsim.units import extinction_from_visibility
 
 SCENARIOS = {
-    "papers_by_day": (
-        "negru2013",
-        "zhu2015",
-        "huang2015_rough",
-        "huang2015_lead",
-        "huang2015",
-        "belaroussi2015",
-    ),
+    "papers_by_day": ("negru2013", "zhu2015", "huang2015_rough", "huang2015_lead", "huang2015", "belaroussi2015"),
     "rural_night_alone": ("gallen2014_veil",),
     "rural_night_oncoming": ("gallen2014", "gallen2014_halo"),
 }
 
 
-def records(name: str, seeds: int) -> list[dict[str, Any]]:
+def records(name: str, seeds: int) -> list[Row]:
     """One record for each method of a scenario."""
     errors = {method: Errors() for method in SCENARIOS[name]}
     bounds: dict[str, list[bool]] = {method: [] for method in errors}
@@ -54,48 +43,36 @@ def records(name: str, seeds: int) -> list[dict[str, Any]]:
     ]
 
 
-def _judged(errors: Errors, bounds: list[bool]) -> dict[str, Any]:
+def _judged(errors: Errors, bounds: list[bool]) -> Row:
     found = errors.result()
     names = ("count", "valid_share", "median_error_percent", "p95_error_percent", "coverage_share")
     share = len(bounds) / errors.asked if errors.asked else 0.0
-    return {
-        **{name: found[name] for name in names},
-        "bounds_share": share,
-        "bounds_hold": sum(bounds) / len(bounds) if bounds else None,
-    }
+    return {**{name: found[name] for name in names}, "bounds_share": share, "bounds_hold": mean(bounds)}
 
 
-def docs_table(found: list[dict[str, Any]]) -> list[str]:
+def docs_table(found: list[Row]) -> list[str]:
     """Lines of the table of docs/explanation/estimators.md."""
-    heads = ["method", "scenario", "frames", "valid, %", "median/p95, %", "90 % intervals hold, %"]
-    heads += ["bound alone, %", "bounds hold, %"]
-    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+    rows = []
     for one in found:
         error = "–"
         if one["median_error_percent"] is not None:
             error = f"{one['median_error_percent']:.1f}/{one['p95_error_percent']:.1f}"
-        valid, cover, alone, hold = (
+        valid, *others = (
             "–" if one[key] is None else f"{100.0 * one[key]:.0f}"
             for key in ("valid_share", "coverage_share", "bounds_share", "bounds_hold")
         )
         name = f"[{one['scenario']}](../../scenarios/{one['scenario']}/README.md)"
-        lines.append(
-            f"| `{one['method']}` | {name} | {one['count']} | {valid} | {error} | {cover} | {alone} | {hold} |"
-        )
-    return lines
+        rows.append((f"`{one['method']}`", name, str(one["count"]), valid, error, *others))
+    heads = ("method", "scenario", "frames", "valid, %", "median/p95, %", "90 % intervals hold, %")
+    return lines_of((*heads, "bound alone, %", "bounds hold, %"), rows)
 
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/explanation/estimators.md")
-    parser.add_argument("--seeds", type=int, default=3, help="runs of each scenario")
-    arguments = parser.parse_args()
-    found = [record for name in SCENARIOS for record in records(name, arguments.seeds)]
-    if arguments.docs:
-        write_table("explanation/estimators.md", "paper methods", docs_table(found))
-    print(json.dumps(found, indent=2) if arguments.json else "\n".join(docs_table(found)))
+    docs = ("explanation/estimators.md", "paper methods")
+    given = parse_options(__doc__, docs=docs, seeds=(3, "runs of each scenario"))
+    found = [record for name in SCENARIOS for record in records(name, given.seeds)]
+    publish(given, found, docs_table(found))
 
 
 if __name__ == "__main__":

@@ -19,20 +19,15 @@ which methods are told that it is sRGB, then bends the fog as well. `--show FOLD
 in fog of 150 m, to be looked at.
 """
 
-import argparse
-import json
 import math
 import statistics
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from docs_table import write_table
-from photograph_pictures import CAMERAS, photograph
+from harness import Row, lines_of, mean, median, parse_options, progress, publish, quantile
+from photograph_pictures import photograph
 from PIL import Image
-from rich.console import Console
-from rich.progress import track
 
 from fogsim.estimators import make
 from fogsim.units import extinction_from_visibility
@@ -43,13 +38,11 @@ VISIBILITIES = (60.0, 80.0, 100.0, 150.0, 200.0, 300.0, 500.0)
 ENDLESS = 999.0  # error [%] of clear air that is seen where there is fog
 SHOWN, SHOWN_FOG = 12, 150.0
 
-Row = dict[str, Any]
-
 
 def measure(pool: int, images: int, methods: list[str], laid_on: str) -> list[Row]:
     """An estimate a row."""
     rows = []
-    for number in track(range(images), "photographs", console=Console(stderr=True)):
+    for number in progress(range(images), "photographs"):
         taken = photograph(pool, number)
         lay = taken.taken_in_fog if laid_on == "light" else taken.fogged
         for visibility, image in zip(VISIBILITIES, lay(VISIBILITIES), strict=True):
@@ -82,34 +75,20 @@ def records(rows: list[Row], pool: int) -> Iterator[Row]:
             record |= {"valid_share": len(valid) / len(some)}
             if valid:
                 errors = [min(100.0 * abs(math.expm1(row["off"])), ENDLESS) for row in valid]
-                record["median_pct"] = statistics.median(errors)
-                record["p95_pct"] = float(np.quantile(errors, 0.95))
+                record |= {"median_pct": median(errors), "p95_pct": quantile(errors, 0.95)}
                 record["bias_pct"] = min(100.0 * statistics.median(row["off"] for row in valid), ENDLESS)
-                record["coverage"] = sum(row["covered"] for row in valid) / len(valid)
+                record["coverage"] = mean([row["covered"] for row in valid])
             yield record
-
-
-def table(found: list[Row]) -> str:
-    """Records in columns."""
-    lines = [f"{'method':18}{'V [m]':>18}{'median':>8}{'p95':>8}{'bias':>8}{'coverage':>10}{'valid':>7}"]
-    for one in found:
-        told = f"{one['method']:18}{one['visibility_m']:>18}"
-        if "median_pct" in one:
-            told += f"{one['median_pct']:8.1f}{one['p95_pct']:8.1f}{one['bias_pct']:+8.1f}{one['coverage']:10.2f}"
-        else:
-            told += " " * 34
-        lines.append(f"{told}{one['valid_share']:7.2f}")
-    return "\n".join(lines)
 
 
 def docs_table(found: list[Row]) -> list[str]:
     """Lines of the table of docs/explanation/estimators.md, of one method."""
-    lines = ["| V_met, m | median/p95, % | bias, % | 90 % intervals hold | valid |", "|---|---|---|---|---|"]
+    rows = []
     for one in found:
         errors = (f"{one[key]:.1f}" if one[key] < 9.95 else f"{one[key]:.0f}" for key in ("median_pct", "p95_pct"))
         bias, place = f"{one['bias_pct']:.1f}".replace("-", "−"), one["visibility_m"].replace("-", "–")
-        lines.append(f"| {place} | {'/'.join(errors)} | {bias} | {one['coverage']:.2f} | {one['valid_share']:.2f} |")
-    return lines
+        rows.append((place, "/".join(errors), bias, f"{one['coverage']:.2f}", f"{one['valid_share']:.2f}"))
+    return lines_of(("V_met, m", "median/p95, %", "bias, %", "90 % intervals hold", "valid"), rows)
 
 
 def show(folder: Path, pool: int) -> None:
@@ -123,24 +102,20 @@ def show(folder: Path, pool: int) -> None:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/explanation/estimators.md")
-    parser.add_argument("--pool", type=int, choices=range(len(CAMERAS)), default=1, help="0: constants chosen on it")
-    parser.add_argument("--images", type=int, default=60, help="photographs")
-    parser.add_argument("--methods", nargs="+", default=["joint_road"], help="names of estimators")
-    parser.add_argument("--laid-on", choices=("picture", "light"), default="picture", help="where the fog is laid")
-    parser.add_argument("--show", type=Path, help="folder to write pictures into, without measuring")
-    arguments = parser.parse_args()
-    if arguments.show:
-        show(arguments.show, arguments.pool)
-        return
-    found = list(
-        records(measure(arguments.pool, arguments.images, arguments.methods, arguments.laid_on), arguments.pool)
+    given = parse_options(
+        __doc__,
+        docs=("explanation/estimators.md", "photographs"),
+        pool=1,
+        images=(60, "photographs"),
+        methods=(["joint_road"], "names of estimators"),
+        laid_on=("picture", "where the fog is laid", ("picture", "light")),
+        show=(Path, "folder to write pictures into, without measuring"),
     )
-    if arguments.docs:
-        write_table("explanation/estimators.md", "photographs", docs_table(found))
-    print(json.dumps(found, indent=2) if arguments.json else table(found))
+    if given.show:
+        show(given.show, given.pool)
+        return
+    found = list(records(measure(given.pool, given.images, given.methods, given.laid_on), given.pool))
+    publish(given, found, docs=docs_table(found))
 
 
 if __name__ == "__main__":

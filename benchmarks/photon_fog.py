@@ -10,16 +10,11 @@ Constants were chosen on pool 0, whose drives are others; pool 1 is what is repo
     python benchmarks/photon_fog.py [--json] [--docs] [--pool 1] [--drives 4] [--droplets moderate_radiation …]
 """
 
-import argparse
-import json
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from docs_table import lines_of, write_table
-from rich.console import Console
-from rich.progress import track
+from harness import Row, lines_of, mean, median, parse_options, progress, publish, quantile
 
 from fogsim.atmosphere import Droplets
 from fogsim.calibration.staged_road import road_renderer
@@ -57,14 +52,14 @@ def measure(pool: int, drives: int, droplets: tuple[str, ...]) -> Found:
     ]
     fogs = tuple(cases(droplets))
     with road_renderer() as renderer:
-        for height, kind, number in track(todo, "drives", console=Console(stderr=True)):
+        for height, kind, number in progress(todo, "drives"):
             for case, method, estimate in kind(renderer, replace(CAMERA, mount_height=height), fogs, number):
                 if method in METHODS:
                     found.setdefault((case, method), []).append(estimate)
     return found
 
 
-def records(found: Found) -> list[dict[str, Any]]:
+def records(found: Found) -> list[Row]:
     """A record for each method, fog and albedo, over all visibilities."""
     groups: dict[tuple[str, str, str | None], list[tuple[Estimate, float]]] = {}
     for (case, method), estimates in found.items():
@@ -77,7 +72,7 @@ def records(found: Found) -> list[dict[str, Any]]:
     return [record(*key, groups[key]) for key in sorted(groups, key=lambda key: key[2] == ALL_ALBEDOS)]
 
 
-def record(method: str, fog: str, albedo: str | None, estimates: list[tuple[Estimate, float]]) -> dict[str, Any]:
+def record(method: str, fog: str, albedo: str | None, estimates: list[tuple[Estimate, float]]) -> Row:
     """Errors and intervals of a group."""
     told = [(one, truth) for one, truth in estimates if one.valid and one.extinction > 0.0]
     off = 100.0 * np.array([one.visibility / truth - 1.0 for one, truth in told])
@@ -88,15 +83,15 @@ def record(method: str, fog: str, albedo: str | None, estimates: list[tuple[Esti
         "ground_albedo": albedo,
         "n": len(estimates),
         "told": round(len(told) / len(estimates), 2),
-        "bias_pct": round(float(np.median(off)), 1) if told else None,
-        "median_pct": round(float(np.median(np.abs(off))), 1) if told else None,
-        "p95_pct": round(float(np.percentile(np.abs(off), 95)), 1) if told else None,
-        "held": round(float(np.mean(held)), 2) if told else None,
+        "bias_pct": median(off, 1),
+        "median_pct": median(np.abs(off), 1),
+        "p95_pct": quantile(np.abs(off), 0.95, 1),
+        "held": mean(held, 2),
     }
 
 
-def write_docs(rows: list[dict[str, Any]]) -> None:
-    """Put the table into the page."""
+def docs_table(rows: list[Row]) -> list[str]:
+    """Lines of the table of docs/explanation/airlight.md."""
     fogs = sorted(dict.fromkeys((row["fog"], row["ground_albedo"]) for row in rows), key=lambda fog: fog[0])
     table = []
     for fog, albedo in fogs:
@@ -104,26 +99,20 @@ def write_docs(rows: list[dict[str, Any]]) -> None:
         cells = [told[method] for method in METHODS]
         texts = (f"{c['median_pct']}/{c['p95_pct']} ({c['held']}; {c['told']})" if c["told"] else "—" for c in cells)
         table.append((fog, albedo or "", *texts))
-    write_table("explanation/airlight.md", "mended", lines_of(("fog", "albedo", *METHODS), table))
+    return lines_of(("fog", "albedo", *METHODS), table)
 
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/explanation/airlight.md")
-    parser.add_argument("--pool", type=int, choices=(0, 1), default=1)
-    parser.add_argument("--drives", type=int, default=4, help="of each camera and kind")
-    parser.add_argument("--droplets", nargs="+", choices=[str(kind) for kind in Droplets], default=list(KINDS))
-    arguments = parser.parse_args()
-    rows = records(measure(arguments.pool, arguments.drives, tuple(arguments.droplets)))
-    if arguments.docs:
-        write_docs(rows)
-    if arguments.json:
-        print(json.dumps(rows, indent=2))
-        return
-    for row in rows:
-        print("  ".join(f"{value!s:>12}" for value in row.values()))
+    given = parse_options(
+        __doc__,
+        docs=("explanation/airlight.md", "mended"),
+        pool=1,
+        drives=(4, "of each camera and kind"),
+        droplets=(list(KINDS), "which", [str(kind) for kind in Droplets]),
+    )
+    rows = records(measure(given.pool, given.drives, tuple(given.droplets)))
+    publish(given, rows, docs=docs_table(rows) if given.docs else None)
 
 
 if __name__ == "__main__":

@@ -7,49 +7,27 @@ the resident set, and of what the C library's allocator has handed out and not g
 from scattered free memory.
 
     python benchmarks/renderers.py [--json] [--renderers 200] [--frames 10000] [--renderer cpu ...]
-
-Found with 200 renderers and 10,000 frames (llvmpipe of Mesa 22.3, 2-core Linux machine busy with other work), growth of
-resident set / allocator: "cpu" 0.56 / 0.07 KiB per renderer, 0.0 / 0.0 KiB per 1000 frames; "opengl" 30 / 0.07 and
-729 / 0.0. Mesa's resident set settles slowly, by about 5 MiB in all: with 20,000 frames 0.3 KiB per 1000 are left.
 """
 
-import argparse
-import json
-import multiprocessing
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
-from frames import Case, read_network, scenario, signs_beside
-from resets import heap_kib, resident_kib
+from frames import RENDERERS, SHOT, Case, scenario
+from harness import Row, apart, parse_options, publish
+from resets import growth
+from staging import network, signs
 
 from fogsim.render import make_renderer
 from fogsim.scenario import build
 from fogsim.scene import build_scene, vehicle_batches
 
 SIZES = ("160x120", "320x240")
-RENDERERS = ("opengl", "cpu")
 
 
-def growth(work: Callable[[int], object], times: int) -> tuple[float, float | None]:
-    """Growth of the resident set and of the allocator's memory [KiB] for each time that something is done."""
-    warm_up = max(1, times // 4)
-    for number in range(warm_up):
-        work(number)
-    resident, heap = resident_kib(), heap_kib()
-    for number in range(warm_up, times):
-        work(number)
-    heap_now, counted = heap_kib(), max(1, times - warm_up)
-    grown = (resident_kib() - resident) / counted
-    return grown, None if heap is None or heap_now is None else (heap_now - heap) / counted
-
-
-def soak(renderer: str, renderers: int, frames: int) -> dict[str, Any]:
+def soak(renderer: str, renderers: int, frames: int) -> Row:
     """One record."""
-    network = read_network()
-    scene = build_scene(network, signs_beside(network.route), np.random.default_rng(1))
+    roads = network("motorway")
+    scene = build_scene(roads, signs(roads.route, SHOT), np.random.default_rng(1))
     cameras = [build.camera(scenario(renderer, "day", size, 1)) for size in SIZES]
-    cases = [Case((renderer, "day", size, 1), network) for size in SIZES]
+    cases = [Case((renderer, "day", size, 1)) for size in SIZES]
     vehicles, pose = vehicle_batches(cases[0].traffic[0], 0), cases[0].poses[0]
 
     def make_and_close(_: int) -> None:
@@ -78,21 +56,13 @@ def soak(renderer: str, renderers: int, frames: int) -> dict[str, Any]:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--renderers", type=int, default=200, help="how many are made and closed")
-    parser.add_argument("--frames", type=int, default=10_000, help="how many are drawn by one renderer")
-    parser.add_argument("--renderer", action="append", choices=RENDERERS, help="default: all")
-    arguments = parser.parse_args()
-    records = []
-    for renderer in arguments.renderer or RENDERERS:
-        with multiprocessing.get_context("spawn").Pool(1) as pool:
-            records.append(pool.apply(soak, (renderer, arguments.renderers, arguments.frames)))
-    if arguments.json:
-        print(json.dumps(records, indent=2))
-        return
-    for record in records:
-        print("\n".join(f"{key:34} {value}" for key, value in record.items() if value is not None), end="\n\n")
+    given = parse_options(
+        __doc__,
+        renderers=(200, "how many are made and closed"),
+        frames=(10_000, "how many are drawn by one renderer"),
+        renderer=(list(RENDERERS), "which", RENDERERS),
+    )
+    publish(given, [apart(soak, renderer, given.renderers, given.frames) for renderer in given.renderer])
 
 
 if __name__ == "__main__":

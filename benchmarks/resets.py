@@ -12,41 +12,18 @@ tells a leak from scattered free memory.
     python benchmarks/resets.py [--json] [--resets 200] [--size 64x48] [--part environment …]
 
 The soak test is ``python benchmarks/resets.py --resets 1000``.
-
-Found with libsumo 1.28 on a 2-core Linux machine, growth per reset of resident set / allocator:
-
-    sumo         1000 resets   1.6 KiB / 1.8 KiB
-    traffic       750 resets   2.1 KiB / 1.7 KiB   (counted from the 250th on)
-    environment  1000 resets   3.1 KiB / 2.1 KiB
-
-    highway      1500 resets   8.2 KiB / 3.1 KiB   (no Python object is left; bare highway-v0 has 3.6)
-
-    episodes     1000 resets   1.4 KiB / 1.4 KiB
-    advisory-v1  1000 resets  12.7 KiB / 1.4 KiB
-    fast-v1      1000 resets   3.4 KiB / 1.4 KiB
-    highway-v1    240 resets  none     / none      (counted from the 60th on)
-
-So most of what grows is SUMO's own ``load``, below 2 KiB each whether the seed changes or not, some 2 MiB in 1000
-resets; our stages, the scene, the renderer and the estimators add at most 0.5 KiB to it. The resident set settles
-slowly, so short runs show more. Also where each reset has another road what is not given back is what ``load`` keeps;
-the resident set grows more, which is no memory in use: probably free memory scattered among scenes of all sizes.
 """
 
-import argparse
 import ctypes
-import functools
-import json
-import multiprocessing
 import os
-import statistics
-import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import gymnasium
 import numpy as np
+from harness import Row, apart, median, parse_options, publish, timed
 
 import fogsim
 import fogsim_envs  # noqa: F401 - registers the environments
@@ -125,7 +102,7 @@ PARTS: dict[str, Part] = {
     "sumo": sumo,
     "traffic": traffic,
     "episodes": episodes,
-    **{part: functools.partial(environment, env_id=env_id) for part, env_id in ENVIRONMENTS.items()},
+    **{part: partial(environment, env_id=env_id) for part, env_id in ENVIRONMENTS.items()},
 }
 
 
@@ -153,49 +130,46 @@ def heap_kib() -> float | None:
     return float(figures.uordblks + figures.hblkhd) / 1024
 
 
-def measure(part: str, resets: int, size: str) -> dict[str, Any]:
+def growth(work: Callable[[int], object], times: int) -> tuple[float, float | None]:
+    """Growth of the resident set and of the allocator's memory [KiB] for each time, the first quarter not counted."""
+    warm_up = max(1, times // 4)
+    for number in range(warm_up):
+        work(number)
+    resident, heap = resident_kib(), heap_kib()
+    for number in range(warm_up, times):
+        work(number)
+    heap_now, counted = heap_kib(), max(1, times - warm_up)
+    grown = round((resident_kib() - resident) / counted, 5)
+    return grown, None if heap is None or heap_now is None else round((heap_now - heap) / counted, 5)
+
+
+def measure(part: str, resets: int, size: str) -> Row:
     """One record."""
-    warm_up = max(1, resets // 4)
-    spent, resident, heap = [], 0.0, None
+    spent: list[float] = []
     with PARTS[part](size) as reset:
-        for index in range(resets):
-            if index == warm_up:
-                resident, heap = resident_kib(), heap_kib()
-            started = time.perf_counter()
-            reset(index)
-            spent.append(1e3 * (time.perf_counter() - started))
-        counted, heap_now = resets - warm_up, heap_kib()
-        grown = (resident_kib() - resident) / counted
-        grown_heap = None if heap is None or heap_now is None else round((heap_now - heap) / counted, 2)
+        grown, grown_heap = growth(lambda seed: spent.append(timed(partial(reset, seed))[1]), resets)
+    counted = spent[max(1, resets // 4) :]
     return {
         "part": part,
         "env": ENVIRONMENTS.get(part),
         "resets": resets,
-        "ms_median": round(statistics.median(spent[warm_up:]), 1),
-        "ms_max": round(max(spent[warm_up:]), 1),
+        "ms_median": median(counted, 1),
+        "ms_max": round(max(counted), 1),
         "growth_kib_per_reset": round(grown, 2),
-        "heap_growth_kib_per_reset": grown_heap,
+        "heap_growth_kib_per_reset": None if grown_heap is None else round(grown_heap, 2),
     }
 
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--resets", type=int, default=200, help="how many resets")
-    parser.add_argument("--size", default="64x48", help="camera WIDTHxHEIGHT")
-    parser.add_argument("--part", action="append", choices=PARTS, help="what is reset (default: all)")
-    arguments = parser.parse_args()
-    records = []
-    for part in arguments.part or PARTS:
-        # A process each: there is one libsumo in a process, and memory of one part must not count for the next.
-        with multiprocessing.get_context("spawn").Pool(1) as pool:
-            records.append(pool.apply(measure, (part, arguments.resets, arguments.size)))
-    if arguments.json:
-        print(json.dumps(records, indent=2))
-        return
-    for record in records:
-        print("\n".join(f"{key:26} {value}" for key, value in record.items() if value is not None), end="\n\n")
+    given = parse_options(
+        __doc__,
+        resets=(200, "how many resets"),
+        size=("64x48", "camera WIDTHxHEIGHT"),
+        part=(list(PARTS), "what is reset", PARTS),
+    )
+    # A process each: there is one libsumo in a process, and memory of one part must not count for the next.
+    publish(given, [apart(measure, part, given.resets, given.size) for part in given.part])
 
 
 if __name__ == "__main__":

@@ -22,21 +22,17 @@ camera, places); pool 1 is what is reported.
 """
 
 import argparse
-import json
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
-from docs_table import write_table
+from harness import Row, lines_of, parse_options, progress, publish
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 from restoration_measures import DETECTORS, Found, blind_indicators, detect, psnr, ssim, vehicle_box
-from rich.console import Console
-from rich.progress import track
 
 from fogsim.calibration.staged_road import StagedVehicle, road_renderer
 from fogsim.estimators import Estimator, make
@@ -48,7 +44,6 @@ from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, Frame, Observation, Response
 
 Pixels = NDArray[np.uint8]
-Row = dict[str, Any]
 Restore = Callable[[Pixels], Pixels]
 
 METHODS = ("foggy", "planar", "planar, k known", "dark_channel", "tarel2009")
@@ -180,9 +175,9 @@ def crop(seen_by: Camera) -> tuple[int, int, int, int]:
 def measure(arguments: argparse.Namespace) -> list[Row]:
     """All records."""
     pool, rows = arguments.pool, []
-    visibilities = arguments.visibilities or VISIBILITIES[pool]
+    visibilities = VISIBILITIES[pool] if arguments.visibilities == list(VISIBILITIES[1]) else arguments.visibilities
     with road_renderer() as renderer:
-        for visibility in track(visibilities, "visibilities", console=Console(stderr=True)):
+        for visibility in progress(visibilities, "visibilities"):
             like = likeness(renderer, pool, visibility, arguments.vehicles)
             seen = approaches(renderer, pool, visibility, arguments.vehicles, arguments.step)
             for name in METHODS:
@@ -212,12 +207,9 @@ COLUMNS = {
 }
 
 
-def table(rows: list[Row]) -> Iterator[str]:
+def table(rows: list[Row]) -> list[str]:
     """Lines of the table."""
-    yield "| " + " | ".join(COLUMNS) + " |"
-    yield "|" + "---|" * len(COLUMNS)
-    for row in rows:
-        yield "| " + " | ".join(cell(row) for cell in COLUMNS.values()) + " |"
+    return lines_of(list(COLUMNS), [[cell(row) for cell in COLUMNS.values()] for row in rows])
 
 
 def draw(path: Path) -> None:
@@ -247,25 +239,21 @@ def strip(scene: Scene, visibility: float, rng: np.random.Generator) -> Pixels:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/how_to/restoration.md")
-    parser.add_argument("--pool", type=int, choices=(0, 1), default=1, help="0: constants chosen on it")
-    parser.add_argument(
-        "--step", type=float, default=0.1, help="of the logarithm of the range, from picture to picture"
+    given = parse_options(
+        __doc__,
+        docs=("how_to/restoration.md", "restoration"),
+        pool=1,
+        step=(0.1, "of the logarithm of the range, from picture to picture"),
+        vehicles=(3, "how many of the vehicles"),
+        visibilities=(list(VISIBILITIES[1]), "V_met [m], in place of the pool's"),
+        picture=(Path, "draw the picture of the docs there, and stop"),
     )
-    parser.add_argument("--vehicles", type=int, default=3, help="how many of the vehicles")
-    parser.add_argument("--visibilities", type=float, nargs="+", help="V_met [m], in place of the pool's")
-    parser.add_argument("--picture", type=Path, help="draw the picture of the docs there, and stop")
-    arguments = parser.parse_args()
     cv2.setNumThreads(1)
-    if arguments.picture is not None:
-        draw(arguments.picture)
+    if given.picture is not None:
+        draw(given.picture)
         return
-    rows = measure(arguments)
-    if arguments.docs:
-        write_table("how_to/restoration.md", "restoration", table(rows))
-    print(json.dumps(rows, indent=2) if arguments.json else "\n".join(table(rows)))
+    rows = measure(given)
+    publish(given, rows, table(rows))
 
 
 if __name__ == "__main__":

@@ -71,10 +71,7 @@ def blind_indicators(foggy: Image, restored: Image) -> tuple[float, float, float
 
 def _visible(image: Floats) -> NDArray[np.bool_]:
     out = np.zeros(image.shape, bool)
-    for one, other, place in (
-        (image[1:], image[:-1], out[1:]),
-        (image[:, 1:], image[:, :-1], out[:, 1:]),
-    ):
+    for one, other, place in ((image[1:], image[:-1], out[1:]), (image[:, 1:], image[:, :-1], out[:, 1:])):
         low, high = np.minimum(one, other), np.maximum(np.maximum(one, other), 1.0)
         np.logical_or(place, 2.0 * (1.0 - np.sqrt(low / high)) > VISIBLE_CONTRAST, out=place)
     return out

@@ -11,13 +11,13 @@ Mount, view and position of the cameras were chosen on ``motorway_fog_bank``, wh
     python benchmarks/roadside_cameras.py [--docs] [--seeds 3]
 """
 
-import argparse
 import math
+import sys
 import time
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from docs_table import write_table
+from harness import parse_options, publish
 from numpy.typing import NDArray
 
 import fogsim
@@ -121,17 +121,11 @@ def milliseconds() -> float:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/reference/sensors.md")
-    parser.add_argument("--seeds", type=int, default=3, help="seeds from 1 on")
-    arguments = parser.parse_args()
-    heading = ["road", "V_met", "images", "reported [%]", "median error [%]", "95th percentile [%]", "held [%]"]
-    table = [heading, ["---"] * len(heading), *rows(arguments.seeds)]
-    lines = [f"| {' | '.join(cells)} |" for cells in table]
-    print("\n".join(lines))
-    print(f"{milliseconds():.0f} ms an image")
-    if arguments.docs:
-        write_table("reference/sensors.md", "roadside cameras", lines)
+    docs = ("reference/sensors.md", "roadside cameras")
+    given = parse_options(__doc__, docs=docs, seeds=(3, "seeds from 1 on"))
+    heads = ("road", "V_met", "images", "reported [%]", "median error [%]", "95th percentile [%]", "held [%]")
+    publish(given, [dict(zip(heads, cells, strict=True)) for cells in rows(given.seeds)])
+    print(f"{milliseconds():.0f} ms an image", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -12,13 +12,11 @@ if the belief of any seed leaves the truth out.
 
 import argparse
 import inspect
-import json
 import math
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
-from docs_table import write_table
+from harness import Row, lines_of, median, parse_options, progress, publish
 
 import fogsim
 from fogsim.estimators import ESTIMATORS
@@ -86,7 +84,7 @@ def holds_truth(estimate: Estimate, extinction: float) -> bool:
     return abs(estimate.extinction - extinction) <= NORMAL_90_PERCENT * estimate.standard_deviation
 
 
-def measure(name: str, asked: argparse.Namespace) -> list[dict[str, Any]]:
+def measure(name: str, asked: argparse.Namespace) -> list[Row]:
     """Records of a fault, one for each method."""
     methods = asked.methods
     said: dict[str, list[Estimate]] = {method: [] for method in methods}
@@ -107,9 +105,7 @@ def measure(name: str, asked: argparse.Namespace) -> list[dict[str, Any]]:
     return [record(name, method, said[method], beliefs[method], extinction) for method in methods]
 
 
-def record(
-    fault: str, method: str, estimates: list[Estimate], beliefs: list[Belief], extinction: float
-) -> dict[str, Any]:
+def record(fault: str, method: str, estimates: list[Estimate], beliefs: list[Belief], extinction: float) -> Row:
     """What a method said during a fault, in figures."""
     valid = [one for one in estimates if one.valid]
     truth = math.log(20.0) / extinction
@@ -119,7 +115,7 @@ def record(
         "method": method,
         "frames": len(estimates),
         "valid_pct": 100.0 * len(valid) / len(estimates),
-        "error_pct": float(np.median([100.0 * (one.visibility / truth - 1.0) for one in valid])) if valid else None,
+        "error_pct": median([100.0 * (one.visibility / truth - 1.0) for one in valid]),
         "outside_pct": 100.0 * float(np.mean([not holds_truth(one, extinction) for one in valid])) if valid else None,
         "low_m": min(low for low, _ in intervals),
         "high_m": max(high for _, high in intervals),
@@ -127,7 +123,7 @@ def record(
     }
 
 
-def cell(one: dict[str, Any]) -> str:
+def cell(one: Row) -> str:
     """A record in a cell of the table: how often valid and how far off, then the belief."""
     error = one["error_pct"]
     off = "" if error is None else "clear" if error > 900 else f"{round(error):+d} %".replace("+0", "0")
@@ -136,31 +132,28 @@ def cell(one: dict[str, Any]) -> str:
     return f"{said}; {'**' + belief + '**' if one['fooled'] else belief}"
 
 
-def table(records: list[dict[str, Any]]) -> str:
+def table(records: list[Row]) -> list[str]:
     """Faults by methods."""
     methods = list(dict.fromkeys(one["method"] for one in records))
-    lines = ["| fault | " + " | ".join(f"`{method}`" for method in methods) + " |", "|---" * (len(methods) + 1) + "|"]
-    for fault in dict.fromkeys(one["fault"] for one in records):
-        row = {one["method"]: cell(one) for one in records if one["fault"] == fault}
-        lines.append(f"| {fault} | " + " | ".join(row[method] for method in methods) + " |")
-    return "\n".join(lines)
+    cells = {(one["fault"], one["method"]): cell(one) for one in records}
+    faults = dict.fromkeys(one["fault"] for one in records)
+    rows = [(fault, *(cells[fault, method] for method in methods)) for fault in faults]
+    return lines_of(("fault", *(f"`{method}`" for method in methods)), rows)
 
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/reference/sensors.md")
-    parser.add_argument("--faults", nargs="+", choices=FAULTS, default=list(FAULTS), help="only these")
-    parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS, help="estimators")
-    parser.add_argument("--seeds", type=int, default=3, help="drives for each fault")
-    parser.add_argument("--visibility", type=float, default=150.0, help="visibility [m]")
-    parser.add_argument("--seconds", type=float, default=5.0, help="time without the fault, and time with it [s]")
-    asked = parser.parse_args()
-    records = [one for name in asked.faults for one in measure(name, asked)]
-    if asked.docs:
-        write_table("reference/sensors.md", "sensor faults", [table(records)])
-    print(json.dumps(records, indent=2) if asked.json else table(records))
+    given = parse_options(
+        __doc__,
+        docs=("reference/sensors.md", "sensor faults"),
+        faults=(list(FAULTS), "only these", FAULTS),
+        methods=(list(METHODS), "estimators", METHODS),
+        seeds=(3, "drives for each fault"),
+        visibility=(150.0, "visibility [m]"),
+        seconds=(5.0, "time without the fault, and time with it [s]"),
+    )
+    records = [one for name in progress(given.faults, "faults") for one in measure(name, given)]
+    publish(given, records, table(records))
 
 
 if __name__ == "__main__":

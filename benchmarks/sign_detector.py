@@ -14,14 +14,13 @@ Constants were chosen with `--pool 0`; what is reported is of `--pool 1`.
 """
 
 import argparse
-import json
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
+from harness import Row, parse_options, publish
 from numpy.typing import NDArray
 from scipy.optimize import isotonic_regression
 from sign_pictures import (
@@ -122,9 +121,10 @@ def measured(
     return reach, near, empty
 
 
-def records(pictures: str, told: argparse.Namespace, rng: np.random.Generator) -> Iterator[dict[str, Any]]:
+def records(pictures: str, told: argparse.Namespace, rng: np.random.Generator) -> Iterator[Row]:
     """One record a visibility and kind, then one of all but triangles."""
-    kinds = told.kinds or (tuple(FIGURES) if pictures == "painted" else OWN_KINDS)
+    every = tuple(FIGURES) if pictures == "painted" else OWN_KINDS
+    kinds = every if told.kinds == ["all"] else told.kinds
     shots = painted(rng, len(kinds)) if pictures == "painted" else own(rng)
     triangles = TRIANGLES if pictures == "painted" else OWN_TRIANGLES
     whole: list[Look] = []
@@ -142,7 +142,7 @@ def records(pictures: str, told: argparse.Namespace, rng: np.random.Generator) -
 
 def _record(
     pictures: str, kind: str, visibility: float | None, reach: float | None, near: list[Look], empty: list[Look]
-) -> dict[str, Any]:
+) -> Row:
     return {
         "pictures": pictures,
         "kind": kind,
@@ -155,7 +155,7 @@ def _record(
     }
 
 
-def whole_pictures(visibilities: Sequence[float], draws: int, rng: np.random.Generator) -> dict[str, Any]:
+def whole_pictures(visibilities: Sequence[float], draws: int, rng: np.random.Generator) -> Row:
     """Signs 30 m ahead and false alarms in whole pictures of FogSim, without a map."""
     seen = []
     for visibility in visibilities:
@@ -166,7 +166,7 @@ def whole_pictures(visibilities: Sequence[float], draws: int, rng: np.random.Gen
     return _record("fogsim, whole", "all", None, 30.0, seen, seen)
 
 
-def timed(frames: int) -> dict[str, Any]:
+def timed(frames: int) -> Row:
     """Processor time of frames of 1400 × 600 with three signs ahead, least of several means [ms]."""
     rng = np.random.default_rng(0)
     (shot,) = fogsim_shots("speed_limit", [40.0], 200.0, rng)
@@ -200,38 +200,24 @@ def _least_ms(work: Callable[[], None], times: int) -> float:
 
 def main() -> None:
     """Measure, and print a table or JSON."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true")
-    parser.add_argument("--pool", type=int, default=1)
-    parser.add_argument("--draws", type=int, default=8)
-    parser.add_argument("--frames", type=int, default=20, help="frames that are timed, 0 for none")
-    parser.add_argument("--pictures", nargs="*", choices=("fogsim", "painted"), default=("fogsim", "painted"))
-    parser.add_argument("--kinds", nargs="*")
-    parser.add_argument("--visibilities", nargs="*", type=float, default=(50.0, 100.0, 200.0, 400.0))
-    parser.add_argument("--distances", nargs="*", type=float, default=DISTANCES)
-    told = parser.parse_args()
-    found: list[dict[str, Any]] = []
-    for pictures in told.pictures:
-        for record in records(pictures, told, np.random.default_rng([told.pool, 18])):
-            found.append(record)
-            if not told.json:
-                print(_line(record), flush=True)
-        if pictures == "fogsim":
-            found.append(whole_pictures(told.visibilities, told.draws, np.random.default_rng([told.pool, 19])))
-            if not told.json:
-                print(_line(found[-1]))
-    if told.frames:
-        found.append(timed(told.frames))
-        if not told.json:
-            print(_line(found[-1]))
-    if told.json:
-        print(json.dumps(found, indent=1))
-
-
-def _line(record: dict[str, Any]) -> str:
-    return "  ".join(
-        f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}" for key, value in record.items()
+    given = parse_options(
+        __doc__,
+        pool=(1, "which draws"),
+        draws=(8, "of each distance"),
+        frames=(20, "frames that are timed, 0 for none"),
+        pictures=(["fogsim", "painted"], "which", ("fogsim", "painted")),
+        kinds=(["all"], "of signs"),
+        visibilities=([50.0, 100.0, 200.0, 400.0], "V_met [m]"),
+        distances=(list(DISTANCES), "of signs [m]"),
     )
+    found: list[Row] = []
+    for pictures in given.pictures:
+        found += records(pictures, given, np.random.default_rng([given.pool, 18]))
+        if pictures == "fogsim":
+            found.append(whole_pictures(given.visibilities, given.draws, np.random.default_rng([given.pool, 19])))
+    if given.frames:
+        found.append(timed(given.frames))
+    publish(given, found)
 
 
 if __name__ == "__main__":

@@ -28,24 +28,12 @@ class Post(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """What is driven.
+    """What is driven."""
 
-    Attributes
-    ----------
-    signs : int
-        How many signs are driven past.
-    step : float
-        Way between two frames [m].
-    wrong_share : float
-        Share of signs that are not what the map says [-].
-    kinds : tuple of str
-        Their kinds.
-    """
-
-    signs: int = 3
-    step: float = 3.0
-    wrong_share: float = 0.0
-    kinds: tuple[str, ...] = KINDS
+    signs: int = 3  # how many signs are driven past
+    step: float = 3.0  # way between two frames [m]
+    wrong_share: float = 0.0  # share of signs that are not what the map says [-]
+    kinds: tuple[str, ...] = KINDS  # their kinds
 
 
 def posts(drive: Drive, rng: np.random.Generator) -> list[Post]:

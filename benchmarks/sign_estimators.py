@@ -11,14 +11,12 @@ the truth, `bounds` the share of bounds that do. Constants were chosen on `--poo
     python benchmarks/sign_estimators.py [--json] [--docs] [--pool 1] [--drives 8] [--wrong 0 0.2] [--visibilities 60 …]
 """
 
-import argparse
-import json
+import itertools
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import numpy as np
-from docs_table import write_table
+from harness import Row, lines_of, mean, parse_options, publish
 from sign_drives import CAMERA, Drive, drives
 
 from fogsim.calibration.sign_calibration import measure_operating_range
@@ -54,7 +52,7 @@ def driven(pool: int, count: int, wrong: float, visibilities: Sequence[float]) -
     return told
 
 
-def records(told: Told, wrong: float) -> Iterator[dict[str, Any]]:
+def records(told: Told, wrong: float) -> Iterator[Row]:
     """One record a method and visibility."""
     for (name, visibility), found in told.items():
         k = extinction_from_visibility(visibility)
@@ -75,10 +73,8 @@ def records(told: Told, wrong: float) -> Iterator[dict[str, Any]]:
             "final_median_pct": _percent(last, 50),
             "final_p95_pct": _percent(last, 95),
             "bias_pct": _percent([one.visibility / visibility - 1.0 for one in every], 50),
-            "coverage": round(float(np.mean(held)), 3) if held else None,
-            "bounds": round(float(np.mean([0.9 * b.least <= k <= 1.1 * b.most for b in bounds])), 3)
-            if bounds
-            else None,
+            "coverage": mean(held, 3),
+            "bounds": mean([0.9 * b.least <= k <= 1.1 * b.most for b in bounds], 3),
         }
 
 
@@ -86,44 +82,37 @@ def _percent(values: list[float], percentile: float) -> float | None:
     return round(100.0 * float(np.percentile(values, percentile)), 2) if values else None
 
 
-def docs_table(found: list[dict[str, Any]]) -> list[str]:
+def docs_table(found: list[Row]) -> list[str]:
     """Lines of the table of docs/benchmarks/estimators.md: `sign_contrast` with right signs, and with wrong ones."""
     told = {(one["visibility"], one["wrong_share"]): one for one in found if one["method"] == "sign_contrast"}
     shares = list(dict.fromkeys(share for _, share in told))
-    heads = ["median/p95, %", "90 % intervals hold"]
+    heads = ["V_met, m", "median/p95, %", "90 % intervals hold"]
     for share in shares[1:]:
         heads += [f"with {100 * share:.0f} % of signs wrong", "intervals hold"]
-    lines = [f"| V_met, m | {' | '.join(heads)} |", "|---" * (1 + len(heads)) + "|"]
+    rows = []
     for visibility in dict.fromkeys(visibility for visibility, _ in told):
         cells = [told[visibility, share] for share in shares]
-        parts = (f"{one['median_pct']:.1f}/{one['p95_pct']:.1f} | {one['coverage']:.2f}" for one in cells)
-        lines.append(f"| {visibility:.0f} | {' | '.join(parts)} |")
-    return lines
+        parts = ((f"{one['median_pct']:.1f}/{one['p95_pct']:.1f}", f"{one['coverage']:.2f}") for one in cells)
+        rows.append((f"{visibility:.0f}", *itertools.chain(*parts)))
+    return lines_of(heads, rows)
 
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/benchmarks/estimators.md")
-    parser.add_argument("--pool", type=int, default=1, help="which drives")
-    parser.add_argument("--drives", type=int, default=8, help="how many of them")
-    parser.add_argument("--wrong", type=float, nargs="+", default=[0.0, 0.2], help="shares of signs that are wrong")
-    parser.add_argument("--visibilities", type=float, nargs="+", default=list(VISIBILITIES), help="V_met [m]")
-    arguments = parser.parse_args()
+    given = parse_options(
+        __doc__,
+        docs=("benchmarks/estimators.md", "sign estimators"),
+        pool=(1, "which drives"),
+        drives=(8, "how many of them"),
+        wrong=([0.0, 0.2], "shares of signs that are wrong"),
+        visibilities=(list(VISIBILITIES), "V_met [m]"),
+    )
     found = [
         record
-        for wrong in arguments.wrong
-        for record in records(driven(arguments.pool, arguments.drives, wrong, arguments.visibilities), wrong)
+        for wrong in given.wrong
+        for record in records(driven(given.pool, given.drives, wrong, given.visibilities), wrong)
     ]
-    if arguments.docs:
-        write_table("benchmarks/estimators.md", "sign estimators", docs_table(found))
-    if arguments.json:
-        print(json.dumps(found, indent=2))
-        return
-    print("| " + " | ".join(found[0]) + " |\n" + "|---" * len(found[0]) + "|")
-    for one in found:
-        print("| " + " | ".join("–" if value is None else str(value) for value in one.values()) + " |")
+    publish(given, found, docs=docs_table(found))
 
 
 if __name__ == "__main__":

@@ -39,24 +39,12 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True)
 class Shot:
-    """A picture and what is true of it.
+    """A picture and what is true of it."""
 
-    Attributes
-    ----------
-    image : (rows, cols, 3) uint8
-        The picture.
-    camera : Camera
-        The true calibration.
-    distance : float
-        From the bumper to the sign [m].
-    u, v, radius : float
-        Middle of its face, and half of its diameter [px].
-    """
-
-    image: NDArray[np.uint8]
-    camera: Camera
-    distance: float
-    u: float
+    image: NDArray[np.uint8]  # the picture
+    camera: Camera  # the true calibration
+    distance: float  # from the bumper to the sign [m]
+    u: float  # middle of its face, and half of its diameter [px]
     v: float
     radius: float
 
@@ -174,27 +162,13 @@ def _paint(light: Floats, depth: Floats, box: tuple[float, float, float, float],
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What a camera makes of light.
+    """What a camera makes of light."""
 
-    Attributes
-    ----------
-    blur : float
-        Standard deviation of the lens's blur [px].
-    sharpening : float
-        How much of what a blur of 1.2 px takes away is added [-].
-    noise : float
-        Standard deviation of the noise of a white pixel [grey levels].
-    level : float
-        Linear pixel value of the airlight, of 255.
-    quality : int
-        Of JPEG, 0 … 100; 0 for none.
-    """
-
-    blur: float = 0.6
-    sharpening: float = 0.0
-    noise: float = 1.5
-    level: float = 200.0
-    quality: int = 90
+    blur: float = 0.6  # standard deviation of the lens's blur [px]
+    sharpening: float = 0.0  # how much of what a blur of 1.2 px takes away is added [-]
+    noise: float = 1.5  # standard deviation of the noise of a white pixel [grey levels]
+    level: float = 200.0  # linear pixel value of the airlight, of 255
+    quality: int = 90  # of JPEG, 0 … 100; 0 for none
 
     def __call__(self, light: Floats, rng: np.random.Generator) -> NDArray[np.uint8]:
         """Picture of light relative to that of the fog."""

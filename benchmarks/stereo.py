@@ -15,18 +15,12 @@ were chosen on pool 0 (other seeds, rigs and visibilities); pool 1 is what is re
     python benchmarks/stereo.py [--json] [--docs] [--pool 1]
 """
 
-import argparse
-import json
 import math
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from functools import partial
 
-import numpy as np
-from docs_table import write_table
-from rich.console import Console
-from rich.progress import track
+from harness import Row, lines_of, mean, median, parse_options, progress, publish, quantile, timed
 
 import fogsim
 from fogsim.estimators import make
@@ -46,8 +40,6 @@ ERRORS = (
 )
 CLOCKS = ("clocks.camera_period_s=1", "clocks.decision_period_s=1", "duration_s=15", "traffic.events=[]", "expect={}")
 METHODS = ("hautiere2006_stereo", "as published", "joint_road")
-
-Row = dict[str, Any]
 
 
 @dataclass(slots=True)
@@ -95,35 +87,28 @@ def follow(steps: Sequence[Step], found: dict[str, Found]) -> None:
     }
     for step in steps:
         for name, method in told.items():
-            started = time.perf_counter()
-            estimate = method.update(step.observation)
-            found[name].spent.append(1e3 * (time.perf_counter() - started))
+            estimate, spent = timed(partial(method.update, step.observation))
+            found[name].spent.append(spent)
             found[name].judge(estimate, step.truth.extinction_ahead)
 
 
-def timed(pool: int) -> float:
+def second_camera_ms(pool: int) -> float:
     """How much longer a step takes with a second camera [ms]: least times of drives, which have the same traffic."""
     least = []
     for rig in (False, True):
-        times = []
-        for _ in range(3):
-            started, count = time.perf_counter(), 0
-            for _ in steps_of(SCENARIOS[0], 150.0, pool, rig=rig):
-                count += 1
-            times.append((time.perf_counter() - started) / count)
-        least.append(min(times))
-    return 1e3 * (least[1] - least[0])
+        drives = (timed(lambda rig=rig: len(list(steps_of(SCENARIOS[0], 150.0, pool, rig=rig)))) for _ in range(3))
+        least.append(min(spent / count for count, spent in drives))
+    return least[1] - least[0]
 
 
 def record(visibility: float, name: str, one: Found, pool: int) -> Row:
     """A record of one method in fog of one visibility."""
     row: Row = {"pool": pool, "visibility_m": visibility, "method": name, "pictures": one.pictures}
-    row |= {"valid": len(one.errors) / one.pictures, "ms": float(np.median(one.spent))}
+    row |= {"valid": len(one.errors) / one.pictures, "ms": median(one.spent)}
     if one.bounds:
-        row["bounds_held"] = float(np.mean(one.bounds))
+        row["bounds_held"] = mean(one.bounds)
     if one.errors:
-        row |= {"median_pct": float(np.median(one.errors)), "p95_pct": float(np.quantile(one.errors, 0.95))}
-        row["coverage"] = float(np.mean(one.held))
+        row |= {"median_pct": median(one.errors), "p95_pct": quantile(one.errors, 0.95), "coverage": mean(one.held)}
     return row
 
 
@@ -135,39 +120,26 @@ def cell(row: Row) -> str:
     return f"{row['median_pct']:.0f} / {row['p95_pct']:.0f} ({row['coverage']:.2f}){silent}"
 
 
-def table(rows: Sequence[Row]) -> Iterator[str]:
-    """Lines of the table."""
-    yield f"| V_met | {' | '.join(METHODS)} |"
-    yield "|---|" + "---|" * len(METHODS)
-    for visibility in sorted({row["visibility_m"] for row in rows}):
-        cells = [cell(row) for row in rows if row["visibility_m"] == visibility]
-        yield f"| {visibility:.0f} m | {' | '.join(cells)} |"
-
-
-def write_docs(rows: Sequence[Row]) -> None:
-    """Write the table into docs/benchmarks/estimators.md."""
+def table(rows: Sequence[Row]) -> list[str]:
+    """Lines of the table, and what an estimate and a second camera cost."""
+    seen = sorted({row["visibility_m"] for row in rows})
+    body = [(f"{one:.0f} m", *(cell(row) for row in rows if row["visibility_m"] == one)) for one in seen]
     cost = f"One estimate takes {rows[0]['ms']:.0f} ms, the second picture {rows[0]['ms_rig']:.0f} ms a step."
-    write_table("benchmarks/estimators.md", "stereo", [*table(rows), "", cost])
+    return [*lines_of(("V_met", *METHODS), body), "", cost]
 
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/benchmarks/estimators.md")
-    parser.add_argument("--pool", type=int, choices=(0, 1), default=1, help="0: constants chosen on it")
-    arguments = parser.parse_args()
+    given = parse_options(__doc__, docs=("benchmarks/estimators.md", "stereo"), pool=1)
     rows: list[Row] = []
-    for visibility in track(VISIBILITIES[arguments.pool], "visibilities", console=Console(stderr=True)):
+    for visibility in progress(VISIBILITIES[given.pool], "visibilities"):
         found = {name: Found() for name in METHODS}
         for scenario in SCENARIOS:
-            follow(list(steps_of(scenario, visibility, arguments.pool, rig=True)), found)
-        rows += [record(visibility, name, one, arguments.pool) for name, one in found.items()]
-    cost = timed(arguments.pool)
+            follow(list(steps_of(scenario, visibility, given.pool, rig=True)), found)
+        rows += [record(visibility, name, one, given.pool) for name, one in found.items()]
+    cost = second_camera_ms(given.pool)
     rows = [row | {"ms_rig": cost} for row in rows]
-    if arguments.docs:
-        write_docs(rows)
-    print(json.dumps(rows, indent=2) if arguments.json else "\n".join(table(rows)))
+    publish(given, rows, table(rows))
 
 
 if __name__ == "__main__":

@@ -9,14 +9,14 @@ each light and each class of visibility with 30 estimates or more.
     python benchmarks/surrogate.py --fit          # writes the table again, from episodes of the split "train"
 """
 
-import argparse
 import itertools
-import json
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from harness import Row, lines_of, parse_options, publish
 from numpy.typing import NDArray
 from scipy.stats import ks_2samp, norm
 
@@ -166,7 +166,7 @@ def _normal_scores(runs: list[list[Record]]) -> Iterator[list[float]]:
             yield scores
 
 
-def compare(real: list[list[Record]], drawn: list[list[Record]]) -> list[dict[str, Any]]:
+def compare(real: list[list[Record]], drawn: list[list[Record]]) -> list[Row]:
     """A record for each light and class of visibility."""
     records, ours = [], cells(drawn)
     for (light, column), cell in sorted(cells(real).items()):
@@ -190,23 +190,40 @@ def compare(real: list[list[Record]], drawn: list[list[Record]]) -> list[dict[st
     return records
 
 
+def shown(record: Row) -> tuple[str, ...]:
+    """A record in cells of the docs' table."""
+    above, far = record["visibility_to_m"], record["distance"]
+    ratio = (
+        "–"
+        if far is None
+        else " / ".join(f"{math.exp(record[k]):.2f}" for k in ("median_error", "surrogate_median_error"))
+    )
+    return (
+        record["light"],
+        f"{record['visibility_from_m']:.0f} … " + ("∞" if above is None else f"{above:.0f}") + " m",
+        str(record["estimates"]),
+        f"{100 * record['valid_share']:.0f} / {100 * record['surrogate_valid_share']:.0f} %",
+        ratio,
+        "–" if far is None else f"{far:.2f}",
+    )
+
+
 def main() -> None:
     """Run it from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print records as JSON")
-    parser.add_argument("--episodes", type=int, default=60)
-    parser.add_argument("--split", default="test", choices=("train", "test"))
-    parser.add_argument("--fit", action="store_true", help="write the table anew, by the split train")
-    asked = parser.parse_args()
-    runs = list(episodes(asked.episodes, "train" if asked.fit else asked.split))
-    if asked.fit:
+    given = parse_options(
+        __doc__,
+        docs=("reference/environments.md", "surrogate"),
+        episodes=(60, "how many"),
+        split=("test", "of which", ("train", "test")),
+        fit=(False, "write the table again, by the split train"),
+    )
+    runs = list(episodes(given.episodes, "train" if given.fit else given.split))
+    if given.fit:
         MEASURED.write_text(fit(runs, runs[0][0].estimate.method).as_json() + "\n", encoding="utf-8")
     records = compare(runs, redrawn(runs, SurrogateTable.load()))
-    if asked.json:
-        print(json.dumps(records))
-        return
-    for record in records:
-        print("  ".join(f"{name} {value}" for name, value in record.items()))
+    ratio = "median k / true k: real / drawn"
+    heads = ("light", "visibility ahead", "estimates", "valid: real / drawn", ratio, "KS distance")
+    publish(given, records, docs=lines_of(heads, map(shown, records)))
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "pictures
 import stripes
 import windscreen
 from flat_road import Road, photograph, scan
+from harness import Row
 
 from fogsim.estimators import make
 from fogsim.estimators.zhu2015 import zhu_category
@@ -55,7 +56,6 @@ WINDSCREEN, STRIPES = "windscreen", "stripes"
 KINDS = (*SCENES, WINDSCREEN, STRIPES)
 AT_RANDOM, IN_THE_WAY = 4, 2  # pictures of a unit behind a windscreen
 
-Row = dict[str, Any]
 Image = NDArray[np.uint8]
 
 

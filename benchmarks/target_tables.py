@@ -3,11 +3,9 @@
 import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-
-Row = dict[str, Any]
+from harness import Row, lines_of, mean, quantile
 
 FEWEST = 3
 """Fewest estimates of which a group is called the worst."""
@@ -42,16 +40,6 @@ ELSEWHERE = (
 """Targets that other commands measure, or none yet."""
 
 
-def percentile(errors: list[float], share: float) -> float | None:
-    """Percentile of errors; None of none."""
-    return round(float(np.percentile(errors, share)), 2) if errors else None
-
-
-def mean(values: list[bool]) -> float | None:
-    """Share of truths; None of none."""
-    return round(float(np.mean(values)), 3) if values else None
-
-
 def is_met(one: Row) -> bool:
     """Whether what a record says is as good as its target asks for; of nothing found nothing is met."""
     if one["target_right_share"] is not None:
@@ -73,7 +61,7 @@ def worst(rows: list[Row], as_share: bool) -> str | None:
         return None
     name = max(known, key=lambda one: np.mean(known[one]) if as_share else np.percentile(known[one], 95))
     errors = known[name]
-    told = f"{1 - np.mean(errors):.2f}" if as_share else f"{percentile(errors, 50)} / {percentile(errors, 95)}"
+    told = f"{1 - np.mean(errors):.2f}" if as_share else f"{quantile(errors, 0.5, 2)} / {quantile(errors, 0.95, 2)}"
     return f"{name}: {told} (n = {len(errors)})"
 
 
@@ -104,11 +92,11 @@ def record(target: Target, cell: str, rows: list[Row], command: str) -> Row:
     as_share = target.right_share is not None
     found = blank(target, cell, command) | {
         "images": len(rows),
-        "valid_share": mean([row["valid"] for row in rows]),
-        "median": None if as_share else percentile(errors, 50),
-        "p95": None if as_share else percentile(errors, 95),
-        "right_share": mean([error == 0.0 for error in errors]) if as_share else None,
-        "coverage": mean([row["covered"] for row in rows if row["covered"] is not None]),
+        "valid_share": mean([row["valid"] for row in rows], 3),
+        "median": None if as_share else quantile(errors, 0.5, 2),
+        "p95": None if as_share else quantile(errors, 0.95, 2),
+        "right_share": mean([error == 0.0 for error in errors], 3) if as_share else None,
+        "coverage": mean([row["covered"] for row in rows if row["covered"] is not None], 3),
         "worst_cell": worst(rows, as_share),
     }
     return found | {"met": is_met(found)}
@@ -125,25 +113,22 @@ def records(rows: list[Row], arguments: list[str]) -> Iterator[Row]:
         yield blank(target, cell, elsewhere)
 
 
-def written(one: Row) -> str:
-    """One line of the table."""
+def written(one: Row) -> tuple[str, ...]:
+    """One row of the table."""
     if one["target_right_share"] is not None:
-        asked, found = f"≥ {one['target_right_share']:g} {one['unit']}", one["right_share"]
+        asked, found = f"≥ {one['target_right_share']:g} {one['unit']}", str(one["right_share"])
     else:
         asked = f"≤ {one['target_median']:g} / {one['target_p95']:g} {one['unit']}"
         found = f"{one['median']} / {one['p95']}" if one["median"] is not None else "–"
-    head = f"| {one['target']} | {one['cell']} | {asked} |"
+    head = (one["target"], one["cell"], asked)
     if one["met"] is None:
         told = f"`{one['command']}`" if one["command"].startswith("python") else one["command"]
-        return f"{head} {told} | | | | | |"
+        return (*head, told, *[""] * 5)
     tail = (one["images"], one["valid_share"], one["coverage"], one["worst_cell"])
-    return f"{head} {found} | {'yes' if one['met'] else '**no**'} | " + " | ".join(
-        "–" if value is None else str(value) for value in tail
-    ) + " |"  # fmt: skip
+    return (*head, found, "yes" if one["met"] else "**no**", *("–" if value is None else str(value) for value in tail))
 
 
-def table(all_records: list[Row]) -> str:
+def table(all_records: list[Row]) -> list[str]:
     """Records as the table that is printed and that the docs hold."""
-    columns = ("target", "cell", "asked", "median / p95", "met", "images", "valid", "coverage", "worst group")
-    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
-    return "\n".join(lines + [written(one) for one in all_records])
+    heads = ("target", "cell", "asked", "median / p95", "met", "images", "valid", "coverage", "worst group")
+    return lines_of(heads, map(written, all_records))

@@ -11,7 +11,6 @@ percentile of its size [%]; ``valid_share`` the share of pictures in which both 
 
 import argparse
 import dataclasses
-import json
 import math
 from collections.abc import Iterator
 from typing import Any
@@ -19,6 +18,7 @@ from typing import Any
 import numpy as np
 from estimator_accuracy import METHODS, driven, road
 from estimator_scenes import CAMERAS, camera, photograph, without_leader
+from harness import Row, median, parse_options, publish, quantile
 
 from fogsim.estimators import make
 from fogsim.values import Camera, Observation
@@ -26,8 +26,6 @@ from fogsim.values import Camera, Observation
 AIRLIGHT_LEVEL = 200.0
 PITCH = math.radians(0.1)
 TENTH = 1.1
-
-Row = dict[str, Any]
 
 
 def wrong(true: Camera) -> Iterator[tuple[str, Camera]]:
@@ -76,29 +74,23 @@ def records(rows: list[Row]) -> Iterator[Row]:
         sizes = np.abs(valid)
         yield dict(zip(keys, group, strict=True)) | {
             "valid_share": round(len(valid) / len(changes), 3),
-            "median_pct": round(float(np.median(valid)), 2) if len(valid) else None,
-            "median_size_pct": round(float(np.median(sizes)), 2) if len(valid) else None,
-            "p95_size_pct": round(float(np.percentile(sizes, 95)), 2) if len(valid) else None,
+            "median_pct": median(valid, 2),
+            "median_size_pct": median(sizes, 2),
+            "p95_size_pct": quantile(sizes, 0.95, 2),
         }
 
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--methods", nargs="+", default=list(METHODS), help="estimators of single frames")
-    parser.add_argument("--visibilities", nargs="+", type=float, default=[100.0, 400.0], help="of the fog [m]")
-    parser.add_argument("--cameras", type=int, default=len(CAMERAS), help="how many of the cameras")
-    parser.add_argument("--scenes", type=int, default=6, help="instants of the drive")
-    parser.add_argument("--seed", type=int, default=1)
-    found = list(records(measure(parser.parse_args())))
-    if parser.parse_args().json:
-        print(json.dumps(found, indent=2))
-        return
-    print("| " + " | ".join(found[0]) + " |")
-    print("|" + "---|" * len(found[0]))
-    for one in found:
-        print("| " + " | ".join(str(value) for value in one.values()) + " |")
+    given = parse_options(
+        __doc__,
+        methods=(list(METHODS), "estimators of single frames"),
+        visibilities=([100.0, 400.0], "of the fog [m]"),
+        cameras=(len(CAMERAS), "how many of the cameras"),
+        scenes=(6, "instants of the drive"),
+        seed=(1, "of the drive"),
+    )
+    publish(given, list(records(measure(given))))
 
 
 if __name__ == "__main__":

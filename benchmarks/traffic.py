@@ -11,7 +11,8 @@ Times are the processor's, medians over blocks [ms]. ``ratio`` is the median of 
 quarter of them lie below ``ratio_low``, a quarter above ``ratio_high``. ``ratio_quiet`` is that of the least times of
 either kind, which other work on the machine disturbs least. ``ms_state`` is the share of the reading.
 
-The simulation is a .sumocfg with SUMO's own defaults, which FogSim's own scenarios share.
+The simulation is a .sumocfg with SUMO's own defaults, which FogSim's own scenarios share. The town needs SUMO's
+netgenerate and netconvert (eclipse-sumo); without them only the motorway is measured.
 
     python benchmarks/traffic.py [--json] [--network town] [--vehicles 20 --vehicles 100 …] [--seconds 10] [--blind]
         [--visibility 100] [--profile]
@@ -19,10 +20,8 @@ The simulation is a .sumocfg with SUMO's own defaults, which FogSim's own scenar
 ``--blind`` leaves perception and speed choice out; ``--profile`` tells where the time of the whole steps goes.
 """
 
-import argparse
 import cProfile
 import dataclasses
-import json
 import pstats
 import statistics
 import tempfile
@@ -30,7 +29,8 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from traffic_town import town_configuration
+from harness import parse_options, publish
+from traffic_town import has_programs, town_configuration
 
 from fogsim.atmosphere import FieldAccess
 from fogsim.scenario import build
@@ -197,28 +197,24 @@ def summary(blocks: Sequence[Block]) -> dict[str, float]:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--vehicles", action="append", type=int, help="vehicles (default 20, 100, 500 and 2000)")
-    parser.add_argument("--network", action="append", choices=[*CONFIGURATIONS], help="which (default both)")
-    parser.add_argument("--visibility", type=float, default=100.0, help="V_met [m]")
-    parser.add_argument("--profile", action="store_true", help="tell where the time goes, and no ratio to be trusted")
-    parser.add_argument("--seconds", type=float, default=10.0, help="time to measure for each number")
-    parser.add_argument("--blind", action="store_true", help="leave perception and speed choice out")
-    arguments = parser.parse_args()
-    counts = arguments.vehicles or [20, 100, 500, 2000]
-    profile = cProfile.Profile() if arguments.profile else None
+    given = parse_options(
+        __doc__,
+        vehicles=([20, 100, 500, 2000], "vehicles"),
+        network=(list(CONFIGURATIONS) if has_programs() else ["motorway"], "which", CONFIGURATIONS),
+        visibility=(100.0, "V_met [m]"),
+        profile=(False, "tell where the time goes, and no ratio to be trusted"),
+        seconds=(10.0, "time to measure for each number"),
+        blind=(False, "leave perception and speed choice out"),
+    )
+    if "town" in given.network and not has_programs():
+        given.error("--network town needs SUMO's netgenerate and netconvert: pip install eclipse-sumo")
+    profile = cProfile.Profile() if given.profile else None
     records = []
-    for network in arguments.network or [*CONFIGURATIONS]:
-        task = Task(network, arguments.seconds, arguments.visibility, arguments.blind)
-        records += [{"network": network, "vehicles": n, **measure(task, n, profile)} for n in counts]
-    if arguments.json:
-        print(json.dumps(records, indent=2))
-        return
-    print("  ".join(f"{key:>13}" for key in records[0]))
-    for record in records:
-        print("  ".join(f"{value:>13}" for value in record.values()))
-    if profile is not None:
+    for network in given.network:
+        task = Task(network, given.seconds, given.visibility, given.blind)
+        records += [{"network": network, "vehicles": n, **measure(task, n, profile)} for n in given.vehicles]
+    publish(given, records)
+    if profile is not None and not given.json:
         pstats.Stats(profile).sort_stats("tottime").print_stats(40)
 
 

@@ -1,12 +1,12 @@
 """The town of `traffic.py`: a grid by netgenerate, half of its junctions with lights, where everyone keeps driving."""
 
+import importlib.util
 import math
 import subprocess
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
-import sumo
 
 BLOCK = 150.0
 """Distance of neighbouring junctions [m]."""
@@ -25,15 +25,7 @@ TYPES = ("passenger", "passenger", "passenger", "passenger", "delivery", "truck"
 
 
 def town_configuration(folder: Path, vehicles: int) -> Path:
-    """Town and vehicles as a configuration of SUMO's, whose other options stay SUMO's defaults.
-
-    Parameters
-    ----------
-    folder : Path
-        Where to write.
-    vehicles : int
-        How many; the town is as large as they need.
-    """
+    """Town and vehicles as a configuration of SUMO's, whose other options stay SUMO's defaults."""
     # n × n junctions have 2 n (n − 1) streets.
     side = max(3, math.ceil(0.5 + math.sqrt(0.25 + vehicles / (2.0 * PER_BLOCK))))
     net = _make_net(folder, side)
@@ -49,14 +41,25 @@ def town_configuration(folder: Path, vehicles: int) -> Path:
 
 def _make_net(folder: Path, side: int) -> Path:
     """A grid in which every second junction has lights, and at the others vehicles give way."""
-    programs, bare, net = Path(sumo.SUMO_HOME, "bin"), folder / "bare.net.xml", folder / "town.net.xml"
+    bare, net = folder / "bare.net.xml", folder / "town.net.xml"
     grid = ["--grid", "--grid.number", str(side), "--grid.length", str(BLOCK), "--seed", "1"]
     streets = ["--default-junction-type", "priority", "--default.lanenumber", "2", "--default.speed", "13.89"]
-    subprocess.run([programs / "netgenerate", *grid, *streets, "-o", bare], check=True, stdout=subprocess.DEVNULL)
+    _run("netgenerate", *grid, *streets, "-o", bare)
     junctions = [j.get("id", "") for j in _root(bare).iterfind("junction") if j.get("type") != "internal"]
-    lights = ["--tls.set", ",".join(junctions[::2]), "--tls.green.time", "20"]
-    subprocess.run([programs / "netconvert", "-s", bare, *lights, "-o", net], check=True, stdout=subprocess.DEVNULL)
+    _run("netconvert", "-s", bare, "--tls.set", ",".join(junctions[::2]), "--tls.green.time", "20", "-o", net)
     return net
+
+
+def has_programs() -> bool:
+    """Whether SUMO's netgenerate and netconvert are installed: eclipse-sumo brings them, libsumo does not."""
+    return importlib.util.find_spec("sumo") is not None
+
+
+def _run(program: str, *arguments: object) -> None:
+    import sumo  # noqa: PLC0415 - FogSim needs libsumo alone
+
+    command = [Path(sumo.SUMO_HOME, "bin", program), *map(str, arguments)]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
 
 def _root(net: Path) -> ET.Element:

@@ -15,17 +15,12 @@ Constants were chosen on pool 0 (other seeds, visibilities and camera); pool 1 i
     python benchmarks/uneven_fog.py [--json] [--pool 1] [--methods joint_road …] [--clear 75] [--only bank] [--docs]
 """
 
-import argparse
-import json
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-from docs_table import write_table
-from rich.console import Console
-from rich.progress import track
+from harness import Row, lines_of, mean, parse_options, progress, publish
 
 import fogsim
 from fogsim.atmosphere.fog.optical_depth import optical_depth_along
@@ -46,7 +41,6 @@ CAMERAS = (
 )
 METHODS = ("joint_road", "negru2013", "zhu2015", "huang2015_rough", "lead_contrast")
 CLEAR_ROADS = ("motorway_fog_bank", "graded_motorway", "clear_day", "ramp_merge")
-Row = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,9 +180,9 @@ def records(found: dict[tuple[str, str], Found], pool: int) -> Iterator[Row]:
             record["valid_share"] = len(errors) / one.frames
             record["median_pct"], record["p95_pct"] = (float(np.quantile(errors, q)) for q in (0.5, 0.95))
             record["bias_pct"] = -100.0 * float(np.median(one.off))
-            record["coverage"] = float(np.mean(one.held))
+            record["coverage"] = mean(one.held)
             if one.told:
-                record["here"] = float(np.mean(one.told))
+                record["here"] = mean(one.told)
         if kind == "bank" and one.announced:
             record["announced_m"] = [round(way) for way in one.announced]
         if kind == "clear" and one.announced:
@@ -200,14 +194,15 @@ def records(found: dict[tuple[str, str], Found], pool: int) -> Iterator[Row]:
 
 def table(rows: list[Row]) -> Iterator[str]:
     """Lines of the table of docs/benchmarks/estimators.md."""
-    yield "| fog | method | frames | valid | median / p95, % | bias, % | 90 % intervals hold | τ(d) held |"
-    yield "|---|---|---|---|---|---|---|---|"
+    heads = ("fog", "method", "frames", "valid", "median / p95, %", "bias, %", "90 % intervals hold", "τ(d) held")
+    body = []
     for row in rows:
         if "median_pct" in row:
-            here = f"{row['here']:.2f}" if "here" in row else "–"
-            errors = f"{row['median_pct']:.1f} / {row['p95_pct']:.1f} | {row['bias_pct']:+.1f}"
-            head = f"| {row['fog']} | {row['method']} | {row['frames']} | {row['valid_share']:.2f}"
-            yield f"{head} | {errors} | {row['coverage']:.2f} | {here} |"
+            errors = f"{row['median_pct']:.1f} / {row['p95_pct']:.1f}", f"{row['bias_pct']:+.1f}"
+            held = f"{row['coverage']:.2f}", f"{row['here']:.2f}" if "here" in row else "–"
+            head = row["fog"], row["method"], str(row["frames"]), f"{row['valid_share']:.2f}"
+            body.append((*head, *errors, *held))
+    yield from lines_of(heads, body)
     for row in rows:
         if "announced_m" in row:
             ways = ", ".join(f"{way}" for way in row["announced_m"])
@@ -218,26 +213,20 @@ def table(rows: list[Row]) -> Iterator[str]:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="print a list of flat records")
-    parser.add_argument("--docs", action="store_true", help="write the table of docs/benchmarks/estimators.md")
-    parser.add_argument("--pool", type=int, choices=(0, 1), default=1, help="0: constants chosen on it")
-    parser.add_argument("--methods", nargs="+", default=METHODS, help="names of estimators")
-    parser.add_argument("--clear", type=float, default=75.0, help="minutes of driving in clear air")
-    parser.add_argument("--only", help="only kinds of fog whose name begins so")
-    arguments = parser.parse_args()
-    plan = [*drives(arguments.pool), *clear_drives(arguments.pool, arguments.clear)]
-    plan = [drive for drive in plan if drive.kind.startswith(arguments.only or "")]
+    given = parse_options(
+        __doc__,
+        docs=("benchmarks/estimators.md", "uneven fog"),
+        pool=1,
+        methods=(list(METHODS), "names of estimators"),
+        clear=(75.0, "minutes of driving in clear air"),
+        only=("", "only kinds of fog whose name begins so"),
+    )
+    plan = [*drives(given.pool), *clear_drives(given.pool, given.clear)]
     found: dict[tuple[str, str], Found] = {}
-    for drive in track(plan, "drives", console=Console(stderr=True)):
-        run(drive, arguments.methods, found)
-    rows = list(records(found, arguments.pool))
-    if arguments.docs:
-        write_table("benchmarks/estimators.md", "uneven fog", table(rows))
-    if arguments.json:
-        print(json.dumps(rows, indent=2))
-    else:
-        print("\n".join(table(rows)))
+    for drive in progress([one for one in plan if one.kind.startswith(given.only)], "drives"):
+        run(drive, given.methods, found)
+    rows = list(records(found, given.pool))
+    publish(given, rows, table(rows))
 
 
 if __name__ == "__main__":

@@ -30,11 +30,7 @@ OTHERS = (
     Vehicle("car", 70.0, 11.5, oncoming=True),
     Vehicle("truck", 110.0, 15.25, oncoming=True),
 )
-TOWNSFOLK = (
-    Vehicle("car", 22.0, 0.0, BRAKING),
-    Vehicle("van", 34.0, 6.4, oncoming=True),
-    Vehicle("car", 60.0, 0.0),
-)
+TOWNSFOLK = (Vehicle("car", 22.0, 0.0, BRAKING), Vehicle("van", 34.0, 6.4, oncoming=True), Vehicle("car", 60.0, 0.0))
 BOARDS = (Board("speed_limit", 62.0, value=100.0), Board("fog_warning", 38.0, diameter=1.2))
 
 

@@ -12,13 +12,14 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 from contact_sheet import HIGH, NIGHT, OTHERS, fog
-from make_night_pictures import ROOT, draw_halos, draw_sight, photons
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from page_tables import ROOT
 from staging import LIT, PICTURES, Shot, Vehicle, network, photograph, scenario
 
 from fogsim.atmosphere import Air, Droplets, airlight_from_illuminance, extinction, field_at
+from fogsim.atmosphere.lamps.glow import glow, narasimhan_nayar, scattered_once
 from fogsim.atmosphere.lamps.lamp_tables import lamp_table
 from fogsim.atmosphere.lamps.phase_function import henyey_greenstein, phase_function
 from fogsim.atmosphere.lamps.veil import FOLD_DISTANCE, INTERVALS, lit_air, ray_pieces, veil_along
@@ -225,6 +226,28 @@ def veil() -> Figure:
     return figure
 
 
+def photons(name: str) -> NDArray[np.void]:
+    """A table that `benchmarks/monte_carlo.py` wrote."""
+    text = (ROOT / "tests" / "data" / name).read_text(encoding="utf-8")
+    lines = [line for line in text.splitlines() if not line.startswith("#")]
+    return np.genfromtxt(lines, delimiter=",", names=True, dtype=None, encoding="utf-8")
+
+
+def draw_halos(axes: Axes) -> None:
+    """Glow over angle at three optical depths."""
+    rows, angle = photons("monte_carlo_halo.csv"), np.geomspace(0.5, 80.0, 60)
+    for depth, colour in ((0.3, "C2"), (1.5, "C0"), (4.0, "C3")):
+        some = rows[(rows["fog"] == "heavy_radiation") & (rows["optical_depth"] == depth) & (rows["angle"] < 80)]
+        axes.plot(angle, glow(depth, np.radians(angle), Droplets.HEAVY_RADIATION), colour, label=f"T = {depth:g}")
+        axes.plot(some["angle"], some["all"], "o", color=colour, ms=4)
+        once = scattered_once(depth, np.radians(angle), phase_function(Droplets.HEAVY_RADIATION))
+        axes.plot(angle, once, ":", color=colour)
+    series = 3 / (4 * math.pi) * narasimhan_nayar(4.0, np.radians(angle))
+    axes.plot(angle, series, "--", color="C3", label="Narasimhan & Nayar, T = 4")
+    axes.set(xscale="log", yscale="log", xlabel="angle from the lamp [°]", ylabel="L R² / I", title="heavy radiation")
+    axes.legend(fontsize=8)
+
+
 def halos() -> Figure:
     """Glow about lamps: a picture, and profiles against photons."""
     figure, (first, second, curve) = panels((1, 1, 1.1))
@@ -234,7 +257,6 @@ def halos() -> Figure:
         shot = Shot("", (NIGHT, fog(visibility)), vehicles=(rear, *coming))
         show(place, photograph(shot, size=SIZE).image, f"rear fog lamp, oncoming cars, V_met {visibility} m")
     draw_halos(curve)
-    curve.set_title("heavy radiation")
     return figure
 
 
@@ -254,6 +276,20 @@ def droplets() -> Figure:
     curve.set_xticks(range(0, 181, 30))
     curve.legend()
     return figure
+
+
+def draw_sight(axes: Axes) -> None:
+    """Distance at which the target is seen, over visibility."""
+    visibilities = np.geomspace(30, 1500, 50)
+    high, low = high_beam(), scaled_beam(low_beam(), 0.30)
+    for kind, style in ((FogKind.RADIATION, "-"), (FogKind.ADVECTION, "--")):
+        by_high = [visibility_distance(high, v, kind) for v in visibilities]
+        axes.plot(visibilities, by_high, f"C1{style}", label=f"high, {kind}")
+        by_low = [visibility_distance(low, v, kind, veil_share=0.10) for v in visibilities]
+        axes.plot(visibilities, by_low, f"C0{style}", label=f"low × 0.3, {kind}")
+    axes.axhline(visibility_distance(low, math.inf), color="C0", lw=0.8, ls=":", label="low, clear air")
+    axes.set(xscale="log", xlabel="V_met [m]", ylabel="distance where VL = 7 [m]")
+    axes.legend(fontsize=8)
 
 
 def visibility_level() -> Figure:
@@ -284,7 +320,6 @@ def visibility_level() -> Figure:
     second.legend()
     draw_sight(third)
     ticks(third, (30, 100, 300, 1000))
-    third.set_title("")
     return figure
 
 

@@ -1,4 +1,4 @@
-"""Write the tables of studies into their pages: ``python docs/make_study_tables.py [--check] STUDY_FOLDER …``.
+"""Write the tables of studies into their pages: ``python docs/make_study_tables.py STUDY_FOLDER …``.
 
 A folder is what ``fogsim study scenarios/studies/NAME.yaml`` has written, ``runs/NAME`` by default; its ``study.csv``
 and ``comparison.csv`` are read. Each cell of a table has a mean and, in brackets, the interval of its difference to
@@ -9,11 +9,10 @@ import argparse
 import csv
 import shutil
 import statistics
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from page_tables import ROOT, filled, lines_of, write_table
+from page_tables import ROOT, lines_of, write_table
 
 DOCS = ROOT / "docs"
 PAGE = DOCS / "benchmarks" / "policies.md"
@@ -89,7 +88,7 @@ COLUMNS: Mapping[str, Sequence[Column]] = {
 """Of each study: metrics, what the column is called, the factor to its unit, and digits after the point."""
 
 FIGURES: Mapping[str, Sequence[str]] = {
-    "message_sign": ("trade_off_traffic_conflicts_per_cohort_vehicle", "speed_over_road"),
+    "message_sign": ("trade_off_traffic_conflicts_per_cohort_vehicle", "speed_over_road")
 }
 """Figures of a study's report that the page shows."""
 
@@ -126,28 +125,18 @@ def _cell(runs: Sequence[Mapping[str, str]], difference: Mapping[str, str] | Non
     return f"{told} [{low:+.{digits}f}, {high:+.{digits}f}]{star}"
 
 
-def main() -> int:
-    """Write the tables and copy the figures, or say which tables are not up to date."""
+def main() -> None:
+    """Write the tables and copy the figures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", nargs="+", type=Path, metavar="STUDY_FOLDER", help=", ".join(COLUMNS))
-    parser.add_argument("--check", action="store_true", help="write nothing, say which are not up to date")
-    arguments = parser.parse_args()
-    stale = False
-    for folder in arguments.folders:
+    for folder in parser.parse_args().folders:
         if folder.name not in COLUMNS:
             parser.error(f"no study of the docs is called {folder.name!r}; there are {', '.join(COLUMNS)}")
         heading, *rows = table(folder, COLUMNS[folder.name])
-        page = PAGES.get(folder.name, PAGE)
-        text, lines = page.read_text(encoding="utf-8"), lines_of(heading, rows)
-        if arguments.check and filled(text, folder.name, lines) != text:
-            stale = True
-            print(f"{page.name}: {folder.name} is not up to date")  # noqa: T201 - the line is the result
-        elif not arguments.check:
-            write_table(page, folder.name, lines)
-            for name in FIGURES.get(folder.name, ()):
-                shutil.copy(folder / "figures" / f"{name}.svg", DOCS / "pictures" / f"{folder.name}_{name}.svg")
-    return int(stale)
+        write_table(PAGES.get(folder.name, PAGE), folder.name, lines_of(heading, rows))
+        for name in FIGURES.get(folder.name, ()):
+            shutil.copy(folder / "figures" / f"{name}.svg", DOCS / "pictures" / f"{folder.name}_{name}.svg")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -327,9 +327,7 @@ TABLES = {
         "harmless": (("elements and attributes", "why"), partial(openscenario_reasons, HARMLESS)),
         "refused": (("elements and attributes", "why"), partial(openscenario_reasons, REFUSED)),
     },
-    "reference/tests.md": {
-        "signals": (("signal", "unit or kind", "meaning", "needs"), signals),
-    },
+    "reference/tests.md": {"signals": (("signal", "unit or kind", "meaning", "needs"), signals)},
     "explanation/night.md": {"laws": (("rules", "what", "from, up to [m]", "source"), laws)},
     "reference/metrics.md": {
         "metrics": (("key", "meaning", "numerator", "denominator", "a policy moves it", "ranks policies"), metrics)

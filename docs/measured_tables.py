@@ -9,37 +9,19 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """Tables that are measured together.
+    """Tables that are measured together."""
 
-    Attributes
-    ----------
-    name : str
-        Its name on the command line. A command that can resume keeps its results in ``runs/tables/NAME`` or
-        ``runs/tables/NAME.kept``.
-    commands : tuple of str
-        Command lines, run one after the other from the root of the checkout.
-    minutes : float
-        About how long they take together on two cores [min]; a stamp's measured time counts instead.
-    rests_on : tuple of str
-        Scripts, modules, data and folders of scenarios; the modules that these import are found.
-    tables : tuple of str
-        Names of the tables in their marks; by default the measurement's own.
-    times : str
-        Which figures are times on the clock, which differ with the machine; the measurement then runs alone.
-    cores : int
-        How many cores its commands keep busy.
-    is_study : bool
-        Whether it is a policy study, which `make tables STUDIES=1` measures.
-    """
-
+    # Its name on the command line; a command that can resume keeps its results in runs/tables/NAME or NAME.kept
     name: str
-    commands: tuple[str, ...]
-    minutes: float
+    commands: tuple[str, ...]  # command lines, run one after the other from the root of the checkout
+    minutes: float  # about how long they take together on two cores [min]; a stamp's measured time counts instead
+    # Scripts, modules, data and folders of scenarios; the modules that these import are found
     rests_on: tuple[str, ...]
-    tables: tuple[str, ...] = ()
+    tables: tuple[str, ...] = ()  # names of the tables in their marks; by default the measurement's own
+    # Which figures are times on the clock, which differ with the machine; the measurement then runs alone
     times: str = ""
-    cores: int = 1
-    is_study: bool = False
+    cores: int = 1  # how many cores its commands keep busy
+    is_study: bool = False  # whether it is a policy study, which `make tables STUDIES=1` measures
 
     def __post_init__(self) -> None:
         """Name the table."""
@@ -178,10 +160,7 @@ MEASUREMENTS = (
     ),
     benchmark("photon_fog", 14, ("mended",), " --drives 2"),
     Measurement(
-        "surroundings",
-        ("python docs/make_airlight_tables.py",),
-        0.1,
-        (PHOTONS, "docs/make_airlight_tables.py"),
+        "surroundings", ("python docs/make_airlight_tables.py",), 0.1, (PHOTONS, "docs/make_airlight_tables.py")
     ),
     study("message_sign", 2),  # 80 runs of 2.5 s on one core
     study("motorway_policies", 15),  # 600 runs of 3 s
@@ -201,36 +180,19 @@ MEASUREMENTS = (
     ),
     environment("advisory_fast", 2, ("returns fogsim/FogAdvisoryFast-v1",), "fogsim/FogAdvisoryFast-v1", cores=2),
     environment("densities", 5, ("densities",), "--density"),
-    environment("surrogate", 3, ("surrogate",), "--surrogate --episodes 90", "benchmarks/surrogate.py"),
-    environment(
-        "corridor",
-        6,
-        ("returns fogsim/FogCorridor-v1",),
-        "--corridor --episodes 8",
-        "benchmarks/corridor.py",
-        "envs/fogsim_envs/corridor",
-    ),
+    benchmark("surrogate", 3, options=" --episodes 90"),
+    benchmark("corridor", 6, ("returns fogsim/FogCorridor-v1",), " --episodes 8"),
 )
 """All of them; a round measures the longest first."""
 
 
 @dataclass(frozen=True, slots=True)
 class Unwritten:
-    """Tables with figures that no command writes.
+    """Tables with figures that no command writes."""
 
-    Attributes
-    ----------
-    page : str
-        Their page.
-    about : str
-        Their subject.
-    figures : str
-        The command that prints their figures, or their source.
-    """
-
-    page: str
-    about: str
-    figures: str
+    page: str  # their page
+    about: str  # their subject
+    figures: str  # the command that prints their figures, or their source
 
 
 UNWRITTEN = (

@@ -6,9 +6,9 @@
     python docs/rerun_tables.py --all         # every table but the studies, changed or not
 
 Names are those of docs/measured_tables.py. The other options do not measure. Run the same command again to resume:
-finished measurements are noted in runs/tables/progress.json, and long commands keep their own results. A command that
-fails leaves its tables as they were and does not stop the others. Logs are runs/tables/NAME.log; what moved is in
-runs/tables/moved.md and moved.json.
+finished measurements are stamped, and long commands keep their own results. A command that fails leaves its tables as
+they were and does not stop the others. Logs are runs/tables/NAME.log; what moved is in runs/tables/moved.md and
+moved.json.
 """
 
 import argparse
@@ -60,7 +60,6 @@ def main(root: Path = ROOT, measurements: tuple[Measurement, ...] = MEASUREMENTS
         ("--stamp", "record tables as measured by the code as it is now"),
     ):
         parser.add_argument(option, action="store_true", help=meaning)
-    parser.add_argument("--commit", help="with --stamp: by the code of this commit")
     given = parser.parse_args()
     if unknown := [name for name in given.names if name not in names]:
         parser.error(f"no tables are called {', '.join(unknown)}; there are {', '.join(names)}")
@@ -79,13 +78,10 @@ def main(root: Path = ROOT, measurements: tuple[Measurement, ...] = MEASUREMENTS
         say(listed(stamps, chosen, with_files=given.list))
     elif given.page or given.stamp:
         for one in chosen if given.stamp else ():
-            if given.commit:
-                stamps.write_from_commit(one, given.commit)
-            else:
-                stamps.write(one, stamps.checkout().files(one.rests_on), None)
+            stamps.write(one, stamps.checkout().files(one.rests_on), None)
         stamps.write_pages()
     else:
-        return rerun(Round(stamps, sys.argv[1:], Console(stderr=True)), chosen)
+        return rerun(Round(stamps, Console(stderr=True)), chosen)
     return 0
 
 

@@ -91,17 +91,7 @@ def with_picture(markdown: str, scenario: str) -> str:
 
 
 def led_to_pages(text: str, folder: str, place: str) -> str:
-    """Lead the links of a text to pages of the site.
-
-    Parameters
-    ----------
-    text : str
-        Markdown, or a notebook.
-    folder : str
-        Where it stands in the checkout.
-    place : str
-        Where it is on the site.
-    """
+    """Lead the links of a text from a folder of the checkout to pages of the site, where it has a place."""
 
     def led(found: re.Match[str]) -> str:
         words, target, anchor = found[1], found[2], found[3] or ""

@@ -78,34 +78,16 @@ class Board:
 
 @dataclass(frozen=True, slots=True)
 class Shot:
-    """What is to be photographed.
+    """What is to be photographed."""
 
-    Attributes
-    ----------
-    title : str
-        Line above the picture.
-    settings : tuple of str
-        Keys of the scenario that differ, as after ``--set``.
-    place : str
-        Where; see `network`.
-    station : float
-        Of the car's front bumper along the route [m].
-    vehicles, boards : tuple
-        What stands ahead.
-    lamps : Lamp
-        Lit lamps of the camera's car.
-    time : float
-        Since the run began [s].
-    """
-
-    title: str
-    settings: tuple[str, ...] = ()
-    place: str = "motorway"
-    station: float = 400.0
-    vehicles: tuple[Vehicle, ...] = ()
+    title: str  # line above the picture
+    settings: tuple[str, ...] = ()  # keys of the scenario that differ, as after ``--set``
+    place: str = "motorway"  # where; see `network`
+    station: float = 400.0  # of the car's front bumper along the route [m]
+    vehicles: tuple[Vehicle, ...] = ()  # what stands ahead
     boards: tuple[Board, ...] = ()
-    lamps: Lamp = LIT
-    time: float = 0.0
+    lamps: Lamp = LIT  # lit lamps of the camera's car
+    time: float = 0.0  # since the run began [s]
 
 
 @dataclass(frozen=True, slots=True)

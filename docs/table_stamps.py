@@ -1,13 +1,10 @@
 """When and with which code tables were measured: docs/measured_at/NAME.json, and what pages show of it."""
 
 import hashlib
-import io
 import json
 import math
 import os
 import subprocess
-import tarfile
-import tempfile
 import tomllib
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
@@ -15,7 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
 
 import yaml
-from code_digests import SOURCES, Checkout
+from code_digests import Checkout
 from measured_tables import MEASUREMENTS, UNWRITTEN, Measurement
 from page_tables import block, digest, filled, link, locked, places, replace, with_line
 
@@ -26,29 +23,15 @@ MEASURED, BY_HAND = "measured tables", "tables by hand"
 
 @dataclass(frozen=True, slots=True)
 class Stamp:
-    """When tables were measured, and with which code.
+    """When tables were measured, and with which code."""
 
-    Attributes
-    ----------
-    version, commit, date : str
-        Of FogSim; the commit ends in " with changes" if files differed from it.
-    machine : str
-        Its processor, if known.
-    minutes : float or None
-        How long it took [min], if known.
-    tables : dict
-        Digests of the tables, by name.
-    files : dict
-        Digests of the files that they depend on, by path.
-    """
-
-    version: str
+    version: str  # of FogSim; the commit ends in " with changes" if files differed from it
     commit: str
     date: str
-    machine: str
-    minutes: float | None
-    tables: dict[str, str]
-    files: dict[str, str]
+    machine: str  # its processor, if known
+    minutes: float | None  # how long it took [min], if known
+    tables: dict[str, str]  # digests of the tables, by name
+    files: dict[str, str]  # digests of the files that they depend on, by path
 
     @property
     def label(self) -> str:
@@ -82,43 +65,21 @@ class Stamps:
         if self._git("status", "--porcelain", "--", *files):
             commit += " with changes"
         now = datetime.now(UTC).strftime("%Y-%m-%d")
-        self._write(one, files, (commit, now, machine()), minutes, (self.root / "pyproject.toml").read_text())
-
-    def minutes(self, one: Measurement) -> float:
-        """How long a measurement took last time, or about how long it takes [min]."""
-        stamp = self.read(one)
-        return one.minutes if stamp is None or stamp.minutes is None else stamp.minutes
-
-    def write_from_commit(self, one: Measurement, commit: str) -> None:
-        """Stamp tables as measured with the code of an earlier commit, on an unknown machine."""
-        at = self._git("show", "-s", "--format=%h %cs", "--abbrev=7", commit).decode().split()
-        tops = [*(folder for folder, _ in SOURCES), "docs", "scenarios", "pyproject.toml"]
-        there = self._git("ls-tree", "--name-only", commit, "--", *tops).decode().split()
-        with tempfile.TemporaryDirectory() as folder:
-            with tarfile.open(fileobj=io.BytesIO(self._git("archive", commit, "--", *there))) as archive:
-                archive.extractall(folder, filter="data")
-            then = Path(folder)
-            self._write(
-                one,
-                Checkout(then).files(one.rests_on),
-                (*at, ""),
-                None,
-                (then / "pyproject.toml").read_text(encoding="utf-8"),
-            )
-
-    def _write(
-        self, one: Measurement, files: dict[str, str], at: Iterable[str], minutes: float | None, project: str
-    ) -> None:
         where = places(self.root)
         tables = {name: digest(block(where[name].read_text(encoding="utf-8"), name)) for name in one.tables}
-        version = tomllib.loads(project)["project"]["version"]
-        kept = asdict(Stamp(version, *at, minutes, tables, files))
+        version = tomllib.loads((self.root / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+        kept = asdict(Stamp(version, commit, now, machine(), minutes, tables, files))
         by_folder: dict[str, list[str]] = {}
         for path, value in files.items():
             by_folder.setdefault(str(PurePosixPath(path).parent), []).append(f"{PurePosixPath(path).name}:{value}")
         kept["files"] = {folder: " ".join(found) for folder, found in by_folder.items()}
         self._file(one).parent.mkdir(parents=True, exist_ok=True)
         self._file(one).write_text(json.dumps(kept, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+    def minutes(self, one: Measurement) -> float:
+        """How long a measurement took last time, or about how long it takes [min]."""
+        stamp = self.read(one)
+        return one.minutes if stamp is None or stamp.minutes is None else stamp.minutes
 
     def _file(self, one: Measurement) -> Path:
         return self.root / "docs" / "measured_at" / f"{one.name}.json"

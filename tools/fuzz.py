@@ -42,21 +42,11 @@ MOST_MEMORY = 8 * 2**30
 
 @dataclass(frozen=True)
 class Entry:
-    """A way by which a user's file comes in.
+    """A way by which a user's file comes in."""
 
-    Attributes
-    ----------
-    suffix : str
-        Ending of the file's name.
-    seeds : sequence of bytes
-        Valid contents that are changed.
-    read : callable
-        Reads the file, as the commands do.
-    """
-
-    suffix: str
-    seeds: Sequence[bytes]
-    read: Callable[[Path], object]
+    suffix: str  # ending of the file's name
+    seeds: Sequence[bytes]  # valid contents that are changed
+    read: Callable[[Path], object]  # reads the file, as the commands do
 
 
 def _files(*patterns: str) -> list[bytes]:
@@ -289,13 +279,7 @@ def _only_clear_errors() -> Iterator[None]:
 
 
 def try_input(entry: Entry, content: bytes, folder: Path) -> None:
-    """Let an entry point read a content.
-
-    Raises
-    ------
-    FindingError
-        If that ends in anything but a result or an error of FogSim's in printable lines.
-    """
+    """Let an entry point read a content."""
     path = folder / f"input{entry.suffix}"
     path.write_bytes(content)
     for name in ("road/road.net.xml", "road/road.rou.xml", "openscenario/two_lanes.xodr"):

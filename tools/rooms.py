@@ -34,31 +34,15 @@ BOX = 176
 
 @dataclass(frozen=True, slots=True)
 class Room:
-    """A package or a module at the top level.
+    """A package or a module at the top level."""
 
-    Attributes
-    ----------
-    name : str
-        As imports have it, without ``fogsim.``.
-    purpose : str
-        First sentence of its docstring.
-    parts : tuple of str
-        Packages in it.
-    files : int
-        Modules in it.
-    code, docstrings : int
-        Lines: not blank and no docstring, and of docstrings.
-    imports : Counter of str
-        Imports of other rooms, by room.
-    """
-
-    name: str
-    purpose: str
-    parts: tuple[str, ...]
-    files: int
-    code: int
+    name: str  # as imports have it, without ``fogsim.``
+    purpose: str  # first sentence of its docstring
+    parts: tuple[str, ...]  # packages in it
+    files: int  # modules in it
+    code: int  # lines: not blank and no docstring, and of docstrings
     docstrings: int
-    imports: Counter[str]
+    imports: Counter[str]  # imports of other rooms, by room
 
 
 def room_of(module: str) -> str:

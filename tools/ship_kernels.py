@@ -68,22 +68,7 @@ def compiled_for(root: Path) -> Mapping[str, str] | None:
 
 
 def compiled_kernels(root: Path, workplace: Path, variables: Mapping[str, str]) -> dict[str, str]:
-    """Compile kernels in a copy of the sources.
-
-    Parameters
-    ----------
-    root : Path
-        The checkout, or the sdist.
-    workplace : Path
-        An empty folder, for the copy.
-    variables : mapping
-        Environment that says for which processors.
-
-    Returns
-    -------
-    dict
-        For each of numba's files its place in the wheel.
-    """
+    """Compile kernels in a copy of the sources in an empty folder: the place in the wheel of each of numba's files."""
     for name in SOURCES:
         shutil.copytree(root / name, workplace / name, ignore=shutil.ignore_patterns("__pycache__"))
     inherited = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}

@@ -34,17 +34,7 @@ ROOMS = {
 
 
 def entered(work: Callable[[], Any], rooms: tuple[str, ...], begin: str = "", end: str = "") -> list[str]:
-    """Files of FogSim whose functions run, in order.
-
-    Parameters
-    ----------
-    work : callable
-        What is done.
-    rooms : tuple of str
-        Rooms whose files count.
-    begin, end : str
-        Functions between the first calls of which files are counted; all if they are empty.
-    """
+    """Files of rooms whose functions run, in order, between the first calls of `begin` and `end` if these are given."""
     found: dict[str, None] = {}
     counting = not begin
 

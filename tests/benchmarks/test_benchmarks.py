@@ -109,14 +109,12 @@ def records(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
             {"growth_kib_per_renderer", "growth_kib_per_1000_frames"},
             marks=SLOW,
         ),
-        ("air.py", ("--repeat", "2"), {"fog", "lamps", "changing", "width", "height", "ms_median", "ms_min", "ms_max"}),
         pytest.param(
             "grades.py",
             ("--visibility", "100", "--duration", "1", "--drawings", "1"),
             {"V_met", "road", "method", "frames", "valid", "bias", "median", "p95", "held"},
             marks=SLOW,
         ),
-        ("sign_map.py", ("--size", "64x48", "--steps", "2"), {"camera", "signs", "step_ms", "sign_map_ms"}),
         ("traffic.py", ("--vehicles", "20", "--seconds", "1"), {"vehicles", "ms_sumo", "ms_total", "ratio"}),
     ],
 )

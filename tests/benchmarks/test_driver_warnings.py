@@ -32,7 +32,8 @@ def test_leads_and_false_warnings_an_hour(
     drives = [drive("bank", 20_000, seed, lead) for seed, lead in ((1, 250.0), (2, 0.0), (3, 300.0))]
     drives += [drive("even", fog, seed, false=fog == 400) for seed in (1, 2) for fog in FOGS]
     kept = tmp_path / "kept.jsonl"
-    kept.write_text("\n".join(map(json.dumps, drives)), encoding="utf-8")
+    units = ([[one["about"], one["visibility_m"], one["seed"]], one] for one in drives)
+    kept.write_text("\n".join(map(json.dumps, ["driver_warnings", *units])) + "\n", encoding="utf-8")
     monkeypatch.syspath_prepend(FOLDER)
     monkeypatch.setattr(
         sys, "argv", ["driver_warnings.py", "--json", "--seeds", "3", "--drives", "2", "--keep", str(kept)]

@@ -241,14 +241,6 @@ def test_interrupted_commands_leave_their_tables_and_are_resumed(root: Path, rer
     assert kept.exists(), "what a command keeps is its own"
     assert "| any | 3.7 |" in page(root)
     assert "| any | 7.4 |" in page(root)
-    assert not (root / "runs" / "tables" / "progress.json").exists(), "the next one is another round"
-
-
-def test_finished_measurements_are_not_repeated_by_the_same_request(root: Path, rerun: Run) -> None:
-    rerun("--all", measured=(WIDTH, FAILS))
-    once = (root / "runs" / "tables" / "width.log").read_text(encoding="utf-8")
-    assert "1 of 2 to measure" in rerun("--all", measured=(WIDTH, TWICE)).stderr
-    assert (root / "runs" / "tables" / "width.log").read_text(encoding="utf-8") == once
 
 
 def test_what_another_command_measures_is_left_alone(root: Path, rerun: Run) -> None:
@@ -309,7 +301,7 @@ def test_imports_are_followed_where_they_are_late_or_lazy(docs: Callable[[str], 
     checkout = docs("code_digests").Checkout(CHECKOUT)
     files = checkout.files(["benchmarks/belief.py"])
     for path in (
-        "benchmarks/docs_table.py",
+        "benchmarks/harness.py",
         "fogsim/loop.py",  # as fogsim.ClosedLoop or fogsim.run, of which nothing is imported
         "fogsim/vision/strips/joint_kernels.py",
         "fogsim/vision/data/airlight_slopes.npz",

@@ -17,21 +17,11 @@ from vehicle_bodies.truck import flatbed, rigid, semitrailer, tractor, trailer
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """A model of a body.
+    """A model of a body."""
 
-    Attributes
-    ----------
-    near : callable
-        Makes the shape in full.
-    size : tuple of float
-        Its length, width and height [m].
-    shadow : float
-        Half the breadth of the darkness under it, in widths.
-    """
-
-    near: Callable[[], Mesh]
-    size: Size
-    shadow: float = 0.5
+    near: Callable[[], Mesh]  # makes the shape in full
+    size: Size  # its length, width and height [m]
+    shadow: float = 0.5  # half the breadth of the darkness under it, in widths
 
 
 def _car(form: CarForm) -> Model:

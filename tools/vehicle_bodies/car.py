@@ -53,36 +53,20 @@ Profile = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True, slots=True)
 class CarForm:
-    """What makes one kind of car out of the common body [m].
+    """What makes one kind of car out of the common body [m]."""
 
-    Attributes
-    ----------
-    along : tuple of float
-        Where the common body's nose, foot of the windscreen, rear window and tail come to lie.
-    heights : tuple of float
-        Where its road, sill, bumper, lower edge of the rear lamps and belt come to lie.
-    roof : tuple of (x, z)
-        Side view of the cabin: foot and top of the windscreen, middle of the roof, top and foot of the rear window.
-    panes : tuple of float
-        x of the ends of the side windows: front, pillar, rear, and end of a third window (0 without one).
-    axles : tuple of float
-        x of the axles.
-    radius : float
-        Of the wheels.
-    lean : float
-        How much narrower the cabin becomes per metre of height.
-    lamps : tuple of float
-        Height of the rear lamps' upper edge above the lower, and y of their inner edge.
-    """
-
+    # Where the common body's nose, foot of the windscreen, rear window and tail come to lie
     along: tuple[float, float, float, float]
+    # Where its road, sill, bumper, lower edge of the rear lamps and belt come to lie
     heights: tuple[float, float, float, float, float]
+    # Side view of the cabin: foot and top of the windscreen, middle of the roof, top and foot of the rear window
     roof: Profile
+    # x of the ends of the side windows: front, pillar, rear, and end of a third window (0 without one)
     panes: tuple[float, float, float, float]
-    axles: tuple[float, float]
-    radius: float
-    lean: float
-    lamps: tuple[float, float]
+    axles: tuple[float, float]  # x of the axles
+    radius: float  # of the wheels
+    lean: float  # how much narrower the cabin becomes per metre of height
+    lamps: tuple[float, float]  # height of the rear lamps' upper edge above the lower, and y of their inner edge
 
     @property
     def length(self) -> float:
@@ -144,13 +128,7 @@ SUV = CarForm(
 
 
 def car(form: CarForm) -> Mesh:
-    """Shape of a car in a unit box.
-
-    Parameters
-    ----------
-    form : CarForm
-        What kind of car.
-    """
+    """Shape of a car in a unit box."""
     half, mirror = 0.90, form.panes[0]
     belt = form.heights[-1]
     parts = [

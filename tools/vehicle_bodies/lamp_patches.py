@@ -28,47 +28,21 @@ _APART = 0.001  # a panel that reaches less far over the middle lies on one side
 
 @dataclass(frozen=True, slots=True)
 class Patch:
-    """One lamp of a shape.
+    """One lamp of a shape."""
 
-    Attributes
-    ----------
-    surface : Surface
-        Which lamp.
-    centre : (3,) float64
-        Its middle, weighted by area.
-    low, high : (3,) float64
-        Corners of its bounding box.
-    area : float
-        Area as seen from straight ahead or behind, in units of the box's width times its height.
-    front : bool
-        True if it shines forwards, else backwards.
-    side : int
-        1 on the left, −1 on the right, 0 if in the middle.
-    reflectance : (3,) float64
-        Colour of its lens.
-    vertices : (n,) int64
-        Its vertices in the shape.
-    """
-
-    surface: Surface
-    centre: NDArray[np.float64]
-    low: NDArray[np.float64]
+    surface: Surface  # which lamp
+    centre: NDArray[np.float64]  # its middle, weighted by area
+    low: NDArray[np.float64]  # corners of its bounding box
     high: NDArray[np.float64]
-    area: float
-    front: bool
-    side: int
-    reflectance: NDArray[np.float64]
-    vertices: NDArray[np.int64]
+    area: float  # area as seen from straight ahead or behind, in units of the box's width times its height
+    front: bool  # true if it shines forwards, else backwards
+    side: int  # 1 on the left, −1 on the right, 0 if in the middle
+    reflectance: NDArray[np.float64]  # colour of its lens
+    vertices: NDArray[np.int64]  # its vertices in the shape
 
 
 def lamp_patches(shape: Mesh) -> list[Patch]:
-    """Lamps of a shape in a unit box whose front lies at x = 0: each kind on the left, in the middle and on the right.
-
-    Parameters
-    ----------
-    shape : Mesh
-        The shape.
-    """
+    """Lamps of a shape in a unit box whose front lies at x = 0: each kind on the left, in the middle and right."""
     return _patches(shape, _side(shape), -0.5)
 
 
@@ -120,15 +94,7 @@ def _side(shape: Mesh) -> NDArray[np.int64]:
 
 
 def with_lit_areas(body: Mesh, areas: Mapping[Surface, float]) -> Mesh:
-    """Body in metres whose lamps are lit in the middle of their lenses only, in areas as large as they are in reality.
-
-    Parameters
-    ----------
-    body : Mesh
-        The body; x leads backwards.
-    areas : mapping of Surface to float
-        Luminous area of each lamp as seen along the road [m²]; smaller lamps stay as they are.
-    """
+    """Body in metres, x backwards, whose lamps are lit in the middle of their lenses only, in real areas [m²]."""
     shape = replace(body, positions=body.positions * np.array([-1.0, 1.0, 1.0], np.float32))
     lens, core = body.surface.copy(), body.positions.astype(np.float64)
     panel, side = _panels(body), _side(shape)

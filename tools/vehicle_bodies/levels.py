@@ -34,18 +34,10 @@ _STEP = 0.9  # a zone whose footprint is smaller than this share of the one belo
 
 @dataclass(frozen=True, slots=True)
 class Detail:
-    """How much of a body a level shows.
+    """How much of a body a level shows."""
 
-    Attributes
-    ----------
-    zones : mapping from str to int
-        Number of zones of height from the "rear", the "front" and the "left".
-    little : float
-        Share of a zone below which a material is left out there (of which there is more elsewhere, then).
-    """
-
-    zones: Mapping[str, int]
-    little: float
+    zones: Mapping[str, int]  # number of zones of height from the "rear", the "front" and the "left"
+    little: float  # share of a zone below which a material is left out there (of which there is more elsewhere, then)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,19 +50,7 @@ class _Gain:
 
 
 def levels_of_detail(shape: Mesh, size: Size, details: Sequence[Detail], shadow: float) -> list[Mesh]:
-    """Levels of detail of a body, with its lamps and plates.
-
-    Parameters
-    ----------
-    shape : Mesh
-        The body in full in a unit box.
-    size : tuple of float
-        Its length, width and height [m].
-    details : sequence of Detail
-        How much each of them shows.
-    shadow : float
-        Half the breadth of the darkness under it [units of its width].
-    """
+    """Levels of detail of a body, with its lamps and plates."""
     body, kept = _without_shadow(shape), merge((lamp_quads(shape), _sheeting(shape)))
     looks = {side: _side_view(side, body, kept, size) for side in _SIDES}
     top, rest = project_shape("top", body, size), merge((kept, _shadow(size, shadow)))
@@ -101,12 +81,7 @@ def _matched(
     return _built(runs, gains, rest, size)
 
 
-def _built(
-    runs: Mapping[str, Sequence[Span]],
-    gains: Mapping[str, _Gain],
-    rest: Mesh,
-    size: Size,
-) -> Mesh:
+def _built(runs: Mapping[str, Sequence[Span]], gains: Mapping[str, _Gain], rest: Mesh, size: Size) -> Mesh:
     panels = {
         side: merge([panel for run in own for panel in _panels(side, run, gains[side], size)])
         for side, own in runs.items()

@@ -33,15 +33,8 @@ RIM = Material((0.19, 0.195, 0.20))
 def hull(table: ArrayLike, material: Material = PAINT, *, columns: int = 5, levels: int = 4) -> Mesh:
     """Closed body through cross-sections.
 
-    Parameters
-    ----------
-    table : (n, 6)
-        One section a row: x, half the width, height of the lower edge, height of the upper edge at the side, half
-        the width there, and how much higher the middle is [m].
-    material : Material
-        Its skin; the underside is dark.
-    columns, levels : int
-        Points across the top and up each side; three levels make upright sides.
+    Each is a row [m]: x, half width, lower edge, upper edge at the side, half width there, rise of the middle.
+    `columns` and `levels` are points across the top and up each side; three levels make upright sides.
     """
     x, half, low, top, half_top, crown = np.asarray(table, float).T
     sides = []
@@ -109,19 +102,7 @@ def pair(left: Mesh) -> Mesh:
 
 
 def wheels(axles: Sequence[float], outside: float, radius: float, width: float, *, arch: bool = True) -> Mesh:
-    """Pairs of wheels.
-
-    Parameters
-    ----------
-    axles : sequence of float
-        x of the axles [m].
-    outside : float
-        y of the wheels' outer faces [m].
-    radius, width : float
-        Size of a tyre [m].
-    arch : bool
-        With the dark opening of the wheel arch around it.
-    """
+    """Pairs of wheels."""
     parts = []
     for x in axles:
         parts.append(_wheel(x, outside, radius, width))
@@ -145,15 +126,7 @@ def _wheel(x: float, outside: float, radius: float, width: float, sides: int = 1
 
 
 def contact_shadow(length: float, half_width: float, *, fine: bool = True) -> Mesh:
-    """Darkness on the road under a body, deepest in the middle, fading towards its outline.
-
-    Parameters
-    ----------
-    length, half_width : float
-        The body's outline [m].
-    fine : bool
-        False for fewer triangles.
-    """
+    """Darkness on the road under a body, deepest in the middle, fading towards its outline."""
     x, along = np.array([0.005, 0.05, 0.15, 0.85, 0.95, 0.995]), np.array([0, 0.6, 1, 1, 0.6, 0])
     y, across = np.array([-0.99, -0.82, 0.82, 0.99]), np.array([0, 0.75, 0.75, 0])
     if not fine:

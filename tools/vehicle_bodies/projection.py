@@ -18,24 +18,12 @@ _LEVEL, _UPWARDS = 0.56, 0.44  # light on an upright surface under an overcast s
 
 @dataclass(frozen=True, slots=True)
 class Projection:
-    """A shape from one side, in a grid of rows (upwards) and columns.
+    """A shape from one side, in a grid of rows (upwards) and columns."""
 
-    Attributes
-    ----------
-    depth : (rows, columns) float64
-        How far it is inside its box, in units of the box; infinite where nothing is seen.
-    normal : (rows, columns, 3) float64
-        Unit normals of the body in its real proportions.
-    paint : (rows, columns) float64
-        1 where paint is seen, else 0.
-    own : (rows, columns, 3) float64
-        Reflectance times share of the sky's light of what is not paint, else 0.
-    """
-
-    depth: Wide
-    normal: Wide
-    paint: Wide
-    own: Wide
+    depth: Wide  # how far it is inside its box, in units of the box; infinite where nothing is seen
+    normal: Wide  # unit normals of the body in its real proportions
+    paint: Wide  # 1 where paint is seen, else 0
+    own: Wide  # reflectance times share of the sky's light of what is not paint, else 0
 
     @property
     def covered(self) -> Mask:
@@ -76,19 +64,7 @@ def _perspective(side: str, depth: Wide, size: Size) -> tuple[Wide, float, float
 
 
 def project_shape(side: str, shape: Mesh, size: Size, fine: int = 1) -> Projection:
-    """SideView at a shape: from 50 m behind or before it, or without perspective from another side.
-
-    Parameters
-    ----------
-    side : str
-        "rear", "front", "left" or "top" (rows then lead to the left).
-    shape : Mesh
-        In a unit box, x −1 (rear) … 0 (front), y ±1/2, z 0 … 1.
-    size : tuple of float
-        Length, width and height of the body [m].
-    fine : int
-        How many times as fine the grid is.
-    """
+    """View of a shape in a unit box from the rear or front 50 m away, or without perspective from the left or top."""
     u, v, w, sign = _VIEWS[side]
     positions = shape.positions.astype(np.float64)
     deep = positions[:, w] - _LOW[w] if sign > 0 else _HIGH[w] - positions[:, w]

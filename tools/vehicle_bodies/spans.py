@@ -27,32 +27,16 @@ class SideView:
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """Part of a zone without a gap, from one side.
+    """Part of a zone without a gap, from one side."""
 
-    Attributes
-    ----------
-    zone : tuple of int
-        First row and the one after the last.
-    middle, breadth, depth : (2,) float64
-        At its lower and upper edge [units of the box].
-    split : tuple of float
-        Where across it the panel of what is not paint begins and ends (0 … 1).
-    colour : (3,) float64
-        Reflectance of that panel.
-    light : float
-        Share of the sky's light on the paint next to it.
-    normals : tuple of (3,) float64
-        Mean normals of what is not paint, and of paint.
-    """
-
-    zone: tuple[int, int]
-    middle: Wide
+    zone: tuple[int, int]  # first row and the one after the last
+    middle: Wide  # at its lower and upper edge [units of the box]
     breadth: Wide
     depth: Wide
-    split: tuple[float, float]
-    colour: Wide
-    light: float
-    normals: tuple[Wide, Wide]
+    split: tuple[float, float]  # where across it the panel of what is not paint begins and ends (0 … 1)
+    colour: Wide  # reflectance of that panel
+    light: float  # share of the sky's light on the paint next to it
+    normals: tuple[Wide, Wide]  # mean normals of what is not paint, and of paint
 
 
 def find_spans(look: SideView, zone: tuple[int, int], little: float) -> list[Span]:
@@ -166,17 +150,6 @@ def divide_into_zones(side: str, seen: Projection, left: Projection, size: Size,
     """First rows of the zones of a body, and the rows after their last, from below.
 
     The sum of squares that straight lines through outlines and mean materials leave is the least.
-
-    Parameters
-    ----------
-    side : str
-        From where it is seen: "rear", "front" or "left".
-    seen, left : Projection
-        The body from there, and from the left.
-    size : tuple of float
-        Its length, width and height [m].
-    count : int
-        Number of zones.
     """
     materials = seen.paint.sum(axis=1) / np.maximum(seen.covered.sum(axis=1), 1)
     cost = _cost(_outlines(side, seen, left, size), straight=True) + _cost(materials[:, None], straight=False)

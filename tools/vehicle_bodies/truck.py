@@ -40,13 +40,7 @@ _CAB = np.array(
 
 
 def semitrailer(box_material: Material) -> Mesh:
-    """Shape of an articulated truck in a unit box.
-
-    Parameters
-    ----------
-    box_material : Material
-        Sides of its trailer.
-    """
+    """Shape of an articulated truck in a unit box."""
     trailer = _load((2.85, 16.35), (1.10, 4.0), 1.27, box_material)
     chassis = box((2.0, -0.45, 0.55), (16.2, 0.45, 1.12), UNDERBODY)
     skirts = both_sides(box((6.2, 1.18, 0.45), (10.2, 1.24, 1.10), STEEL))
@@ -66,13 +60,7 @@ def tractor() -> Mesh:
 
 
 def trailer(box_material: Material) -> Mesh:
-    """Shape of the trailer of such a truck in a unit box.
-
-    Parameters
-    ----------
-    box_material : Material
-        Its sides.
-    """
+    """Shape of the trailer of such a truck in a unit box."""
     load = _load((0.0, 13.5), (1.10, 4.0), 1.27, box_material)
     front = panel_front(0.005, (-1.26, 1.26), (1.10, 4.0), box_material)
     chassis = box((3.6, -0.45, 0.55), (13.35, 0.45, 1.12), UNDERBODY)

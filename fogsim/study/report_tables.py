@@ -114,7 +114,7 @@ def comparison_table(
     cells = rows_of_cells(study.factors, rows)
     numbers = ("baseline", "mean", "difference", f"{study.confidence:.0%} interval", "p", "p adjusted", "seeds")
     head = ["metric", *study.factors, *numbers, f"seeds for ± {study.wanted_interval:.0%}"]
-    body = []
+    body: list[list[str | TableCell]] = []
     for one in differences:
         interval = remarks.get(one.metric, "–") if one.low is None else f"{one.low:.3g} … {one.high:.3g}"
         means = zip((one.baseline_mean, one.mean), events_of_both(study, cells, one), strict=True)

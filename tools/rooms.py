@@ -3,6 +3,7 @@
     python tools/rooms.py                  # rooms with their files, lines of code and of docstrings, and imports
     python tools/rooms.py --draw           # docs/pictures/rooms.svg
     python tools/rooms.py --check          # exit code 1 if that drawing is not of today's rooms
+    python tools/rooms.py --summary        # the size of the code, the tests and the docs
 
 Arrows that follow from others are left out, as are those to the foundations, on which every room may stand; the
 stages, which do not know one another, are drawn in one frame, and an arrow to it is one to some of them.
@@ -10,10 +11,14 @@ stages, which do not know one another, are drawn in one frame, and an arrow to i
 
 import argparse
 import ast
+import io
+import subprocess
 import sys
 import textwrap
+import tokenize
 import tomllib
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -216,7 +221,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--draw", action="store_true", help="write docs/pictures/rooms.svg")
     parser.add_argument("--check", action="store_true", help="compare it with the rooms of today")
+    parser.add_argument("--summary", action="store_true", help="print the size of the code, the tests and the docs")
     arguments = parser.parse_args()
+    if arguments.summary:
+        print("\n".join(f"{value:7,} {name}" for name, value in summary().items()))  # noqa: T201 - what it is for
+        return
     rooms = read_rooms()
     drawing = draw(rooms, read_floors())
     if arguments.draw:
@@ -225,6 +234,51 @@ def main() -> None:
         sys.exit(None if DRAWING.read_text() == drawing else f"{DRAWING.name} is not of today: tools/rooms.py --draw")
     else:
         _print_table(rooms)
+
+
+def summary() -> dict[str, int]:
+    """Sizes by name; attributes' docstrings and comments are no lines of code."""
+    texts = [path.read_text(encoding="utf-8") for path in sorted((ROOT / "fogsim").rglob("*.py"))]
+    trees = [ast.parse(text) for text in texts]
+    public = [node for tree in trees for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)]
+    loop = next(name for name in ("fogsim.simulation.loop", "fogsim.loop") if name in modules())
+    loaded = f"import sys, {loop}; print(sum(name.partition('.')[0] == 'fogsim' for name in sys.modules))"
+    scripts = [path for folder in ("benchmarks", "docs", "tools") for path in (ROOT / folder).rglob("*.py")]
+    pages = [*(ROOT / "docs").rglob("*.md"), *(ROOT / f"{name}.md" for name in ("README", "CONTRIBUTING", "CHANGELOG"))]
+    return {
+        "lines of code in fogsim/": sum(_code_lines(*pair) for pair in zip(trees, texts, strict=True)),
+        "lines of docstrings in fogsim/": sum(_docstring_lines(tree) for tree in trees),
+        "files in fogsim/": len(texts),
+        f"modules of fogsim that import {loop} loads": int(subprocess.check_output([sys.executable, "-c", loaded])),  # noqa: S603 - Python itself
+        "public functions and classes": sum(not node.name.startswith("_") for node in public),
+        "rooms": len(read_rooms()) - 1,
+        "lines of benchmarks, docs' scripts and tools": _all_lines(scripts),
+        "lines of tests": _all_lines((ROOT / "tests").rglob("*.py")),
+        "words of pages outside tables": sum(_words(page) for page in pages),
+    }
+
+
+def _all_lines(paths: Iterable[Path]) -> int:
+    return sum(len(path.read_text(encoding="utf-8").splitlines()) for path in paths)
+
+
+def _words(page: Path) -> int:
+    lines = page.read_text(encoding="utf-8").splitlines()
+    return sum(len(line.split()) for line in lines if not line.startswith(("|", "<!--")))
+
+
+def _code_lines(tree: ast.Module, text: str) -> int:
+    _, told = _lines(tree, text)
+    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+    quiet = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
+    spans = [(token.start[0], token.end[0]) for token in tokens if token.type not in quiet]
+    return len({line for first, last in spans for line in range(first, last + 1)}) - told
+
+
+def _docstring_lines(tree: ast.Module) -> int:
+    documented = (ast.Module, ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+    nodes = [node for node in ast.walk(tree) if isinstance(node, documented) and ast.get_docstring(node)]
+    return sum((node.body[0].end_lineno or 0) - node.body[0].lineno + 1 for node in nodes)
 
 
 def _print_table(rooms: dict[str, Room]) -> None:

@@ -38,7 +38,7 @@ HORIZON_SHARE = 0.6
 SHARP = 0.03
 """Change of the signal within four rows from which on the horizon is where it is steepest, as one more choice [-]."""
 
-FIRST_WORTHWHILE, WORTHWHILE = 14.0, 8.0
+FIRST_WORTHWHILE, WORTHWHILE = 14.0, 10.0
 """Logarithms of the evidence below the best at which a visibility is not tried under other horizons and surfaces, and
 under other responses [-]."""
 

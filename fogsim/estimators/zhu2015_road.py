@@ -128,7 +128,9 @@ def seen_road(
     edges = edge_map(blurred, slope if Zhu2015Repair.FOG_DRAWS_NO_EDGES in repairs else np.zeros_like(slope))
     if edges.threshold > road.contrast:
         raise CannotTellError("noise or texture drowns the contrast of road and airlight")
-    lines = hough_lines(edges.pixels, math.ceil(assumed.row - road.first_row) + 1, LOWEST_ANGLE)
+    lines: list[LaneLine] = []
+    if not {Zhu2015Repair.SUBPIXEL_HORIZON, Zhu2015Repair.OWN_LANE} <= repairs:
+        lines = hough_lines(edges.pixels, math.ceil(assumed.row - road.first_row) + 1, LOWEST_ANGLE)
     if Zhu2015Repair.SUBPIXEL_HORIZON in repairs:
         horizon, point = seen_horizon(linear_pixels(road.level, camera), camera, assumed)
     else:

@@ -124,11 +124,11 @@ def evidence(gram: Floats, half: float, law: Law, least_airlight: float, first: 
 class Laws(NamedTuple):
     """Laws of the factors under all responses and lights."""
 
-    # mean, deviation (r, m, COLUMNS); used (m, COLUMNS) int64, of which so many count; count (m,) int64
+    # mean, deviation (r, m, COLUMNS); used (m, COLUMNS) int64, of which so many are columns; number (m,) int64
     mean: Floats
     deviation: Floats
     used: NDArray[np.int64]
-    count: NDArray[np.int64]
+    number: NDArray[np.int64]
 
 
 @kernel
@@ -136,16 +136,16 @@ def _laws_of(lights: Floats, levels: Floats, shift: float) -> Laws:
     """Laws under responses of some levels of light (`lights` (2, m, COLUMNS), `levels` (r,), `shift` [px])."""
     many = lights.shape[1]
     mean, deviation = np.empty((levels.size, many, COLUMNS)), np.empty((levels.size, many, COLUMNS))
-    used, count = np.zeros((many, COLUMNS), np.int64), np.zeros(many, np.int64)
+    used, number = np.zeros((many, COLUMNS), np.int64), np.zeros(many, np.int64)
     for r in range(levels.size):
         mean[r], deviation[r] = lights[0] * levels[r], lights[1] * levels[r]
     mean[:, :, SHIFT], deviation[:, :, SHIFT] = 0.0, shift
     for j in range(many):
         for i in range(COLUMNS):
             if deviation[0, j, i] > 0.0:
-                used[j, count[j]] = i
-                count[j] += 1
-    return Laws(mean, deviation, used, count)
+                used[j, number[j]] = i
+                number[j] += 1
+    return Laws(mean, deviation, used, number)
 
 
 @kernel
@@ -154,13 +154,13 @@ def _of_lights(
     room: Factor, out: Floats,
 ) -> None:  # fmt: skip
     """Evidence of one response and surface under each light, and of a road that ends at a cut (`out` (m,))."""
-    many, last, before = laws.count.size, rows.cuts.size - 1, -1.0
+    many, last, before = laws.number.size, rows.cuts.size - 1, -1.0
     gram = grams[last] + sky_gram
     for j in range(out.size):
         cut, which = (last, j) if j < many else (j - many, 0)
         if j >= many:
             gram = grams[cut] + sky_gram
-        used = laws.used[which, : laws.count[which]]
+        used = laws.used[which, : laws.number[which]]
         law = Law(laws.mean[response, which], laws.deviation[response, which], used)
         least = rows.least_airlight[response] if law.deviation[OTHER_SKY] == 0.0 else 0.0
         # What lights have in common is factored once.

@@ -56,21 +56,17 @@ def slants(curve: RoadCurve) -> Floats:
     return np.asarray(distance * below / curve.row_distance)
 
 
-def law_fit(curve: RoadCurve, extinction: float, airlight: float | None = None) -> LawFit:
-    """Fit road and airlight of an extinction to a curve (`extinction` [1/m], `airlight` [linear grey levels])."""
+def law_fit(curve: RoadCurve, extinction: float) -> LawFit:
+    """Fit road and airlight of an extinction to a curve (`extinction` [1/m])."""
     optical = extinction * curve.row_distance * slants(curve)
     shape, weight = transmittance(optical, curve.below_horizon), curve.weight
     total = max(float(weight.sum()), 1e-9)
     mean_shape = float(matrix_product(weight, shape)) / total
     mean = float(matrix_product(weight, curve.luminance)) / total
-    if airlight is None:
-        centred = shape - mean_shape
-        square = float(matrix_product(weight, centred**2))
-        drop = -float(matrix_product(weight * centred, curve.luminance)) / max(square, 1e-12)
-        airlight = mean + drop * mean_shape
-    else:
-        square = float(matrix_product(weight, shape**2))
-        drop = float(matrix_product(weight * shape, airlight - curve.luminance)) / max(square, 1e-12)
+    centred = shape - mean_shape
+    square = float(matrix_product(weight, centred**2))
+    drop = -float(matrix_product(weight * centred, curve.luminance)) / max(square, 1e-12)
+    airlight = mean + drop * mean_shape
     model = airlight - drop * shape
     left = math.sqrt(float(matrix_product(weight, (curve.luminance - model) ** 2)) / total)
     return LawFit(airlight, airlight - drop, model, left / drop if drop > 0.0 else math.inf)

@@ -48,14 +48,14 @@ SMOOTH, EXPLAINED = 4, 1.0
 """How many of those have patches as faint as the first, and misfit of the first up to which stronger ones are not tried
 [-]: they explain nothing then."""
 
-EXTINCTIONS, SIMPLE_EXTINCTIONS = 14, 28
-"""Extinctions of the first searches, evenly in ln k."""
+EXTINCTIONS = 28
+"""Extinctions of the first search, evenly in ln k."""
 
 ALIKE = 0.3
 """Difference of ln k below which two starts lead to the same answer [-]."""
 
-CLEAR_MISFIT, CLEAR_USED = 1.5, 0.97
-"""Misfit below which, and share of bins in use from which on, the simple model's answer needs no other [-]."""
+CLEAR_MISFIT = 1.5
+"""Misfit below which all lanes' answer needs no other [-]."""
 
 STEPS, MORE_STEPS = 10, 5
 """Most Gauss–Newton steps for the first strength of patches and drift, and from its answer for each of the others."""
@@ -63,14 +63,8 @@ STEPS, MORE_STEPS = 10, 5
 LEAST_BINS = 8
 """Fewest bins of the own lane for a fit."""
 
-UNSURE_AIRLIGHT = 0.008
-"""Relative deviation of the airlight from which on its place is sought [-]."""
-
 MOST_VIGNETTING = 0.6
 """Most that a lens takes of a bin's light [-]."""
-
-FAR_BINS = 8
-"""Farthest bins of the own lane, which show the airlight where the fog is dense."""
 
 DISAGREEMENT = 2.0
 """Standard deviations by which a neighbouring strip may change the extinction [-]."""
@@ -148,7 +142,7 @@ def _answers(
 ) -> list[_Answer]:
     """Answers under one prior, each with its cost, in which how likely the albedo is beforehand is counted."""
     bins = strip_bins(curves, geometry, prior)
-    best = _from_search(bins, prior) if near is None else _from_near(bins, near, prior)
+    best = _from_near(bins, near, prior)
     most = len(ALBEDOS) if best.misfit > EXPLAINED else SMOOTH
     found = [(0, best)]
     found += [(a, _refined(bins, ALBEDOS[a], prior, best.theta, MORE_STEPS)) for a in albedos if 0 < a < most]
@@ -179,42 +173,19 @@ def strip_bins(curves: StripCurves, geometry: StripGeometry, prior: JointPrior) 
     )
 
 
-def _from_near(bins: Bins, near: JointFit, prior: JointPrior) -> Solution:
-    """Best answer from one for some of the strips, and from that with a constant albedo if it is another."""
-    found = [_refined_from(bins, prior, (near.extinction, near.airlight), near.shift)]
+def _from_near(bins: Bins, near: JointFit | None, prior: JointPrior) -> Solution:
+    """Best answer from that with a constant albedo, and from one for some of the strips, if there is another."""
     simple = _constant_albedo(bins, prior)
+    if near is None:
+        return _refined_from(bins, prior, simple, prior.shift)
+    found = [_refined_from(bins, prior, (near.extinction, near.airlight), near.shift)]
     if abs(math.log(simple[0] / max(near.extinction, _span(bins)[0]))) > ALIKE:
         found.append(_refined_from(bins, prior, simple, prior.shift))
     return min(found, key=lambda f: f.cost)
 
 
-def _from_search(bins: Bins, prior: JointPrior) -> Solution:
-    """Best answer from that with a constant albedo, whose likelihood is not so narrow that a grid may miss it.
-
-    Where it does not fit nearly all bins, others are tried: the best of a coarse grid with an airlight as in the
-    prior or, where that is unsure, as what the farthest road may have faded into.
-    """
-    starts = [_constant_albedo(bins, prior)]
-    found = [_refined_from(bins, prior, starts[0], prior.shift)]
-    if _is_clear(bins, found[0]):
-        return found[0]
-    airlights = [prior.airlight]
-    if prior.below > UNSURE_AIRLIGHT * prior.airlight:
-        airlights.append(float(np.median(bins.luminance[0][bins.noise[0] > 0][-FAR_BINS:])))
-    grid = extinction_grid(bins, EXTINCTIONS)
-    for airlight in airlights:
-        around = prior._replace(airlight=airlight)
-        cost = joint_start_kernels.extinction_costs(bins, under_sky(ALBEDOS[1], prior), grid, around)
-        best = int(np.argmin(cost))
-        new = all(abs(math.log(grid[best] / k)) > ALIKE for k, _ in starts)
-        if math.isfinite(cost[best]) and new:
-            starts.append((float(grid[best]), airlight))
-            found.append(_refined_from(bins, prior, starts[-1], prior.shift))
-    return min(found, key=lambda f: f.cost)
-
-
 def _constant_albedo(bins: Bins, prior: JointPrior) -> tuple[float, float]:
-    return joint_start_kernels.fit_constant_albedo(bins, extinction_grid(bins, SIMPLE_EXTINCTIONS), prior)
+    return joint_start_kernels.fit_constant_albedo(bins, extinction_grid(bins, EXTINCTIONS), prior)
 
 
 def extinction_grid(bins: Bins, count: int) -> Floats:
@@ -243,12 +214,6 @@ def _refined(bins: Bins, albedo: Albedo, prior: JointPrior, start: Floats, steps
 def under_sky(albedo: Albedo, prior: JointPrior) -> Albedo:
     """Albedo seen through an airlight that is as uneven as is known beforehand."""
     return albedo._replace(cloud_deviation=prior.cloud)
-
-
-def _is_clear(bins: Bins, found: Solution) -> bool:
-    """Whether an answer leaves nothing to explain, even on a road that hardly wanders."""
-    used = int((found.used == albedo_filter.USED).sum())
-    return found.misfit < CLEAR_MISFIT and used >= CLEAR_USED * int((bins.noise > 0).sum())
 
 
 def _average(answers: list[_Answer]) -> JointFit:

@@ -6,16 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.jit import kernel
-from fogsim.vision.strips.albedo_filter import Albedo, albedo_transitions, whiten
 from fogsim.vision.strips.joint_kernels import (
     MOST_DARKER,
     Bins,
     JointPrior,
-    allocated,
     darkening,
     eye_level,
     mean_transmittance,
-    near_road,
 )
 
 GRAINY = 0.01
@@ -42,44 +39,10 @@ def darkness_by_sky(prior: JointPrior, k: float, eye: float) -> tuple[float, flo
 
 
 @kernel
-def extinction_costs(
-    bins: Bins, albedo: Albedo, extinctions: NDArray[np.float64], prior: JointPrior
-) -> NDArray[np.float64]:
-    """Minus twice the log likelihood of each of several extinctions, the rest at their first guesses; inf for none.
-
-    Takes `extinctions` (m,) [1/m].
-    """
-    strips, count = bins.luminance.shape
-    shift = prior.shift
-    cost, changes = np.empty(extinctions.size), albedo_transitions(bins.distance, bins.extent, bins.grazing, albedo)
-    residuals, whitened = allocated(strips, count, 1, bins.noise)
-    for j in range(extinctions.size):
-        k, possible = extinctions[j], True
-        darker, airlight = darkness_by_sky(prior, k, bins.eye)
-        level, on = eye_level(k, bins.eye, bins.darker.shape[0]) if darker > 0.0 else (0, 0.0)
-        for strip in range(strips):
-            road = near_road(bins, strip, k, airlight, shift, darker)
-            possible = possible and 0.0 < road < 1.5 * airlight
-            for i in range(count):
-                value, _, _ = mean_transmittance(bins.below[i] - shift, bins.half[i], bins.path[strip, i], k)
-                rest = bins.luminance[strip, i] - airlight - (road - airlight) * value
-                if darker > 0.0:
-                    rest += airlight * darker * darkening(bins, i, level, on, shift)[0] * (1.0 - value)
-                residuals.columns[strip, i, 0] = rest
-                residuals.scale[strip, i], residuals.veil[strip, i] = road * value, airlight * (1.0 - value)
-        cost[j] = np.inf
-        if possible:
-            cost[j] = whiten(residuals, changes, albedo, prior.airlight, True, whitened)
-            cost[j] += (whitened.innovations**2).sum()
-    return cost
-
-
-@kernel
 def fit_constant_albedo(bins: Bins, extinctions: NDArray[np.float64], prior: JointPrior) -> tuple[float, float]:
     """Extinction and airlight that best fit all strips as one road of constant albedo, in Cauchy's norm.
 
-    A smooth broad search, where `extinction_costs` has narrow minima: what does not fit weighs little, and nothing is
-    explained by an albedo that wanders.
+    A smooth broad search: what does not fit weighs little, and nothing is explained by an albedo that wanders.
 
     Takes `extinctions` (m,) [1/m].
     """

@@ -16,7 +16,7 @@ from fogsim.vision.day.hypotheses import CUT_CHANCE, LIGHTS, SURFACES, lights_ch
 from fogsim.vision.day.response_curves import curves_of
 from fogsim.vision.day.row_bins import row_bins
 from fogsim.vision.day.row_data import read_rows
-from fogsim.vision.day.row_kernels import AIRLIGHT, RowData
+from fogsim.vision.day.row_kernels import AIRLIGHT, COLUMNS, RowData, contrast_across, fill_columns
 from fogsim.vision.lines.horizon import Horizon
 
 Floats = NDArray[np.float64]
@@ -80,6 +80,9 @@ class DayFit:
     contrast: float  # How much brighter the far road is than the near one, over the sky [-]
     response_deviation: float  # Standard deviation of ln k among responses [-]
     obstacle: float  # Depth at which something hides the road, if something does [m]
+    # How much contrast across the road speaks against the extinction that another method claims, in logarithms of
+    # chances [-]
+    doubt: float = 0.0
 
     def quantile(self, share: float) -> float:
         """Visibility below which the truth lies with a probability [m]."""
@@ -102,11 +105,12 @@ def fit_day(
     camera: Camera,
     horizon: Horizon,
     free: float = math.inf,
+    claimed: float = 0.0,
     earlier: DayFit | None = None,
 ) -> DayFit:
     """Weigh all hypotheses by their evidence, or those that an earlier image of the same drive has left.
 
-    Takes `image` (rows, cols), `free` [m].
+    Takes `image` (rows, cols), `free` [m], `claimed` [1/m].
     """
     pixels = image if image.ndim == 3 else image[:, :, None]
     bins = row_bins(camera, horizon.standard_deviation, round(horizon.row))
@@ -114,7 +118,8 @@ def fit_day(
         bins = _without_vehicle(bins, camera, horizon.row, free)
         if int((bins.first > horizon.row).sum()) < FEWEST_BINS:
             return _nothing_seen(camera)
-    fit = _weighed(read_rows(pixels, bins, camera, horizon.row), camera, horizon, earlier)
+    rows = read_rows(pixels, bins, camera, horizon.row)
+    fit = replace(_weighed(rows, camera, horizon, earlier), doubt=_contradiction(rows, camera, horizon, claimed))
     if earlier is None:
         return fit
     return replace(fit, responses=earlier.responses, response_deviation=earlier.response_deviation)
@@ -337,6 +342,16 @@ def _ended(rows: RowData, cut: int) -> RowData:
         cuts=np.array([rows.cuts[0], end]),
         free=np.array([rows.free[0] - rows.free[cut], 0.0]),
     )
+
+
+def _contradiction(rows: RowData, camera: Camera, horizon: Horizon, extinction: float) -> float:
+    """How much contrast across the road speaks against an extinction, at the horizon that suits it best."""
+    columns, place = np.empty((rows.first.size, COLUMNS + 1)), np.empty((rows.first.size, 5))
+    logs = []
+    for row in horizon.row + horizon.standard_deviation * np.array([-1.0, 0.0, 1.0]):
+        fill_columns(rows.first, rows.last, float(row), _lens_of(camera), extinction, math.inf, columns, place)
+        logs.append(contrast_across(rows.contrast, place, int((rows.last + 0.5 <= row).sum())))
+    return -max(logs)
 
 
 def _lens_of(camera: Camera) -> Floats:

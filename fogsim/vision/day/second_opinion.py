@@ -21,6 +21,9 @@ POSSIBLY, MOSTLY = 0.35, 0.6
 """Probabilities of a wet road, local tone mapping or a clipped sky from which on an estimate that knows none of them
 does not count against the day model's answer, and against its silence [-]."""
 
+MOST_DOUBT = 18.0
+"""Doubt by contrast across the road from which on an estimate is given up [-]."""
+
 PERIOD = 10.0
 """Time after which an estimate that has been agreed with is looked at again [s]."""
 
@@ -70,10 +73,10 @@ class SecondOpinion:
     ) -> Estimate:
         if not self._agreed < time < self._agreed + 2.0 * PERIOD:
             self._fit = None
-        fit = fit_day(np.ascontiguousarray(level), self._camera, horizon, free, self._fit)
+        fit = fit_day(np.ascontiguousarray(level), self._camera, horizon, free, max(_ends(own)[0], 0.0), self._fit)
         self._fit = self._fit or fit
         verdict = verdict_of(fit, self._scale)
-        if own.valid and math.isfinite(free):
+        if own.valid and math.isfinite(free) and verdict.doubt <= MOST_DOUBT:
             # Before what stands in the lane it sees less.
             return own
         shows_none = math.isinf(verdict.interval[1]) and agree(own.visibility_interval, verdict.interval)
@@ -88,6 +91,8 @@ class SecondOpinion:
 def _chosen(own: Estimate, verdict: DayVerdict) -> Estimate:
     if not own.valid:
         return _of_day(own, verdict)
+    if verdict.doubt > MOST_DOUBT:
+        return refused(own, "contrast survives where the fog that the road's brightness shows would leave none")
     if verdict.reason:
         return _of_day(own, verdict) if verdict.outside > MOSTLY else own
     return _weighed(own, verdict) if verdict.is_sure else own

@@ -63,7 +63,9 @@ class DayVerdict:
     # Probability that the image shows what the joint fit does not know, a wet road, local tone mapping or clipped
     # airlight that is not even; 0 where the road is not sure [-]
     outside: float
-    response_deviation: float  # See `DayFit` [-]
+    # doubt, response_deviation: see `DayFit`
+    doubt: float
+    response_deviation: float
     is_road: bool = True  # Whether a road is likelier than none
 
     @property
@@ -117,6 +119,7 @@ def verdict_of(fit: DayFit, scale_deviation: float) -> DayVerdict:
         is_sure=is_sure,
         is_even=is_even,
         outside=outside if is_sure and is_even else 0.0,
+        doubt=fit.doubt,
         response_deviation=fit.response_deviation if fit.below(FOG) > LEAST_FOG else 0.0,
         is_road=is_road,
     )

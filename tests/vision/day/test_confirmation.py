@@ -27,7 +27,7 @@ SCALE = 0.05
 IMAGE = np.zeros((48, 64), np.uint8)
 OWN = Estimate("zhu2015", 0.03, 0.0015, diagnostics={"frames": 1})
 NO_FOG = Estimate("zhu2015", 0.0, 1e-4)
-FOG = DayVerdict(0.031, 0.002, 0.031, (88.0, 108.0), "", True, True, True, 0.0, 0.0)
+FOG = DayVerdict(0.031, 0.002, 0.031, (88.0, 108.0), "", True, True, True, 0.0, 0.0, 0.0)
 CLEAR = replace(FOG, extinction=0.001, deviation=0.0006, median=0.0005, interval=(1500.0, math.inf), shows_fog=False)
 SILENT = replace(FOG, reason="the sky above the road is hidden", shows_fog=False)
 

@@ -8,14 +8,14 @@ import pytest
 
 from fogsim.values import Camera, Estimate
 from fogsim.vision.day import second_opinion
-from fogsim.vision.day.second_opinion import PERIOD, SecondOpinion
+from fogsim.vision.day.second_opinion import MOST_DOUBT, PERIOD, SecondOpinion
 from fogsim.vision.day.verdict import DayVerdict
 from fogsim.vision.lines.horizon import Horizon
 
 CAMERA = Camera(64, 48, 60.0, (31.5, 23.5), 1.3)
 SCALE = 0.05
 OWN = Estimate("joint_road", 0.03, 0.0015, diagnostics={"road": 50.0})
-AGREES = DayVerdict(0.031, 0.002, 0.031, (88.0, 108.0), "", True, True, True, 0.0, 0.0)
+AGREES = DayVerdict(0.031, 0.002, 0.031, (88.0, 108.0), "", True, True, True, 0.0, 0.0, 0.0)
 DENSER = replace(AGREES, extinction=0.06, deviation=0.003, interval=(46.0, 54.0))
 FAR = replace(AGREES, extinction=0.003, deviation=0.0002, interval=(900.0, 1100.0))
 SILENT = replace(AGREES, reason="dark")
@@ -75,6 +75,11 @@ def test_what_the_joint_fit_does_not_know_makes_the_day_model_decide(said):
     assert said(OWN, replace(FAR, outside=0.9))[0].visibility == pytest.approx(math.log(20) / 0.003)
     assert not said(OWN, replace(SILENT, outside=0.9))[0].valid
     assert said(OWN, replace(SILENT, outside=0.4))[0].valid
+
+
+def test_contrast_beyond_its_fog_ends_an_estimate(said):
+    assert said(OWN, replace(AGREES, doubt=MOST_DOUBT - 1.0))[0].valid
+    assert "contrast" in str(said(OWN, replace(AGREES, doubt=MOST_DOUBT + 1.0))[0].diagnostics["reason"])
 
 
 def test_a_bent_road_is_the_joint_fits(said):

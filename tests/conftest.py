@@ -11,8 +11,13 @@ from subprocess import CompletedProcess
 
 import pytest
 import sumo
+from hypothesis import HealthCheck, settings
 
 from fogsim.cli import app
+
+# How long an example takes says more about the machine than about what is tested.
+settings.register_profile("fogsim", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("fogsim")
 
 Command = Callable[..., "CompletedProcess[str]"]
 SumoProcess = Callable[..., contextlib.AbstractContextManager[tuple[int, "subprocess.Popen[bytes]"]]]

@@ -37,7 +37,10 @@ def run(*arguments: str, **environment: str) -> str:
 
 @pytest.mark.usefixtures("_opengl")
 # The other two, fork with cpu and spawn with opengl, draw below, where the parent drew first.
-@pytest.mark.parametrize(("method", "renderer"), [("fork", "opengl"), ("spawn", "cpu"), ("forkserver", "opengl")])
+@pytest.mark.parametrize(
+    ("method", "renderer"),
+    [("fork", "opengl"), ("spawn", "cpu"), pytest.param("forkserver", "opengl", marks=pytest.mark.nightly)],
+)
 def test_workers_of_vector_environments_draw(method: str, renderer: str) -> None:
     assert "frames 2 2 alike" in run(str(WORKERS), method, renderer)
 
@@ -87,6 +90,7 @@ def test_without_opengl_the_cpu_draws(missing: str) -> None:
     assert "one frame" in run("-c", code)
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("_opengl")
 @pytest.mark.parametrize("renderer", ["opengl", "cpu"])
 def test_renderers_made_and_closed_leave_no_memory_behind(renderer: str) -> None:

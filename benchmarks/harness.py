@@ -68,7 +68,8 @@ def publish(
     """Print records as JSON or as lines of a table, and with ``--docs`` write these, or others, into their page."""
     shown = columns(records) if lines is None else list(lines)
     if getattr(given, "docs", False):
-        write_table(*given.table, shown if docs is None else docs)
+        page, name = given.table
+        write_table(page, name, shown if docs is None else docs)
     print(json.dumps(records, indent=2) if given.json else "\n".join(shown))
 
 

@@ -210,7 +210,7 @@ def main() -> None:
         for name in FUSIONS:
             follow(name, seen, found.setdefault((drive.kind, name), Found()), drive.seed)
     rows = list(records(found, given.pool))
-    publish(given, rows, table(rows))
+    publish(given, rows, table)
 
 
 if __name__ == "__main__":

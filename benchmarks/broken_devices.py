@@ -287,7 +287,7 @@ def main() -> int:
     else:
         with multiprocessing.get_context("fork").Pool(given.j, maxtasksperchild=1) as pool:
             records = pool.map(work, given.devices, chunksize=1)
-    publish(given, records, table(records))
+    publish(given, records, table)
     wrong = [one["device"] for one in records if bool(one["failed"]) == (one["device"] == SOUND)]
     for name in wrong:
         print(f"not as it should be: {name}", file=sys.stderr)

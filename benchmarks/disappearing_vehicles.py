@@ -165,7 +165,7 @@ def main() -> None:
             follow(renderer, drive, found)
     rows = [record(f"{visibility:g}", one, given.pool) for visibility, one in found.items()]
     rows.append(record("all", together(found), given.pool))
-    publish(given, rows, lines_of(HEADS, map(cells, rows)))
+    publish(given, rows, lambda rows: lines_of(HEADS, map(cells, rows)))
 
 
 if __name__ == "__main__":

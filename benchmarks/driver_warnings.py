@@ -151,7 +151,7 @@ def main() -> None:
         keep=(Path, "file in which to keep what is measured, and from which to go on"),
     )
     found = list(records(rows(given)))
-    publish(given, found, table(found))
+    publish(given, found, table)
 
 
 if __name__ == "__main__":

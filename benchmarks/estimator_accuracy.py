@@ -146,7 +146,7 @@ def main() -> None:
         seed=(1, "of the drive"),
     )
     found = list(records(measure(given)))
-    publish(given, found, [tables(found)])
+    publish(given, found, lambda found: [tables(found)])
 
 
 if __name__ == "__main__":

@@ -47,7 +47,7 @@ def main() -> None:
         given.error(f"--images: at least 1 is needed, got {given.images}")
     rows = measure(given.images, given.seed, given.keep)
     found = list(records(rows, ["--images", str(given.images), "--seed", str(given.seed)]))
-    publish(given, found, table(found))
+    publish(given, found, table)
 
 
 if __name__ == "__main__":

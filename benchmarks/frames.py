@@ -183,7 +183,7 @@ def main() -> None:
     records = [one | shared for one in measure(cases, given.frames, given.repeat)]
     for one in cases.values():
         one.close()
-    publish(given, records, docs=table(records))
+    publish(given, records, docs=table)
 
 
 if __name__ == "__main__":

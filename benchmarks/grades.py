@@ -165,7 +165,7 @@ def main() -> None:
     ]
     bends = draw_bends(given.visibility, given.seed, given.drawings)
     records += [record(*key, found) for key, found in bends.items()]
-    publish(given, records, docs=table(records))
+    publish(given, records, docs=table)
 
 
 if __name__ == "__main__":

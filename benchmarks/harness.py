@@ -22,6 +22,7 @@ __all__ += ["publish", "quantile", "timed", "write_table"]
 
 Row = dict[str, Any]
 Option = tuple[Any, ...]
+Table = Callable[[Any], Iterable[str]]
 T = TypeVar("T")
 
 
@@ -60,16 +61,14 @@ def parse_options(
 
 
 def publish(
-    given: argparse.Namespace,
-    records: Sequence[Row],
-    lines: Iterable[str] | None = None,
-    docs: Iterable[str] | None = None,
+    given: argparse.Namespace, records: Sequence[Row], table: Table | None = None, docs: Table | None = None
 ) -> None:
-    """Print records as JSON or as lines of a table, and with ``--docs`` write these, or others, into their page."""
-    shown = columns(records) if lines is None else list(lines)
+    """Print records as JSON or as lines of a table, and with ``--docs`` write that table, or another, into its page."""
+    table = table or columns
     if getattr(given, "docs", False):
-        write_table(*given.table, shown if docs is None else docs)
-    print(json.dumps(records, indent=2) if given.json else "\n".join(shown))
+        page, name = given.table
+        write_table(page, name, (docs or table)(records))
+    print(json.dumps(records, indent=2) if given.json else "\n".join(table(records)))
 
 
 def columns(records: Sequence[Row]) -> list[str]:

@@ -216,7 +216,7 @@ def main() -> None:
         seed=(1, "of the sequences"),
     )
     records = measure(given)
-    publish(given, records, docs=tables(records))
+    publish(given, records, docs=tables)
 
 
 if __name__ == "__main__":

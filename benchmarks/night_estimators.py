@@ -197,7 +197,7 @@ def main() -> None:
     drawn = [] if given.part == "photons" else drawn_records(given.pool, given.images)
     photons = [] if given.part == "drawn" else photon_records(given.pool, round(0.4 * given.images))
     times = milliseconds()
-    publish(given, [*photons, *drawn, {"ms_640x480": times}], tables(photons, drawn, times))
+    publish(given, [*photons, *drawn, {"ms_640x480": times}], lambda _: tables(photons, drawn, times))
 
 
 def tables(photons: list[Row], drawn: list[Row], times: dict[str, float]) -> list[str]:

@@ -72,7 +72,7 @@ def main() -> None:
     docs = ("explanation/estimators.md", "paper methods")
     given = parse_options(__doc__, docs=docs, seeds=(3, "runs of each scenario"))
     found = [record for name in SCENARIOS for record in records(name, given.seeds)]
-    publish(given, found, docs_table(found))
+    publish(given, found, docs_table)
 
 
 if __name__ == "__main__":

@@ -112,7 +112,7 @@ def main() -> None:
         droplets=(list(KINDS), "which", [str(kind) for kind in Droplets]),
     )
     rows = records(measure(given.pool, given.drives, tuple(given.droplets)))
-    publish(given, rows, docs=docs_table(rows) if given.docs else None)
+    publish(given, rows, docs=docs_table)
 
 
 if __name__ == "__main__":

@@ -253,7 +253,7 @@ def main() -> None:
         draw(given.picture)
         return
     rows = measure(given)
-    publish(given, rows, table(rows))
+    publish(given, rows, table)
 
 
 if __name__ == "__main__":

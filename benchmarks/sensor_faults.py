@@ -153,7 +153,7 @@ def main() -> None:
         seconds=(5.0, "time without the fault, and time with it [s]"),
     )
     records = [one for name in progress(given.faults, "faults") for one in measure(name, given)]
-    publish(given, records, table(records))
+    publish(given, records, table)
 
 
 if __name__ == "__main__":

@@ -112,7 +112,7 @@ def main() -> None:
         for wrong in given.wrong
         for record in records(driven(given.pool, given.drives, wrong, given.visibilities), wrong)
     ]
-    publish(given, found, docs=docs_table(found))
+    publish(given, found, docs=docs_table)
 
 
 if __name__ == "__main__":

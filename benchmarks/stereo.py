@@ -139,7 +139,7 @@ def main() -> None:
         rows += [record(visibility, name, one, given.pool) for name, one in found.items()]
     cost = second_camera_ms(given.pool)
     rows = [row | {"ms_rig": cost} for row in rows]
-    publish(given, rows, table(rows))
+    publish(given, rows, table)
 
 
 if __name__ == "__main__":

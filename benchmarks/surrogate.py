@@ -223,7 +223,7 @@ def main() -> None:
     records = compare(runs, redrawn(runs, SurrogateTable.load()))
     ratio = "median k / true k: real / drawn"
     heads = ("light", "visibility ahead", "estimates", "valid: real / drawn", ratio, "KS distance")
-    publish(given, records, docs=lines_of(heads, map(shown, records)))
+    publish(given, records, docs=lambda records: lines_of(heads, map(shown, records)))
 
 
 if __name__ == "__main__":

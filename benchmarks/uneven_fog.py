@@ -226,7 +226,7 @@ def main() -> None:
     for drive in progress([one for one in plan if one.kind.startswith(given.only)], "drives"):
         run(drive, given.methods, found)
     rows = list(records(found, given.pool))
-    publish(given, rows, table(rows))
+    publish(given, rows, table)
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ def records(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
     """Run a benchmark in this process, for one of its own would spend its time on imports: gives what it prints."""
 
     def run(name: str, *arguments: str) -> list[dict[str, Any]]:
+        monkeypatch.syspath_prepend(FOLDER.parent / "docs")
         monkeypatch.syspath_prepend(FOLDER)
         monkeypatch.setattr(sys, "argv", [name, "--json", *arguments])
         capsys.readouterr()

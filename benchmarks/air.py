@@ -1,6 +1,6 @@
 """Time that the air takes: least and median milliseconds of one call of `Air.radiance` on a flat road.
 
-``fog`` is even fog of 100 m, a bank, or a bank of ground fog; ``lamps`` tells whether low beams are lit; ``changing``
+``fog`` is even fog of 100 m, a bank, or a bank of ground fog; ``lamps`` says whether low beams are lit; ``changing``
 whether the extinction is another one in every frame, so that whatever depends on it is set up again. The longest call
 (ms_max) shows hitches; the first call of each case, which compiles, is not counted.
 

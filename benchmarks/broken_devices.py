@@ -1,4 +1,4 @@
-"""Whether the scenarios' expectations bite: devices that are broken on purpose, each of which a scenario must catch.
+"""Whether the scenarios' expectations find faults: devices broken on purpose, which a scenario must each catch.
 
 Each broken device takes the place of the sound one in the shipped scenarios that expect something, the shortest first,
 until one fails. The sound device comes first, and must pass them all. The exit code is 1 if it does not, or if a broken
@@ -58,7 +58,7 @@ class Estimator:
 
 @dataclass
 class LastValue(Estimator):
-    """An estimator that repeats its last value where it cannot tell."""
+    """An estimator that repeats its last value instead of giving none."""
 
     told: Callable[[Estimate], Estimate] = lambda estimate: estimate
     last: Estimate | None = None
@@ -73,7 +73,7 @@ class LastValue(Estimator):
 
 @dataclass
 class WithoutSigns(Estimator):
-    """An estimator that is told of no sign."""
+    """An estimator that gets no signs."""
 
     told: Callable[[Estimate], Estimate] = lambda estimate: estimate
 
@@ -97,7 +97,7 @@ class TrustsTheMap(Estimator):
 
 @dataclass
 class NeverWidens:
-    """A fusion whose belief stays as it is where estimators cannot tell."""
+    """A fusion whose belief stays constant while estimates are invalid."""
 
     sound: Any
     last: Belief | None = None

@@ -70,7 +70,7 @@ def peak_mb() -> float:
 
 
 def run_fogsim(config: Path, seconds: float, size: str) -> dict[str, Any]:
-    """Start a run, go on for some time, and tell what it took."""
+    """Start a run, continue it for some time, and measure what it took."""
     from fogsim.loop import ClosedLoop  # noqa: PLC0415 - each process imports only what it measures
     from fogsim.scenario import scenario_from_config  # noqa: PLC0415
     from fogsim.values import Command  # noqa: PLC0415

@@ -121,7 +121,7 @@ def in_vector(name: str, settings: dict[str, Any], mode: str, **vector: Any) -> 
 
 
 def with_a_killed_worker(name: str, settings: dict[str, Any]) -> str:
-    """Our vector environment, a worker of which is killed."""
+    """Our vector environment, with one worker killed."""
     envs: Any = make_vector(name, 2, **settings)
     envs.reset(seed=1)
     workers = envs.processes

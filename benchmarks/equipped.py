@@ -1,7 +1,7 @@
 """What cameras in other vehicles cost: time of a step by how many look, and by processes that draw for them.
 
 The motorway's fog bank with pictures of 320×240; the same seed, so that all runs have the same traffic until advice to
-others tells. Time of a step over that with the ego's camera alone, fastest of several runs.
+others has an effect. Time of a step over that with the ego's camera alone, fastest of several runs.
 
     python benchmarks/equipped.py [--json] [--seconds 10] [--runs 3]
 """

@@ -96,7 +96,7 @@ def signs_beside(route: NDArray[np.float64]) -> SignMap:
 
 
 def traffic_at(route: NDArray[np.float64], travelled: float) -> TrafficState:
-    """The ego and the vehicles ahead of it, all of which have travelled as far."""
+    """The ego and the vehicles ahead of it; all have travelled as far."""
     kinds = ["car", *(KINDS[number % len(KINDS)] for number in range(VEHICLES))]
     stations = [0.0, *(12.0 + 8.0 * number + SIZES[kind][0] for number, kind in enumerate(kinds[1:]))]
     lanes = [0.0, *(LANES[number % 3] for number in range(VEHICLES))]

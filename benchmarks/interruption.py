@@ -1,7 +1,7 @@
 """Time from a signal to the end of ``fogsim run``: at moments drawn evenly from its start to well into its run.
 
 Each run of the motorway scenario (160×120, with table, video and report) is sent one of SIGINT, SIGTERM and SIGHUP and
-must end with that signal's exit code, as a shell sees it. `where` tells what it was doing by what is in its directory:
+must end with that signal's exit code, as a shell sees it. `where` is the state found in its directory:
 "before the run" (the program starts, or the traffic fills up) or "run". Kernels are compiled already.
 
     python benchmarks/interruption.py [--json] [--runs 12] [--latest 12] [--seed 1]

@@ -1,4 +1,4 @@
-"""Fog by the halos about lamps of others, told from clear nights.
+"""Fog by the halos about lamps of others, distinguished from clear nights.
 
 For docs/explanation/night.md:
 

@@ -1,6 +1,6 @@
 """What it costs that drivers do not see through what stands next to the road, with some hundred vehicles.
 
-A winding road of 4 km in air of 5 km, by day, without anything next to it and with walls (60 m each). Told are vehicles
+A winding road of 4 km in air of 5 km, by day, without anything next to it and with walls (60 m each). Rows: vehicles
 on the road, the drivers' perception and the whole step of 0.1 s (perception, SUMO, reading) [ms], and what walls add to
 perception, over the step without a camera and over one with a frame of 320 × 240 pixels each 0.1 s.
 
@@ -73,7 +73,7 @@ def measure(walls: int, flow: float, renderer: str, steps: int) -> tuple[list[fl
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Measure and tell."""
+    """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--walls", type=int, default=20)

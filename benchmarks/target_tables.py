@@ -10,7 +10,7 @@ import numpy as np
 Row = dict[str, Any]
 
 FEWEST = 3
-"""Fewest estimates of which a group is called the worst."""
+"""Fewest estimates that make a group eligible as the worst."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ The simulation is a .sumocfg with SUMO's own defaults, which FogSim's own scenar
     python benchmarks/traffic.py [--json] [--network town] [--vehicles 20 --vehicles 100 …] [--seconds 10] [--blind]
         [--visibility 100] [--profile]
 
-``--blind`` leaves perception and speed choice out; ``--profile`` tells where the time of the whole steps goes.
+``--blind`` leaves perception and speed choice out; ``--profile`` shows where the time of the whole steps goes.
 """
 
 import argparse

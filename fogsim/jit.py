@@ -54,7 +54,7 @@ _NEWS_PERIOD = 10.0
 
 
 class Announcement(event.Listener):  # type: ignore[misc] # numba is untyped
-    """Tells the user that the time goes into compiling, and that it will not the next time; then how far it has come.
+    """Explains to the user that the time goes into compiling, at the first run only; then shows the progress.
 
     Takes `clock` [s].
     """
@@ -79,7 +79,7 @@ class Announcement(event.Listener):  # type: ignore[misc] # numba is untyped
         self._depth += 1
 
     def on_end(self, compiling: Any) -> None:
-        """Count what was compiled, and tell now and then."""
+        """Count a compiled kernel, and report the count now and then."""
         self._depth -= 1
         if self._depth == 0 and compiling.data["dispatcher"].py_func.__module__.startswith(f"{__package__}."):
             now = self._clock()
@@ -93,7 +93,7 @@ class Announcement(event.Listener):  # type: ignore[misc] # numba is untyped
 class CompileSpeedup(event.Listener):  # type: ignore[misc] # numba is untyped
     """Leaves out what costs time while one of FogSim's kernels is compiled, with all that it calls.
 
-    That is the search for garbage, of which compiling makes little among millions of objects, and what numba is spared
+    It pauses garbage collection, which finds little among millions of objects, and skips what numba is spared
     by `fogsim.compiling`.
     """
 
@@ -302,7 +302,7 @@ class Bands:
 def processors() -> int:
     """Number of processors that this process may use: one where it is a worker, next to others that draw too.
 
-    Ray tells its workers by ``OMP_NUM_THREADS``, as does whoever else shares a machine out.
+    Ray sets ``OMP_NUM_THREADS`` for its workers, and so do others that share out a machine.
     """
     if multiprocessing.parent_process() is not None or os.environ.get("OMP_NUM_THREADS") == "1":
         return 1

@@ -18,9 +18,9 @@ class RoadAdvice:
     """What the sections of the ego's route are advised in one run; it remembers what each was advised last.
 
     Informed by the truth, each section goes by the visibility meter on it and the speed limit of its own road, and the
-    ego hears what others hear there. Informed by sensors, each goes by what the nearest one has reported last,
-    and one of which nothing is known has no advice. Informed by the ego's belief, the ego goes by its own advice, and
-    tells it to the section on which it is; a section that it has left keeps what it told last, and one that it has not
+    ego hears what others hear there. Informed by sensors, each goes by the latest report of the nearest one, and a
+    section without any report has no advice. Informed by the ego's belief, the ego goes by its own advice and
+    passes it to the section on which it is; a section that it has left keeps the last one, and one that it has not
     reached knows nothing.
     """
 

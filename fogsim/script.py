@@ -153,7 +153,7 @@ def write(
     Parameters
     ----------
     scenario, vary, verdict
-        As of `to_yaml`.
+        See `to_yaml`.
     path : Path
         The file; ``NAME.fog.yaml`` is found by ``fogsim test`` and pytest.
     overwrite : bool

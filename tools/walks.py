@@ -6,7 +6,7 @@
 - ``fog``: a fog's visibility, from a scenario file to the pixels of a frame (drawing what stands in it left out);
 - ``estimate``: a frame, from an estimator's `update` to its estimate: all methods of the day but those that need a
   vehicle ahead;
-- ``advice``: a belief, from the advice to what SUMO is told.
+- ``advice``: a belief, from the advice to what SUMO is set to.
 
 Kernels do not show as they run: those that a function names count as run by it.
 """
@@ -43,7 +43,7 @@ def entered(work: Callable[[], Any], rooms: tuple[str, ...], begin: str = "", en
     rooms : tuple of str
         Rooms whose files count.
     begin, end : str
-        Functions between the first calls of which files are counted; all if they are empty.
+        Functions between whose first calls files are counted; all if they are empty.
     """
     found: dict[str, None] = {}
     counting = not begin

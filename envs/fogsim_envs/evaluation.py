@@ -82,7 +82,7 @@ class Evaluation:
     def minus(self, other: "Evaluation") -> tuple[float, float, float]:
         """Mean of what was gained over another policy on the same seeds, and its 95 % interval [points].
 
-        Episodes differ more from one another than policies do, so this tells policies apart where the intervals of
+        Episodes differ more from one another than policies do, so this separates policies even where the intervals of
         their means overlap.
 
         Parameters
@@ -124,7 +124,7 @@ def evaluate(
         Stable-Baselines3; or the name of one of `fogsim_envs.baselines.BASELINES` (of FogCorridor:
         `fogsim_envs.corridor.baselines.SIGN_BASELINES`).
     env_id : str, gymnasium.Env or pettingzoo.ParallelEnv
-        The environment; one that is made here has ``split="test"`` unless told otherwise. Of several agents
+        The environment; one that is made here has ``split="test"`` by default. Of several agents
         (``fogsim/FogCorridor-v1``) each asks the policy by itself, and all are paid the same.
     seeds : iterable of int
         Seeds of the episodes.

@@ -16,7 +16,7 @@ from fogsim.estimators.signs.watch import SignWatch
 from fogsim.values import Camera, Observation
 
 VISIBILITIES = (50.0, 75.0, 100.0, 130.0, 170.0, 220.0, 280.0, 350.0, 430.0, 550.0, 800.0)
-"""Visibilities at which the range is measured, unless told otherwise [m]."""
+"""Visibilities at which the range is measured by default [m]."""
 
 KINDS = ("speed_limit", "stop", "pedestrian_crossing", "no_overtaking", "no_entry", "priority_road")
 """Kinds of the signs, one after the other; none is a triangle, which the detector's authors exclude."""

@@ -1,4 +1,4 @@
-"""``fogsim calibrate …``: what methods must know of a camera before they can tell anything."""
+"""``fogsim calibrate …``: measure what methods need to know about a camera."""
 
 import json
 from pathlib import Path

@@ -49,7 +49,7 @@ DEEPEST = 20
 def parse_condition(written: object) -> Condition:
     """Parse a condition; ValueError with what is allowed or nearest if it is malformed.
 
-    Text; or a mapping from signals to the rest (``{"ego.speed": "> 90 km/h"}``), all of which must hold; or ``all:``,
+    Text; or a mapping from signals to the rest (``{"ego.speed": "> 90 km/h"}``), which must all hold; or ``all:``,
     ``any:`` with a list of conditions, ``not:`` with one. A list stands for all of its conditions.
     """
     return _read(written, 0)

@@ -1,4 +1,4 @@
-"""What others tell the ego of the fog where they are: sensors next to its route, and vehicles on it."""
+"""Fog reports to the ego from sensors next to its route and from vehicles on it."""
 
 import math
 import zlib
@@ -49,7 +49,7 @@ def sensor_places(sensors: RoadsideReports, length: float) -> Floats:
 
 
 def place_seen(place: float, estimate: Estimate) -> float:
-    """Middle of the road of which the estimate of a camera at a place along a route is the mean [m]."""
+    """Stretch of road over which a camera's estimate is the mean, given by its middle [m]."""
     return place + 0.5 * min(estimate.reach, estimate.visibility, REACH)
 
 
@@ -95,7 +95,7 @@ class FogReports:
     def heard(
         self, time: float, state: TrafficState, ego: int, fog: FogField, sent: Iterable[tuple[str, FogReport]] = ()
     ) -> tuple[FogReport, ...]:
-        """Let all measure that are to, and tell what has come in by now (`time` [s])."""
+        """Take the measurements that are due; return the reports that have arrived by now (`time` [s])."""
         sent = tuple(sent)
         if self._cameras is not None:
             self._take_from_cameras(self._cameras, sent, state, ego)
@@ -106,7 +106,7 @@ class FogReports:
         return self.heard_from_roadside(time, fog)
 
     def heard_from_roadside(self, time: float, fog: FogField) -> tuple[FogReport, ...]:
-        """Let sensors next to the road measure, and tell what has come in by now from anybody."""
+        """Let sensors next to the road measure; return all reports that have arrived by now."""
         if self._roadside is not None and self._roadside.camera is None:
             self._measure_roadside(self._roadside, time, fog)
         arrived = tuple(report for due, report in self._under_way if due <= time + 1e-9)

@@ -1,4 +1,4 @@
-"""Denser fog ahead: told by one picture, believed after several."""
+"""Denser fog ahead: seen in one image, believed after several."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -6,17 +6,17 @@ from collections.abc import Sequence
 from fogsim.values.estimate import DenserFog, Estimate
 
 FEWEST = 2
-"""Fewest pictures that must tell of denser fog."""
+"""Fewest images that must report denser fog."""
 
 MOST, LEAST = 0.7, 0.3
-"""Shares of the last pictures that must tell of denser fog for it to be announced, and to stay so [-]."""
+"""Shares of the last images that must report denser fog for it to be announced, and to stay so [-]."""
 
 FASTEST = 70.0
 """Speed beyond which nothing ahead comes nearer [m/s]."""
 
 NEARER, FARTHER = 0.35, 0.2
-"""How much nearer than it can have come, and how much farther than before, a later picture may tell the same fog, in
-shares of its distance [-]. What seems to be fog beyond a crest recedes."""
+"""How much nearer than expected, and how much farther than before, a later image may report the same fog, in shares
+of its distance [-]. What seems to be fog beyond a crest recedes."""
 
 
 class Announcements:
@@ -28,7 +28,7 @@ class Announcements:
     Parameters
     ----------
     time : float
-        Over which estimates must tell of it [s].
+        Window in which estimates must report it [s].
 
     Attributes
     ----------
@@ -42,14 +42,14 @@ class Announcements:
         self.announced = False
 
     def reset(self) -> None:
-        """Forget what was told."""
+        """Forget all reports."""
         self._told.clear()
         self.announced = False
 
     def update(self, estimates: Sequence[Estimate], time: float) -> DenserFog | None:
         """Take in the estimates of one instant.
 
-        Returns what most pictures, and of those the last, tell, if it is to be announced. Takes `time` [s].
+        Returns what most images, including most of the last ones, report, if it is to be announced. Takes `time` [s].
         """
         telling = [one for one in estimates if one.valid and one.optical_depths is not None]
         if telling:
@@ -70,7 +70,7 @@ class Announcements:
 
 
 def _is_same(earlier: tuple[float, DenserFog], later: tuple[float, DenserFog]) -> bool:
-    """Whether the later tells of the same fog, which one may have come nearer to meanwhile."""
+    """Whether the later one reports the same fog; the vehicle may have come nearer meanwhile."""
     way = later[0] - earlier[0]
     nearest = earlier[1].distance - FASTEST * way
     return way >= 0.0 and (1.0 - NEARER) * nearest <= later[1].distance <= (1.0 + FARTHER) * earlier[1].distance

@@ -52,7 +52,7 @@ class GridFilter:
 
     An estimate speaks of the fog up to its `reach`. Where that is nearer than the visibility that it gives, the fog
     beyond may be another, and it counts for less the less of the way it has seen. Denser fog ahead is believed once
-    most estimates of the last `announcement_time` tell of it; estimates that do not reach as far then say nothing.
+    most estimates of the last `announcement_time` report it; estimates that do not reach as far then say nothing.
 
     Parameters
     ----------
@@ -69,9 +69,9 @@ class GridFilter:
     correlation_time : float
         Time after which the errors of an estimator are new ones [s].
     unseen_deviation : float
-        Standard deviation of ln k over the way to the visibility of which an estimate has seen nothing [-].
+        Standard deviation of ln k over the way to the visibility if an estimate has seen none of that way [-].
     announcement_time : float
-        Time over which estimates must tell of denser fog ahead [s].
+        Time over which estimates must report denser fog ahead [s].
     announced_leap_rate : float
         Expected leaps a second while denser fog is announced, in place of `leap_rate` where that is less [1/s].
 

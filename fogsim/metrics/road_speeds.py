@@ -42,7 +42,7 @@ class _Squares(NamedTuple):
 
 
 class RoadSpeeds:
-    """Speeds along a road: the way of an ego, of which `update` is told, or else the route that spans name.
+    """Speeds along a road: the ego's way, passed to `update`, or else the route that spans name.
 
     What is on an ego's way is known only when it has driven it: until then others' speeds wait in small squares.
     """

@@ -123,7 +123,7 @@ class Overlay:
 def _draw_estimate(draw: ImageDraw.ImageDraw, y: int, estimate: Estimate, colour: Colour) -> None:
     draw.text((12, y), estimate.method, fill=colour, font=font(15, bold=True), anchor="lm")
     if not estimate.valid:
-        reason = f"cannot tell: {estimate.diagnostics.get('reason', 'no reason given')}"
+        reason = f"no estimate: {estimate.diagnostics.get('reason', 'no reason given')}"
         draw.text((190, y), reason, fill=MUTED, font=font(13), anchor="lm")
         return
     draw.text((270, y), metres(estimate.visibility), fill=TEXT, font=font(17, bold=True), anchor="rm")

@@ -30,7 +30,7 @@ _UNITS: Mapping[str, str] = {
 """Unit by the end of a key."""
 
 MOST_SIGNS = 60
-"""Signs of which the report tells."""
+"""Signs listed in the report."""
 
 PAGE_STYLE = """
 :root { color-scheme: light; }

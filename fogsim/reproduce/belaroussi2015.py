@@ -26,7 +26,7 @@ STEP, IMAGES = 5.0, 504
 """Way between two images [m], and how many there are in each fog."""
 
 APART, FIRST = 100.0, 600.0
-"""Way between two signs, and to the first of them [m]; the paper tells neither."""
+"""Way between two signs, and to the first of them [m]; not given in the paper."""
 
 REACH = 560.0
 """How far ahead the map is read [m]."""

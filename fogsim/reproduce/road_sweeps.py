@@ -21,7 +21,7 @@ VISIBILITIES = (50.0, 100.0, 200.0, 400.0)
 """Of every drive [m]."""
 
 DRIVES, FRAMES = 6, 3
-"""Drives of each setting, and their frames, of which the last one's estimate counts."""
+"""Drives of each setting, and their frames; the last one's estimate counts."""
 
 GROWTHS = (0.5, 1.0, 2.0, 4.0, 6.0, 8.0, 12.0, 20.0, 40.0)
 """G_max of region growing as published [grey levels]."""

@@ -111,8 +111,8 @@ def _place(block: object, key: str, path: tuple[str, ...], text: str) -> int:
 class Document:
     """Plain data from a file; `origins` has each key's ``file:line``, or the override that set it.
 
-    An OpenSCENARIO file that varies another one's parameters has `cases`, values of all of them, of which the first is
-    in `data`, and `of_case` reads another. `are_runs` if they are random test runs.
+    An OpenSCENARIO file that varies another one's parameters has `cases`, values of all of them. `data` is the first
+    case, and `of_case` reads another. `are_runs` if they are random test runs.
     """
 
     path: Path

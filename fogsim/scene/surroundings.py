@@ -112,7 +112,7 @@ Nearness = Corridor
 
 
 def _dense_lines(lines: Sequence[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
-    """Lines as of `_dense`: few are so long that they need it."""
+    """Lines as from `_dense`: few are so long that they need it."""
     places = np.concatenate([line[:, :2] for line in lines])
     owner = np.repeat(np.arange(len(lines)), [len(line) for line in lines])
     far = (np.abs(np.diff(places, axis=0)) > _SQUARE).any(axis=1) & (owner[1:] == owner[:-1])

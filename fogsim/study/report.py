@@ -189,7 +189,7 @@ def _details(study: Study, rows: Sequence[Row], found: _Findings) -> Iterator[st
     absent = [name for name in study.metrics if name not in found.main]
     told = {**dict.fromkeys(absent, "no run has a value"), **found.remarks}
     if told:
-        yield "<details><summary>Metrics that cannot tell the policies apart</summary>"
+        yield "<details><summary>Metrics that do not separate the policies</summary>"
         yield plain_table(["metric", "why"], told.items()) + "</details>"
 
 

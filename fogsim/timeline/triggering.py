@@ -122,7 +122,7 @@ class _Entry:
             self._waiting.append((moment.step.time + self.written.delay_s, self._watch.told()))
 
     def is_due(self, time: float) -> bool:
-        """Tell whether it is time to begin."""
+        """Whether it is time to begin."""
         return bool(self._waiting) and self._waiting[0][0] <= time + _TICK
 
     def begin(self, time: float, moment: Moment) -> Begun:
@@ -201,7 +201,7 @@ def _end(begun: Begun, actions: Actions) -> Begun | None:
 
 
 def _duration(action: TrafficAction | ChangeFog | ChangeLight) -> float:
-    """How long an action lasts [s]; 0 for what is done at once, or over when no one can tell beforehand."""
+    """How long an action lasts [s]; 0 for what is done at once, or whose end is unknown beforehand."""
     match action:
         case ChangeSpeed() | Follow() | SetSignal():
             return action.hold

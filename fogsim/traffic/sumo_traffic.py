@@ -383,7 +383,7 @@ class SumoTraffic:
 
     @_translates_errors
     def observe(self) -> TrafficSnapshot | None:
-        """Tell where everyone near the ego is; see `Traffic.observe`."""
+        """Report where everyone near the ego is; see `Traffic.observe`."""
         run, ego = self._running, self._setup.ego
         teleported, self._teleported = self._teleported, False
         run.roster.update()
@@ -413,7 +413,7 @@ class SumoTraffic:
 
     @_translates_errors
     def observe_network(self) -> NetworkSnapshot:
-        """Tell where everyone is; see `NetworkTraffic.observe_network`."""
+        """Report where everyone is; see `NetworkTraffic.observe_network`."""
         run = self._running
         run.roster.update()
         state = run.reader.state(self._command.lamps, self._heard(run))

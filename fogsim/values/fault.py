@@ -54,7 +54,7 @@ class Latency:
 
 @dataclass(frozen=True, slots=True)
 class Miscalibration:
-    """A camera that is knocked out of place, or whose lens slips, of which the estimators are told nothing."""
+    """A camera that is knocked out of place, or whose lens slips, unknown to the estimators."""
 
     sensor: ClassVar[str] = "camera"
     name: ClassVar[str] = "calibration"
@@ -209,7 +209,7 @@ class Fouled:
 
 @dataclass(frozen=True, slots=True)
 class NoSignal:
-    """A scatterometer that tells nothing."""
+    """A scatterometer that reports nothing."""
 
     sensor: ClassVar[str] = "scatterometer"
     name: ClassVar[str] = "no_signal"

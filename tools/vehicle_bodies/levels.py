@@ -41,7 +41,7 @@ class Detail:
     zones : mapping from str to int
         Number of zones of height from the "rear", the "front" and the "left".
     little : float
-        Share of a zone below which a material is left out there (of which there is more elsewhere, then).
+        Share of a zone below which a material is left out there (it is then more frequent elsewhere).
     """
 
     zones: Mapping[str, int]

@@ -46,7 +46,7 @@ class FogAdvisoryFastEnv(FogAdvisoryV1Env):
 
     ### Arguments
     scenario, scenario_distribution, fog_distribution, split, overrides, continuous, reward_weights, flat_info,
-    timeout : as of `FogAdvisoryV1Env`
+    timeout : see `FogAdvisoryV1Env`
     render_mode : None, "rgb_array" (road, traffic and fog from above next to a panel with belief, truth, advice, speed
     and lamps), or "human", which shows it in a window
     surrogate : file with a table of your own, made by ``benchmarks/surrogate.py --fit``; None for the one that was

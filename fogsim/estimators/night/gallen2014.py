@@ -48,8 +48,8 @@ def fog_class(visibility: float) -> int:
 class Gallen2014:
     """Halos about lamps first, the own head lamps' veil without lamps (figure 9).
 
-    Where lamps are seen, their halos tell whether there is fog, but not how much: estimates are then not valid and have
-    bounds. Where none is, the veil is compared with references, which tells how much.
+    Where lamps are seen, their halos show whether there is fog, but not how much: estimates are then not valid and have
+    bounds. Where none are, the veil is compared with references, which gives the density.
 
     Gallen, Cord, Hautière, Dumont & Aubert, "Nighttime Visibility Analysis and Estimation Method in the Presence of
     Dense Fog", IEEE Transactions on Intelligent Transportation Systems, 2014.
@@ -140,7 +140,7 @@ class Gallen2014:
         Estimate
             Diagnostics: ``by``, "halos" or "veil"; ``detected``, whether there is fog; by halos ``value`` of this
             picture, ``smoothed`` over pictures [levels a pixel], and ``lamps``, how many; by the veil what
-            `Gallen2014Veil` tells, and ``fog_class`` 1 … 3; or ``reason``.
+            `Gallen2014Veil` reports, and ``fog_class`` 1 … 3; or ``reason``.
 
         Raises
         ------

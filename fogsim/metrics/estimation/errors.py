@@ -27,7 +27,7 @@ _MOST_WAITING = 64
 """Beliefs that are gathered before they are judged: one after another they cost half of one in each step."""
 
 LEAST_CHANGE = 0.1
-"""Standard deviation of ln V over a run from which a latency can be told; a tenth is a change of 10 %."""
+"""Standard deviation of ln V over a run above which a latency can be measured; a tenth is a change of 10 %."""
 
 
 @dataclass(slots=True)

@@ -30,7 +30,7 @@ ROAD_METHODS = (*PUBLISHED, EVEN_AIRLIGHT, "joint_road")
 CHASE_METHODS = ("lead_contrast",)
 
 FRAMES, PERIOD = 10, 1.0
-"""Frames of a drive alone, of which the last one's estimate counts, and the time between [s]."""
+"""Frames of a drive alone, whose last estimate counts, and the time between [s]."""
 
 EXPOSED, BRIGHTEST = 0.65, 95.0
 """Share of saturation at which the camera holds a percentile of the picture's luminance, as FogSim's does."""

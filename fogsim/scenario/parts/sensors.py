@@ -1,4 +1,4 @@
-"""From a scenario to the ego's sensors, and what they are told of themselves."""
+"""From a scenario to the ego's sensors, and what these know of themselves."""
 
 import dataclasses
 import math
@@ -15,7 +15,7 @@ AIRLIGHT_EXPOSURE = 0.6
 """Share of saturation at which the fixed exposure puts the airlight: bright fog, yet room for lamps above it."""
 
 CAR = "car"
-"""Body kind of an ego of which no more is known."""
+"""Body kind of an ego by default."""
 
 METERED_PERCENT = {Metering.HIGHLIGHTS: 65.0, Metering.LOG_AVERAGE: 18.0}
 """Share of saturation at which automatic exposure holds what it meters, where a scenario does not say [%]."""

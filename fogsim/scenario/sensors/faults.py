@@ -383,7 +383,7 @@ class ScatterometerFouled(ScatterometerFaultSection):
     """`fouled`: its values are wrong by a factor, by dirt or water on its windows, or what else scatters its light."""
 
     factor: Annotated[Number, Field(ge=0, le=1000)] = 0.5
-    """What it tells over what it should; below 1 it tells of thinner fog."""
+    """Reported over correct value; below 1 it reports thinner fog."""
 
     def in_si(self) -> FaultKind:
         """What is wrong, in SI units."""
@@ -391,10 +391,10 @@ class ScatterometerFouled(ScatterometerFaultSection):
 
 
 class ScatterometerNoSignal(ScatterometerFaultSection):
-    """A scatterometer that tells nothing."""
+    """A scatterometer that reports nothing."""
 
     fault: Literal["no_signal"]
-    """`no_signal`: it tells nothing."""
+    """`no_signal`: it reports nothing."""
 
     def in_si(self) -> FaultKind:
         """What is wrong, in SI units."""

@@ -39,14 +39,14 @@ class LampSides(Section):
 
 
 class StopLampSides(LampSides):
-    """Stop lamps, of which cars, vans and buses have a third one."""
+    """Stop lamps; cars, vans and buses have a third one."""
 
     middle: Lit = None
     """The third one, in the middle."""
 
 
 def _word_or_sides(sides: type[LampSides]) -> WrapValidator:
-    """Tell a word from a block of sides, so that a mistake in one is not told of the other as well."""
+    """Distinguish a word from a block of sides, so that an error in one is not reported for the other as well."""
 
     def check(value: object, _: object) -> Switch | LampSides:
         if isinstance(value, dict | LampSides):
@@ -100,10 +100,10 @@ class LampActions(Section):
     """Daytime running lamps."""
 
     all: Lit = None
-    """Every lamp but those of which something else is said."""
+    """Every lamp that has no key of its own here."""
 
     def kinds_by_side(self) -> tuple[str, ...]:
-        """Kinds of which the sides are distinguished."""
+        """Kinds whose sides are distinguished."""
         return tuple(key for key in type(self).model_fields if isinstance(getattr(self, key), LampSides))
 
 

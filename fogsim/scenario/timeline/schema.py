@@ -230,7 +230,7 @@ class DepartAction(Section):
     """Gap to it along the road, bumper to bumper: positive ahead, negative behind."""
 
     type: str | None = None
-    """Its type, as of actors; by default that of the other one, or a car."""
+    """Its type, as for actors; by default that of the other one, or a car."""
 
     on: Id | None = None
     """Without another one, its way on a road by template; by default `same_way`."""

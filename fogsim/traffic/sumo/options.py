@@ -67,8 +67,8 @@ class KnownOption:
 def option_mistakes(options: Mapping[str, OptionValue]) -> dict[str, str]:
     """Say why options cannot be handed to SUMO, by their names; nothing of those that can.
 
-    Where SUMO is not installed, or runs in this process, so that it cannot be asked what it knows, only options of
-    FogSim's own are told; SUMO itself refuses what it does not know when it starts.
+    Where SUMO is not installed, or runs in this process and so cannot be asked for its options, only FogSim's own are
+    checked; SUMO itself refuses what it does not know when it starts.
     """
     known = known_options() if options else {}
     told = {name: _mistake(name, value, known) for name, value in options.items()}

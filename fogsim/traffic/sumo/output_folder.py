@@ -93,7 +93,7 @@ class OutputFolder:
     def twice(self) -> list[str]:
         """Names of files that SUMO has open more than once, for outputs of one name in different folders.
 
-        Where the system does not tell what is open, and where nothing is kept, none.
+        Returns none where the system does not report open files, and where nothing is kept.
         """
         if self._folder is None or not _OPEN_FILES.is_dir():
             return []

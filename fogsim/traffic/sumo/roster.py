@@ -85,7 +85,7 @@ class Roster:
             self.check_count()
 
     def check_count(self) -> None:
-        """Notice vehicles removed by hand, of which SUMO says nothing; asks for all ids if there are any."""
+        """Notice vehicles removed by hand, which SUMO does not report; asks for all ids if there are any."""
         self._check_mark(often=True)
         if self._count() != len(self.present):
             self.reload()

@@ -129,7 +129,7 @@ class TraciLink:
 
 
 class _LimitedSocket:
-    """A socket of traci's that tells a silent SUMO by an error of ours; traci takes silence for a closed connection.
+    """A traci socket that raises our error if SUMO is silent; traci takes silence for a closed connection.
 
     Takes `timeout` [s].
     """

@@ -235,7 +235,7 @@ class VehicleReader:
         return np.asarray(np.hypot(offset[:, 0], offset[:, 1]) <= self._radius)
 
     def collisions(self) -> list[Collision]:
-        """Collisions of the last step; SUMO tells one in every step while the vehicles overlap."""
+        """Collisions of the last step; SUMO reports one in every step while the vehicles overlap."""
         hits, time = self._hits(), self._api.simulation.getTime
         return [Collision(time(), c.collider, c.victim, self._impact_speed(c)) for c in hits]
 

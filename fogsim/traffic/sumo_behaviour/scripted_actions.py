@@ -169,7 +169,7 @@ class ScriptedActions:
 
 
 def has_lane(api: Api, vehicle: str, lanes: int) -> bool:
-    """Tell whether a vehicle could go so many lanes to the left, negative to the right, where it is."""
+    """Whether a vehicle could go so many lanes to the left, negative to the right, where it is."""
     if is_off_lanes(api, vehicle):
         return False
     edge, lane = str(api.vehicle.getRoadID(vehicle)), int(api.vehicle.getLaneIndex(vehicle)) + lanes

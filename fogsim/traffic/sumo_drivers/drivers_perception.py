@@ -25,7 +25,7 @@ class PerceivedPart(Protocol):
     """What drivers perceive of one kind of thing; it does nothing where everything is certainly seen."""
 
     def update(self, own_lamps: OwnLamps) -> None:
-        """Tell SUMO's drivers, before a step, what they do not see."""
+        """Pass to SUMO's drivers, before a step, what they do not see."""
 
     def release(self) -> None:
         """Let everyone on the road see everything again, as SUMO's own drivers do."""
@@ -38,7 +38,7 @@ class DriversPerception:
         self._parts = tuple(parts)
 
     def update(self, told: Mapping[str, Lamp], lamps: Lamps) -> None:
-        """Tell SUMO's drivers, before a step, what they do not see."""
+        """Pass to SUMO's drivers, before a step, what they do not see."""
         own_lamps: OwnLamps = {vehicle: int(lit) for vehicle, lit in told.items()}
         own_lamps.update((v, lamps.switched(v, own_lamps.get(v, int(OTHERS_LAMPS)))) for v in lamps.vehicles)
         for part in self._parts:

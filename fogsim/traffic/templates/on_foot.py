@@ -14,7 +14,7 @@ WALKING_SPEED = 5.0 / 3.6
 """How fast persons walk where nothing else is said [m/s]."""
 
 WAITING_SPEED = 1e-3
-"""Of a person who waits to be told to walk [m/s]: SUMO's persons do not stand still on a footway."""
+"""Speed of a person who waits for an order to walk [m/s]: SUMO's persons do not stand still on a footway."""
 
 _BESIDE = 15.0  # from a crossing to where those who cross come from, and go to [m]
 _NEAR = 15.0  # as far as this from a crossing's middle a place means that crossing [m]

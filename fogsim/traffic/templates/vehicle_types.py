@@ -1,4 +1,4 @@
-"""Types of vehicles on roads by template: sizes and drivers as of the scenarios that come with FogSim."""
+"""Types of vehicles on roads by template, with the sizes and drivers of FogSim's own scenarios."""
 
 from dataclasses import dataclass
 

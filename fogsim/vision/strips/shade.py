@@ -2,7 +2,7 @@
 
 A shadow multiplies the road's luminance by some factor. Where its edge crosses the strips their bins mix both, which
 looks like fog, like uneven fog or like an obstacle. Each row has the same fog before both, so that a road which has
-two luminances without fog tells its extinction by either, and by how the contrast between both is lost.
+two luminances without fog gives its extinction by either, and by how the contrast between both is lost.
 """
 
 import math
@@ -115,7 +115,7 @@ def shade_levels(
 
 
 def _seen_or_stated(prior: JointPrior, told: Horizon, camera: Camera) -> tuple[JointPrior, JointPrior]:
-    """Prior with the seen horizon, and that with the told one."""
+    """Prior with the seen horizon, and prior with the stated one."""
     seen = prior._replace(cost=-2.0 * math.log((1.0 - MISLED) / prior.shift_deviation))
     shift, deviation = told.row - camera.horizon_row, told.standard_deviation
     return seen, prior._replace(

@@ -169,7 +169,7 @@ def main() -> None:
     parser.add_argument("--json", action="store_true", help="print a list of flat records")
     parser.add_argument("--docs", action="store_true", help="write the tables of docs/benchmarks/estimators.md")
     parser.add_argument("--methods", nargs="+", default=list(METHODS), help="estimators of single frames")
-    parser.add_argument("--pitch-deviation", type=float, default=0.1, help="deviation of the told pitch [deg]")
+    parser.add_argument("--pitch-deviation", type=float, default=0.1, help="deviation of the stated pitch [deg]")
     parser.add_argument("--cameras", type=int, default=len(CAMERAS), help="how many of the cameras")
     parser.add_argument("--scenes", type=int, default=12, help="instants of the drive")
     parser.add_argument("--draws", type=int, default=4, help="visibilities by bin, instant and camera, on average")

@@ -219,10 +219,13 @@ def main() -> None:
     parser.add_argument("--vehicles", type=int, default=len(VEHICLES), help="how many of the vehicles")
     parser.add_argument("--others", action="store_true", help="four other vehicles, an estate among them")
     parser.add_argument("--step", type=float, default=2.5, help="change of range between frames [m]")
-    parser.add_argument("--range-noise", type=float, default=0.25, help="deviation of the told range [m]")
+    parser.add_argument("--range-noise", type=float, default=0.25, help="deviation of the measured range [m]")
     parser.add_argument("--sway", type=float, default=0.07, help="deviation of the own vehicle's pitch [deg]")
     parser.add_argument(
-        "--pitch-deviation", type=float, default=0.1, help="deviation of the told pitch, constant over a sequence [deg]"
+        "--pitch-deviation",
+        type=float,
+        default=0.1,
+        help="deviation of the stated pitch, constant over a sequence [deg]",
     )
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()

@@ -126,7 +126,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=200.0, help="simulated time of each run")
     parser.add_argument("--block", type=int, default=BLOCK, help="steps in a block")
     parser.add_argument("--profiles", action="store_true", help="with the profiles that a study keeps")
-    parser.add_argument("--profile", action="store_true", help="tell the cost of each metric alone")
+    parser.add_argument("--profile", action="store_true", help="print the cost of each metric alone")
     arguments = parser.parse_args()
     counts = arguments.vehicles or [100]
     if arguments.profile:

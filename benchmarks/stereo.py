@@ -130,8 +130,8 @@ def record(visibility: float, name: str, one: Found, pool: int) -> Row:
 def cell(row: Row) -> str:
     """What a method makes of one visibility, in a cell of the table."""
     if "median_pct" not in row:
-        return "says nothing"
-    silent = f", tells {row['valid']:.2f}" if row["valid"] < 1.0 else ""
+        return "no estimate"
+    silent = f", valid {row['valid']:.2f}" if row["valid"] < 1.0 else ""
     return f"{row['median_pct']:.0f} / {row['p95_pct']:.0f} ({row['coverage']:.2f}){silent}"
 
 

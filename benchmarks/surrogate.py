@@ -196,7 +196,7 @@ def main() -> None:
     parser.add_argument("--json", action="store_true", help="print records as JSON")
     parser.add_argument("--episodes", type=int, default=60)
     parser.add_argument("--split", default="test", choices=("train", "test"))
-    parser.add_argument("--fit", action="store_true", help="write the table anew, by the split train")
+    parser.add_argument("--fit", action="store_true", help="rewrite the table, from the split train")
     asked = parser.parse_args()
     runs = list(episodes(asked.episodes, "train" if asked.fit else asked.split))
     if asked.fit:

@@ -202,7 +202,7 @@ def main() -> None:
     parser.add_argument("--vehicles", action="append", type=int, help="vehicles (default 20, 100, 500 and 2000)")
     parser.add_argument("--network", action="append", choices=[*CONFIGURATIONS], help="which (default both)")
     parser.add_argument("--visibility", type=float, default=100.0, help="V_met [m]")
-    parser.add_argument("--profile", action="store_true", help="tell where the time goes, and no ratio to be trusted")
+    parser.add_argument("--profile", action="store_true", help="show where the time goes; ratios are then not reliable")
     parser.add_argument("--seconds", type=float, default=10.0, help="time to measure for each number")
     parser.add_argument("--blind", action="store_true", help="leave perception and speed choice out")
     arguments = parser.parse_args()

@@ -205,7 +205,7 @@ class AttachedSession:
         began, last = (now, now) if self._times is None else self._times
         if now < last:
             raise SimulationError(
-                f"the simulation's time went back from {last:g} s to {now:g} s: attach again after loading it anew"
+                f"the simulation's time went back from {last:g} s to {now:g} s: attach again after reloading it"
             )
         self._times = (began, now)
         return clock_time(now - began)

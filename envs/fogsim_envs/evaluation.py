@@ -53,7 +53,7 @@ class EpisodeResult:
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """What a policy came to.
+    """Results of a policy.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Evaluation:
     mean, low, high : float
         Mean return and its 95 % interval, by bootstrap over episodes [points].
     arrived, struck : float
-        Shares of episodes in which the ego arrived, and struck somebody (without an ego: no one arrives, anybody).
+        Shares of episodes in which the ego arrived, and collided (without an ego: none, and any collision).
     """
 
     episodes: tuple[EpisodeResult, ...]
@@ -76,7 +76,7 @@ class Evaluation:
         """One line."""
         return (
             f"return {self.mean:.1f} ({self.low:.1f} … {self.high:.1f}) over {len(self.episodes)} episodes, "
-            f"arrived {self.arrived:.0%}, struck somebody {self.struck:.0%}"
+            f"arrived {self.arrived:.0%}, collided with others {self.struck:.0%}"
         )
 
     def minus(self, other: "Evaluation") -> tuple[float, float, float]:

@@ -62,9 +62,10 @@ def calibrate_signs_command(
         table.add_row(f"{visibility:.0f}", f"{reach:.0f}", f"{first:.0f} ± {deviation:.0f}")
     stdout.print(table)
     low, high = measured.reach
-    told = f"tells V_met between {low:.0f} and {high:.0f} m of first detection, up to {measured.farthest:.0f} m"
+    usable = f"gives V_met between {low:.0f} and {high:.0f} m of first detection, up to {measured.farthest:.0f} m"
     stdout.print(
-        f"{told if low < high else 'tells nothing: resolution sets the range, not fog'}: {escape(out)}", soft_wrap=True
+        f"{usable if low < high else 'gives nothing: resolution limits the range, not fog'}: {escape(out)}",
+        soft_wrap=True,
     )
 
 

@@ -415,7 +415,7 @@ _OF_EGO = {
 
 _OF_LIGHTS = {
     "signal(ID).state": Signal(
-        "what a traffic light shows to the ego, as long as it is the next on its way",
+        "colour of a traffic light for the ego, while it is the next one ahead",
         _light(lambda light: light.colour.value),
         Kind.WORD,
         words=tuple(colour.value for colour in SignalColour),
@@ -423,7 +423,7 @@ _OF_LIGHTS = {
         needs=_EGO,
     ),
     "signal(ID).distance": _metres(
-        "way to its stop line, as long as it is the next on the ego's way",
+        "distance to its stop line, while it is the next one ahead of the ego",
         _light(lambda light: light.distance),
         places=(Place.SIGNAL,),
         needs=_EGO,

@@ -30,7 +30,7 @@ def find_map(written: str, folder: Path) -> Path:
         if name and is_map(Path(maps) / f"{name}{ending}"):
             return Path(maps) / f"{name}{ending}"
     there = sorted(one.name for one in Path(maps).glob("*") if is_map(one))
-    what = suggest(f"{name}{OPENDRIVE}", there) if there else f"there is no {OPENDRIVE} or {SUMO} file at all"
+    what = suggest(f"{name}{OPENDRIVE}", there) if there else f"it contains no {OPENDRIVE} or {SUMO} file"
     raise InputError(f"there is no map {shown(name)} in {maps}; {what}")
 
 

@@ -184,7 +184,9 @@ class GridFilter:
         if not math.isfinite(time):
             raise InputError(f"grid_filter: the time of an update must be finite, got {time!r}")
         if self._time is not None and time < self._time:
-            raise InputError(f"grid_filter: time went back from {self._time!r} to {time!r} s; reset() starts anew")
+            raise InputError(
+                f"grid_filter: time went back from {self._time!r} to {time!r} s; call reset() to start again"
+            )
         if self._time is not None and time > self._time:
             elapsed = self._elapsed = time - self._time
             self._weight = min(1.0, elapsed / self._correlation_time)

@@ -76,7 +76,7 @@ def _paths(given: str) -> list[Path]:
     if path.is_dir():
         found = _ordered(one for one in path.iterdir() if one.suffix.lower() in IMAGE_ENDINGS and one.is_file())
         if not found:
-            raise InputError(f"{path}: no image is in this folder; looked for {', '.join(IMAGE_ENDINGS)}")
+            raise InputError(f"{path}: the folder contains no image with one of the endings {', '.join(IMAGE_ENDINGS)}")
         return found
     if path.exists():
         return [path]

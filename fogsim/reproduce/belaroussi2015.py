@@ -53,8 +53,8 @@ CALIBRATED = (60.0, 80.0, 110.0, 150.0, 200.0, 260.0, 330.0, 400.0, 500.0, 650.0
 NOTES = (
     "The paper prints neither camera, sign size, spacing nor the coefficients of its curve. Ours: signs of"
     f" {DIAMETER} m (speed limit, pedestrian crossing, stop) every {APART:.0f} m, images of 1400x600 px every"
-    f" {STEP:.0f} m, {IMAGES} in each fog, and two cameras. The map errs by 0.5 m, the heading by 0.2°, the told pitch"
-    " by 0.1° (standard deviations).",
+    f" {STEP:.0f} m, {IMAGES} in each fog, and two cameras. The map errs by 0.5 m, the heading by 0.2°, the stated"
+    " pitch by 0.1° (standard deviations).",
     "Calibration: drives of their own up to single signs (`fogsim calibrate signs`), with other numbers drawn. 'ours'"
     " is a monotone curve through the distances of first detection; it abstains where resolution and not fog sets them"
     " ('at least'). 'cubic' is the paper's polynomial of third degree through the distances of 80 % detection; nothing"

@@ -264,7 +264,9 @@ class Scenario(Section):
     @model_validator(mode="after")
     def _sensors_that_inform(self) -> Self:
         if self.lighting.informed_by == "sensors":
-            raise ValueError("lighting.informed_by: sensors beside the road choose no lamps; write belief or truth")
+            raise ValueError(
+                "lighting.informed_by: sensors next to the road cannot control lamps; write belief or truth"
+            )
         if self.advice.informed_by == "sensors":
             if self.sensors.reports.roadside is None:
                 raise ValueError(

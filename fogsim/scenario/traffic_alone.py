@@ -54,7 +54,7 @@ def _of_camera(written: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
     if _method(written.get("advice")).get("informed_by") == "belief":
         yield (
             ("advice", "informed_by"),
-            f"belief {_NEEDS}; leave it out, or write truth, a visibility meter at the road, or sensors beside it",
+            f"belief {_NEEDS}; leave it out, or write truth (a meter at the road) or sensors (next to the road)",
         )
     sensors = written.get("sensors")
     if isinstance(sensors, dict) and sensors.get("faults"):

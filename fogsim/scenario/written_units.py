@@ -72,7 +72,7 @@ class _Conversion:
     ) -> tuple[str, float]:
         name, number = _converted(suffixed, value)
         if name in written:
-            self._tell(at, f"the key {name} stands beside it; one of them must go")
+            self._tell(at, f"the key {name} is given too; remove one of them")
         elif isinstance(number, ValueError):
             self._tell(at, number)
         if at in self.origins:

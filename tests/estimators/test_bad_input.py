@@ -326,7 +326,7 @@ def test_time_may_stand_and_begins_anew_after_a_reset(method, sequence):
 @pytest.mark.parametrize("method", METHODS)
 def test_a_frame_of_another_camera_is_told(method, changes):
     other = Frame(0.0, GREY, dataclasses.replace(CAMERA, **changes))
-    with pytest.raises(InputError, match="camera must be the told one"):
+    with pytest.raises(InputError, match="camera must be that of the estimator"):
         make(method, CAMERA).update(observation(GREY, frame=other))
 
 

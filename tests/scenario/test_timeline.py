@@ -24,7 +24,7 @@ def mistake(entry: str, *settings: str) -> str:
         ("{lead: {brakes: {}}}", "do.lead.brakes: unknown key; did you mean 'brake'"),
         ("{lead: {brake: {to: 80 m}}}", "do.lead.brake.to: "),
         ("{lead: {brake: {to_kmh: -3}}}", "do.lead.brake.to_kmh: input should be greater than or equal to 0; got -3"),
-        ("{lead: {}}", "do.lead: says nothing to do; allowed: speed, brake, follow"),
+        ("{lead: {}}", "do.lead: no action given; allowed: speed, brake, follow"),
         ("{lead: {brake: {}, speed: {to: 3 m/s}}}", "do.lead: speed and brake cannot begin together"),
         ("{lead: {change_lane: {}}}", "do.lead.change_lane: say where: lanes"),
         (
@@ -49,7 +49,7 @@ def mistake(entry: str, *settings: str) -> str:
             "do.lead.path: at_s has a time for each of points",
         ),
         ("{ego: {take_route: [bank]}}", "do.ego: take_route: positions count along the ego's route"),
-        ("{lead: {leave: true, brake: {}}}", "do.lead: leave stands by itself"),
+        ("{lead: {leave: true, brake: {}}}", "do.lead: leave must be the only key"),
         ("{lead: {change_lane: {to: 1, to_lane_of: ego}}}", "do.lead.change_lane: say where: lanes"),
         ("{lead: {speed: {like: nobody}}}", "there is no vehicle 'nobody' in "),
         ("{lead: {change_lane: {to_lane_of: nobody}}}", "there is no vehicle 'nobody' in "),
@@ -61,7 +61,7 @@ def mistake(entry: str, *settings: str) -> str:
         ("{lead: {follow: {vehicle: nobody, headway: 1 s}}}", "there is no vehicle 'nobody' in "),
         ("{signal.C: {state: red}}", "do.signal.C: the net has no traffic lights 'C'; it has none"),
         ("{new: {depart: {like: leed, gap: 9 m}}}", "do.leed: there is no vehicle 'leed' in "),
-        ("{new: {depart: {like: ego, gap: 9 m}, brake: {}}}", "do.new: depart stands by itself"),
+        ("{new: {depart: {like: ego, gap: 9 m}, brake: {}}}", "do.new: depart must be the only key"),
         ("{}", "do: "),
     ],
 )

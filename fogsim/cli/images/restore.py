@@ -36,9 +36,9 @@ def restore_command(
     airlight: Annotated[
         str | None, typer.Option(metavar="R,G,B", help="Its pixel values; else those above the horizon.")
     ] = None,
-    tone_map: Annotated[bool, typer.Option("--tone-map", help="Make the result to be looked at.")] = False,
-    beside: Annotated[bool, typer.Option("--beside", help="The original and the restored side by side.")] = False,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what is there already.")] = False,
+    tone_map: Annotated[bool, typer.Option("--tone-map", help="Compress brightness for viewing.")] = False,
+    beside: Annotated[bool, typer.Option("--beside", help="Write original and restored image side by side.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")] = False,
 ) -> None:
     """Restore the contrast that daytime fog took from your own images or video (docs/how_to/restoration.md)."""
     from fogsim.offline import find_source, load_calibration, straightened

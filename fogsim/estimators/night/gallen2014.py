@@ -230,4 +230,4 @@ class Gallen2014Halo(Gallen2014):
         super().__init__(camera, halos=halos, window=window, as_published=as_published)
 
     def _by_veil(self, observation: Observation) -> Estimate:  # noqa: ARG002 - what the combination is given
-        return Estimate.invalid(self.method, "no lamp is seen whose halo could tell")
+        return Estimate.invalid(self.method, "no lamp is seen whose halo could be measured")

@@ -176,7 +176,7 @@ class Gabb2014:
         if seen.found and abs(seen.aside) <= NEARLY_AHEAD:
             self._ahead_until = observation.time + SEEN_BEFORE
         if not seen.found and not self._is_lost(level, crop, observation.time):
-            return "the vehicle ahead may be beside where it is looked for, or be too small"
+            return "the vehicle ahead may be outside the searched area, or too small"
         left = self._left(depth, observation.time)
         if seen.found and seen.step >= left:
             self._last = observation.time, depth, seen.step

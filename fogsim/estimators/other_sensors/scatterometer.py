@@ -81,7 +81,7 @@ class Scatterometer:
         self._check.image_of(observation)
         told = observation.scattering
         if told is None:
-            why = "no forward-scatter sensor tells of the fog here: sensors.scatterometer puts one on the vehicle"
+            why = "no forward-scatter sensor measures the fog here: sensors.scatterometer adds one to the vehicle"
             return Estimate.invalid(self.method, why)
         if not 0.0 <= told < math.inf:
             raise InputError(f"Observation.scattering must be a finite extinction coefficient ≥ 0 [1/m], got {told!r}")

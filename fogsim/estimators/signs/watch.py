@@ -101,10 +101,10 @@ class SignWatch:
         """Why no sign can be seen; empty if one might be."""
         if self._lost >= STRANGE:
             return (
-                f"none of the last {self._lost} signs was found where the map has it: the map may be in another "
-                "coordinate frame, or the camera be told wrongly"
+                f"the last {self._lost} signs were not found at their positions in the map: the map may be in another "
+                "coordinate frame, or the camera's calibration be wrong"
             )
-        return "" if self._told else "the map tells of no sign ahead; sensors.sign_reach_m and the map decide that"
+        return "" if self._told else "no sign ahead in the map within sensors.sign_reach_m"
 
 
 def sign_looks(watched: Watched, tracks: Iterable[SignTrack]) -> tuple[SignLook, ...]:

@@ -67,7 +67,7 @@ def _mistakes(scenario: "Scenario") -> Iterator[tuple[KeyPath, str]]:
         if content is not None:
             yield from (((number, "when"), told) for told in condition_mistakes(entry.when, content))
         if not scenario.traffic.has_ego and EGO in vehicles_of(entry):
-            yield (number, "do"), "it tells of the ego, and traffic.ego is none"
+            yield (number, "do"), "it refers to the ego, but traffic.ego is none"
         for subject, doing in operations(entry):
             told = (
                 _mistake(doing, scenario)
@@ -89,7 +89,8 @@ def _person_mistake(subject: str, doing: Doing, scenario: "Scenario") -> str | N
         return "take_route: positions count along the ego's route, which is known from the beginning"
     if doing.walk and (subject == EGO or (actor is not None and not actor.is_person)):
         persons = [name for name, one in scenario.actors.items() if one.is_person]
-        return f"{subject} is a vehicle, and persons walk; {suggest(subject, persons) if persons else 'there are none'}"
+        there = suggest(subject, persons) if persons else "the scenario has no persons"
+        return f"{subject} is a vehicle, and only persons walk; {there}"
     return None
 
 
@@ -140,7 +141,7 @@ def _fog_mistake(doing: FogActions, scenario: "Scenario") -> str | None:
     visibility = scenario.fog.visibility_m or scenario.fog.outside_visibility_m or math.inf
     is_clear, has_banks = math.isinf(visibility), bool(scenario.fog.banks)
     if doing.density is not None and is_clear and not has_banks:
-        return "there is no fog of which this could be a multiple; write visibility_m, or give the scenario fog"
+        return "this multiplies the scenario's fog, and the scenario has none; write visibility_m, or add fog"
     if doing.visibility_m is not None and is_clear and has_banks:
         return "outside the banks the air is clear; write density, which is that of the banks"
     return None

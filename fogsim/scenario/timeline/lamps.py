@@ -34,7 +34,7 @@ class LampSides(Section):
     @model_validator(mode="after")
     def _says_something(self) -> Self:
         if not self.model_fields_set:
-            raise ValueError(f"says nothing to do; allowed: {', '.join(type(self).model_fields)}")
+            raise ValueError(f"no action given; allowed: {', '.join(type(self).model_fields)}")
         return self
 
 

@@ -16,7 +16,7 @@ OptionValue = bool | int | float | str
 
 _SEED = "a run must depend on its own seed alone (fogsim run --seed)"
 _NO_RUN = "SUMO would write that file and end"
-_TRACI = "SUMO runs inside FogSim, and waits for nobody"
+_TRACI = "SUMO runs inside FogSim, and waits for no clients"
 _WINDOW = "SUMO has no window here"
 
 OWN_OPTIONS: Mapping[str, str] = {

@@ -105,7 +105,7 @@ def _position(actor: Actor, by_name: Mapping[str, Actor], asked: tuple[str, ...]
     if not isinstance(relation, Relation):
         return relation
     if actor.name in asked:
-        raise PlacementError(actor.name, f"is placed by itself, through {', '.join(asked)}")
+        raise PlacementError(actor.name, f"is placed relative to itself, through {', '.join(asked)}")
     other = by_name.get(relation.other)
     if other is None:
         raise PlacementError(actor.name, f"there is no actor {relation.other!r}; {suggest(relation.other, by_name)}")

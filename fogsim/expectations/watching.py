@@ -246,7 +246,7 @@ class _WheneverWatch:
         tried = self._passed + self._failed
         if self._broken is not None:
             sight, since = self._broken
-            return _failed(sight, sight[2], f"not so {self._failed} of {tried} times; the first began at {since:g} s")
+            return _failed(sight, sight[2], f"failed {self._failed} of {tried} times, first from {since:g} s")
         came = f"{self._passed} of {tried} times" if tried else ""
         if tried < self._clause.at_least:
             undecided = f", {self._fired - tried} of them not decided" if self._fired > tried else ""

@@ -197,7 +197,7 @@ def test_a_guessed_camera_is_written_and_good_to_use(estimate, folder: Path) -> 
         (("drive", "--camera", "typo.yaml"), "typo.yaml:1: widht: unknown key; did you mean 'width'"),
         (("drive", "--camera", "large.yaml"), "the image has 320 × 240 pixels, the camera 640 × 240"),
         (("drive", "--camera", "camera.yaml", "--method", "negru2031"), "did you mean 'negru2013'"),
-        (("empty", "--camera", "camera.yaml"), "no image is in this folder"),
+        (("empty", "--camera", "camera.yaml"), "the folder contains no image"),
         (("*.bmp", "--camera", "camera.yaml"), "no file fits this pattern"),
         (("empty.mp4", "--camera", "camera.yaml"), "this is no video"),
         (("camera.yaml", "--camera", "camera.yaml"), "the only image cannot be read"),

@@ -85,7 +85,11 @@ def test_mistakes_of_conditions_and_names() -> None:
 @pytest.mark.parametrize(
     ("do", "setting", "told"),
     [
-        ("fog: {density: 2}", "fog={visibility_m: inf}", "there is no fog of which this could be a multiple"),
+        (
+            "fog: {density: 2}",
+            "fog={visibility_m: inf}",
+            "this multiplies the scenario's fog, and the scenario has none",
+        ),
         (
             "fog: {visibility: 30 m}",
             "fog={outside_visibility_m: inf, banks: [{start_m: 100, end_m: 900, visibility_m: 40}]}",

@@ -84,6 +84,6 @@ def spread_advice(command: Command, scenario: Scenario, sections: Sequence[RoadS
         return dataclasses.replace(command, advice_reach=scenario.traffic.reading_radius_m)
     if scenario.drivers.advised in DISPLAYS:
         stretches, speeds = [section.stretch for section in sections], [command.advice.speed] * len(sections)
-        told = stretch_advices(stretches, speeds, DISPLAYS[scenario.drivers.advised])
-        return dataclasses.replace(command, stretches=told)
+        advices = stretch_advices(stretches, speeds, DISPLAYS[scenario.drivers.advised])
+        return dataclasses.replace(command, stretches=advices)
     return dataclasses.replace(command, stretches=(stretch_advice(scenario, command.advice.speed),))

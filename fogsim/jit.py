@@ -59,20 +59,20 @@ class Announcement(event.Listener):  # type: ignore[misc] # numba is untyped
     Takes `clock` [s].
     """
 
-    def __init__(self, tell: Callable[[str], object], clock: Callable[[], float] = time.monotonic) -> None:
-        self._tell, self._clock = tell, clock
+    def __init__(self, print_line: Callable[[str], object], clock: Callable[[], float] = time.monotonic) -> None:
+        self._print, self._clock = print_line, clock
         self._depth = self._compiled = 0
         self._spent = self._started = 0.0
-        self._told: float | None = None
+        self._printed: float | None = None
 
     def on_start(self, _: Any) -> None:
         """Begin to count at the outermost kernel; those that it calls are compiled within it."""
         if self._depth == 0:
             self._started = self._clock()
-            if self._told is None and self._spent > _PATIENCE:
-                self._told = self._started
+            if self._printed is None and self._spent > _PATIENCE:
+                self._printed = self._started
                 why = why_not_taken()
-                self._tell(
+                self._print(
                     "fogsim: compiling for this processor, a minute or two, the first time only "
                     f"(ahead of time and on all cores: fogsim compile{f'; {why}' if why else ''})"
                 )
@@ -85,9 +85,9 @@ class Announcement(event.Listener):  # type: ignore[misc] # numba is untyped
             now = self._clock()
             self._compiled += 1
             self._spent += now - self._started
-            if self._told is not None and now - self._told > _NEWS_PERIOD:
-                self._told = now
-                self._tell(f"fogsim: compiled {self._compiled} functions in {self._spent:.0f} s")
+            if self._printed is not None and now - self._printed > _NEWS_PERIOD:
+                self._printed = now
+                self._print(f"fogsim: compiled {self._compiled} functions in {self._spent:.0f} s")
 
 
 class CompileSpeedup(event.Listener):  # type: ignore[misc] # numba is untyped

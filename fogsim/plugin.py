@@ -241,10 +241,10 @@ class AttachedSession:
         Every vehicle gets back what was changed about it: top speed, time headway, lane-change mode, the ego's own
         speed, and sight of its leader.
         """
-        tells = self._reports_unplayed and self._started and not self._closed
+        is_reporting = self._reports_unplayed and self._started and not self._closed
         self._end()
-        unplayed = self._traffic.unplayed() if tells else NOTHING_UNPLAYED
-        if tells and self._last is not None:
+        unplayed = self._traffic.unplayed() if is_reporting else NOTHING_UNPLAYED
+        if is_reporting and self._last is not None:
             unplayed += self._timeline.unplayed(self._last)
         if unplayed:
             warnings.warn(f"{self._name}: not played: {unplayed}", UnplayedWarning, stacklevel=2)

@@ -59,8 +59,8 @@ def compiled_for() -> dict[str, str] | None:
 def usable_kind() -> Processors | None:
     """The processor kind of this machine; None if it is not a known one, or if numba's target was configured."""
     kind = KINDS.get(platform.machine())
-    told = config.CPU_NAME is not None or config.CPU_FEATURES is not None or config.BOUNDSCHECK
-    if kind is None or told:
+    is_configured = config.CPU_NAME is not None or config.CPU_FEATURES is not None or config.BOUNDSCHECK
+    if kind is None or is_configured:
         return None
     try:
         features = llvm.get_host_cpu_features()

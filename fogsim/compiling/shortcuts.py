@@ -37,11 +37,11 @@ class UnobservedLock:
 
     def take(self) -> Callable[[], None]:
         """Leave the events out; what is returned lets them in again."""
-        told = ffi.lib._lock._cblist
+        listeners = ffi.lib._lock._cblist
         ffi.lib._lock._cblist = []
 
         def restore() -> None:
-            ffi.lib._lock._cblist = told
+            ffi.lib._lock._cblist = listeners
 
         return restore
 

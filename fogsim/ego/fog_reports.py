@@ -169,12 +169,12 @@ class FogReports:
 
     def _send(self, name: str, place: float, k: float, sender: MeasuredReports, time: float) -> None:
         wrong, noise, any_k = self._rng.random(), self._rng.standard_normal(), self._rng.random()
-        told = k * math.exp(sender.deviation * noise)
+        reported = k * math.exp(sender.deviation * noise)
         if wrong < sender.wrong:
-            told = WRONG[0] * (WRONG[1] / WRONG[0]) ** any_k
+            reported = WRONG[0] * (WRONG[1] / WRONG[0]) ** any_k
         stated_time = time + self._clock_error(name, sender.clock_deviation_s)
         number = self._beats.number(name)
-        self._let_travel(FogReport(name, number, place, stated_time, told, sender.deviation), time, sender)
+        self._let_travel(FogReport(name, number, place, stated_time, reported, sender.deviation), time, sender)
 
     def _clock_error(self, name: str, deviation: float) -> float:
         """How far a sender's clock is ahead [s]; in one run always the same."""

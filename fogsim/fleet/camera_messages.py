@@ -15,8 +15,8 @@ def camera_messages(step: Step) -> tuple[tuple[str, FogReport], ...]:
     """
     seen = [(step.traffic.ids[step.ego], step.route_position, step.estimates)]
     seen += [(one.vehicle_id, one.place, one.estimates) for one in step.equipped]
-    told = ((vehicle, _report(vehicle, place, estimates, step)) for vehicle, place, estimates in seen)
-    return tuple((vehicle, report) for vehicle, report in told if report is not None)
+    reports = ((vehicle, _report(vehicle, place, estimates, step)) for vehicle, place, estimates in seen)
+    return tuple((vehicle, report) for vehicle, report in reports if report is not None)
 
 
 def _report(vehicle: str, place: float, estimates: tuple[Estimate, ...], step: Step) -> FogReport | None:

@@ -38,12 +38,12 @@ class Announcements:
 
     def __init__(self, time: float) -> None:
         self._window = time
-        self._told: deque[tuple[float, DenserFog | None]] = deque()
+        self._reports: deque[tuple[float, DenserFog | None]] = deque()
         self.announced = False
 
     def reset(self) -> None:
         """Forget all reports."""
-        self._told.clear()
+        self._reports.clear()
         self.announced = False
 
     def update(self, estimates: Sequence[Estimate], time: float) -> DenserFog | None:
@@ -53,18 +53,20 @@ class Announcements:
         """
         telling = [one for one in estimates if one.valid and one.optical_depths is not None]
         if telling:
-            self._told.append((time, next((one.denser for one in telling if one.denser is not None), None)))
-        while self._told and self._told[0][0] < time - self._window - 1e-9:
-            self._told.popleft()
-        told = [(when, denser) for when, denser in self._told if denser is not None]
-        if not told:
+            self._reports.append((time, next((one.denser for one in telling if one.denser is not None), None)))
+        while self._reports and self._reports[0][0] < time - self._window - 1e-9:
+            self._reports.popleft()
+        denser_fogs = [(when, denser) for when, denser in self._reports if denser is not None]
+        if not denser_fogs:
             self.announced = False
             return None
-        likely = [(sum(_is_same(one, other) or _is_same(other, one) for one in told), other) for other in told]
+        likely = [
+            (sum(_is_same(one, other) or _is_same(other, one) for one in denser_fogs), other) for other in denser_fogs
+        ]
         agreeing, last = max(likely, key=lambda pair: (pair[0], pair[1][0]))
-        share = agreeing / len(self._told)
+        share = agreeing / len(self._reports)
         enough = agreeing >= FEWEST and share >= (LEAST if self.announced else MOST)
-        spans = self.announced or time - told[0][0] >= 0.5 * self._window
+        spans = self.announced or time - denser_fogs[0][0] >= 0.5 * self._window
         self.announced = bool(enough and spans)
         return last[1] if self.announced else None
 

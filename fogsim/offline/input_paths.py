@@ -92,8 +92,8 @@ def _nearest(path: Path) -> str:
     """The nearest file name in the folder, if one is near."""
     if not path.parent.is_dir():
         return ""
-    told = suggest(path.name, sorted(one.name for one in path.parent.iterdir()))
-    return f"; {told.partition('?')[0]}?" if "?" in told else ""
+    suggestion = suggest(path.name, sorted(one.name for one in path.parent.iterdir()))
+    return f"; {suggestion.partition('?')[0]}?" if "?" in suggestion else ""
 
 
 def _ordered(paths: Iterable[Path]) -> list[Path]:

@@ -174,18 +174,18 @@ def _track(setup: Setup, measured: OperatingRange, images: int) -> Iterator[list
     last: dict[float, dict[str, Cell]] = {v: {} for v in PUBLISHED}
     for image, seen in enumerate(observed(drive, tuple(PUBLISHED), rng)):
         for visibility, observation in seen.items():
-            told, published = ours[visibility].update(observation), cubic[visibility].update(observation)
-            least = told.diagnostics.get("visibility_at_least")
+            estimate, published = ours[visibility].update(observation), cubic[visibility].update(observation)
+            least = estimate.diagnostics.get("visibility_at_least")
             last[visibility] = {
                 "camera": setup.name,
                 "visibility_m": visibility,
                 "images": image + 1,
-                "ours_m": round(told.visibility, 1) if told.valid else None,
-                "ours_deviation_m": round(told.visibility * told.standard_deviation / told.extinction, 1)
-                if told.valid
+                "ours_m": round(estimate.visibility, 1) if estimate.valid else None,
+                "ours_deviation_m": round(estimate.visibility * estimate.standard_deviation / estimate.extinction, 1)
+                if estimate.valid
                 else None,
                 "at_least_m": None if least is None else round(float(str(least)), 1),
-                "signs": int(str(told.diagnostics.get("signs", 0))),
+                "signs": int(str(estimate.diagnostics.get("signs", 0))),
                 "cubic_m": round(published.visibility, 1) if published.valid else None,
             }
         yield list(last.values())

@@ -147,17 +147,17 @@ def swept(
 def _record(
     method: str, setting: Setting, form: str, visibility: float, estimates: Sequence[Estimate]
 ) -> dict[str, Cell]:
-    told = [one.extinction for one in estimates if one.valid and one.extinction > 0.0]
-    apart = extinction_from_visibility(visibility) / np.array(told) - 1.0
+    extinctions = [one.extinction for one in estimates if one.valid and one.extinction > 0.0]
+    apart = extinction_from_visibility(visibility) / np.array(extinctions) - 1.0
     return {
         "paper": method,
         "table": "sweep",
         "setting": setting.name,
         "form": form,
         "visibility_m": visibility,
-        "told_share": len(told) / len(estimates),
-        "median_error_pct": 100.0 * float(np.median(np.abs(apart))) if told else None,
-        "bias_pct": 100.0 * float(np.median(apart)) if told else None,
+        "told_share": len(extinctions) / len(estimates),
+        "median_error_pct": 100.0 * float(np.median(np.abs(apart))) if extinctions else None,
+        "bias_pct": 100.0 * float(np.median(apart)) if extinctions else None,
     }
 
 

@@ -253,5 +253,5 @@ def _errors(records: Sequence[Mapping[str, Cell]]) -> tuple[float, NDArray[np.fl
     foggy = [r for r in records if r["visibility_m"] is not None]
     true = np.array([r["visibility_m"] for r in foggy], np.float64)
     found = np.array([np.inf if (v := r["corrected_visibility_m"]) is None else v for r in foggy], np.float64)
-    told = np.isfinite(found)
-    return float(np.mean(np.abs(found - true) <= TOLERANCE)), np.abs(found[told] / true[told] - 1.0)
+    valid = np.isfinite(found)
+    return float(np.mean(np.abs(found - true) <= TOLERANCE)), np.abs(found[valid] / true[valid] - 1.0)

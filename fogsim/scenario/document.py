@@ -153,11 +153,11 @@ class Document:
         """
         origins = dict(self.origins)
         for text in overrides:
-            at, told = _override_path(text), _shown_override(text)
+            at, origin = _override_path(text), _shown_override(text)
             origins = {key: origin for key, origin in origins.items() if key[: len(at)] != at}
             for block in (at[:length] for length in range(1, len(at))):
-                origins[block] = f"{origins[block]} with {told}" if block in origins else told
-            origins[at] = told
+                origins[block] = f"{origins[block]} with {origin}" if block in origins else origin
+            origins[at] = origin
         return replace(self, origins=origins)
 
 

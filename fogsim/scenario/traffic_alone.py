@@ -22,8 +22,8 @@ def without_ego(written: object) -> object:
     if not isinstance(written, dict) or not isinstance(traffic, dict) or traffic.get("ego") != NO_EGO:
         return written
     mistakes = [
-        InitErrorDetails(type=PydanticCustomError(MISTAKE, "{told}", {"told": told}), loc=place, input=0)
-        for place, told in (*_of_camera(written), *_of_place(written), *_of_events(traffic))
+        InitErrorDetails(type=PydanticCustomError(MISTAKE, "{message}", {"message": message}), loc=place, input=0)
+        for place, message in (*_of_camera(written), *_of_place(written), *_of_events(traffic))
     ]
     if mistakes:
         raise ValidationError.from_exception_data("scenario", mistakes)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from fogsim.conditions import History, Moment, Watch
 from fogsim.scenario import Scenario
 from fogsim.scenario.roads.departures import Entries, entering_vehicles
-from fogsim.scenario.timeline import TimelineEntry, actions_of, entry_name, fog_reference, told, vehicles_of
+from fogsim.scenario.timeline import TimelineEntry, actions_of, entry_name, entry_text, fog_reference, vehicles_of
 from fogsim.scenario.timeline.schema import DepartAction
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Ending, Reason, TrafficStep, Unplayed, UnplayedEvent
@@ -94,7 +94,7 @@ class Timeline:
         reasons = [(entry, entry.why_not(self._seen, step)) for entry in self._entries]
         names = {vehicle for entry in self._entries for vehicle in entry.vehicles(step)}
         return Unplayed(
-            tuple(UnplayedEvent(f"{e.name} ({told(e.written)})", why) for e, why in reasons if why is not None),
+            tuple(UnplayedEvent(f"{e.name} ({entry_text(e.written)})", why) for e, why in reasons if why is not None),
             tuple(sorted(names.difference(self._seen))),
         )
 
@@ -119,7 +119,7 @@ class _Entry:
         self._held = holds
         self._has_held |= holds
         if comes:
-            self._waiting.append((moment.step.time + self.written.delay_s, self._watch.told()))
+            self._waiting.append((moment.step.time + self.written.delay_s, self._watch.readings()))
 
     def is_due(self, time: float) -> bool:
         """Whether it is time to begin."""
@@ -130,7 +130,7 @@ class _Entry:
         _, why = self._waiting.pop(0)
         self._has_begun = True
         who = tuple(moment.vehicle_id(vehicle) for vehicle in vehicles_of(self.written))
-        return Begun(self.name, time, told(self.written), why, who, self.key)
+        return Begun(self.name, time, entry_text(self.written), why, who, self.key)
 
     def vehicles(self, step: TrafficStep) -> tuple[str, ...]:
         """Ids of its vehicles."""

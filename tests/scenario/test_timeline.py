@@ -88,7 +88,7 @@ def test_mistakes_of_conditions_and_names() -> None:
         (
             "fog: {density: 2}",
             "fog={visibility_m: inf}",
-            "this multiplies the scenario's fog, and the scenario has none",
+            "this multiplies the scenario's fog",
         ),
         (
             "fog: {visibility: 30 m}",

@@ -80,8 +80,8 @@ def _mean_glow(depths: NDArray[np.float64], seen: NDArray[np.float64], droplets:
 
 def _edges(lines: list[str], name: str) -> NDArray[np.float64]:
     """Edges of bins, read from a comment of the table [rad]."""
-    told = next(line for line in lines if line.startswith(f"# {name} ")).split()[2:]
-    return np.radians([float(edge) for edge in told])
+    words = next(line for line in lines if line.startswith(f"# {name} ")).split()[2:]
+    return np.radians([float(edge) for edge in words])
 
 
 def mean_intensity(

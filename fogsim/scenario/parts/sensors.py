@@ -50,13 +50,13 @@ def camera(scenario: Scenario, body: str = CAR) -> Camera:
 
 def assumed_camera(scenario: Scenario, body: str = CAR) -> Camera:
     """Calibration that the ego's estimators assume, with the scenario's errors in it."""
-    true, told = camera(scenario, body), scenario.camera.told
+    true, errors = camera(scenario, body), scenario.camera.told
     return dataclasses.replace(
         true,
-        mount_height=true.mount_height * (1.0 + told.mount_height_error_percent / 100.0),
-        pitch=true.pitch + math.radians(told.pitch_error_deg),
-        roll=true.roll + math.radians(told.roll_error_deg),
-        focal_length=true.focal_length * (1.0 + told.focal_length_error_percent / 100.0),
+        mount_height=true.mount_height * (1.0 + errors.mount_height_error_percent / 100.0),
+        pitch=true.pitch + math.radians(errors.pitch_error_deg),
+        roll=true.roll + math.radians(errors.roll_error_deg),
+        focal_length=true.focal_length * (1.0 + errors.focal_length_error_percent / 100.0),
     )
 
 

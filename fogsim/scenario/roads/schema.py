@@ -347,9 +347,9 @@ class ActorSection(Section):
 
     @model_validator(mode="after")
     def _has_the_lamps(self) -> Self:
-        told = lamp_mistake(self.type, self.lamps) if isinstance(self.lamps, LampActions) else None
-        if told is not None:
-            raise ValueError(told)
+        mistake = lamp_mistake(self.type, self.lamps) if isinstance(self.lamps, LampActions) else None
+        if mistake is not None:
+            raise ValueError(mistake)
         return self
 
 

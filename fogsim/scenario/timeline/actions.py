@@ -111,7 +111,7 @@ def entry_name(entry: TimelineEntry, number: int) -> str:
     return entry.name or f"timeline.{number}"
 
 
-def told(entry: TimelineEntry) -> str:
+def entry_text(entry: TimelineEntry) -> str:
     """What an entry does in a few words: ``slow: brake; fog: visibility_m``."""
     words = []
     for subject, doing in operations(entry):

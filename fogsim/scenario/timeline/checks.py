@@ -34,10 +34,10 @@ DAYLIGHT_RENDERER = "reference"
 
 def check_timeline(scenario: "Scenario") -> None:
     """Refuse a timeline that a run of its scenario could not play."""
-    refuse((("timeline", *place), told) for place, told in _mistakes(scenario))
+    refuse((("timeline", *place), mistake) for place, mistake in _mistakes(scenario))
     if scenario.end_when is not None:
-        told = condition_mistakes(scenario.end_when, run_content(scenario))
-        refuse((("end_when",), one) for one in told)
+        mistakes = condition_mistakes(scenario.end_when, run_content(scenario))
+        refuse((("end_when",), one) for one in mistakes)
 
 
 def pointless_triggers(document: Document, scenario: "Scenario", limits: Limits) -> Iterator[tuple[KeyPath, str]]:
@@ -54,8 +54,8 @@ def pointless_triggers(document: Document, scenario: "Scenario", limits: Limits)
     triggers += [(("timeline", number, "when"), entry.when) for number, entry in enumerate(scenario.timeline)]
     for at, condition in triggers:
         if condition is not None and document.is_written(at):
-            for told in pointless_parts(condition, limits, scenario.traffic.ego):
-                yield at, f"this can never come: {told}"
+            for reason in pointless_parts(condition, limits, scenario.traffic.ego):
+                yield at, f"this can never come: {reason}"
 
 
 def _mistakes(scenario: "Scenario") -> Iterator[tuple[KeyPath, str]]:
@@ -65,17 +65,17 @@ def _mistakes(scenario: "Scenario") -> Iterator[tuple[KeyPath, str]]:
         if names[number] in names[:number]:
             yield (number, "name"), f"names of entries must differ, and {names[number]!r} stands there twice"
         if content is not None:
-            yield from (((number, "when"), told) for told in condition_mistakes(entry.when, content))
+            yield from (((number, "when"), mistake) for mistake in condition_mistakes(entry.when, content))
         if not scenario.traffic.has_ego and EGO in vehicles_of(entry):
             yield (number, "do"), "it refers to the ego, but traffic.ego is none"
         for subject, doing in operations(entry):
-            told = (
+            mistake = (
                 _mistake(doing, scenario)
                 or _person_mistake(subject, doing, scenario)
                 or _lamp_mistake(subject, doing, scenario)
             )
-            if told:
-                yield (number, "do", subject), told
+            if mistake:
+                yield (number, "do", subject), mistake
 
 
 def _person_mistake(subject: str, doing: Doing, scenario: "Scenario") -> str | None:

@@ -449,7 +449,7 @@ def _by_subject(written: object) -> object:
             except ValidationError as error:
                 mistakes += [
                     InitErrorDetails(
-                        type=PydanticCustomError(MISTAKE, "{told}", {"told": text}), loc=(*at, *inner), input=0
+                        type=PydanticCustomError(MISTAKE, "{message}", {"message": text}), loc=(*at, *inner), input=0
                     )
                     for inner, text in mistakes_in(_schema_of(subject), error, block)
                 ]
@@ -476,8 +476,10 @@ def _read(subject: str, block: object) -> object:
     kind = _kind_of(subject)
     read = kind.model_validate(block)
     if not read.model_fields_set:
-        told = f"no action given; allowed: {', '.join(kind.model_fields)}"
-        mistake = InitErrorDetails(type=PydanticCustomError(MISTAKE, "{told}", {"told": told}), loc=(), input=0)
+        message = f"no action given; allowed: {', '.join(kind.model_fields)}"
+        mistake = InitErrorDetails(
+            type=PydanticCustomError(MISTAKE, "{message}", {"message": message}), loc=(), input=0
+        )
         raise ValidationError.from_exception_data("do", [mistake])
     return read
 

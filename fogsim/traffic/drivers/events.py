@@ -160,11 +160,11 @@ class Script:
 
         missed = [event for event in self._events if event in self._waiting or event in self._without_lane]
         # What stands for one event of a scenario bears one name, and is told once.
-        told = dict.fromkeys(
+        names = dict.fromkeys(
             UnplayedEvent(event.trigger.name or f"event of {event.vehicle}", why(event)) for event in missed
         )
         expected = {*others, *(event.vehicle for event in self._events)}
-        return Unplayed(tuple(told), tuple(sorted(expected.difference(seen))))
+        return Unplayed(tuple(names), tuple(sorted(expected.difference(seen))))
 
     def _begin(self, situation: Situation) -> list[Event]:
         measured = {event.vehicle for event in self._waiting if event.trigger.at_gap_to_ego is not None}

@@ -71,8 +71,8 @@ def option_mistakes(options: Mapping[str, OptionValue]) -> dict[str, str]:
     checked; SUMO itself refuses what it does not know when it starts.
     """
     known = known_options() if options else {}
-    told = {name: _mistake(name, value, known) for name, value in options.items()}
-    return {name: mistake for name, mistake in told.items() if mistake is not None}
+    mistakes = {name: _mistake(name, value, known) for name, value in options.items()}
+    return {name: mistake for name, mistake in mistakes.items() if mistake is not None}
 
 
 def _mistake(name: str, value: OptionValue, known: Mapping[str, KnownOption]) -> str | None:

@@ -53,7 +53,7 @@ class OutputFolder:
         self.warnings: tuple[str, ...] = ()
         self._own: Path | None = None
         self._way = ""
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
 
     def open(self) -> list[str]:
         """Make the folder, and give the arguments of SUMO's command line that lead there."""
@@ -109,9 +109,9 @@ class OutputFolder:
         """Warn of outputs that will not be kept, each once."""
         if self._folder is not None or self._own is None:
             return
-        lost = [name for name in _names(self._own) if name not in self._told]
+        lost = [name for name in _names(self._own) if name not in self._reported]
         if lost:
-            self._told.update(lost)
+            self._reported.update(lost)
             more = f" and {len(lost) - MOST_NAMED} more" if len(lost) > MOST_NAMED else ""
             warnings.warn(
                 f"SUMO writes {', '.join(lost[:MOST_NAMED])}{more}, which will not be kept: each run would replace the "

@@ -19,11 +19,11 @@ class LampPublisher:
 
     def __init__(self, api: Api) -> None:
         self._api = api
-        self._told: dict[str, Lamp] = {}
+        self._published: dict[str, Lamp] = {}
 
     def publish(self, lamps: Mapping[str, Lamp], present: set[str]) -> None:
         """Publish the lamps that have changed."""
         for vehicle, lit in lamps.items():
-            if lit != self._told.get(vehicle) and vehicle in present:
+            if lit != self._published.get(vehicle) and vehicle in present:
                 self._api.vehicle.setParameter(vehicle, LAMPS_PARAMETER, lamp_names(lit))
-                self._told[vehicle] = lit
+                self._published[vehicle] = lit

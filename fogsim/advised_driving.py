@@ -52,7 +52,7 @@ def warned(command: Command, step: Step, previous: Command) -> Command:
 
 
 def _questions_to(adviser: Adviser | VehicleAdviser) -> Callable[[Step, Belief, SpeedAdvice], SpeedAdvice]:
-    """A function that asks an adviser what it says after a step, by what is known of the fog, after what it said."""
+    """A function that gets an adviser's next advice after a step, from what is known of the fog and the last advice."""
     if isinstance(adviser, VehicleAdviser):
         return lambda step, known, previous: adviser.advise_vehicle(
             known, step.observation, step.speed_limit, step.time, previous

@@ -109,7 +109,7 @@ def stretch_advices(
     for section, speed in zip(sections, speeds, strict=True):
         last = advices[-1] if advices else None
         if last and display != Display.MESSAGE_SIGN and (last.speed, last.stretch.end) == (speed, section.start):
-            # What is heard anywhere needs no end where the next section is told the same.
+            # Advice that is heard anywhere continues where the next section has the same.
             advices[-1] = StretchAdvice(speed, Stretch(last.stretch.start, section.end), display)
         elif speed < math.inf:
             advices.append(StretchAdvice(speed, section, display))

@@ -1,6 +1,6 @@
 """Scenario files by Python: the blocks as typed classes, conditions by operators, and the YAML that they stand for.
 
-What a file can say is said here by the same keys: ``Fog(visibility_m=80)`` is ``fog: {visibility_m: 80}``.
+Arguments have the same keys as the file: ``Fog(visibility_m=80)`` is ``fog: {visibility_m: 80}``.
 """
 
 import copy

@@ -43,7 +43,7 @@ class PoseNoise:
 class SignDrive:
     """A drive past signs along a straight road."""
 
-    camera: Camera  # The told calibration
+    camera: Camera  # The stated calibration
     signs: tuple[Sign, ...]  # Signs as they stand, along x
     places: tuple[float, ...]  # Where the front bumper is at each frame [m]
     noise: PoseNoise = PoseNoise()  # How far off map and own pose are

@@ -118,7 +118,7 @@ class FogReports:
         due = [i for i in range(len(places)) if self._beats.is_due(f"{SENSOR} {i}", sensors.period_s, time)]
         if not due:
             return
-        # A run begins with what sensors have told before of the fog as it is then.
+        # A run begins with the sensors' earlier reports, made in the fog of that moment.
         time = time if self._has_begun else time - sensors.delay_s
         self._has_begun = True
         points = np.stack([np.interp(places[due], self._places.stations, axis) for axis in self._route.T], axis=1)

@@ -213,7 +213,7 @@ class FieldFilter:
         value, deviation = now.log_moments()
         if deviation > CERTAIN:
             return
-        # A bank beyond what was seen, of which others have told, is no contradiction.
+        # A bank that others have reported beyond what was seen is no contradiction.
         sight = min(self._sight(math.exp(value)), reach)
         believed, variance = self._field.mean_extinction(0.0, sight)
         apart = abs(value - believed)

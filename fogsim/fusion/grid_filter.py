@@ -244,7 +244,7 @@ class GridFilter:
             inside *= _normal_share((math.log(max(bounds.most, 1e-12)) - self._log_extinction) / softness)
         if bounds.least > 0.0:
             inside *= _normal_share((self._log_extinction - math.log(bounds.least)) / softness)
-        # Signs that are told wrongly are more than other outliers, and the belief must survive two of them.
+        # Wrong signs are more frequent than other outliers, and the belief must survive two of them.
         share = max(self._outlier_share, LEAST_UNBOUND)
         return np.asarray(np.log(share + (1.0 - share) * inside))
 

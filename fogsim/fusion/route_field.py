@@ -50,7 +50,7 @@ class RouteField:
         self._varying, self._beforehand = varying[:-1, :-1], beforehand[:-1, :-1]
         self._next = matrix_product(inverse_of(np.ascontiguousarray(self._beforehand)), beforehand[:-1, -1])
         self._rest = float(beforehand[-1, -1] - matrix_product(self._next, beforehand[:-1, -1]))
-        # The same in every run: what is told of a distribution is not to go by chance.
+        # The same in every run: samples of a distribution must not depend on chance.
         self._normals = np.ascontiguousarray(np.random.default_rng(0).standard_normal((SAMPLES, AHEAD + 1)).T)
         self.reset()
 

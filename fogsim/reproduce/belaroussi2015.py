@@ -57,8 +57,8 @@ NOTES = (
     " pitch by 0.1° (standard deviations).",
     "Calibration: drives of their own up to single signs (`fogsim calibrate signs`), with other numbers drawn. 'ours'"
     " is a monotone curve through the distances of first detection; it abstains where resolution and not fog sets them"
-    " ('at least'). 'cubic' is the paper's polynomial of third degree through the distances of 80 % detection; nothing"
-    " tells where it is flat.",
+    " ('at least'). 'cubic' is the paper's polynomial of third degree through the distances of 80 % detection; no"
+    " mark shows where it is flat.",
     "With 1400 px a sign of 0.9 m comes out at 209 m, three pixels in radius, in any fog from about 175 m on: the"
     " paper's range to 400 m needs a lens such as the second one, or larger signs.",
 )

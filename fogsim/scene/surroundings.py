@@ -15,7 +15,7 @@ T = TypeVar("T")
 REACH = 1700.0
 """What is nearer to a line than this [m] belongs to its surroundings; renderers show little that is farther away."""
 
-_SQUARE = 250.0  # side of the squares by which it is told what is near [m]
+_SQUARE = 250.0  # side of the squares that index what is near [m]
 _ORIGINS = 10_000.0  # origins are multiples of this [m], so that networks near the origin of theirs keep it
 
 

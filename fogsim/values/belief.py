@@ -98,7 +98,7 @@ class Belief:
     profile : FogProfile or None
         Belief about places along the way, from fusions that provide one.
     age : float
-        Time since an estimate or a report last said anything about the fog [s]; ``inf`` if none has.
+        Time since the last estimate or report with information on the fog [s]; ``inf`` if none has.
     """
 
     log_extinction: NDArray[np.float64]

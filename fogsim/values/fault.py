@@ -203,7 +203,7 @@ class Fouled:
 
     sensor: ClassVar[str] = "scatterometer"
     name: ClassVar[str] = "fouled"
-    # What it tells over what it should [-]: below 1 by windows that let less light through, above by what scatters
+    # Reported over correct value [-]: below 1 by windows that let less light through, above by what scatters
     factor: float = 0.5
 
 

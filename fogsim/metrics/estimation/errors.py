@@ -43,7 +43,7 @@ class Errors:
     percent: list[float] = field(default_factory=list)
     covered: int = 0
     _ratios: list[float] = field(default_factory=list)
-    _said: list[tuple[float, float]] = field(default_factory=list)
+    _estimates: list[tuple[float, float]] = field(default_factory=list)
     _truths: list[tuple[float, float]] = field(default_factory=list)
 
     def follow(self, time: float, truth: float, estimate: float | None) -> None:

@@ -100,7 +100,8 @@ def reproduce(
             records += [_record(height, case, method, estimates) for (case, method), estimates in found.items()]
     tables = tuple(
         TitledTable(
-            f"V_met as read [m] (share of drives that tell), camera {height:g} m high", _rows(records, plan, height)
+            f"V_met as read [m] (share of drives with one), camera {height:g} m high",
+            _rows(records, plan, height),
         )
         for height in plan.heights
     )

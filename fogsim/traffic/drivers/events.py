@@ -159,7 +159,7 @@ class Script:
             return Reason.LEFT if event.vehicle in seen else Reason.NEVER_SEEN
 
         missed = [event for event in self._events if event in self._waiting or event in self._without_lane]
-        # What stands for one event of a scenario bears one name, and is told once.
+        # What stands for one event of a scenario has one name, and is listed once.
         names = dict.fromkeys(
             UnplayedEvent(event.trigger.name or f"event of {event.vehicle}", why(event)) for event in missed
         )

@@ -66,7 +66,7 @@ class Roster:
             return
         self._check_mark(often=True)
         self.teleported = self._teleporting()
-        # Lists of changes are of one step only: after a jump of time they do not tell all.
+        # Lists of changes are of one step only: after a jump of time they are incomplete.
         if not 0.0 < now - self.time < 1.5 * self._step:
             self.reload()
             return

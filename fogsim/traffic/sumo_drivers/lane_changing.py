@@ -89,7 +89,7 @@ class StandingLeaders:
         if leader != hidden or gap > STANDING_REACH:
             return False
         lane = self._vehicles.getLaneID(driver)
-        # SUMO tells of each lane of the edge how many lanes away the best one for the route is.
+        # SUMO reports for each lane of the edge how many lanes away the best one for the route is.
         return any(best[0] == lane and best[3] == 0 for best in self._vehicles.getBestLanes(driver))
 
     def restart(self, drivers: Sequence[str], present: set[str]) -> None:

@@ -15,7 +15,7 @@ class EdgeMeasures(Protocol):
     """What actors need to know of an edge: how many lanes it has, its length [m] and its limit [m/s]."""
 
     @property
-    def lanes(self) -> int: ...  # noqa: D102 - told above
+    def lanes(self) -> int: ...  # noqa: D102 - described above
     @property
     def length(self) -> float: ...  # noqa: D102
     @property

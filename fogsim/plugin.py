@@ -141,7 +141,7 @@ def _clocks(step: float, decision_period: float = DECISION_PERIOD) -> list[str]:
 
 
 class AttachedSession:
-    """An ego in somebody else's simulation; see `attach`."""
+    """An ego in a simulation that another program runs; see `attach`."""
 
     def __init__(self, scenario: Scenario, traffic: AttachedTraffic, drivers: bool, seed: int) -> None:
         if scenario.traffic.has_equipped:

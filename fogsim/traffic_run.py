@@ -131,7 +131,7 @@ class TrafficRun:
     def start(self, seed: Seed) -> tuple[TrafficStep, float]:
         """Begin a run, or begin again.
 
-        Returns the first instant, and the highest speed limit where somebody drives [m/s].
+        Returns the first instant, and the highest speed limit of any driven road [m/s].
         """
         self._step = None
         streams = spawn_streams(seed)

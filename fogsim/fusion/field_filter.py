@@ -174,7 +174,7 @@ class FieldFilter:
         self._field.learn(start, end, value, widened, self._outlier_share, floor)
 
     def _hear(self, report: FogReport, time: float, place: float) -> None:
-        """Learn what somebody else has measured."""
+        """Learn what others have measured."""
         age, ahead, known = time - report.time, report.place - place, (report.source, report.number)
         age = 0.0 if -CLOCKS_DISAGREE <= age < 0.0 else age
         numbers = (age, ahead, report.extinction, report.relative_deviation)

@@ -125,7 +125,7 @@ class _Walk:
             key.tag = TEXT
         here = (*at, key.value)
         if here in self._lines:
-            message = f"{dotted(here)}: this key stands twice, first on line {self._lines[here]}"
+            message = f"{dotted(here)}: duplicate key, first on line {self._lines[here]}"
             raise PlainYamlError(message, _line(key))
         self._lines[here] = _line(key)
 

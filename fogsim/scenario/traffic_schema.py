@@ -356,7 +356,7 @@ class Harmonisation(Section):
     """Largest step from one section to the next."""
 
     deceleration_mps2: Deceleration = 1.0
-    """How hard somebody has to brake steadily from the beginning of one section to that of the next, at most."""
+    """Greatest deceleration needed to brake steadily from the beginning of one section to that of the next."""
 
 
 def _shares_of_kinds(value: object) -> object:

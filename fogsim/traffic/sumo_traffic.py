@@ -321,7 +321,7 @@ class SumoTraffic:
 
     @_translates_errors
     def obey(self, command: Command) -> None:
-        """Put a command in force for the next step of a simulation that somebody else steps."""
+        """Put a command in force for the next step of a simulation that another program steps."""
         run = self._running
         self._command = command
         orders = self._play_script(run, command)
@@ -334,7 +334,7 @@ class SumoTraffic:
 
     @_translates_errors
     def look(self) -> None:
-        """Read the last step of a simulation that somebody else steps."""
+        """Read the last step of a simulation that another program steps."""
         self._read_step(self._running)
 
     def _play_script(self, run: _Run, command: Command) -> dict[str, Order]:

@@ -209,5 +209,5 @@ THINNEST = 1e-6
 
 
 def certain_belief(extinction: float) -> Belief:
-    """Belief of somebody who knows the fog, as a visibility meter next to the road does (`extinction` [1/m])."""
+    """Belief of an observer who knows the fog, as a visibility meter next to the road does (`extinction` [1/m])."""
     return Belief(np.log([max(extinction, THINNEST)]), np.ones(1))

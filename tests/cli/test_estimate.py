@@ -206,7 +206,7 @@ def test_a_guessed_camera_is_written_and_good_to_use(estimate, folder: Path) -> 
         (("drive", "--camera", "camera.yaml", "--json", "--csv"), "give one of them"),
         (("drive", "--camera", "camera.yaml", "--stills", "--plot", "v.png"), "--plot draws over time"),
         (("drive", "--camera", "camera.yaml", "--plot", "v.bmp"), "--plot must end in .png, .svg or .pdf"),
-        (("drive", "--camera", "camera.yaml", "--guess-camera", "--mount-height", "1.4"), "is there already"),
+        (("drive", "--camera", "camera.yaml", "--guess-camera", "--mount-height", "1.4"), "already exists"),
         (("drive", "--camera", "camera.yaml", "--overlay", "a.avi"), "ends in .mp4"),
         (("drive", "--camera", "camera.yaml", "--rate", "-1"), "--rate"),
         (("drive", "--camera", "aside.yaml"), "aside.yaml:8: yaw_deg must lie within -29.0 … 28.9"),

@@ -79,7 +79,7 @@ def test_mistakes_of_conditions_and_names() -> None:
     assert "timeline.0.when: happened(timeline.7): unknown event 'timeline.7'" in unknown
     assert "timeline.0.when: this key is missing" in mistake(f"{{{brake}}}")
     two = f"{{name: a, when: time > 1 s, {brake}}}, {{name: a, when: time > 1 s, {brake}}}"
-    assert "timeline.1.name: names of entries must differ, and 'a' stands there twice" in mistake(two)
+    assert "timeline.1.name: names of entries must differ, but 'a' occurs twice" in mistake(two)
 
 
 @pytest.mark.parametrize(

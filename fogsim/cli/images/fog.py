@@ -65,7 +65,7 @@ def fog_command(
     layer_height: Annotated[
         float | None, typer.Option(min=0.001, max=1e6, help="For --ground-albedo: metres of fog; else 250.")
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it is there already.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
 ) -> None:
     """Put homogeneous fog on an image or video from disk: Koschmieder's law on light and slant range."""
     light = None if airlight is None else pixel_values(airlight)

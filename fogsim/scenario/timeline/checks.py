@@ -63,7 +63,7 @@ def _mistakes(scenario: "Scenario") -> Iterator[tuple[KeyPath, str]]:
     content = run_content(scenario) if scenario.timeline else None
     for number, entry in enumerate(scenario.timeline):
         if names[number] in names[:number]:
-            yield (number, "name"), f"names of entries must differ, and {names[number]!r} stands there twice"
+            yield (number, "name"), f"names of entries must differ, but {names[number]!r} occurs twice"
         if content is not None:
             yield from (((number, "when"), mistake) for mistake in condition_mistakes(entry.when, content))
         if not scenario.traffic.has_ego and EGO in vehicles_of(entry):

@@ -7,9 +7,9 @@ kind of drive and fusion:
 ``ahead``    error of the median visibility, |V_believed − V_true| / V_true, against the mean extinction from the camera
              to where 95 % of the light is lost, and how often the 90 % interval held it, where that visibility is
              below 1 km
-``here``     the same of the fog at the vehicle's own place, by fusions that tell of places
+``here`` the same of the fog at the vehicle's own place, by fusions that estimate places
 ``entered``  ``ahead`` in the 5 s after the ego has come 60 m into a bank (median)
-``at D m``   error (median) and share held of the visibility at a place D m ahead, too, by fusions that tell
+``at D m``   error (median) and share held of the visibility at a place D m ahead, too, by fusions that give it
 
 ``reported`` gives the field filter what a vehicle 300 m ahead measures (deviation 10 %, every second, a second late).
 Constants were chosen on pool 0 (other seeds, banks and cameras); pool 1 is what is reported.

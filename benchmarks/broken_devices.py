@@ -1,4 +1,4 @@
-"""Whether the scenarios' expectations bite: devices that are broken on purpose, each of which a scenario must catch.
+"""Whether the scenarios' expectations find faults: devices broken on purpose, which a scenario must each catch.
 
 Each broken device takes the place of the sound one in the shipped scenarios that expect something, the shortest first,
 until one fails. The sound device comes first, and must pass them all. The exit code is 1 if it does not, or if a broken
@@ -90,7 +90,7 @@ def changed(change: Callable[[Estimate], Estimate]) -> Update:
 
 @dataclass
 class NeverWidens:
-    """A fusion whose belief stays as it is where estimators cannot tell."""
+    """A fusion whose belief stays constant while estimates are invalid."""
 
     sound: Any
     last: Belief | None = None

@@ -1,7 +1,7 @@
 """Time of a first run, which compiles its kernels, and of a second one, which finds them on the disk.
 
 Each is a `fogsim run` of one simulated second in a process of its own, the first with an empty folder for what is
-compiled. Processor time says more than wall time on a machine that does other work too; both are told, with the
+compiled. Processor time says more than wall time on a machine that does other work too; both are printed, with the
 machine's load when the run began, and how many kernels the first run kept.
 
 It measures the FogSim of the Python that runs it: away from the checkout, that of an environment with a wheel.

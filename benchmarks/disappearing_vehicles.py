@@ -1,7 +1,7 @@
-"""What `gabb2014` tells of fog by vehicles that disappear in it, and that come out of it.
+"""Fog measured by `gabb2014` on vehicles that disappear in it, and that come out of it.
 
 On a straight road a vehicle drives away from 12 m to 199.5 m, or comes near from there: a picture every 2.5 m, half a
-second apart, with a sway of 0.07°, a told pitch off by 0.1° (deviation over drives) and a range with 0.25 m of noise.
+second apart, with a sway of 0.07°, a stated pitch off by 0.1° (deviation over drives) and a range with 0.25 m of noise.
 Each range is drawn once for a camera and a vehicle and fogged with each visibility; the airlight has 120, 200 or 255
 levels. For each visibility:
 

@@ -3,10 +3,10 @@
 Instants of the motorway scenario in running traffic are drawn again under four cameras (three focal lengths and more,
 mount heights, resolutions), with lane marks or without, and with a vehicle ahead in the own lane (12 to 80 m, of the
 traffic's kinds) or none. Each picture is fogged with a visibility drawn evenly in ln V from 25 to 1500 m, or none, and
-exposed such that the airlight has 120, 200 or 255 levels of light. The told pitch is off by a normal error that the
-estimators are not told.
+exposed such that the airlight has 120, 200 or 255 levels of light. The stated pitch is off by a normal error that
+the estimators do not know.
 
-`lead`: "absent", no vehicle in the own lane; "told", one is there and its range is measured; "untold", the same picture
+`lead`: `absent`, no vehicle in the own lane; `told`, one with a measured range is there; `untold`, the same picture
 without the range. Errors are |V_est − V| / V of estimates that are valid and see fog. `coverage` is the share of 90 %
 intervals of k that hold the truth, of valid ones. `class_share` is the share of the valid ones in the right of
 zhu2015's four classes, `class_off_edge_share` that of frames whose visibility is more than 5 % from an edge (100, 300,

@@ -124,7 +124,7 @@ def tables(all_records: list[Row]) -> str:
     errors, sureness = cell_of("median_pct", "p95_pct"), cell_of("valid_share", "coverage")
     low, high = MIDDLE
     parts = (
-        "Error of V_met, median / 95th percentile [%], by V_met [m]; n frames, of which the valid ones count:",
+        "Error of V_met, median / 95th percentile [%], by V_met [m]; n frames; only valid ones count:",
         crossed([one for one in own["visibility"] if one["visibility"] != "inf"], "visibility", errors),
         "Valid share / coverage of the 90 % intervals:",
         crossed(own["visibility"], "visibility", sureness),

@@ -1,7 +1,7 @@
 """Every target of the daytime estimators, and how far it is met, on pictures that FogSim's renderer did not make.
 
 A flat road of blocky texture (3 % albedo patches) with lane marks is drawn for one of four cameras (320×240 to 800×400,
-focal lengths of 288 to 1400 px, linear, gamma and sRGB) whose pitch is off the told one by a normal error of 0.1°, at
+focal lengths of 288 to 1400 px, linear, gamma and sRGB) whose stated pitch is off by a normal error of 0.1°, at
 an airlight of 120, 200 or 255 levels; so is the same road with albedo that drifts by ±15 % within 40 m, with a vehicle
 at 25 m, dark or bright, and with a verge. Each drawing is fogged with visibilities from 30 to 1000 m. Behind a
 windscreen another renderer draws scenes at random (bends, yaw, woods, vehicles, bonnet, wiper, compression, up to 6 %

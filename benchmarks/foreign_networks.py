@@ -143,7 +143,7 @@ def trips(
     """Write traffic from anywhere to anywhere, and a person on foot for three vehicles; SUMO looks for the ways."""
     rng, root = np.random.default_rng(1), _root(net)
     usable, ring = _edges(root)
-    rows = [f'<vType id="{name}" {told}/>' for name, told in TYPES.items()]
+    rows = [f'<vType id="{name}" {attributes}/>' for name, attributes in TYPES.items()]
     users = [user for user in ROAD_USERS if usable[user]]
     for number, user in zip(range(int(per_hour * seconds / 3600.0)), itertools.cycle(users), strict=False):
         depart, edges = number * 3600.0 / per_hour, usable[user]
@@ -169,7 +169,7 @@ def _root(net: Path) -> ET.Element:
 def _edges(root: ET.Element) -> tuple[dict[str, list[str]], list[str]]:
     """Edges on which each type may drive, and those of the first roundabout."""
     usable: dict[str, list[str]] = {name: [] for name in TYPES}
-    classes = {name: told.split('"')[1] for name, told in TYPES.items()}
+    classes = {name: attributes.split('"')[1] for name, attributes in TYPES.items()}
     for edge in root.iterfind("edge"):
         if edge.get("function"):
             continue
@@ -261,7 +261,7 @@ def large_town(folder: Path, size: Size) -> Path:
 
 
 def _trips(rng: np.random.Generator, edges: Sequence[str], areas: Sequence[str], size: Size) -> list[str]:
-    """Vehicles in the order of their departures: one that stays, taxis, and the others, of which some park."""
+    """Vehicles in the order of their departures: one that stays, taxis, and the others; some of these park."""
     some = rng.choice(edges, _TOUR + 2)
     rows = [
         _TRIP.format(

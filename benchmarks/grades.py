@@ -2,7 +2,7 @@
 
 Grades are those of a drive through ``graded_motorway``: a frame counts to a grade if the road keeps it for the next
 150 m, else to a sag or a crest; where it ends within V_met (at least 250 m), grass lies behind it, and the frame counts
-as of the end. Bends of 400 and 800 m to either side are drawn by a renderer that is not FogSim's
+with the end. Bends of 400 and 800 m to either side are drawn by a renderer that is not FogSim's
 (`tests/pictures/flat_road.py`), level and in a sag, for four cameras whose pitch is off by 0.1°. For each visibility,
 kind of road and method: frames, share of valid ones, median of the error of V_met [%] with its sign, median and 95th
 percentile of its amount, and how often the 90 % interval held the truth. ``belief`` is what the grid filter makes of

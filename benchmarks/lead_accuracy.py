@@ -2,7 +2,7 @@
 
 On a straight road a vehicle drives away from 25 to 90 m; frames are taken every 2.5 m. Each range is drawn once for a
 camera and a vehicle, with the own vehicle's pitch swaying and the vehicle ahead weaving a little, then fogged with each
-visibility and exposed such that the airlight has 120, 200 or 255 levels. The estimators are told the camera without the
+visibility and exposed such that the airlight has 120, 200 or 255 levels. The estimators get the camera without the
 sway and with a pitch that is off by an error of the whole sequence, the camera's place behind the bumper, and the
 radar's noisy range. An error is |V_est − V| / V after the last
 frame, of estimates that are valid and see fog; `bias_pct` is the median of (V_est − V) / V, `coverage` the share of

@@ -13,7 +13,7 @@ own step, where nothing is left out between two steps that are measured. Times a
     python benchmarks/metrics.py [--json] [--network town] [--vehicles 100 …] [--seconds 200] [--block 80]
         [--profiles] [--profile]
 
-``--profile`` tells where the metrics' time goes, by metric.
+``--profile`` shows where the metrics' time goes, by metric.
 """
 
 import itertools

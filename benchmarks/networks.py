@@ -132,7 +132,7 @@ def run_in_fog(config: Path, task: Task, ego: str, visibility: float) -> Countin
 
 
 def digest(path: Path) -> str:
-    """Hash of a file of floating car data, without the comment that tells when it was written; the file is removed."""
+    """Hash of a file of floating car data, without the comment on when it was written; the file is removed."""
     with path.open("rb") as file:
         rows = itertools.dropwhile(lambda row: b"<fcd-export" not in row, file)
         total = hashlib.sha256()

@@ -1,4 +1,4 @@
-"""Fog by the halos about lamps of others, told from clear nights.
+"""Fog by the halos about lamps of others, distinguished from clear nights.
 
 For docs/explanation/night.md: a threshold is calibrated on one pool of scenes and fog counted on another, also at
 exposures and strengths of lamps that the calibration did not see. Constants were chosen on ``--pool 1`` and 2; what is

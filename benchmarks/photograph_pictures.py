@@ -48,7 +48,7 @@ OVER = 2  # rays across a pixel
 
 @dataclass(frozen=True)
 class Photograph:
-    """A clear photograph: pixels (red first), the camera that took it, the one that is told, and whether by sun."""
+    """A clear photograph: pixels (red first), the camera that took it, the stated one, and whether by sun."""
 
     image: Image
     taken_by: Camera

@@ -4,7 +4,7 @@ Photographs of clear air are drawn (`photograph_pictures.py`): asphalt that brig
 times (CIE's standard surfaces: 1.35 to 2.1 at 1°), tyre tracks, joints, repairs, stains, sun and shade, verge and
 woods, taken through a tone curve of gamma 1.8 to 2.6 with an s-curve on it, gains that differ by channel, noise and
 JPEG of quality 60 to 95. Even fog is laid on them by the functions of `fogsim fog --road-plane` with the camera that
-took them; methods are told a pitch that is off by 0.1° (standard deviation) and a response of sRGB, as users do.
+took them; methods get a pitch that is off by 0.1° (standard deviation) and a response of sRGB, as users do.
 Constants are to be chosen on pool 0; pool 1, other roads and other cameras, is what is reported.
 
 Errors are |V_est − V| / V of valid estimates in %; an infinite estimate is an error of 999 %. `bias` is the median of
@@ -14,8 +14,8 @@ an estimate.
     python benchmarks/photograph_roads.py [--json] [--docs] [--pool 1] [--images 60] [--methods joint_road …]
         [--laid-on light] [--show FOLDER]
 
-With `--laid-on light` the fog is laid on the light, and the photograph is taken of the foggy road: the tone curve, of
-which methods are told that it is sRGB, then bends the fog as well. `--show FOLDER` writes the first pictures, clear and
+With `--laid-on light` the fog is laid on the light, and the photograph is taken of the foggy road: the tone curve,
+which methods assume to be sRGB, then bends the fog as well. `--show FOLDER` writes the first pictures, clear and
 in fog of 150 m, to be looked at.
 """
 

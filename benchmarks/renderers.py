@@ -3,8 +3,8 @@
 Each backend runs in a process of its own. First renderers are made, draw a frame at each of two sizes and are closed;
 then frames are taken through traffic as the closed loop does, each fiftieth at another size by another renderer. The
 first quarter of either is not counted (libraries load, shaders compile, the allocator's pools fill). Growth is that of
-the resident set, and of what the C library's allocator has handed out and not got back (glibc only), which tells a leak
-from scattered free memory.
+the resident set, and of what the C library's allocator has handed out and not got back (glibc only), to separate
+a leak from scattered free memory.
 
     python benchmarks/renderers.py [--json] [--renderers 200] [--frames 10000] [--renderer cpu ...]
 """

@@ -7,7 +7,7 @@ draws, another road and traffic each time, and ``advisory-v1``, ``fast-v1``, ``d
 environments.
 The first quarter of the resets is not counted (libraries load, caches fill, the allocator's pools settle). Growth is
 that of the resident set, and of what the C library's allocator has handed out and not got back (glibc only), which
-tells a leak from scattered free memory.
+separates a leak from scattered free memory.
 
     python benchmarks/resets.py [--json] [--resets 200] [--size 64x48] [--part environment …]
 
@@ -121,7 +121,7 @@ def resident_kib() -> float:
 
 
 def heap_kib() -> float | None:
-    """What the C library's allocator has handed out [KiB]; None where it does not tell."""
+    """What the C library's allocator has handed out [KiB]; None where it does not report that."""
     mallinfo = getattr(ctypes.CDLL(None), "mallinfo2", None)
     if mallinfo is None:
         return None

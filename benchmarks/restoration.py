@@ -78,7 +78,7 @@ def camera(pool: int, width: int, height: int, field_of_view: float | None = Non
 
 
 def restorers(seen_by: Camera, visibility: float, estimator: Estimator) -> dict[str, Restore]:
-    """The methods, each of which makes a picture of a foggy one."""
+    """The methods; each makes a picture of a foggy one."""
     k = extinction_from_visibility(visibility)
 
     def estimated(image: Pixels) -> Pixels:

@@ -152,7 +152,7 @@ def _regions(part: Image) -> NDArray[np.float64]:
 
 
 def _judged(found: NDArray[np.float64], camera: Camera, box: tuple[float, float, float, float]) -> Found:
-    """Tell the vehicle from other things on the road that are as large as one would be there."""
+    """Separate the vehicle from other things on the road that are as large as one would be there."""
     left, top, right, bottom = box
     wide, high = right - left, bottom - top
     middle = 0.5 * (found[:, :2] + found[:, 2:])

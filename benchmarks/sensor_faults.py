@@ -48,7 +48,7 @@ FAULTS = {
     "radar noise × 10": "fault: noise",
 }
 UNSURE = {"pitch + 2°, told as unsure"}
-"""Where methods are told that the pitch is not known well, by `pitch_deviation` [rad], as far as they have that."""
+"""Methods with the `pitch_deviation` [rad] of a pitch that is not known well, as far as they have that parameter."""
 
 UNSURE_PITCH = 0.01
 METHODS = ("joint_road", "negru2013", "zhu2015", "huang2015_rough", "huang2015_lead", "lead_contrast")

@@ -67,7 +67,7 @@ def sighted(shot: Shot, rng: np.random.Generator) -> SignSighting:
 
 
 def looked(shot: Shot, rng: np.random.Generator, *, standing: bool = True) -> Look:
-    """Look for a sign where the map and a camera that is told a wrong pitch have it."""
+    """Look for a sign where the map and a camera with a wrong stated pitch have it."""
     told = replace(shot.camera, pitch=shot.camera.pitch + rng.normal(0.0, math.radians(0.1)))
     signs = project_sightings([sighted(shot, rng)], told, SETBACK)
     found = detect_signs(shot.image, [sign.region for sign in signs])

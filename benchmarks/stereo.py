@@ -1,10 +1,10 @@
-"""What two cameras tell of the fog: error, intervals, and what they cost.
+"""Fog by two cameras: error, intervals, and cost.
 
 Drives on straight and graded motorways and in a city, in traffic, in fog from 50 to 600 m. Of the rig: a baseline of
-0.5 m (pool 1: 0.4 m) whose calibration is 1 % wrong, and of which the relative yaw and pitch are wrong by 0.005 and
+0.5 m (pool 1: 0.4 m) whose calibration is 1 % wrong, and whose relative yaw and pitch are wrong by 0.005 and
 0.02 degrees. For each visibility:
 
-``valid``      share of pictures of which the method tells an extinction; of the others, how often its bound holds
+``valid`` share of pictures with an extinction; of the others, how often its bound holds
 ``error``      |V_told − V_true| / V_true, median and 95th percentile, and how often the 90 % interval held the truth
 ``published``  the same of the farthest thing of 5 % contrast, as published
 ``joint``      the same of `joint_road`, by the first of the two cameras
@@ -115,8 +115,8 @@ def record(visibility: float, name: str, one: Found, pool: int) -> Row:
 def cell(row: Row) -> str:
     """What a method makes of one visibility, in a cell of the table."""
     if "median_pct" not in row:
-        return "says nothing"
-    silent = f", tells {row['valid']:.2f}" if row["valid"] < 1.0 else ""
+        return "no estimate"
+    silent = f", valid {row['valid']:.2f}" if row["valid"] < 1.0 else ""
     return f"{row['median_pct']:.0f} / {row['p95_pct']:.0f} ({row['coverage']:.2f}){silent}"
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from harness import Row, lines_of, mean, quantile
 
 FEWEST = 3
-"""Fewest estimates of which a group is called the worst."""
+"""Fewest estimates that make a group eligible as the worst."""
 
 
 @dataclass(frozen=True, slots=True)

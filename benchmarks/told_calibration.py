@@ -2,7 +2,7 @@
 
 Instants of the motorway scenario are drawn with an empty own lane under four cameras, with lane marks and without, and
 fogged with one visibility (see `estimator_scenes.py`). Each is read twice by a fresh estimator: as it is, and with the
-camera's pitch told 0.1° too high or too low, its focal length told 10 % too long, or its mount 10 % too high.
+camera's pitch stated 0.1° too high or too low, its focal length stated 10 % too long, or its mount 10 % too high.
 ``median_pct`` is the median of the change of V_met, ``median_size_pct`` and ``p95_size_pct`` the median and the 95th
 percentile of its size [%]; ``valid_share`` the share of pictures in which both readings are valid.
 
@@ -29,7 +29,7 @@ TENTH = 1.1
 
 
 def wrong(true: Camera) -> Iterator[tuple[str, Camera]]:
-    """Cameras as they could be told, by what is wrong with them."""
+    """Cameras with wrong calibrations, by what is wrong with them."""
     for sign in (-1.0, 1.0):
         yield "pitch 0.1°", dataclasses.replace(true, pitch=true.pitch + sign * PITCH)
     yield "focal length +10 %", dataclasses.replace(true, focal_length=TENTH * true.focal_length)
@@ -37,7 +37,7 @@ def wrong(true: Camera) -> Iterator[tuple[str, Camera]]:
 
 
 def visibility(method: str, told: Camera, seen: Observation) -> float:
-    """What a fresh estimator says [m]; nan where it cannot tell."""
+    """Visibility from a fresh estimator [m]; nan where it gives none."""
     found = make(method, told).update(seen)
     return found.visibility if found.valid else math.nan
 

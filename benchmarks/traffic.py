@@ -17,7 +17,7 @@ netgenerate and netconvert (eclipse-sumo); without them only the motorway is mea
     python benchmarks/traffic.py [--json] [--network town] [--vehicles 20 --vehicles 100 …] [--seconds 10] [--blind]
         [--visibility 100] [--profile]
 
-``--blind`` leaves perception and speed choice out; ``--profile`` tells where the time of the whole steps goes.
+``--blind`` leaves perception and speed choice out; ``--profile`` shows where the time of the whole steps goes.
 """
 
 import cProfile

@@ -4,11 +4,11 @@ Drives through every kind of fog that a scenario can have, with traffic: even, b
 of 30 … 300 m (strength 0.6), ground fog, a scale height, fog that thickens, wind, airlight dimmed by the fog overhead.
 An estimate is held against the mean extinction along the road from the camera to where 95 % of the light is lost, or
 as far as the estimate speaks (`Estimate.reach`). Errors are |V_est − V| / V of valid estimates in %; `coverage` is the
-share of 90 % intervals of k that hold the truth, `here` the same for τ(d) at all distances that a method tells.
+share of 90 % intervals of k that hold the truth, `here` the same for τ(d) at all distances that a method gives.
 
 `announced_m`: way before the point of half density at which denser fog was believed (`Belief.denser`), and stayed so to
 150 m before it, where the fog of the widest edge begins; 0 if it was not believed there.
-The drives in clear air (V_met 2000 m and more; `--clear` minutes of them) count announcements, each of which is false.
+The drives in clear air (V_met 2000 m and more; `--clear` minutes of them) count announcements; each is false.
 
 Constants were chosen on pool 0 (other seeds, visibilities and camera); pool 1 is what is reported.
 

@@ -1,4 +1,4 @@
-"""What MkDocs is told next to mkdocs.yml: pages that stand elsewhere in the checkout, and links that lead to them.
+"""MkDocs settings beyond mkdocs.yml: pages from elsewhere in the checkout, and links that lead to them.
 
 Scenarios' own pages, notebooks, the changelog and the command line's reference are pages of the site without being
 files of docs/, so that no text is there twice. Links are written as they hold in the checkout, and are led to them.

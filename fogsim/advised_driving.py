@@ -52,7 +52,7 @@ def warned(command: Command, step: Step, previous: Command) -> Command:
 
 
 def _questions_to(adviser: Adviser | VehicleAdviser) -> Callable[[Step, Belief, SpeedAdvice], SpeedAdvice]:
-    """A function that asks an adviser what it says after a step, by what is known of the fog, after what it said."""
+    """A function that gets an adviser's next advice after a step, from what is known of the fog and the last advice."""
     if isinstance(adviser, VehicleAdviser):
         return lambda step, known, previous: adviser.advise_vehicle(
             known, step.observation, step.speed_limit, step.time, previous
@@ -84,6 +84,6 @@ def spread_advice(command: Command, scenario: Scenario, sections: Sequence[RoadS
         return dataclasses.replace(command, advice_reach=scenario.traffic.reading_radius_m)
     if scenario.drivers.advised in DISPLAYS:
         stretches, speeds = [section.stretch for section in sections], [command.advice.speed] * len(sections)
-        told = stretch_advices(stretches, speeds, DISPLAYS[scenario.drivers.advised])
-        return dataclasses.replace(command, stretches=told)
+        advices = stretch_advices(stretches, speeds, DISPLAYS[scenario.drivers.advised])
+        return dataclasses.replace(command, stretches=advices)
     return dataclasses.replace(command, stretches=(stretch_advice(scenario, command.advice.speed),))

@@ -37,7 +37,7 @@ class MethodError(FogSimError, RuntimeError):
 
 
 class RenamedWarning(FutureWarning):
-    """A value is called otherwise now and works by its old name; the message tells the new one."""
+    """A value has a new name; the old one still works. The message gives the new name."""
 
 
 class UnplayedWarning(UserWarning):

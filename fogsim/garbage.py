@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 @contextlib.contextmanager
 def no_garbage_collection() -> Iterator[None]:
-    """Pause garbage collection, for work that makes much of which nothing becomes garbage in circles."""
+    """Pause garbage collection, for work that creates many objects but hardly any cyclic garbage."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:

@@ -54,46 +54,46 @@ _NEWS_PERIOD = 10.0
 
 
 class Announcement(event.Listener):  # type: ignore[misc] # numba is untyped
-    """Tells the user that the time goes into compiling, and that it will not the next time; then how far it has come.
+    """Explains to the user that the time goes into compiling, at the first run only; then shows the progress.
 
     Takes `clock` [s].
     """
 
-    def __init__(self, tell: Callable[[str], object], clock: Callable[[], float] = time.monotonic) -> None:
-        self._tell, self._clock = tell, clock
+    def __init__(self, print_line: Callable[[str], object], clock: Callable[[], float] = time.monotonic) -> None:
+        self._print, self._clock = print_line, clock
         self._depth = self._compiled = 0
         self._spent = self._started = 0.0
-        self._told: float | None = None
+        self._printed: float | None = None
 
     def on_start(self, _: Any) -> None:
         """Begin to count at the outermost kernel; those that it calls are compiled within it."""
         if self._depth == 0:
             self._started = self._clock()
-            if self._told is None and self._spent > _PATIENCE:
-                self._told = self._started
+            if self._printed is None and self._spent > _PATIENCE:
+                self._printed = self._started
                 why = why_not_taken()
-                self._tell(
+                self._print(
                     "fogsim: compiling for this processor, a minute or two, the first time only "
                     f"(ahead of time and on all cores: fogsim compile{f'; {why}' if why else ''})"
                 )
         self._depth += 1
 
     def on_end(self, compiling: Any) -> None:
-        """Count what was compiled, and tell now and then."""
+        """Count a compiled kernel, and report the count now and then."""
         self._depth -= 1
         if self._depth == 0 and compiling.data["dispatcher"].py_func.__module__.startswith(f"{__package__}."):
             now = self._clock()
             self._compiled += 1
             self._spent += now - self._started
-            if self._told is not None and now - self._told > _NEWS_PERIOD:
-                self._told = now
-                self._tell(f"fogsim: compiled {self._compiled} functions in {self._spent:.0f} s")
+            if self._printed is not None and now - self._printed > _NEWS_PERIOD:
+                self._printed = now
+                self._print(f"fogsim: compiled {self._compiled} functions in {self._spent:.0f} s")
 
 
 class CompileSpeedup(event.Listener):  # type: ignore[misc] # numba is untyped
     """Leaves out what costs time while one of FogSim's kernels is compiled, with all that it calls.
 
-    That is the search for garbage, of which compiling makes little among millions of objects, and what numba is spared
+    It pauses garbage collection, which finds little among millions of objects, and skips what numba is spared
     by `fogsim.compiling`.
     """
 
@@ -302,7 +302,7 @@ class Bands:
 def processors() -> int:
     """Number of processors that this process may use: one where it is a worker, next to others that draw too.
 
-    Ray tells its workers by ``OMP_NUM_THREADS``, as does whoever else shares a machine out.
+    Ray sets ``OMP_NUM_THREADS`` for its workers, and so do others that share out a machine.
     """
     if multiprocessing.parent_process() is not None or os.environ.get("OMP_NUM_THREADS") == "1":
         return 1

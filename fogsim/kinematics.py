@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fogsim.units import GRAVITY
 
 REACTION_TIME, DECELERATION = 2.5, 3.4
-"""Design values of the stopping sight distance [s], [m/s²] (AASHTO Green Book), where nothing else is said."""
+"""Default design values of the stopping sight distance [s], [m/s²] (AASHTO Green Book)."""
 
 _Quantity = TypeVar("_Quantity", float, NDArray[np.float64])
 

@@ -110,7 +110,7 @@ class DriversFog:
 
     @property
     def is_entered(self) -> bool:
-        """Whether the traffic has been told of the fog."""
+        """Whether the traffic has the fog."""
         return self._fog is not None
 
     def matches(self, fog: FogField) -> bool:
@@ -124,7 +124,7 @@ class DriversFog:
         return self._field == fog or (self._field is None and fog.extinction == 0 and not fog.banks)
 
     def enter(self, fog: FogField, traffic: EntersFog) -> None:
-        """Tell a traffic of the fog, whose place is known only when the ego's route is.
+        """Pass the fog to a traffic; its place is known only when the ego's route is.
 
         Parameters
         ----------
@@ -183,9 +183,9 @@ class ClosedLoop:
     traffic : Traffic or None
         The traffic simulation; None for SUMO in this process, as the scenario describes it.
     sumo_outputs : Path or None
-        As of `run`.
+        See `run`.
     camera_processes : int
-        As of `run`.
+        See `run`.
 
     Raises
     ------
@@ -315,7 +315,7 @@ class ClosedLoop:
         return self._timeline.begun(due, refused)
 
     def surrounding(self) -> Surrounding:
-        """Tell what is around the ego's camera now: scene, vehicles, camera and lamps.
+        """Describe the surroundings of the ego's camera now: scene, vehicles, camera and lamps.
 
         Raises
         ------

@@ -141,7 +141,7 @@ def _clocks(step: float, decision_period: float = DECISION_PERIOD) -> list[str]:
 
 
 class AttachedSession:
-    """An ego in somebody else's simulation; see `attach`."""
+    """An ego in a simulation that another program runs; see `attach`."""
 
     def __init__(self, scenario: Scenario, traffic: AttachedTraffic, drivers: bool, seed: int) -> None:
         if scenario.traffic.has_equipped:
@@ -205,7 +205,7 @@ class AttachedSession:
         began, last = (now, now) if self._times is None else self._times
         if now < last:
             raise SimulationError(
-                f"the simulation's time went back from {last:g} s to {now:g} s: attach again after loading it anew"
+                f"the simulation's time went back from {last:g} s to {now:g} s: attach again after reloading it"
             )
         self._times = (began, now)
         return clock_time(now - began)
@@ -241,10 +241,10 @@ class AttachedSession:
         Every vehicle gets back what was changed about it: top speed, time headway, lane-change mode, the ego's own
         speed, and sight of its leader.
         """
-        tells = self._reports_unplayed and self._started and not self._closed
+        is_reporting = self._reports_unplayed and self._started and not self._closed
         self._end()
-        unplayed = self._traffic.unplayed() if tells else NOTHING_UNPLAYED
-        if tells and self._last is not None:
+        unplayed = self._traffic.unplayed() if is_reporting else NOTHING_UNPLAYED
+        if is_reporting and self._last is not None:
             unplayed += self._timeline.unplayed(self._last)
         if unplayed:
             warnings.warn(f"{self._name}: not played: {unplayed}", UnplayedWarning, stacklevel=2)

@@ -18,9 +18,9 @@ class RoadAdvice:
     """What the sections of the ego's route are advised in one run; it remembers what each was advised last.
 
     Informed by the truth, each section goes by the visibility meter on it and the speed limit of its own road, and the
-    ego hears what others hear there. Informed by sensors, each goes by what the nearest one has reported last,
-    and one of which nothing is known has no advice. Informed by the ego's belief, the ego goes by its own advice, and
-    tells it to the section on which it is; a section that it has left keeps what it told last, and one that it has not
+    ego hears what others hear there. Informed by sensors, each goes by the latest report of the nearest one, and a
+    section without any report has no advice. Informed by the ego's belief, the ego goes by its own advice and
+    passes it to the section on which it is; a section that it has left keeps the last one, and one that it has not
     reached knows nothing.
     """
 
@@ -30,20 +30,20 @@ class RoadAdvice:
         self._display = DISPLAYS[scenario.drivers.advised]
         self._harmonisation = scenario.drivers.harmonisation
         self._read_before = scenario.drivers.signs.reading_distance_m if self._display == Display.MESSAGE_SIGN else 0.0
-        self._told: dict[Stretch, SpeedAdvice] = {}
+        self._advised: dict[Stretch, SpeedAdvice] = {}
         self._egos = SpeedAdvice()
         self._read: tuple[Stretch, float] | None = None
 
     def advise(self, step: Step) -> tuple[SpeedAdvice, tuple[StretchAdvice, ...]]:
         """Advice to the ego, and to all on the sections that have any."""
         if step.index == 0:
-            self._told, self._egos, self._read = {}, SpeedAdvice(), None
+            self._advised, self._egos, self._read = {}, SpeedAdvice(), None
         sections = tuple(section.stretch for section in step.truth.sections)
         here = next((s for s in sections if s.start <= step.route_position < s.end), None)
         if self._advice.informed_by == "belief":
             self._egos = self._ask(step, step.speed_limit, step.belief, self._egos)
             if here is not None:
-                self._told[here] = self._egos
+                self._advised[here] = self._egos
         else:
             self._ask_meters(step)
         shown = self._shown(step)
@@ -55,7 +55,7 @@ class RoadAdvice:
     def advise_traffic(self, step: TrafficStep) -> tuple[StretchAdvice, ...]:
         """Advice to all on the sections that have any, by the meters, where there is no ego."""
         if step.index == 0:
-            self._told = {}
+            self._advised = {}
         self._ask_meters(step)
         sections = tuple(section.stretch for section in step.truth.sections)
         return self._advices(sections, self._shown(step))
@@ -70,18 +70,18 @@ class RoadAdvice:
 
     def _ask_meters(self, step: TrafficStep) -> None:
         for section in step.truth.sections:
-            previous = self._told.get(section.stretch, SpeedAdvice())
+            previous = self._advised.get(section.stretch, SpeedAdvice())
             measured = section.reported if self._advice.informed_by == "sensors" else section.extinction
             if measured is not None:
                 known = certain_belief(measured)
-                self._told[section.stretch] = self._ask(step, section.speed_limit, known, previous)
+                self._advised[section.stretch] = self._ask(step, section.speed_limit, known, previous)
 
     def _ask(self, step: TrafficStep, limit: float, known: Belief, previous: SpeedAdvice) -> SpeedAdvice:
         return checked_advice(self._advice.method, self._adviser.advise(known, limit, step.time, previous))
 
     def _shown(self, step: TrafficStep) -> tuple[float, ...]:
         sections, steps = step.truth.sections, self._harmonisation
-        speeds = tuple(self._told.get(section.stretch, SpeedAdvice()).speed for section in sections)
+        speeds = tuple(self._advised.get(section.stretch, SpeedAdvice()).speed for section in sections)
         if steps is None:
             return speeds
         starts, limits = [s.stretch.start for s in sections], [s.speed_limit for s in sections]
@@ -105,12 +105,12 @@ def stretch_advices(
     sections: Sequence[Stretch], speeds: Sequence[float], display: Display
 ) -> tuple[StretchAdvice, ...]:
     """Advice to all on sections of road, as far as there is any (`speeds` [m/s])."""
-    told: list[StretchAdvice] = []
+    advices: list[StretchAdvice] = []
     for section, speed in zip(sections, speeds, strict=True):
-        last = told[-1] if told else None
+        last = advices[-1] if advices else None
         if last and display != Display.MESSAGE_SIGN and (last.speed, last.stretch.end) == (speed, section.start):
-            # What is heard anywhere needs no end where the next section is told the same.
-            told[-1] = StretchAdvice(speed, Stretch(last.stretch.start, section.end), display)
+            # Advice that is heard anywhere continues where the next section has the same.
+            advices[-1] = StretchAdvice(speed, Stretch(last.stretch.start, section.end), display)
         elif speed < math.inf:
-            told.append(StretchAdvice(speed, section, display))
-    return tuple(told)
+            advices.append(StretchAdvice(speed, section, display))
+    return tuple(advices)

@@ -1,6 +1,6 @@
 """Scenario files by Python: the blocks as typed classes, conditions by operators, and the YAML that they stand for.
 
-What a file can say is said here by the same keys: ``Fog(visibility_m=80)`` is ``fog: {visibility_m: 80}``.
+Arguments have the same keys as the file: ``Fog(visibility_m=80)`` is ``fog: {visibility_m: 80}``.
 """
 
 import copy
@@ -153,7 +153,7 @@ def write(
     Parameters
     ----------
     scenario, vary, verdict
-        As of `to_yaml`.
+        See `to_yaml`.
     path : Path
         The file; ``NAME.fog.yaml`` is found by ``fogsim test`` and pytest.
     overwrite : bool
@@ -193,16 +193,16 @@ def _name_files_from(traffic: dict[str, Any], old: Path, new: Path) -> None:
 
 def _put(data: Any, path: list[str], name: str, values: object) -> None:
     """Put a name at a key path in place of a value; a number in the path is a place in a list."""
-    told, block = ".".join(path), data
+    dotted_key, block = ".".join(path), data
     for key in path[:-1]:
         place = int(key) if isinstance(block, list) and key.isdecimal() else key
         try:
             block = block[place]
         except (KeyError, IndexError, TypeError):
             known = block if isinstance(block, dict) else ()
-            raise InputError(f"vary: there is no {told}; {suggest(str(place), known)}") from None
+            raise InputError(f"vary: there is no {dotted_key}; {suggest(str(place), known)}") from None
     if not isinstance(block, dict) or not block:
-        raise InputError(f"vary: there is no {told}; it must be a key of a block that is written")
+        raise InputError(f"vary: there is no {dotted_key}; it must be a key of a block that is written")
     key = path[-1]
     stem, _, suffix = key.rpartition("_")
     if suffix in UNIT_OF_SUFFIX and _bring_units(values):

@@ -47,7 +47,7 @@ def run_traffic(
     seed : int
         The same seed gives the same run, bit for bit.
     sumo_outputs : Path or None
-        As of `fogsim.run`.
+        See `fogsim.run`.
 
     Yields
     ------
@@ -63,7 +63,7 @@ def run_traffic(
     Warns
     -----
     UnplayedWarning
-        As of `fogsim.run`.
+        See `fogsim.run`.
     """
     policy = MeteredAdvice(scenario)
     with TrafficRun(scenario, sumo_outputs=sumo_outputs) as traffic:
@@ -131,7 +131,7 @@ class TrafficRun:
     def start(self, seed: Seed) -> tuple[TrafficStep, float]:
         """Begin a run, or begin again.
 
-        Returns the first instant, and the highest speed limit where somebody drives [m/s].
+        Returns the first instant, and the highest speed limit of any driven road [m/s].
         """
         self._step = None
         streams = spawn_streams(seed)
@@ -149,7 +149,7 @@ class TrafficRun:
     def advance(self, command: Command) -> tuple[TrafficStep, float]:
         """Move by one camera period with a command in force.
 
-        Returns as of `start`.
+        Returns what `start` does.
         """
         if self._step is None or self._step.ending is not None:
             raise SimulationError("the run has not been started or is over: call start() before advance()")

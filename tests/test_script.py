@@ -104,5 +104,5 @@ def test_a_file_with_a_mistake_is_not_written(tmp_path, patchy):
         fs.write(patchy, tmp_path / "wrong.fog.yaml", vary={"s": fs.varied([0.4], "fog.paches.strength")})
     assert not list(tmp_path.iterdir())
     (tmp_path / "there.yaml").write_text("")
-    with pytest.raises(InputError, match="is there already"):
+    with pytest.raises(InputError, match="already exists"):
         fs.write(patchy, tmp_path / "there.yaml")

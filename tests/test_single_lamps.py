@@ -113,7 +113,7 @@ def test_python_writes_the_same_file(tmp_path: Path) -> None:
     [
         ("{left: failed}", "{lefft: failed}", "actors.slow.lamps.position.lefft: unknown key; did you mean 'left'"),
         ("{left: failed}", "broken", "actors.slow.lamps.position: must be on, off, failed, automatic, or a block of"),
-        ("{left: failed}", "{}", "actors.slow.lamps.position: says nothing to do; allowed: left, right"),
+        ("{left: failed}", "{}", "actors.slow.lamps.position: no action given; allowed: left, right"),
         ("{left: failed}", "{middle: failed}", "actors.slow.lamps.position.middle: unknown key"),
         ("{position: {left", "{indicator_left: {left", "actors.slow.lamps.indicator_left"),
         (

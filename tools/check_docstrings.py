@@ -1,10 +1,11 @@
-"""Check docstrings: public names have all of numpydoc's sections that they need, internal ones stay short.
+"""Check docstrings and words: public names have all of numpydoc's sections that they need, internal ones stay short.
 
     python tools/check_docstrings.py
 
 Public is what a package exports that docs/reference/python documents, with its bases and methods. What is registered
 under a name may be described at length too. Everything else has one sentence with units, in at most `MOST_LINES` lines;
-`LONGER` internal docstrings still have more, and that number may only fall.
+`LONGER` internal docstrings still have more, and that number may only fall. Docstrings and docs must not contain
+`AVOIDED` words, which make text read like a translation; code and generated tables may.
 """
 
 import ast
@@ -22,6 +23,9 @@ from fogsim.registry import Registry
 
 ROOT = Path(__file__).resolve().parents[1]
 MOST_LINES, LONGER = 4, 520
+FOLDERS = ("fogsim", "envs", "tools", "benchmarks", "docs")
+AVOIDED = re.compile(r"\b(told|tells?|anew|likewise|thereof|therein|as\s+of|of\s+which|nobody|everybody)\b", re.I)
+CODE = re.compile(r"<!-- table:.*?<!-- end of|^```.*?^```|^    \S[^\n]*$|`[^`]*`", re.DOTALL | re.MULTILINE)
 Place = tuple[Path, str]
 
 
@@ -85,9 +89,30 @@ def _undescribed(node: ast.AST) -> list[str]:
     return [name for name in names if not re.search(rf"\b{name}\b", text)]
 
 
+def avoided() -> Iterator[str]:
+    """File and line of each avoided word."""
+    for file, line, text in (*_pages(), *_docstrings()):
+        for word in AVOIDED.finditer(text):
+            at = line + text.count("\n", 0, word.start())
+            yield f"{file.relative_to(ROOT)}:{at}: {word[0]!r} is to be avoided; rewrite the sentence"
+
+
+def _pages() -> Iterator[tuple[Path, int, str]]:
+    for page in (*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")):
+        yield page, 1, CODE.sub(lambda code: "\n" * code[0].count("\n"), page.read_text(encoding="utf-8"))
+
+
+def _docstrings() -> Iterator[tuple[Path, int, str]]:
+    for file in (file for folder in FOLDERS for file in (ROOT / folder).rglob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            match node:
+                case ast.Expr(value=ast.Constant(value=str(text))):
+                    yield file, node.lineno, re.sub(r"`[^`\n]*`", "", text)
+
+
 def main() -> None:
     """Print what is wrong, with exit code 1."""
-    public, wrong, longer = exported(), [], 0
+    public, wrong, longer = exported(), [*avoided()], 0
     known = public | registered()
     for folder in ("fogsim", "envs/fogsim_envs"):
         for file in sorted((ROOT / folder).rglob("*.py")):

@@ -70,7 +70,7 @@ class Outlines(osmium.SimpleHandler):  # type: ignore[misc]  # osmium tells no t
 
 
 def write_network(extract: Path, path: Path) -> None:
-    """Convert an extract's streets, and tell in the file whose data they are."""
+    """Convert an extract's streets, and note in the file whose data they are."""
     data = Path(sumolib.__file__).parents[1] / "sumo" / "data" / "typemap"
     types = ",".join(str(data / f"osmNetconvert{name}.typ.xml") for name in ("", "UrbanDe"))
     with tempfile.TemporaryDirectory() as folder:

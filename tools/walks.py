@@ -6,7 +6,7 @@
 - ``fog``: a fog's visibility, from a scenario file to the pixels of a frame (drawing what stands in it left out);
 - ``estimate``: a frame, from an estimator's `update` to its estimate: all methods of the day but those that need a
   vehicle ahead;
-- ``advice``: a belief, from the advice to what SUMO is told.
+- ``advice``: a belief, from the advice to what SUMO is set to.
 
 Kernels do not show as they run: those that a function names count as run by it.
 """

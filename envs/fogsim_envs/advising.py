@@ -137,7 +137,7 @@ class AdvisingEnv(gymnasium.Env[Observation, NDArray[Any]]):
 
 
 def _info(step: Step) -> dict[str, Any]:
-    """What is told next to the observation; agents must not use ``truth``."""
+    """Information returned next to the observation; agents must not use ``truth``."""
     return {
         "time_s": step.time,
         "route_position_m": step.route_position,

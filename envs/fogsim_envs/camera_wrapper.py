@@ -48,9 +48,9 @@ def _scenario(config: Mapping[str, Any], visibility: float, overrides: Iterable[
 
 @checked_parameters
 class FogCameraWrapper(gymnasium.Wrapper[dict[str, Any], Any, Any, Any], RecordConstructorArgs):
-    """Add a fogged camera frame and what it tells of the fog to the observation of a highway-env environment.
+    """Add a fogged camera frame and its fog estimate to the observation of a highway-env environment.
 
-    The observation becomes a ``Dict``: ``camera``, the frame (rows, cols, 3) at the end of the step; ``state``, as of
+    The observation becomes a ``Dict``: ``camera``, the frame (rows, cols, 3) at the end of the step; ``state``, as in
     ``fogsim/FogAdvisory-v0`` (no advice is in force); ``highway``, the environment's own observation, which knows of no
     fog. ``info["truth"]`` holds the fog as it is. Actions, rewards, endings and rendering stay the environment's.
 

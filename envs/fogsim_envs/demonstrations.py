@@ -24,7 +24,7 @@ def record_demonstrations(
     """
     minari = _import_minari()
     if data_set in minari.list_local_datasets():
-        raise InputError(f"data set {data_set!r} is there already: choose another id, or minari delete {data_set}")
+        raise InputError(f"data set {data_set!r} already exists: choose another id, or minari delete {data_set}")
     env = minari.DataCollector(gymnasium.make(env_id, **arguments))
     try:
         policy = baseline(name, env.action_space)

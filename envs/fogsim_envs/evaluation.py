@@ -54,7 +54,7 @@ class EpisodeResult:
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """What a policy came to.
+    """Results of a policy.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class Evaluation:
     mean, low, high : float
         Mean return and its 95 % interval, by bootstrap over episodes [points].
     arrived, struck : float
-        Shares of episodes in which the ego arrived, and struck somebody (without an ego: no one arrives, anybody).
+        Shares of episodes in which the ego arrived, and collided (without an ego: none, and any collision).
     metrics : mapping from str to (float, float, float)
         Mean of each metric, by the names of a study, and its 95 % interval, over the episodes in which it is defined;
         empty where the environment measures none (`metrics=True`).
@@ -81,13 +81,13 @@ class Evaluation:
         """One line."""
         return (
             f"return {self.mean:.1f} ({self.low:.1f} … {self.high:.1f}) over {len(self.episodes)} episodes, "
-            f"arrived {self.arrived:.0%}, struck somebody {self.struck:.0%}"
+            f"arrived {self.arrived:.0%}, collided with others {self.struck:.0%}"
         )
 
     def minus(self, other: "Evaluation") -> tuple[float, float, float]:
         """Mean of what was gained over another policy on the same seeds, and its 95 % interval [points].
 
-        Episodes differ more from one another than policies do, so this tells policies apart where the intervals of
+        Episodes differ more from one another than policies do, so this separates policies even where the intervals of
         their means overlap.
 
         Parameters

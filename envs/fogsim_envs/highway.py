@@ -50,7 +50,7 @@ class FogHighwayEnv(AdvisingEnv):
     visibility : meteorological visibility of homogeneous fog [m]; ``inf`` for clear air
     overrides : ``key.path=value`` each, as after ``fogsim run --set`` (of ``traffic`` not those that name files or the
     ego); ``reset(options={"overrides": [...]})`` adds to them for one episode
-    image_size, continuous, reward_weights, render_mode : as of ``fogsim/FogAdvisory-v0``
+    image_size, continuous, reward_weights, render_mode : see ``fogsim/FogAdvisory-v0``
 
     ### Version history
     * v0: first version

@@ -25,7 +25,7 @@ _INSTEAD = "take 'rgb_array', or start it under xvfb-run"
 
 
 def has_display() -> bool:
-    """Tell whether a window can be opened here, or a driver of SDL is asked for, such as ``SDL_VIDEODRIVER=dummy``."""
+    """Whether a window can be opened here, or a driver of SDL is requested, such as ``SDL_VIDEODRIVER=dummy``."""
     if sys.platform in {"win32", "darwin"}:
         return True
     return any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"))

@@ -1,4 +1,4 @@
-"""Many environments at once, each in a process of its own, whose loss is told.
+"""Many environments at once, each in a process of its own; the loss of a process is reported.
 
 `gymnasium.make_vec` runs all of them one after another (``vectorization_mode="sync"``) or in processes (``"async"``);
 there a process that is killed shows as a bare ``BrokenPipeError``, and one that stands still is waited for for ever.
@@ -37,7 +37,7 @@ def make_vector(
     context: Literal["fork", "spawn", "forkserver"] | None = None,
     **kwargs: Any,
 ) -> AsyncVectorEnv:
-    """Make a vector environment that tells of lost processes, unlike `gymnasium.make_vec` in its mode ``async``.
+    """Make a vector environment that reports lost processes, unlike `gymnasium.make_vec` in its mode ``async``.
 
     Takes `timeout` [s].
     """

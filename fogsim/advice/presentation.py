@@ -75,7 +75,7 @@ class PresentedAdviser(ABC):
         Parameters
         ----------
         belief, speed_limit, time, previous
-            As of `Adviser.advise`.
+            See `Adviser.advise`.
         """
         here = self._here(belief)
         if here is None:

@@ -38,7 +38,7 @@ class VehicleAdviser(Protocol):
         belief : Belief
             What is believed about the fog.
         observation : Observation
-            What the vehicle's sensors tell: its speed, the lead vehicle, the frame, the signs ahead.
+            Sensor readings of the vehicle: its speed, the lead vehicle, the frame, the signs ahead.
         speed_limit : float
             Speed limit [m/s].
         time : float

@@ -78,7 +78,7 @@ class NoAdvice:
         Parameters
         ----------
         belief, speed_limit, time, previous
-            As of `Adviser.advise`; they do not matter.
+            See `Adviser.advise`; not used here.
         """
         return SpeedAdvice()
 
@@ -113,6 +113,6 @@ class FixedSpeed:
         Parameters
         ----------
         belief, speed_limit, time, previous
-            As of `Adviser.advise`; they do not matter.
+            See `Adviser.advise`; not used here.
         """
         return SpeedAdvice(self.speed)

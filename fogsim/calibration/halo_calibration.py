@@ -13,7 +13,7 @@ from fogsim.vision.sources.halo_profile import halos_of
 from fogsim.vision.sources.source_tree import source_tree
 
 FOGS = (200.0, 100.0, 50.0)
-"""Visibilities of the fogs that are to be told from clear nights [m]."""
+"""Visibilities of the fogs that must be distinguished from clear nights [m]."""
 
 EXPOSURES, STRENGTHS = (0.6, 1.6), (0.6, 1.6)
 """Range of exposures over the automatic one, and of lamps' intensities over the usual ones [-]."""

@@ -16,7 +16,7 @@ from fogsim.estimators.signs.watch import SignWatch
 from fogsim.values import Camera, Observation
 
 VISIBILITIES = (50.0, 75.0, 100.0, 130.0, 170.0, 220.0, 280.0, 350.0, 430.0, 550.0, 800.0)
-"""Visibilities at which the range is measured, unless told otherwise [m]."""
+"""Visibilities at which the range is measured by default [m]."""
 
 KINDS = ("speed_limit", "stop", "pedestrian_crossing", "no_overtaking", "no_entry", "priority_road")
 """Kinds of the signs, one after the other; none is a triangle, which the detector's authors exclude."""
@@ -90,18 +90,18 @@ class _Approach:
 
 def _summary(camera: Camera, diameter: float, found: dict[float, list[_Approach]]) -> OperatingRange:
     firsts = {v: np.array([one.first for one in each if one.first is not None]) for v, each in found.items()}
-    told = [v for v, first in firsts.items() if len(first) >= 0.5 * len(found[v])]
-    if len(told) < 3:
+    detected = [v for v, first in firsts.items() if len(first) >= 0.5 * len(found[v])]
+    if len(detected) < 3:
         raise InputError(
             f"signs of {diameter:g} m are detected in fewer than three of the visibilities with a focal length of "
             f"{camera.focal_length:g} px: larger signs, a longer focal length, or thinner fog"
         )
-    low, middle, high = np.array([np.quantile(firsts[v], (0.25, 0.5, 0.75)) for v in told]).T
+    low, middle, high = np.array([np.quantile(firsts[v], (0.25, 0.5, 0.75)) for v in detected]).T
     return OperatingRange(
         camera.focal_length,
         diameter,
-        tuple(told),
-        tuple(_range_of([look for one in found[v] for look in one.looks]) for v in told),
+        tuple(detected),
+        tuple(_range_of([look for one in found[v] for look in one.looks]) for v in detected),
         tuple(middle.tolist()),
         tuple(np.maximum((high - low) / _QUARTILES, 1.0).tolist()),
     )

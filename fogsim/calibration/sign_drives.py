@@ -43,7 +43,7 @@ class PoseNoise:
 class SignDrive:
     """A drive past signs along a straight road."""
 
-    camera: Camera  # The told calibration
+    camera: Camera  # The stated calibration
     signs: tuple[Sign, ...]  # Signs as they stand, along x
     places: tuple[float, ...]  # Where the front bumper is at each frame [m]
     noise: PoseNoise = PoseNoise()  # How far off map and own pose are
@@ -57,11 +57,11 @@ def observed(
     drive: SignDrive, visibilities: Sequence[float], rng: np.random.Generator
 ) -> Iterator[dict[float, Observation]]:
     """Observations of a drive, frame by frame, in homogeneous fog of each visibility [m]."""
-    noise, told = drive.noise, drive.camera
+    noise, stated = drive.noise, drive.camera
     known = SignMap(drive.known or tuple(_misplaced(sign, noise.position, rng) for sign in drive.signs))
     length = max(drive.places) + 2.0 * drive.reach
     scene = build_scene(straight_road(length), SignMap(drive.signs), np.random.default_rng(rng.integers(2**31)))
-    true = replace(told, pitch=told.pitch + rng.normal(0.0, noise.pitch))
+    true = replace(stated, pitch=stated.pitch + rng.normal(0.0, noise.pitch))
     sensor = Sensor(AIRLIGHT * 255.0 / drive.grey)
     # Not OpenGL: a run may use the only context of this process, and results would depend on the machine.
     renderer = make_renderer("cpu", scene, illuminance=ILLUMINANCE)
@@ -75,8 +75,8 @@ def observed(
             seen = {}
             for visibility in visibilities:
                 light = foggy_radiance(view, pose, true, extinction_from_visibility(visibility))
-                image = expose(light, sensor, told.response, rng).astype(np.uint8)
-                seen[visibility] = Observation(Frame(x / SPEED, image, told), SPEED, None, signs, SETBACK)
+                image = expose(light, sensor, stated.response, rng).astype(np.uint8)
+                seen[visibility] = Observation(Frame(x / SPEED, image, stated), SPEED, None, signs, SETBACK)
             yield seen
     finally:
         renderer.close()

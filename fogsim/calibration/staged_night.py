@@ -34,7 +34,7 @@ AUTOMATIC = AutoExposure(Metering.HIGHLIGHTS, 0.6, 0.0, 1e5, 100.0, 4.0)
 """As scenarios have it, but that it follows at once."""
 
 GLARE = 0.01
-"""Share of lamps' light that the lens scatters, as a scenario's camera does unless told otherwise [-]."""
+"""Share of lamps' light that the lens scatters; the default of a scenario's camera [-]."""
 
 _SIGNS_APART = 70.0
 _ROAD = 2

@@ -18,7 +18,7 @@ from fogsim.values import Camera
 Floats = NDArray[np.float64]
 
 GLASS_DISTANCE = 0.05
-"""From the entrance pupil to the glass along the axis [m]; assumed, as of a camera close behind a windscreen."""
+"""From the entrance pupil to the glass along the axis [m]; assumed, for a camera close behind a windscreen."""
 
 PUPIL_DIAMETER = 0.003
 """Of the entrance pupil [m]: a focal length of 6 mm at F/2, assumed."""

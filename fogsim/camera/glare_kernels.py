@@ -19,7 +19,7 @@ class Places(NamedTuple):
 
 @kernel
 def count_bright(lines: NDArray[np.float32], limit: np.float32, counts: NDArray[np.int32]) -> int:
-    """Values above a limit in each row, and in all: a sum of integers, of which compilers make vector instructions.
+    """Count the values above a limit, by row and in all. A sum of integers, so that compilers emit vector instructions.
 
     Takes `lines` (rows, 3 · cols), `counts` (rows,) int32.
     """

@@ -21,7 +21,7 @@ CELL = 16
 """Rows and columns of the picture that count as one where drops show it small [px]."""
 
 STEP = 4
-"""Rows and columns of the picture in each of which a drop's light is found once [px]; the pupil is far wider."""
+"""Rows and columns of the blocks of the image that share one value of a drop's light [px]; the pupil is far wider."""
 
 
 class DirtyGlass:

@@ -1,4 +1,4 @@
-"""``fogsim calibrate …``: what methods must know of a camera before they can tell anything."""
+"""``fogsim calibrate …``: measure what methods need to know about a camera."""
 
 import json
 from pathlib import Path
@@ -26,7 +26,7 @@ def calibrate_signs_command(
     out: Annotated[Path, typer.Option(help="File of the calibration.")] = Path("signs_range.json"),
     approaches: Annotated[int, typer.Option(help="Signs that are driven up to in each fog.", min=4, max=100_000)] = 24,
     seed: Annotated[int, typer.Option(help="Of places, errors and noise.", min=0)] = 0,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it is there already.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the calibration in place of the table.")] = False,
 ) -> None:
     """From how far signs are detected in fog: the operating range that belaroussi2015 turns into a visibility."""
@@ -62,9 +62,10 @@ def calibrate_signs_command(
         table.add_row(f"{visibility:.0f}", f"{reach:.0f}", f"{first:.0f} ± {deviation:.0f}")
     stdout.print(table)
     low, high = measured.reach
-    told = f"tells V_met between {low:.0f} and {high:.0f} m of first detection, up to {measured.farthest:.0f} m"
+    usable = f"gives V_met between {low:.0f} and {high:.0f} m of first detection, up to {measured.farthest:.0f} m"
     stdout.print(
-        f"{told if low < high else 'tells nothing: resolution sets the range, not fog'}: {escape(out)}", soft_wrap=True
+        f"{usable if low < high else 'gives nothing: resolution limits the range, not fog'}: {escape(out)}",
+        soft_wrap=True,
     )
 
 
@@ -79,7 +80,7 @@ def calibrate_halos_command(
         float, typer.Option(help="Share of lamps' light that the lens scatters.", min=0.0, max=1.0)
     ] = 0.01,
     seed: Annotated[int, typer.Option(help="Of scenes, exposures and noise.", min=0)] = 0,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it is there already.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the calibration in place of a line.")] = False,
 ) -> None:
     """How steeply light falls off about lamps in clear air and in fog: below which Br50 gallen2014 sees fog."""

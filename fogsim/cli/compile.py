@@ -119,14 +119,14 @@ def _estimate_visibility() -> None:
     from fogsim.vision.uneven.uneven_kernels import extinction_at
     from fogsim.vision.vehicle.decay_fit import fit_decay
 
-    said: list[list[Estimate]] = []
+    estimates: list[list[Estimate]] = []
     for width, height in _SIZES:
         camera = Camera(width, height, 0.9 * width, (width / 2, height / 2), 1.4, pitch=0.03)
         for factory in ESTIMATORS.values():
             published = [{"as_published": True}] if "as_published" in accepted_parameters(factory) else []
-            said += [_read(factory(camera=camera, **parameters), camera) for parameters in ({}, *published)]
+            estimates += [_read(factory(camera=camera, **parameters), camera) for parameters in ({}, *published)]
     for fusion in FUSIONS:
-        fuse_estimates(fusion, {}, said)
+        fuse_estimates(fusion, {}, estimates)
     _follow_a_bend(camera)
     # Cases that need more than these images: a vehicle ahead that leaves far enough, and fog that varies for certain.
     fit_decay(np.array([20.0, 40.0, 60.0]), np.array([0.5, 0.3, 0.2]), np.full(3, 0.01), 0.02, 0.01)
@@ -188,13 +188,13 @@ def _read(estimator: "Estimator", camera: "Camera") -> "list[Estimate]":
 
     from fogsim.values import Frame, LeadMeasurement, Observation
 
-    said = []
+    estimates = []
     for index in range(4):
         distance = 25.0 + 5.0 * index
         image = _foggy_road(camera, distance, *((600.0, 60.0) if index == 1 else ()))
         frame = Frame(0.1 * index, image if index < 3 else np.ascontiguousarray(image[:, :, 0]), camera)
-        said.append(estimator.update(Observation(frame, 20.0, LeadMeasurement(distance, 5.0), ())))
-    return said
+        estimates.append(estimator.update(Observation(frame, 20.0, LeadMeasurement(distance, 5.0), ())))
+    return estimates
 
 
 def read_own_beams() -> None:

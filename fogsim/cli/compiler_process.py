@@ -39,7 +39,7 @@ def compiling_in_background() -> Iterator[Callable[["Scenario"], None]]:
     with ExitStack() as stack:
         stack.callback(_end, process)
 
-        def tell(scenario: "Scenario") -> None:
+        def send(scenario: "Scenario") -> None:
             methods = _methods(scenario)
             if not methods or not _is_first():
                 # It has nothing to do in this run, however long the run is.
@@ -48,7 +48,7 @@ def compiling_in_background() -> Iterator[Callable[["Scenario"], None]]:
             stack.enter_context(COMPILER_PROCESS.compiles(lambda: process.poll() is not None, PACKAGES))
             _send(process, {"size": (scenario.camera.width, scenario.camera.height), **methods})
 
-        yield tell
+        yield send
 
 
 def _started() -> "subprocess.Popen[bytes] | None":
@@ -66,11 +66,11 @@ def _started() -> "subprocess.Popen[bytes] | None":
         return None
 
 
-def _send(process: "subprocess.Popen[bytes]", told: Mapping[str, Any]) -> None:
+def _send(process: "subprocess.Popen[bytes]", message: Mapping[str, Any]) -> None:
     """Pass the other process what to compile; if it has died, this one compiles alone."""
     if (pipe := process.stdin) is not None:
         with suppress(OSError), pipe:
-            pipe.write(json.dumps(told).encode())
+            pipe.write(json.dumps(message).encode())
 
 
 def _end(process: "subprocess.Popen[bytes]") -> None:
@@ -115,9 +115,9 @@ def read_pictures(parent: int) -> None:
     # Modules of methods and fusions are imported while the scenario is loaded.
     for name in ("fogsim.estimators", "fogsim.fusion"):
         importlib.import_module(name)
-    if not (told := sys.stdin.read()):
+    if not (message := sys.stdin.read()):
         return
-    wanted = json.loads(told)
+    wanted = json.loads(message)
     size: Sequence[int] = wanted["size"]
     estimates = [read_foggy_road(name, parameters, size) for name, parameters in wanted["methods"]]
     if any(name in {"night_road", "gallen2014_veil"} for name, _ in wanted["methods"]):

@@ -78,7 +78,7 @@ def run_command(
         Path | None, typer.Option(help="Directory for the results. [runs/SCENARIO-seedN, runs/SCENARIO-CASE]")
     ] = None,
     settings: Settings = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace results that are there already.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing results.")] = False,
     video: Annotated[
         bool | None, typer.Option("--video/--no-video", help="Write video.mp4 (as a rule where there is an ego).")
     ] = None,

@@ -68,7 +68,7 @@ def signs_command(
     scenario: Annotated[str, typer.Argument(help=SCENARIO_HELP)],
     out: Annotated[Path, typer.Option(help="GeoJSON file.")] = Path("signs.geojson"),
     settings: Settings = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it is there already.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
 ) -> None:
     """Write the signs of a scenario's road network, additional files and OpenDRIVE signals as GeoJSON."""
     from fogsim.recording import record_signs

@@ -72,8 +72,8 @@ def study_command(
 
             def show(done: int, message: str | None) -> None:
                 failed.extend([message] if message else [])
-                said = f", {len(failed)} failed" if failed else ""
-                progress.update(task, completed=done, description=f"{done} of {len(loaded.runs)} runs{said}")
+                failures = f", {len(failed)} failed" if failed else ""
+                progress.update(task, completed=done, description=f"{done} of {len(loaded.runs)} runs{failures}")
 
             rows = run_study(loaded, directory, **runner, watch=show)
     except KeyboardInterrupt:

@@ -121,8 +121,8 @@ def _run(
         task = progress.add_task(STARTING, total=total)
 
         def show(done: int, failed: int) -> None:
-            said = f", {failed} failed" if failed else ""
-            progress.update(task, completed=done, description=f"{done} of {total} runs{said}")
+            failures = f", {failed} failed" if failed else ""
+            progress.update(task, completed=done, description=f"{done} of {total} runs{failures}")
 
         engine = ProcessPool(processes, check_to_file)
         return run_tests(tests, out, engine, resume=resume, first_failure_ends=exit_first, watch=show)
@@ -153,8 +153,8 @@ def _print_outcome(outcome: "FileOutcome", settings: Sequence[str]) -> None:
         stdout.print(f"{_INDENT}{escape(command_text(test, outcome.broken[0].run, settings))}", soft_wrap=True)
 
 
-def _print_line(outcome: str, told: str) -> None:
-    stdout.print(f"  [{_COLOURS[outcome]}]{outcome.upper():13}[/]{escape(told)}", soft_wrap=True)
+def _print_line(outcome: str, text: str) -> None:
+    stdout.print(f"  [{_COLOURS[outcome]}]{outcome.upper():13}[/]{escape(text)}", soft_wrap=True)
 
 
 def _print_smallest(outcome: "FileOutcome", settings: Sequence[str], out: Path) -> None:
@@ -165,8 +165,8 @@ def _print_smallest(outcome: "FileOutcome", settings: Sequence[str], out: Path) 
     for judgement in outcome.judgements:
         if len(outcome.results) > 1 and judgement.numbers[1]:
             found = shrink(outcome, judgement, settings, ProcessPool(1, check_to_file), out / "results")
-            told = smallest_text(outcome.test, found, settings)
-            stdout.print(f"{_INDENT}{escape(f'{judgement.title}: {told}')}", soft_wrap=True)
+            text = smallest_text(outcome.test, found, settings)
+            stdout.print(f"{_INDENT}{escape(f'{judgement.title}: {text}')}", soft_wrap=True)
 
 
 def _annotate(outcomes: "Sequence[FileOutcome]", settings: Sequence[str]) -> None:

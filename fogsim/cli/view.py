@@ -31,7 +31,7 @@ def view_command(
     seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Write what the window would show to this image instead.")] = None,
     settings: Settings = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it is there already.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
 ) -> None:
     """Open the world around the ego, in clear air, in pyrender's viewer, or write a picture of it."""
     from fogsim.offline.image_files import refuse_unwritable_image, write_image

@@ -57,10 +57,10 @@ def compiled_for() -> dict[str, str] | None:
 
 @functools.cache
 def usable_kind() -> Processors | None:
-    """The kind of which this processor is; None if it is of none, or if numba was told what to compile for, or how."""
+    """The processor kind of this machine; None if it is not a known one, or if numba's target was configured."""
     kind = KINDS.get(platform.machine())
-    told = config.CPU_NAME is not None or config.CPU_FEATURES is not None or config.BOUNDSCHECK
-    if kind is None or told:
+    is_configured = config.CPU_NAME is not None or config.CPU_FEATURES is not None or config.BOUNDSCHECK
+    if kind is None or is_configured:
         return None
     try:
         features = llvm.get_host_cpu_features()

@@ -32,16 +32,16 @@ class Shortcut(NamedTuple):
 class UnobservedLock:
     """The lock of LLVM, taken and given back without the events by which numba times it.
 
-    Each of 200,000 calls of LLVM would be an event, told to all functions that are being compiled one within another.
+    Each of 200,000 LLVM calls would be an event, passed to all functions being compiled in nested calls.
     """
 
     def take(self) -> Callable[[], None]:
         """Leave the events out; what is returned lets them in again."""
-        told = ffi.lib._lock._cblist
+        listeners = ffi.lib._lock._cblist
         ffi.lib._lock._cblist = []
 
         def restore() -> None:
-            ffi.lib._lock._cblist = told
+            ffi.lib._lock._cblist = listeners
 
         return restore
 
@@ -174,7 +174,7 @@ def _plain_array(kind: Any) -> Any:
 
 
 def make_array(kind: Any) -> Any:
-    """Class of what tells an array's fields."""
+    """Class that describes an array's fields."""
     return _plain_array(kind) if type(kind) is types.Array else _make_array(kind)
 
 

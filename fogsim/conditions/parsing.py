@@ -49,7 +49,7 @@ DEEPEST = 20
 def parse_condition(written: object) -> Condition:
     """Parse a condition; ValueError with what is allowed or nearest if it is malformed.
 
-    Text; or a mapping from signals to the rest (``{"ego.speed": "> 90 km/h"}``), all of which must hold; or ``all:``,
+    Text; or a mapping from signals to the rest (``{"ego.speed": "> 90 km/h"}``), which must all hold; or ``all:``,
     ``any:`` with a list of conditions, ``not:`` with one. A list stands for all of its conditions.
     """
     return _read(written, 0)
@@ -73,8 +73,8 @@ def _entry(key: object, value: object, depth: int) -> Condition:
     if key == "not":
         return Not(_read(value, depth + 1))
     if value is None or isinstance(value, bool):
-        told = _Text(str(key)).condition()
-        return Not(told) if value is False else told
+        condition = _Text(str(key)).condition()
+        return Not(condition) if value is False else condition
     # Anything other than text or a number is refused with its own message when it is parsed as text.
     rest = str(value).strip()
     relation = "" if _OPERATOR.match(rest) or _HOW.match(rest) else "== "
@@ -240,8 +240,8 @@ class _Text:
             return _refuse(f"{shown(self._text)}: unknown signal {shown(written)}; {suggest(written, known)}")
         name = written.partition("(")[0]
         same = [key for key in SIGNALS if key.partition("(")[0] == name]
-        told = f"it is {' or '.join(same)}" if same else suggest(written, known)
-        return _refuse(f"{shown(self._text)}: unknown signal {shown(written)}; {told}")
+        hint = f"it is {' or '.join(same)}" if same else suggest(written, known)
+        return _refuse(f"{shown(self._text)}: unknown signal {shown(written)}; {hint}")
 
     def _operand(self, left: Reference, relation: str) -> Operand:
         signal = SIGNALS[left.signal]
@@ -303,8 +303,8 @@ class _Text:
         return ValueError(f"{shown(self._text)}: expected {expected}, got {shown(rest) if rest else 'the end'}")
 
 
-def _refuse(told: str) -> Reference:
-    raise ValueError(told)
+def _refuse(message: str) -> Reference:
+    raise ValueError(message)
 
 
 def _allowed(kind: Kind) -> tuple[str, ...]:

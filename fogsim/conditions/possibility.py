@@ -86,8 +86,8 @@ def _range(reference: Reference, limits: Limits) -> tuple[float, float]:
 
 def _range_text(reference: Reference, limits: Limits) -> str:
     ends = zip(("at least", "at most"), _range(reference, limits), strict=True)
-    told = [f"{word} {shown_value(reference, end)}" for word, end in ends if math.isfinite(end)]
-    return f"{reference} is {' and '.join(told)}"
+    bounds = [f"{word} {shown_value(reference, end)}" for word, end in ends if math.isfinite(end)]
+    return f"{reference} is {' and '.join(bounds)}"
 
 
 def _measured(asked: Sequence[Comparison | Edge | Flag]) -> tuple[Reference, ...]:

@@ -271,7 +271,7 @@ _OF_VEHICLES = {
         places=_VEHICLE,
     ),
     "X.position": Signal(
-        "position of the front bumper along the ego's route, or along `traffic.along`; no value 30 m beside it",
+        "position of the front bumper along the ego's route, or along `traffic.along`; no value 30 m off it",
         lambda m, x: m.position(x),
         unit="m",
         places=_VEHICLE,
@@ -293,7 +293,7 @@ _OF_VEHICLES = {
     "X.collision": Signal("whether it has collided so far", _has_collided, Kind.FLAG, places=_VEHICLE),
     "gap(X, Y)": _metres(
         "gap from X to Y along the route, bumper to bumper, whatever the lane: positive if Y is ahead, negative if it "
-        "is behind, 0 if it is beside",
+        "is behind, 0 if they overlap",
         _of_pair(gap_between),
         least=-math.inf,
         places=_PAIR,
@@ -312,7 +312,7 @@ _OF_VEHICLES = {
     ),
     "clearance(X, Y)": _metres("straight distance between the bodies, 0 where they touch", _clearance, places=_PAIR),
     "ttc(X, Y)": Signal(
-        "time until X and Y are beside one another at constant speeds, whatever the lane: inf if they do not approach",
+        "time until X and Y are side by side at constant speeds, whatever the lane: inf if they do not approach",
         _of_pair(time_to_meet),
         unit="s",
         least=0.0,
@@ -392,7 +392,7 @@ _OF_EGO = {
         needs=_EGO,
     ),
     "ego.signs": Signal(
-        "signs ahead of which the map tells", _of_step(lambda s: float(len(s.observation.signs))), least=0.0, needs=_EGO
+        "signs ahead in the map", _of_step(lambda s: float(len(s.observation.signs))), least=0.0, needs=_EGO
     ),
     "ego.sign_distance": _metres(
         "how far ahead the nearest of them is, as the map has it; inf without one",
@@ -415,7 +415,7 @@ _OF_EGO = {
 
 _OF_LIGHTS = {
     "signal(ID).state": Signal(
-        "what a traffic light shows to the ego, as long as it is the next on its way",
+        "colour of a traffic light for the ego, while it is the next one ahead",
         _light(lambda light: light.colour.value),
         Kind.WORD,
         words=tuple(colour.value for colour in SignalColour),
@@ -423,7 +423,7 @@ _OF_LIGHTS = {
         needs=_EGO,
     ),
     "signal(ID).distance": _metres(
-        "way to its stop line, as long as it is the next on the ego's way",
+        "distance to its stop line, while it is the next one ahead of the ego",
         _light(lambda light: light.distance),
         places=(Place.SIGNAL,),
         needs=_EGO,
@@ -472,7 +472,7 @@ _OF_FOG = {
         needs=_FRAMES,
     ),
     "estimate(METHOD).visibility": _metres(
-        "visibility that an estimator gives; no value where it cannot tell",
+        "visibility that an estimator gives; no value if the estimate is invalid",
         _estimate(lambda _, e: e.visibility if e.valid else None),
         places=(Place.METHOD,),
         needs=_FRAMES,
@@ -485,7 +485,7 @@ _OF_FOG = {
         needs=_FRAMES,
     ),
     "estimate(METHOD).error": Signal(
-        "how far its visibility is from the true one ahead, as a share of it, unsigned; no value where it cannot tell",
+        "absolute relative error of its visibility against the true one ahead; no value if the estimate is invalid",
         _estimate(lambda m, e: _relative_error(e.visibility, m.step.truth.visibility_ahead) if e.valid else None),
         shown_unit="%",
         least=0.0,

@@ -140,7 +140,7 @@ class AllOf:
 
 @dataclass(frozen=True, slots=True)
 class AnyOf:
-    """Conditions, at least one of which is true."""
+    """Conditions, true if at least one is."""
 
     parts: tuple["Condition", ...]
 

@@ -63,7 +63,7 @@ class Watch:
         """The two values that a comparison compared at the last step; None if unknown."""
         return self.values[comparison.left], self._operand(comparison.right)
 
-    def told(self) -> str:
+    def readings(self) -> str:
         """Values of the condition's signals at the last step: ``gap(ego, slow) = 83.2 m``."""
         return ", ".join(
             f"{signal} = {shown_value(signal, v, self._units[signal])}" for signal, v in self.values.items()

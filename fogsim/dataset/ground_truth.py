@@ -178,7 +178,7 @@ def sign_picture(step: Step, instance: NDArray[np.uint16]) -> NDArray[np.uint8]:
 def _places(view: View, truth: Truth, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> NDArray[np.float64]:
     """Points in the world that pixels show (n, 3) [m]."""
     if truth.camera is None or truth.pose is None:
-        raise InputError("signs can be told apart only in steps that a camera in a loop has made")
+        raise InputError("signs can be distinguished only in steps made with a camera")
     pixels = np.stack((cols, rows, np.ones(rows.shape)), axis=1)
     rays = matrix_product(pixels, ray_from_pixel(truth.camera, truth.pose).T)
     rays *= (view.distance[rows, cols] / np.linalg.norm(rays, axis=1))[:, None]

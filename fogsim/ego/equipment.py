@@ -56,7 +56,7 @@ from fogsim.values.script import Actions
 
 
 class _RunParts(NamedTuple):
-    """What lives as long as one run: random numbers, faults, meters, what others tell, roads and signs."""
+    """State that lasts for one run: random numbers, faults, meters, reports from others, roads and signs."""
 
     streams: Streams
     schedule: FaultSchedule
@@ -104,7 +104,7 @@ class EgoEquipment:
         self._mount_camera(build.CAR)
 
     def _mount_camera(self, body: str) -> None:
-        """Put the camera where it belongs on a kind of body, and tell the estimators."""
+        """Put the camera where it belongs on a kind of body, and pass its calibration to the estimators."""
         scenario = self._scenario
         self._body = body
         self._camera = build.camera(scenario, body)
@@ -433,7 +433,7 @@ class EgoEquipment:
         return Frame(when, left, self._assumed_camera), SecondView(right, self._second.stated_baseline)
 
     def surrounding(self, state: TrafficState, ego: int, pose: CameraPose) -> Surrounding:
-        """Tell what is around the camera.
+        """Describe the surroundings of the camera.
 
         Parameters
         ----------
@@ -459,7 +459,7 @@ class EgoEquipment:
         return mounted_pose(self._camera, state.position[ego], heading, self._setback, grade, body_pitch)
 
     def _estimate(self, frame: Frame, observation: Observation, time: float, old: str) -> tuple[Estimate, ...]:
-        """What each estimator says; none is asked about a frame that tells nothing new, for a reason."""
+        """Results of all estimators; a frame that shows nothing new is rejected with a reason."""
         if not self._estimators:
             return ()
         self._leads.add(time, observation.lead)

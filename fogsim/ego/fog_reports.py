@@ -1,4 +1,4 @@
-"""What others tell the ego of the fog where they are: sensors next to its route, and vehicles on it."""
+"""Fog reports to the ego from sensors next to its route and from vehicles on it."""
 
 import math
 import zlib
@@ -49,7 +49,7 @@ def sensor_places(sensors: RoadsideReports, length: float) -> Floats:
 
 
 def place_seen(place: float, estimate: Estimate) -> float:
-    """Middle of the road of which the estimate of a camera at a place along a route is the mean [m]."""
+    """Stretch of road over which a camera's estimate is the mean, given by its middle [m]."""
     return place + 0.5 * min(estimate.reach, estimate.visibility, REACH)
 
 
@@ -95,7 +95,7 @@ class FogReports:
     def heard(
         self, time: float, state: TrafficState, ego: int, fog: FogField, sent: Iterable[tuple[str, FogReport]] = ()
     ) -> tuple[FogReport, ...]:
-        """Let all measure that are to, and tell what has come in by now (`time` [s])."""
+        """Take the measurements that are due; return the reports that have arrived by now (`time` [s])."""
         sent = tuple(sent)
         if self._cameras is not None:
             self._take_from_cameras(self._cameras, sent, state, ego)
@@ -106,7 +106,7 @@ class FogReports:
         return self.heard_from_roadside(time, fog)
 
     def heard_from_roadside(self, time: float, fog: FogField) -> tuple[FogReport, ...]:
-        """Let sensors next to the road measure, and tell what has come in by now from anybody."""
+        """Let sensors next to the road measure; return all reports that have arrived by now."""
         if self._roadside is not None and self._roadside.camera is None:
             self._measure_roadside(self._roadside, time, fog)
         arrived = tuple(report for due, report in self._under_way if due <= time + 1e-9)
@@ -118,7 +118,7 @@ class FogReports:
         due = [i for i in range(len(places)) if self._beats.is_due(f"{SENSOR} {i}", sensors.period_s, time)]
         if not due:
             return
-        # A run begins with what sensors have told before of the fog as it is then.
+        # A run begins with the sensors' earlier reports, made in the fog of that moment.
         time = time if self._has_begun else time - sensors.delay_s
         self._has_begun = True
         points = np.stack([np.interp(places[due], self._places.stations, axis) for axis in self._route.T], axis=1)
@@ -169,12 +169,12 @@ class FogReports:
 
     def _send(self, name: str, place: float, k: float, sender: MeasuredReports, time: float) -> None:
         wrong, noise, any_k = self._rng.random(), self._rng.standard_normal(), self._rng.random()
-        told = k * math.exp(sender.deviation * noise)
+        reported = k * math.exp(sender.deviation * noise)
         if wrong < sender.wrong:
-            told = WRONG[0] * (WRONG[1] / WRONG[0]) ** any_k
+            reported = WRONG[0] * (WRONG[1] / WRONG[0]) ** any_k
         stated_time = time + self._clock_error(name, sender.clock_deviation_s)
         number = self._beats.number(name)
-        self._let_travel(FogReport(name, number, place, stated_time, told, sender.deviation), time, sender)
+        self._let_travel(FogReport(name, number, place, stated_time, reported, sender.deviation), time, sender)
 
     def _clock_error(self, name: str, deviation: float) -> float:
         """How far a sender's clock is ahead [s]; in one run always the same."""

@@ -21,7 +21,7 @@ _EYES = np.array([0.0, 0.0, 1.2])
 
 
 _WAY = np.arange(-200.0, 1001.0, 25.0)
-"""Distances ahead along the route at which the fog is told [m]."""
+"""Distances ahead along the route at which the true fog is reported [m]."""
 
 
 class KnownWay(NamedTuple):

@@ -1,4 +1,4 @@
-"""Whether a camera's frame tells anything new, and what was measured when it was taken: what a vehicle can find out."""
+"""Whether a camera's frame is new, and what was measured when it was taken, from what a vehicle can know."""
 
 import math
 from collections import deque

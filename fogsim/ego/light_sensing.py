@@ -23,7 +23,7 @@ FARTHEST_DAZZLED = 250.0
 _STEPS_PER_E_FOLD = 200.0
 
 HEAD_LAMPS, TAIL_LAMPS = 1200.0, 16.0
-"""What a pair of low beams, and of tail lamps, shines straight ahead and back, by which reaches are told [cd]."""
+"""Intensity straight ahead of a pair of low beams, and straight back of tail lamps; gives their reach [cd]."""
 
 
 class Other(NamedTuple):
@@ -47,7 +47,7 @@ class LightSensing:
         self._half_view = math.radians(0.5 * section.field_of_view_deg)
 
     def measure(self, state: TrafficState, ego: int, fog: FogField, illuminance: float) -> LightMeasurement:
-        """Tell how bright it is, and by night whether others' lamps are ahead; no vehicle hides another.
+        """Measure how bright it is, and by night whether others' lamps are ahead; vehicles do not hide one another.
 
         Takes `illuminance` [lx].
         """

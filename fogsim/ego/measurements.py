@@ -78,7 +78,7 @@ class EgoSensors:
         return signs_ahead(known, measured.position, measured.heading, self._sign_reach, grade=grade)
 
     def scattering(self, snapshot: TrafficSnapshot, fog: FogField, time: float, faults: Faults) -> float | None:
-        """What the scatterometer tells of the extinction coefficient at the front bumper [1/m]; None without one.
+        """Extinction coefficient at the front bumper as the scatterometer measures it [1/m]; None without one.
 
         Takes `time` [s].
         """

@@ -26,7 +26,7 @@ _STEEPEST = math.radians(
 class NearScene:
     """The part of a scene that a camera sees, or may soon see.
 
-    Pictures are the same as of the whole scene: where ground is built it is complete, and all else is there at once.
+    Images equal those of the whole scene: built ground is always complete, and all other things are included at once.
 
     Parameters
     ----------

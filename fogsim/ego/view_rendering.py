@@ -48,7 +48,7 @@ from fogsim.values.scene import Instance
 DARKEST_SKY = 1e-4
 """Illuminance below which no sky under street lamps is taken to be [lx]: that of an overcast night without a moon.
 
-Surfaces return street lamps' light as they return the sky's, of which there must be some.
+Surfaces reflect street lamps' light as they reflect the sky's, so the sky must give some.
 """
 
 BEHIND_BUMPER = 0.15
@@ -277,7 +277,7 @@ class ViewRenderer:
         return middle_samples(view, self._samples), averaged(radiance, self._samples)
 
     def surrounding(self, state: TrafficState, ego: int, pose: CameraPose) -> Surrounding:
-        """Tell what `render` draws."""
+        """Describe what `render` draws."""
         self._go_to(state.position[ego])
         near, seen_from = self._from_origin(state, pose)
         lights = self._lights(state, ego, pose)

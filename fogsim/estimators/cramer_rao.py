@@ -1,4 +1,4 @@
-"""Cramér–Rao bound of fog's extinction: how well one picture of an even road can tell it, whatever the method."""
+"""Cramér–Rao bound of fog's extinction: the best precision that any method can reach on one image of an even road."""
 
 import math
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ NEAREST_ROW = 1.0
 """How far the middle of a row is from the horizon at least for the row to count, as road or as sky [px]."""
 
 LEAST_LEFT = 1e-12
-"""Share of what a picture tells of k, all else known, below which what is left is rounding [-]."""
+"""Information about k in an image, all else known, below whose share what is left is rounding [-]."""
 
 DARKEST = 1e-9
 """Least luminance of a road that is divided by [linear grey levels]."""
@@ -83,7 +83,7 @@ def extinction_bound(camera: Camera, scene: FoggyRoad) -> float:
     A pixel of road at the slant distance d has the level A (1 − e^(−kd)) + R e^(−kd) (Koschmieder) plus white noise,
     one of sky A. Unknown are k, A, R and, with its prior, the pitch. Patches of albedo are a Gaussian process of mean 0
     whose correlation falls linearly to 0 over the length of a patch; its deviation and length are known, so that a
-    picture tells of k also by how the patches fade. The information of a Gaussian picture is that of its mean and that
+    image also informs about k by how the patches fade. The information of a Gaussian image is that of its mean and that
     of its covariance (Kay 1993, Fundamentals of Statistical Signal Processing, eq. 3.31); that of a prior is added to
     it (Van Trees 1968, section 2.4.3). The bound is that of k when the others are fitted too.
 
@@ -101,7 +101,7 @@ def extinction_bound(camera: Camera, scene: FoggyRoad) -> float:
     Returns
     -------
     float
-        [1/m]; ``inf`` where the picture does not tell k. Over k it is the relative deviation of the visibility too.
+        [1/m]; ``inf`` where the image does not determine k. Over k it is the relative deviation of the visibility too.
 
     Examples
     --------
@@ -184,7 +184,7 @@ def _patch_covariance(rows: _Rows, scene: FoggyRoad) -> Floats:
 
 
 def _information_of_fading(rows: _Rows, scene: FoggyRoad, weights: Floats, patches: Floats) -> Floats:
-    """(4, 4) float64: what the covariance of the patches tells, which fade with the distance as all contrast does."""
+    """(4, 4) float64: information in the covariance of the patches, which fade with distance as all contrast does."""
     # The covariance is that of albedos times R e^(−kd) of both rows: relative slopes are sums of theirs.
     by_road = np.full(len(rows.slant), 1.0 / max(scene.road, DARKEST))
     relative = (-rows.slant, np.zeros(len(rows.slant)), by_road, -scene.extinction * rows.slant_slope)

@@ -49,7 +49,7 @@ BROADEST = 64.0
 """Width of a vehicle beyond which its picture is shrink before it is compared [px]: it shows no more."""
 
 OUTLINE = 1.28
-"""Size of what a vehicle is placed by, over that of what is compared [-]: its outline tells more than its rear."""
+"""Size of the region that places a vehicle, over the compared region [-]: an outline is more precise than a rear."""
 
 
 AGREES, CONTRADICTED = 0.1, 0.1
@@ -60,8 +60,8 @@ MISPLACED = 3.0
 """Standard deviation of the fading of detail that is faster than the light's, over their difference [-]."""
 
 BUMPER = 0.15
-"""Height of the lowest part of a rear that tells no light, in widths of the vehicle [-]: black plinths and shadows end
-there at heights that no far picture resolves."""
+"""Height of the lowest part of a rear without information on light, in widths of the vehicle [-]: black plinths and
+shadows end at heights that no distant image resolves."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -96,13 +96,13 @@ class Huang2015Repair(Repair):
     )
     RELATIVE_SEARCH = (
         "relative_search",
-        "k is sought within ± 0.01 1/m of k0, which is little in dense fog and more than all in thin",
-        "k is sought from k0 / 2 to 2 k0",
+        "k is searched within ± 0.01 1/m of k0, which is little in dense fog and more than all in thin",
+        "k is searched from k0 / 2 to 2 k0",
     )
     LEAD_LEFT_OUT = (
         "lead_left_out",
         "a vehicle ahead joins the region or ends it",
-        "what the tracked vehicle hides is left out, and the road beside it looked at",
+        "what the tracked vehicle hides is left out, and the road next to it is used",
     )
     CONFIRMED = (
         "confirmed",

@@ -28,7 +28,7 @@ class ObservationCheck:
         if not isinstance(frame, Frame):
             return checked_image(frame, self._camera)
         if frame.camera != self._camera:
-            raise InputError(f"the frame's camera must be the told one, {self._camera}, got {frame.camera}")
+            raise InputError(f"the frame's camera must be that of the estimator, {self._camera}, got {frame.camera}")
         image, time = checked_image(frame.image, self._camera), float(frame.time)
         if time < self._time:
             raise InputError(
@@ -55,7 +55,7 @@ def checked_image(image: object, camera: Camera) -> NDArray[np.uint8] | NDArray[
     if image.shape[:2] != (camera.height, camera.width):
         raise InputError(
             f"the image has {image.shape[1]}×{image.shape[0]} pixels (width × height), "
-            f"the camera was told as {camera.width}×{camera.height}"
+            f"but its camera has {camera.width}×{camera.height}"
         )
     if camera.bits > 8 and image.max() > most:
         raise InputError(f"an image of {camera.bits} bits must have values 0 … {most}, got one of {image.max()}")

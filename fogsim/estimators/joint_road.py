@@ -70,8 +70,8 @@ HARDLY_UNEVEN, UNEVEN_DEVIATION = 0.05, 0.13
 uneven, by what nodes along the way leave out [-]."""
 
 MEMORY, CHANGING, MOST_CHANGE = 10.0, 1.5, 0.15
-"""Time over which the last pictures' extinctions tell how uneven the fog is [s], how many times their relative
-deviation that of a single one is, and the most of it [-]: fog that has changed along the way goes on to."""
+"""Time over which recent extinctions measure how uneven the fog is [s], the factor on a single one's relative
+deviation, and its upper limit [-]: fog that has varied along the road will vary further."""
 
 LEAST_DEPTH = 1.0
 """Least optical depth through which road is seen, where no tracked vehicle says why not [-]: what looks like an
@@ -282,7 +282,7 @@ class JointRoad:
     ) -> UnevenFit | str:
         """Fit of a road in sun and shade, where the own lane's does not explain it, or why it is not to be believed.
 
-        Empty where there is no shade, or where what seems so is refused, and tells little or what the own lane tells.
+        Empty where there is no shade, where a supposed shade is rejected, or where it adds little to the own lane.
         """
         if self._earlier.maxlen or is_sure(own, curves) or is_ramp(curves, self._geometry, self._camera):
             return ""
@@ -401,7 +401,7 @@ class JointRoad:
 
 
 def _too_little_seen(uneven: UnevenFit, tracked: float) -> str:
-    """Say why too little is seen of a road that a tracked vehicle leaves free up to a depth; empty if it is enough."""
+    """Why too little is seen of a road that should be free up to a depth; empty if it is enough."""
     fit = uneven.fit
     if math.isinf(tracked) and fit.extinction > CLEAR and uneven.reach * fit.extinction < LEAST_DEPTH:
         return "something hides all lanes, or shade lies on them"

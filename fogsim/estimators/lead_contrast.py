@@ -78,9 +78,9 @@ class LeadContrast:
 
     The range of the sensor says where to look; edges and symmetry show the rear, car or motorcycle, and from then on it
     is placed by its likeness to the nearest picture. A picture's contrast over that one's is a line through the
-    airlight: dark parts tell the most, lamps that were lit since are left out, and as contrast is relative to the sky's
+    airlight: dark parts weigh most, lamps that were lit since are left out, and as contrast is relative to the sky's
     luminance, exposure cancels. k is the rate at which it falls while the range changes: no flat road, no horizon and
-    no reflectance enters, and a constant error of the range, as of the setback, changes k by a few percent: pictures
+    no reflectance enters. A constant error of the range, as by the setback, changes k by a few percent: images
     are then compared at sizes that are not quite the same.
 
     Own method, after the contrast of preceding vehicles in Mori et al. 2007. Daytime only. Remembers the track; another

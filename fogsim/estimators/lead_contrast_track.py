@@ -153,7 +153,7 @@ class ContrastTrack(TrackedVehicle[RearDetection]):
         self._compare_all(reference)
 
     def _keep_new(self, detection: RearDetection) -> None:
-        """Keep a detection from a new range; one from a known range tells whether fog has changed, or replaces it."""
+        """Keep a detection from a new range; one from a known range shows whether fog has changed, or replaces it."""
         known = self._nearest(detection.distance) if self.detections else None
         if known is None or abs(known.distance - detection.distance) >= SPACING:
             self._keep(detection)

@@ -112,7 +112,7 @@ class Negru2013Repair(Repair):
     LEAD_LEFT_OUT = (
         "lead_left_out",
         "a vehicle ahead joins the region or ends it",
-        "the band lies beside the tracked vehicle",
+        "the band lies next to the tracked vehicle",
     )
     SINGLE_FRAMES = (
         "single_frames",

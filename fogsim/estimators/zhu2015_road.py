@@ -68,13 +68,13 @@ class Zhu2015Repair(Repair):
         "steepest_row",
         "the row where the region ends is taken for the inflection",
         "the steepest row of the region's medians, to a fraction of a row, its slopes taken over rows in proportion to"
-        " their height below the horizon; the law itself tells by how much such a window shifts the steepest row",
+        " their height below the horizon; the shift of the steepest row by such a window follows from the law",
     )
     LAST_ROW = (
         "last_row",
         "a road that is hidden before its inflection (by a vehicle, or by what stands along the horizon) has none, and"
         " its end is taken for it",
-        "how far the last row that is seen has brightened towards the sky, since the bottom of the picture, tells k",
+        "k from how far the last visible row has brightened towards the sky since the bottom of the image",
     )
     SUBPIXEL_HORIZON = (
         "subpixel_horizon",
@@ -90,7 +90,7 @@ class Zhu2015Repair(Repair):
     LEAD_LEFT_OUT = (
         "lead_left_out",
         "a vehicle ahead joins the region or ends it",
-        "what the tracked vehicle hides is left out, and the road beside it looked at",
+        "what the tracked vehicle hides is left out, and the road next to it is used",
     )
     CONFIRMED = (
         "confirmed",

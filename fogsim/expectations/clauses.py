@@ -1,4 +1,4 @@
-"""What is expected of a run: clauses as plain values, each of which says in words what it expects."""
+"""What is expected of a run: clauses as plain values; each describes itself in words."""
 
 import math
 from dataclasses import dataclass

@@ -85,9 +85,9 @@ def _open(reason: str, came: str = "") -> Result:
     return FindingVerdict.INCONCLUSIVE, None, came, reason
 
 
-def _sight(moment: Moment, told: str) -> Sight:
+def _sight(moment: Moment, readings: str) -> Sight:
     step = moment.ego_step
-    return moment.step.time, None if step is None else step.route_position, told
+    return moment.step.time, None if step is None else step.route_position, readings
 
 
 class _Scope:
@@ -116,18 +116,18 @@ class _AlwaysWatch:
         self._worst = _Worst(clause.condition, clause.is_never)
         self._counted, self._known_once = 0.0, False
         self._broken: Sight | None = None
-        self._told = ""
+        self._readings = ""
 
     def look(self, moment: Moment) -> None:
         counts, holds = self._scope.look(moment), self._watch.look(moment)
         if not counts or holds is None:
             return
         if not self._known_once:
-            self._known_once, self._told = True, self._watch.told()
+            self._known_once, self._readings = True, self._watch.readings()
         self._counted += self._scope.elapsed
         self._worst.look(self._watch, moment)
         if holds == self._clause.is_never and self._broken is None:
-            self._broken = _sight(moment, self._watch.told())
+            self._broken = _sight(moment, self._watch.readings())
 
     def result(self, _: Mapping[str, object]) -> Result:
         worst = self._worst.sight
@@ -138,10 +138,10 @@ class _AlwaysWatch:
         if not self._scope.was_entered:
             return _open(f"{self._clause.during} never held")
         if not self._known_once:
-            return _open(_NEVER_KNOWN, self._watch.told())
+            return _open(_NEVER_KNOWN, self._watch.readings())
         if self._counted < self._clause.for_at_least - _TICK:
             return _open(f"it counted for {self._counted:g} s, and {self._clause.for_at_least:g} s were wanted")
-        return _passed(worst, self._told if worst is None else f"at worst {worst[2]}")
+        return _passed(worst, self._readings if worst is None else f"at worst {worst[2]}")
 
 
 class _Worst:
@@ -162,7 +162,7 @@ class _Worst:
         if isinstance(left, float) and isinstance(right, float) and not math.isinf(right):
             margin = self._sign * (left - right)
             if margin < self._margin:
-                self._margin, self.sight = margin, _sight(moment, watch.told())
+                self._margin, self.sight = margin, _sight(moment, watch.readings())
 
 
 class _EventuallyWatch:
@@ -177,21 +177,23 @@ class _EventuallyWatch:
         if counts and holds is not None:
             self._known_once = True
             if holds and self._held is None:
-                self._held = _sight(moment, self._watch.told())
+                self._held = _sight(moment, self._watch.readings())
 
     def result(self, _: Mapping[str, object]) -> Result:
         within, end = self._clause.within, self._scope.end
         if self._held is not None:
-            time, told = self._held[0], self._held[2]
-            return _passed(self._held) if time <= within + _TICK else _failed(self._held, told, f"only at {time:g} s")
+            time, readings = self._held[0], self._held[2]
+            return (
+                _passed(self._held) if time <= within + _TICK else _failed(self._held, readings, f"only at {time:g} s")
+            )
         if not self._scope.was_entered:
             return _open(f"{self._clause.during} never held")
         if not self._known_once:
             return _open(_NEVER_KNOWN)
         if end < within - _TICK and not math.isinf(within):
             return _open(f"the run ended at {end:g} s, before the {within:g} s were over")
-        told = f"{self._watch.told()} at the end, {end:g} s"
-        return _failed((min(within, end), None, told), told, "it never held")
+        readings = f"{self._watch.readings()} at the end, {end:g} s"
+        return _failed((min(within, end), None, readings), readings, "it never held")
 
 
 class _Trial:
@@ -237,7 +239,7 @@ class _WheneverWatch:
                 self._passed += 1
             elif decided is False:
                 self._failed += 1
-                self._broken = self._broken or (_sight(moment, self._require.told()), trial.time)
+                self._broken = self._broken or (_sight(moment, self._require.readings()), trial.time)
             elif not trial.is_over(time):
                 still_open.append(trial)
         self._open = still_open
@@ -246,7 +248,7 @@ class _WheneverWatch:
         tried = self._passed + self._failed
         if self._broken is not None:
             sight, since = self._broken
-            return _failed(sight, sight[2], f"not so {self._failed} of {tried} times; the first began at {since:g} s")
+            return _failed(sight, sight[2], f"failed {self._failed} of {tried} times, first from {since:g} s")
         came = f"{self._passed} of {tried} times" if tried else ""
         if tried < self._clause.at_least:
             undecided = f", {self._fired - tried} of them not decided" if self._fired > tried else ""

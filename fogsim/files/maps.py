@@ -24,13 +24,13 @@ def find_map(written: str, folder: Path) -> Path:
         name = name.removesuffix(ending)
     maps = os.environ.get(MAPS, "")
     if not maps:
-        told = f"expected an OpenDRIVE file ({OPENDRIVE}) that is there"
-        raise InputError(f"{told}, or a map in a folder that --maps names; got {shown(written)}")
+        expected = f"expected an OpenDRIVE file ({OPENDRIVE}) that is there"
+        raise InputError(f"{expected}, or a map in a folder that --maps names; got {shown(written)}")
     for ending in (OPENDRIVE, SUMO):
         if name and is_map(Path(maps) / f"{name}{ending}"):
             return Path(maps) / f"{name}{ending}"
     there = sorted(one.name for one in Path(maps).glob("*") if is_map(one))
-    what = suggest(f"{name}{OPENDRIVE}", there) if there else f"there is no {OPENDRIVE} or {SUMO} file at all"
+    what = suggest(f"{name}{OPENDRIVE}", there) if there else f"it contains no {OPENDRIVE} or {SUMO} file"
     raise InputError(f"there is no map {shown(name)} in {maps}; {what}")
 
 

@@ -40,7 +40,7 @@ def refuse_unwritable(
             if any(given.exists() and given.samefile(final) for given in read):
                 raise InputError(f"{named} would replace what is read; give another name")
             if not overwrite:
-                raise InputError(f"{named} is there already; give another name, or replace it with --overwrite")
+                raise InputError(f"{named} already exists; give another name, or replace it with --overwrite")
             if not os.access(final, os.W_OK):
                 raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         _refuse_unmakeable(partial_path(path), named, makes_folder)

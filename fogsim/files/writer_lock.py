@@ -36,8 +36,8 @@ class WritingProcess:
         """The process that a file names; None if the file names none."""
         if not isinstance(values, Mapping) or not isinstance(values.get("id"), int):
             return None
-        told: dict[str, Any] = {field.name: values.get(field.name) for field in dataclasses.fields(cls)}
-        return cls(**told)
+        fields: dict[str, Any] = {field.name: values.get(field.name) for field in dataclasses.fields(cls)}
+        return cls(**fields)
 
     def to_json(self) -> dict[str, object]:
         """The process as JSON data."""

@@ -1,22 +1,22 @@
-"""What vehicles with cameras tell others of the fog."""
+"""Messages about the fog from vehicles with cameras to others."""
 
 from fogsim.ego.fog_reports import place_seen
 from fogsim.values import Estimate, FogReport, Step
 
 SURE = 0.5
-"""Relative deviation beyond which an extinction is not told [-]."""
+"""Relative deviation beyond which an extinction is not sent [-]."""
 
 
 def camera_messages(step: Step) -> tuple[tuple[str, FogReport], ...]:
     """What the ego and the other equipped vehicles see in their pictures, with their ids.
 
-    What is told is the surest estimate of one picture and not what is believed: whoever believes what others tell, and
-    tells it on, would hear it come back as if it were news. It counts for the middle of the road that it was seen on.
+    A message carries the surest estimate of one image, not a belief: a vehicle that believes others' messages and
+    forwards them would receive its own as news. It applies to the middle of the road on which the fog was seen.
     """
     seen = [(step.traffic.ids[step.ego], step.route_position, step.estimates)]
     seen += [(one.vehicle_id, one.place, one.estimates) for one in step.equipped]
-    told = ((vehicle, _report(vehicle, place, estimates, step)) for vehicle, place, estimates in seen)
-    return tuple((vehicle, report) for vehicle, report in told if report is not None)
+    reports = ((vehicle, _report(vehicle, place, estimates, step)) for vehicle, place, estimates in seen)
+    return tuple((vehicle, report) for vehicle, report in reports if report is not None)
 
 
 def _report(vehicle: str, place: float, estimates: tuple[Estimate, ...], step: Step) -> FogReport | None:

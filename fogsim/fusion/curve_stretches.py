@@ -1,4 +1,4 @@
-"""Stretches of the way of which a curve of optical depths tells, each by itself."""
+"""Stretches of the road ahead that a curve of optical depths describes one by one."""
 
 import math
 
@@ -11,7 +11,7 @@ from fogsim.values.estimate import OpticalDepths
 Floats = NDArray[np.float64]
 
 CUTS = np.array([0.5, 1.0, 1.5, 2.0, 2.5, 3.0])
-"""Optical depths between which a curve of them tells of stretches of their own [-]."""
+"""Range of optical depths in which a curve resolves stretches of its own [-]."""
 
 SHORTEST, SHARED, GRAIN = 15.0, 0.8, 0.02
 """Shortest such stretch [m], correlation of a curve's errors at its ends, and least deviation of its depth [-]."""

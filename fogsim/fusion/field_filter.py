@@ -40,11 +40,11 @@ lies behind it."""
 class FieldFilter:
     """A Gaussian process of ln k over the way, ahead and behind, next to `GridFilter`'s belief of the here and now.
 
-    Each estimate tells of the mean extinction over both halves of the stretch that it has seen, for it has taken the
-    fog for even; a curve of optical depths, of several stretches. Denser fog that is announced is believed where it
-    is told; a report, where it was measured, the less the older it is; two side by side that contradict what was
-    believed, and agree, are the edge of a bank. What no one has told of is known by what is near, and beyond that by
-    nothing but that fog varies: the interval widens. Where the filter of the here and now, which believes in leaps,
+    Each estimate measures the mean extinction over both halves of the stretch that it has seen, for it has taken the
+    fog for even; a curve of optical depths measures several stretches. Denser fog that is announced is believed at its
+    position, and a report where it was measured, less as it ages. Two neighbouring reports that contradict the belief
+    and agree are the edge of a bank. Fog without any report follows from what is near, and beyond that only from how
+    much fog varies: the interval widens. Where the filter of the here and now, which believes in leaps,
     surely differs from the field, the edge of a bank has been driven through: what was believed ahead is doubted.
 
     The scalar belief is the distribution of the mean extinction from the vehicle to where 95 % of the light is lost.
@@ -100,12 +100,12 @@ class FieldFilter:
     def update_at(
         self, estimates: Sequence[Estimate], time: float, place: float, reports: Sequence[FogReport] = ()
     ) -> Belief:
-        """Take in the estimates of one instant, and what others tell.
+        """Take in the estimates of one instant and the reports of others.
 
         Parameters
         ----------
         estimates : sequence of Estimate
-            From any estimators; invalid ones tell no more than their bounds.
+            From any estimators; invalid ones contribute only their bounds.
         time : float
             The instant [s], not before that of the last call.
         place : float
@@ -145,7 +145,7 @@ class FieldFilter:
         return self._belief(now)
 
     def _take_in(self, estimate: Estimate) -> None:
-        """Learn what an estimate tells of the stretch that it has seen."""
+        """Learn an estimate over the stretch that it has seen."""
         if not estimate.valid:
             if estimate.bounds is not None and estimate.bounds.most < math.inf:
                 most = max(estimate.bounds.most, CLEAR)
@@ -174,7 +174,7 @@ class FieldFilter:
         self._field.learn(start, end, value, widened, self._outlier_share, floor)
 
     def _hear(self, report: FogReport, time: float, place: float) -> None:
-        """Learn what somebody else has measured."""
+        """Learn what others have measured."""
         age, ahead, known = time - report.time, report.place - place, (report.source, report.number)
         age = 0.0 if -CLOCKS_DISAGREE <= age < 0.0 else age
         numbers = (age, ahead, report.extinction, report.relative_deviation)
@@ -188,7 +188,7 @@ class FieldFilter:
         self._learn_report(report.place, value, deviation)
 
     def _learn_report(self, at: float, value: float, deviation: float) -> None:
-        """Learn a report; two side by side that tell of the same fog, which was doubted, are the edge of a bank."""
+        """Learn a report; two neighbours that agree on a fog that was doubted are the edge of a bank."""
         wrong, doubted = self._wrong_reports, self._doubted
         if doubted is not None and self._confirms(doubted, at, value, deviation):
             # Two that are both wrong would hardly agree.
@@ -213,7 +213,7 @@ class FieldFilter:
         value, deviation = now.log_moments()
         if deviation > CERTAIN:
             return
-        # A bank beyond what was seen, of which others have told, is no contradiction.
+        # A bank that others have reported beyond what was seen is no contradiction.
         sight = min(self._sight(math.exp(value)), reach)
         believed, variance = self._field.mean_extinction(0.0, sight)
         apart = abs(value - believed)

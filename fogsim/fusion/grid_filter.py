@@ -52,7 +52,7 @@ class GridFilter:
 
     An estimate speaks of the fog up to its `reach`. Where that is nearer than the visibility that it gives, the fog
     beyond may be another, and it counts for less the less of the way it has seen. Denser fog ahead is believed once
-    most estimates of the last `announcement_time` tell of it; estimates that do not reach as far then say nothing.
+    most estimates of the last `announcement_time` report it; estimates that do not reach as far then say nothing.
 
     Parameters
     ----------
@@ -69,9 +69,9 @@ class GridFilter:
     correlation_time : float
         Time after which the errors of an estimator are new ones [s].
     unseen_deviation : float
-        Standard deviation of ln k over the way to the visibility of which an estimate has seen nothing [-].
+        Standard deviation of ln k over the way to the visibility if an estimate has seen none of that way [-].
     announcement_time : float
-        Time over which estimates must tell of denser fog ahead [s].
+        Time over which estimates must report denser fog ahead [s].
     announced_leap_rate : float
         Expected leaps a second while denser fog is announced, in place of `leap_rate` where that is less [1/s].
 
@@ -184,7 +184,9 @@ class GridFilter:
         if not math.isfinite(time):
             raise InputError(f"grid_filter: the time of an update must be finite, got {time!r}")
         if self._time is not None and time < self._time:
-            raise InputError(f"grid_filter: time went back from {self._time!r} to {time!r} s; reset() starts anew")
+            raise InputError(
+                f"grid_filter: time went back from {self._time!r} to {time!r} s; call reset() to start again"
+            )
         if self._time is not None and time > self._time:
             elapsed = self._elapsed = time - self._time
             self._weight = min(1.0, elapsed / self._correlation_time)
@@ -242,7 +244,7 @@ class GridFilter:
             inside *= _normal_share((math.log(max(bounds.most, 1e-12)) - self._log_extinction) / softness)
         if bounds.least > 0.0:
             inside *= _normal_share((self._log_extinction - math.log(bounds.least)) / softness)
-        # Signs that are told wrongly are more than other outliers, and the belief must survive two of them.
+        # Wrong signs are more frequent than other outliers, and the belief must survive two of them.
         share = max(self._outlier_share, LEAST_UNBOUND)
         return np.asarray(np.log(share + (1.0 - share) * inside))
 

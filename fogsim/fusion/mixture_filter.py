@@ -106,7 +106,9 @@ class MixtureFilter:
         if not (math.isfinite(time) and math.isfinite(place)):
             raise InputError(f"mixture_filter: time and place of an update must be finite, got {time!r} and {place!r}")
         if time < self._time:
-            raise InputError(f"mixture_filter: time went back from {self._time!r} to {time!r} s; reset() starts anew")
+            raise InputError(
+                f"mixture_filter: time went back from {self._time!r} to {time!r} s; call reset() to start again"
+            )
         self._time = time
         for one in estimates:
             if one.valid and math.isfinite(one.visibility) and time >= self._taken.get(one.method, -math.inf):

@@ -22,7 +22,7 @@ class NoFusion:
         Parameters
         ----------
         estimates, time
-            As of `Fusion.update`.
+            See `Fusion.update`.
         """
         return Belief(self._log_extinction, np.full(CELLS, 1.0 / CELLS))
 

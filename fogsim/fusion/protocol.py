@@ -55,7 +55,7 @@ class LocatedFusion(Protocol):
         place : float
             How far the vehicle has come along its way [m].
         reports : sequence of FogReport
-            What others have told since the last call.
+            Reports from others since the last call.
 
         Raises
         ------
@@ -97,7 +97,7 @@ class DatedFusion:
         Parameters
         ----------
         estimates, time, place, reports
-            As of `LocatedFusion.update_at`.
+            See `LocatedFusion.update_at`.
 
         Raises
         ------

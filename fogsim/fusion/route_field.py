@@ -27,7 +27,7 @@ BELIEVED = 1.3
 """Standard deviations by which the belief lies below a bound that says nothing new [-]."""
 
 SAMPLES = 48
-"""Pairs of samples from which the visibility ahead is told."""
+"""Pairs of samples that give the visibility ahead."""
 
 
 class RouteField:
@@ -50,7 +50,7 @@ class RouteField:
         self._varying, self._beforehand = varying[:-1, :-1], beforehand[:-1, :-1]
         self._next = matrix_product(inverse_of(np.ascontiguousarray(self._beforehand)), beforehand[:-1, -1])
         self._rest = float(beforehand[-1, -1] - matrix_product(self._next, beforehand[:-1, -1]))
-        # The same in every run: what is told of a distribution is not to go by chance.
+        # The same in every run: samples of a distribution must not depend on chance.
         self._normals = np.ascontiguousarray(np.random.default_rng(0).standard_normal((SAMPLES, AHEAD + 1)).T)
         self.reset()
 
@@ -99,7 +99,7 @@ class RouteField:
         return route_field_kernels.stretch_weights(COUNT, CELL, self._rear(), start, end)
 
     def learn(self, start: float, end: float, value: float, deviation: float, wrong: float, floor: float) -> float:
-        """Take in a measurement of the mean extinction over a stretch, and tell how likely it is a right one [-].
+        """Update with a measurement of the mean extinction over a stretch; return the probability that it is right [-].
 
         Takes `start`, `end` [m].
         """

@@ -122,7 +122,7 @@ def learn(
     wrong: float,
     floor: float,
 ) -> float:
-    """Take in a measurement of the mean extinction over a stretch, in place, and tell how likely it is a right one.
+    """Update in place with the mean extinction measured over a stretch; return the probability that it is right.
 
     Takes `mean`, `covariance` (n, n), `weights` (n,).
     """

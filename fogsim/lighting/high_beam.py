@@ -16,7 +16,7 @@ Metres = Annotated[float, Range(0.0, 1e6, "m")]
 
 
 def is_dark(observation: Observation) -> bool:
-    """Whether the light sensor tells of less light than UNECE R48 lights the dipped beams below; not without one."""
+    """Whether the light sensor measures less light than UNECE R48 lights the dipped beams below; not without one."""
     return observation.light is not None and observation.light.illuminance < DAY_ILLUMINANCE
 
 
@@ -43,7 +43,7 @@ class Gallen2014:
     """Low beams in fog below 100 m, high beams above it, and never against anybody who would be dazzled.
 
     Gallen, Cord, Hautière, Dumont & Aubert (2014), § II-C: below V_met = 100 m high beams show less than low beams do;
-    from 100 m on they are preferred. By day, and in a vehicle without a light sensor, low beams. Fog lamps as of
+    from 100 m on they are preferred. By day, and in a vehicle without a light sensor, low beams. Fog lamps follow
     `FogLampRules`, next to low beams.
 
     Attributes

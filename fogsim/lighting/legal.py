@@ -48,7 +48,7 @@ LAWS: Mapping[Country, LightingLaw] = {
         near_lead=100.0,
         sources={
             "rear_fog_below": "Code de la route R416-7 II: in fog or falling snow; fog by the meteorologists' 1000 m",
-            "front_fog_below": "Code de la route R416-7 I: in fog, with dipped beams; likewise",
+            "front_fog_below": "Code de la route R416-7 I: in fog, with dipped beams; also 1000 m",
             "high_beam_from": "Code de la route R416-6: dipped beams in place of high ones where fog reduces sight",
             "near_lead": f"Code de la route R416-6: 'à faible distance'; {_LEAD}",
         },
@@ -72,8 +72,8 @@ LAWS: Mapping[Country, LightingLaw] = {
         near_lead=100.0,
         sources={
             "rear_fog_below": "Vienna Convention on Road Traffic 1968, art. 32: in thick fog; 50 m is FogSim's reading",
-            "front_fog_below": "the same: in thick fog, falling snow, heavy rain and the like; likewise 1000 m",
-            "high_beam_from": "the same: dipped, or front fog lamps, where fog reduces sight; likewise",
+            "front_fog_below": "the same: in thick fog, falling snow, heavy rain and the like; also 1000 m",
+            "high_beam_from": "the same: dipped, or front fog lamps, where fog reduces sight; also 1000 m",
             "near_lead": "UN Regulation 48 on automatic high beams: who is ahead at 100 m, who comes at 400 m",
         },
     ),

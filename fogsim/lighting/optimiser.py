@@ -16,7 +16,7 @@ MEETING_DISTANCE, MEETING_ANGLE = 50.0, math.radians(4.0)
 """Where the policy takes a driver to be who meets it: at 50 m, 3.5 m aside [m], [rad]."""
 
 LEAD_DISTANCE, MIRROR_ANGLE, MIRROR_SHARE = 50.0, math.radians(40.0), 0.8
-"""Where it takes one to be who drives ahead, unless the radar tells [m], the angle at which that driver's mirrors are
+"""Assumed range of the driver ahead without a radar range [m], the angle at which that driver's mirrors are
 [rad], and how much light they send on [-]."""
 
 _TOWARD = {Lamp.LOW_BEAM: (1000.0, 1200.0), Lamp.HIGH_BEAM: (32_000.0, 66_000.0)}
@@ -30,8 +30,8 @@ class SightOptimiser:
 
     By night it reckons for low and for high beams the distance at which visibility level 7 is reached in the fog as
     believed (`fogsim.lighting.own_sight`), minus `price` for the veil that they would lay over the eyes of a driver who
-    meets it at 50 m, if the light sensor tells of head lamps, and of one ahead, if it tells of tail lamps or the radar
-    of a vehicle. Fog lamps as of `FogLampRules`, next to low beams.
+    meets it at 50 m, if the light sensor detects head lamps, and of one ahead, if it detects tail lamps or the radar
+    a vehicle. Fog lamps follow `FogLampRules`, next to low beams.
 
     Attributes
     ----------

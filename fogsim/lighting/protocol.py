@@ -32,7 +32,7 @@ class VehicleLightingPolicy(Protocol):
         belief : Belief
             What is believed about the fog.
         observation : Observation
-            What the vehicle's sensors tell: its speed, the vehicle ahead by radar, the light sensor.
+            Sensor readings of the vehicle: its speed, the vehicle ahead by radar, the light sensor.
         time : float
             Instant [s].
         previous : LampChoice

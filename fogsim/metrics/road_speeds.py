@@ -42,7 +42,7 @@ class _Squares(NamedTuple):
 
 
 class RoadSpeeds:
-    """Speeds along a road: the way of an ego, of which `update` is told, or else the route that spans name.
+    """Speeds along a road: the ego's way, passed to `update`, or else the route that spans name.
 
     What is on an ego's way is known only when it has driven it: until then others' speeds wait in small squares.
     """
@@ -86,7 +86,7 @@ class RoadSpeeds:
         return self._pending[0]
 
     def sums(self) -> NDArray[np.float64]:
-        """Sums over all steps so far, a row for each stretch of road that somebody was on.
+        """Sums over all steps so far, a row for each stretch of road that had vehicles.
 
         Returns `ROAD_COLUMNS`: middle of the stretch [m]; time [s], way [m] and extinction over time [s/m] of the ego,
         and of everyone (n, 7).
@@ -97,7 +97,7 @@ class RoadSpeeds:
         return np.array(rows).reshape(-1, len(ROAD_COLUMNS))
 
     def means(self) -> NDArray[np.float64]:
-        """Means over everyone on the road and all steps so far, a row for each stretch that somebody was on.
+        """Means over all vehicles on the road and all steps so far, a row for each stretch that had vehicles.
 
         Returns middle of the stretch [m], speed as way over time [m/s], extinction [1/m], and time of the vehicles [s]
         (n, 4).

@@ -181,7 +181,7 @@ class MetricsOfRun(ABC, Generic[AnyStep]):
         Parameters
         ----------
         step : TrafficStep
-            The step, as of `update`.
+            The step, as for `update`.
         """
 
     def summary(self) -> RunSummary:

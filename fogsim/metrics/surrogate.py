@@ -252,7 +252,7 @@ def time_integrated_time_to_collision(
     Parameters
     ----------
     times_to_collision, durations, threshold
-        As of `time_exposed_time_to_collision`.
+        See `time_exposed_time_to_collision`.
 
     Returns
     -------

@@ -62,7 +62,7 @@ def add_ways_inside(starts: _Array, ends: _Array, boxes: _Array, ways: _Array) -
 
 @kernel
 def find_hidden(eyes: _Array, targets: _Array, boxes: _Array, bounds: _Array, hidden: NDArray[np.bool_]) -> None:
-    """Tell for each pair of eyes whether boxes hide all points of its target.
+    """Find for each pair of eyes whether boxes hide all points of its target.
 
     Takes `eyes` (n, 3) [m], `targets` (n, k, 3) [m], `boxes` (m, 10), `bounds` (m, 4) [m], `hidden` (n,) bool.
     """

@@ -83,7 +83,7 @@ def _summary(readings: list[Reading]) -> Iterator[str]:
         middle, low, high = (float(np.median([getattr(one, name) for one in recent])) for name in _VALUES)
         yield f"at the end     {metres(middle)} (90 %: {span_text(low, high)}), fog: {fog_category(middle).value}"
     else:
-        yield f"at the end     cannot tell: {readings[-1].reason or 'no valid estimate in the last second'}"
+        yield f"at the end     no estimate: {readings[-1].reason or 'no valid estimate in the last second'}"
     if valid:
         low, middle, high = np.quantile([min(one.visibility, ENDLESS) for one in valid], (0.05, 0.5, 0.95))
         yield f"over {length:.1f} s    median {metres(middle)}, 9 of 10 frames within {span_text(low, high)}"

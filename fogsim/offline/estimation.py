@@ -160,10 +160,10 @@ def estimates_of(
             sightings = None if watch is None else watch.sightings(picture.time)
             estimates = bench.estimates(picture.image, picture.time, sightings or ())
         except InputError as error:
-            told = f"{_place(source, picture)}: {error}"
+            message = f"{_place(source, picture)}: {error}"
             if not fitted:
-                raise InputError(told) from error
-            yield FrameEstimates(replace(picture, image=None, error=told), ())
+                raise InputError(message) from error
+            yield FrameEstimates(replace(picture, image=None, error=message), ())
             continue
         fitted = True
         looks = () if watch is None or sightings is None else watch.look(picture.image, picture.time, sightings)

@@ -146,6 +146,6 @@ def given_airlight(airlight: tuple[float, ...], colours: int, pixels: Pixels, ca
     if len(airlight) not in (1, colours):
         raise InputError(f"--airlight must be one pixel value or {colours}, got {len(airlight)}")
     if not all(0 <= value <= full for value in airlight):
-        told = ", ".join(f"{value:g}" for value in airlight)
-        raise InputError(f"--airlight must lie within 0 … {full:g}, the pixel values of this image, got {told}")
+        given = ", ".join(f"{value:g}" for value in airlight)
+        raise InputError(f"--airlight must lie within 0 … {full:g}, the pixel values of this image, got {given}")
     return np.broadcast_to(np.array(airlight[::-1], dtype=np.float64), (colours,)).copy()

@@ -30,7 +30,7 @@ STATED_DEVIATION, METADATA_DEVIATION, FIELD_DEVIATION, HEIGHT_DEVIATION = 0.03, 
 (45° to 82° within 90 %), and of the assumed height [-]."""
 
 LANE_WIDTH, LANE_DEVIATION = 3.5, 0.08
-"""Usual width of lanes [m] and its relative standard deviation, of which the lines' own errors are a part [-]."""
+"""Usual width of lanes [m] and its relative standard deviation, including the lines' own errors [-]."""
 
 NEAREST_LINE, FARTHEST_LINE, SHORTEST_LINE = 0.4, 3.0, 0.3
 """Lateral offsets over the camera's height between which the own lane's lines are sought, and their least length over
@@ -309,7 +309,7 @@ def _scaled(
     size: tuple[int, int],
     response: Response,
 ) -> tuple[_Guessed, _Guessed]:
-    """Focal length and height, the less certain of which follows from the camera's way, if the road's texture shows."""
+    """Focal length and height; the less certain one follows from the camera's way, if the road's texture shows."""
     cols, rows = size
     middle = (0.5 * (cols - 1), 0.5 * (rows - 1))
     pitch = math.atan((middle[1] - horizon_row) / focal.value)

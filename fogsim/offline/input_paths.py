@@ -76,7 +76,7 @@ def _paths(given: str) -> list[Path]:
     if path.is_dir():
         found = _ordered(one for one in path.iterdir() if one.suffix.lower() in IMAGE_ENDINGS and one.is_file())
         if not found:
-            raise InputError(f"{path}: no image is in this folder; looked for {', '.join(IMAGE_ENDINGS)}")
+            raise InputError(f"{path}: the folder contains no image with one of the endings {', '.join(IMAGE_ENDINGS)}")
         return found
     if path.exists():
         return [path]
@@ -92,8 +92,8 @@ def _nearest(path: Path) -> str:
     """The nearest file name in the folder, if one is near."""
     if not path.parent.is_dir():
         return ""
-    told = suggest(path.name, sorted(one.name for one in path.parent.iterdir()))
-    return f"; {told.partition('?')[0]}?" if "?" in told else ""
+    suggestion = suggest(path.name, sorted(one.name for one in path.parent.iterdir()))
+    return f"; {suggestion.partition('?')[0]}?" if "?" in suggestion else ""
 
 
 def _ordered(paths: Iterable[Path]) -> list[Path]:

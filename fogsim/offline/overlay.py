@@ -113,8 +113,8 @@ class Overlay:
     def _draw_lines(self, draw: ImageDraw.ImageDraw, result: FrameEstimates) -> None:
         y = self._picture_height + _LINE // 2
         name = result.picture.name
-        told = f"frame {name}, {result.picture.time:.2f} s" if isinstance(name, int) else name
-        draw.text((12, y), told[-90:], fill=MUTED, font=font(13), anchor="lm")
+        title = f"frame {name}, {result.picture.time:.2f} s" if isinstance(name, int) else name
+        draw.text((12, y), title[-90:], fill=MUTED, font=font(13), anchor="lm")
         for estimate in result.estimates:
             y += _LINE
             _draw_estimate(draw, y, estimate, self._colours[estimate.method])
@@ -123,14 +123,14 @@ class Overlay:
 def _draw_estimate(draw: ImageDraw.ImageDraw, y: int, estimate: Estimate, colour: Colour) -> None:
     draw.text((12, y), estimate.method, fill=colour, font=font(15, bold=True), anchor="lm")
     if not estimate.valid:
-        reason = f"cannot tell: {estimate.diagnostics.get('reason', 'no reason given')}"
+        reason = f"no estimate: {estimate.diagnostics.get('reason', 'no reason given')}"
         draw.text((190, y), reason, fill=MUTED, font=font(13), anchor="lm")
         return
     draw.text((270, y), metres(estimate.visibility), fill=TEXT, font=font(17, bold=True), anchor="rm")
     draw.text((288, y), f"90 %: {interval_text(estimate)}", fill=MUTED, font=font(13), anchor="lm")
     category = estimate.category.value
-    told = denser_text(estimate) or ("no fog" if category == "none" else f"{category} fog")
-    draw.text((470, y), told, fill=TEXT, font=font(15), anchor="lm")
+    text = denser_text(estimate) or ("no fog" if category == "none" else f"{category} fog")
+    draw.text((470, y), text, fill=TEXT, font=font(15), anchor="lm")
 
 
 def _shown(image: Pixels, bits: int) -> NDArray[np.uint8]:

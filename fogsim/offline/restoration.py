@@ -127,14 +127,14 @@ def _airlight(
     """Pixel values of the given airlight, or of the image's own with the estimate's luminance."""
     if wish.airlight is not None:
         return np.array(wish.airlight)
-    told = None if estimate is None else estimate.diagnostics.get("airlight")
-    if not isinstance(told, float):
+    airlight = None if estimate is None else estimate.diagnostics.get("airlight")
+    if not isinstance(airlight, float):
         return None
     full = largest_value(image, camera)
     channels = image.reshape(*image.shape[:2], -1)
     light = METHODS.find(wish.method).airlight(channels, camera, int(full))
     weights = np.array(LUMINANCE_WEIGHTS if len(light) == 3 else (1.0,))
-    scaled = np.minimum(light * (told / 255.0 / float((light * weights).sum())), 1.0)
+    scaled = np.minimum(light * (airlight / 255.0 / float((light * weights).sum())), 1.0)
     return np.asarray(full * respond(scaled, camera.response, camera.black_level))
 
 

@@ -222,7 +222,7 @@ def _line(widths: tuple[int, int], cells: Sequence[str]) -> str:
 
 def _cells(estimate: Estimate) -> tuple[str, ...]:
     if not estimate.valid:
-        return (f"cannot tell: {estimate.diagnostics.get('reason', 'no reason given')}",)
+        return (f"no estimate: {estimate.diagnostics.get('reason', 'no reason given')}",)
     horizon = estimate.diagnostics.get("horizon_row")
     return (
         metres(estimate.visibility),

@@ -138,11 +138,14 @@ class VideoFile:
             finally:
                 process.kill()
             log.read()
-        said = [*log.errors, *(["the last packet is incomplete"] if log.is_stream and self._ends_in_a_packet() else [])]
+        errors = [
+            *log.errors,
+            *(["the last packet is incomplete"] if log.is_stream and self._ends_in_a_packet() else []),
+        ]
         is_short = self.duration - end > max(MOST_MISSING, 2.0 * self.period)
-        if failed or said or is_short:
+        if failed or errors or is_short:
             frames = f"{read} of {self.count} frames" if is_short else f"{read} frames"
-            reason = f" ({said[0]})" if said else ""
+            reason = f" ({errors[0]})" if errors else ""
             message = f"{self.path}: the video is cut off or damaged: {frames} could be read{reason}"
             yield Picture(read, end, None, message)
 

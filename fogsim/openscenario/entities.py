@@ -85,7 +85,7 @@ def read_vehicles(entities: Node, catalogs: Catalogs) -> Vehicles:
     for entity in entities.all("ScenarioObject"):
         name = sumo_name(entity.get("name"))
         if not name or name in _TAKEN or name in found:
-            entity.refuse(f"expected a name of its own, which is not {' or '.join(_TAKEN)}; got {name!r}")
+            entity.refuse(f"expected a unique name other than {' or '.join(_TAKEN)}; got {name!r}")
             continue
         for controller in entity.all("ObjectController"):
             if controller.children or controller.attributes:

@@ -176,7 +176,7 @@ class Positions:
         node = self.catalogs.need(holder, "Route")
         points = node.some("Waypoint")
         if any(point.within("Position", "RoutePosition") for point in points):
-            raise NodeError(node, "a waypoint has a place of its own, not one on a route")
+            raise NodeError(node, "a waypoint needs an absolute position, not one on a route")
         known = [self.on_lanes(point.need("Position")) for point in points]
         if node.flag("closed", "false"):
             node.refuse("closed: write the waypoints of each lap")

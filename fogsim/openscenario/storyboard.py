@@ -109,7 +109,7 @@ class Storyboard:
             trigger = entry.trigger
             if number:
                 if effect.is_endless:
-                    node.refuse("maximumExecutionCount: what is never over by itself is played once")
+                    node.refuse("maximumExecutionCount: an action that never ends is played once")
                 # It is played again once it is over and its own trigger holds.
                 trigger = both(Trigger(self._played(entry, entry.names[number - 1])), trigger)
             written.append(timeline_entry(node, name, trigger, effect.do, until))

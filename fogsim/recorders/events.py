@@ -26,8 +26,8 @@ EVENT_COLUMNS: Mapping[str, tuple[Any, str]] = {
     "what": (pa.string(), "what is done; of a collision the speed of the impact [m/s]; lane and colour"),
     "who": (pa.string(), "vehicles, with commas between"),
     "x_m": (pa.float64(), "where the first of them is, the signal head, or else the ego: east; null if none is there"),
-    "y_m": (pa.float64(), "likewise, north"),
-    "z_m": (pa.float64(), "likewise, height"),
+    "y_m": (pa.float64(), "the same, north"),
+    "z_m": (pa.float64(), "the same, height"),
     "why": (pa.string(), "what held of the condition when it came to hold"),
 }
 """Columns of ``events.parquet``: their types and meanings."""

@@ -1,4 +1,4 @@
-"""What a recorder is, and what it is told about the run it records."""
+"""Protocol of recorders, and the run that they are given."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

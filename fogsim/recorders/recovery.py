@@ -39,7 +39,7 @@ def recover_run(path: Path, overwrite: bool = False) -> list[str]:
             shutil.rmtree(folder)
         return whole_files(path)
     if not manifest:
-        raise InputError(f"{path} holds no run that did not come to its end")
+        raise InputError(f"{path} contains no unfinished run")
     with WriterLock(path):
         refuse_living(folder)
         dead = manifest["status"] == Status.RUNNING.value

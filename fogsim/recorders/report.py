@@ -28,7 +28,7 @@ _UNITS: Mapping[str, str] = {
 """Unit by the end of a key."""
 
 MOST_SIGNS = 60
-"""Maximum number of signs in the report."""
+"""Signs listed in the report."""
 
 _KEY_NUMBERS: Sequence[tuple[str, str]] = (
     ("ego_collisions", "collisions of the ego"),

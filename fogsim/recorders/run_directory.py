@@ -90,7 +90,7 @@ class RunDirectory:
         # Without a manifest, a run was killed when all its results were in place.
         if self.manifest.exists():
             raise InputError(
-                f"{self.path} holds rows of a run that did not come to its end: {_fate_of_run(self.unfinished)}. "
+                f"{self.path} contains rows of an unfinished run: {_fate_of_run(self.unfinished)}. "
                 f"fogsim recover {self.path} makes them readable, --overwrite replaces them, --out goes elsewhere"
             )
         if self.earlier:

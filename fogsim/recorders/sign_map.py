@@ -9,7 +9,7 @@ from fogsim.units import KMH_PER_MPS
 from fogsim.values import Sign, SignMap
 
 GEOGRAPHIC = "longitude and latitude [deg], WGS 84"
-NET = "x and y of the SUMO network [m], not longitude and latitude: the network tells no usable projection"
+NET = "x and y of the SUMO network [m], not longitude and latitude: the network has no usable projection"
 
 LonLat = tuple[float, float]
 

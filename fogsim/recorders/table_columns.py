@@ -115,7 +115,7 @@ def _estimator_columns(method: str) -> list[Column[Step]]:
 
     number = pa.float64()
     return [
-        Column(f"{method}_valid", pa.bool_(), "the method could tell", of_estimate(lambda e: e.valid)),
+        Column(f"{method}_valid", pa.bool_(), "whether the estimate is valid", of_estimate(lambda e: e.valid)),
         Column(
             f"{method}_extinction_per_m",
             number,
@@ -176,7 +176,7 @@ _EGO_COLUMNS: tuple[Column[Step], ...] = (
     Column(
         "off_lanes",
         pa.bool_(),
-        "whether the ego is off the lanes: parked beside them, or put there by another simulator",
+        "whether the ego is off the lanes: parked next to them, or put there by another simulator",
         lambda step, _: bool(step.traffic.off_lanes[step.ego]),
     ),
     Column(

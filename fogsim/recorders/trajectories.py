@@ -31,7 +31,7 @@ TRAJECTORY_COLUMNS: Mapping[str, tuple[Any, str]] = {
     "timestep_time": (pa.float64(), "SUMO's time after its step [s]; fcd-output has the time before it"),
     "vehicle_id": (pa.string(), "vehicle, or person on foot"),
     "vehicle_x": (pa.float64(), "east, middle of the front bumper [m]; a change of lane takes time here"),
-    "vehicle_y": (pa.float64(), "north, likewise [m]"),
+    "vehicle_y": (pa.float64(), "north, of the same point [m]"),
     "vehicle_z": (pa.float64(), "height of the road there [m]"),
     "vehicle_angle": (pa.float64(), "heading, clockwise from north [°]"),
     "vehicle_type": (pa.string(), "kind of body (car, van, truck, bus, motorcycle, pedestrian), not SUMO's vType"),

@@ -166,7 +166,7 @@ def make(registry: Registry[Callable[..., T]], name: str, *arguments: object, **
     """Call a registered factory; InputError if it has no such parameter or the value does not fit its annotation."""
     factory = registry[name]
     by_place = list(inspect.signature(factory).parameters)[: len(arguments)]
-    mistakes = [f"{option}: {told}" for option, told in parameter_mistakes(factory, options, by_place)]
+    mistakes = [f"{option}: {mistake}" for option, mistake in parameter_mistakes(factory, options, by_place)]
     if mistakes:
         raise InputError(f"{registry.kind} {name!r}: " + "; ".join(mistakes))
     return factory(*arguments, **options)

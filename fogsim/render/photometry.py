@@ -56,7 +56,7 @@ def lamp_radiance(surface: Surface) -> NDArray[np.float64]:
 
 
 def lighting_bits(surface: Surface) -> int:
-    """Bits of `Lamp` any of which lights a surface: −1 for one that is always lit, 0 for what is no lamp."""
+    """Bits of `Lamp`; any of them lights a surface. −1 for one that is always lit, 0 for what is no lamp."""
     if surface == Surface.LAMP_STREET:
         return -1
     return int(LAMPS[surface][0]) if surface in LAMPS else 0

@@ -1,4 +1,4 @@
-"""Which triangles of a mesh belong to closed solids, of which only the outside can be seen from outside."""
+"""Which triangles of a mesh belong to closed solids, where only the outside can be seen from outside."""
 
 import numpy as np
 from numpy.typing import NDArray

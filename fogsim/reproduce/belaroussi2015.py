@@ -26,7 +26,7 @@ STEP, IMAGES = 5.0, 504
 """Way between two images [m], and how many there are in each fog."""
 
 APART, FIRST = 100.0, 600.0
-"""Way between two signs, and to the first of them [m]; the paper tells neither."""
+"""Way between two signs, and to the first of them [m]; not given in the paper."""
 
 REACH = 560.0
 """How far ahead the map is read [m]."""
@@ -53,12 +53,12 @@ CALIBRATED = (60.0, 80.0, 110.0, 150.0, 200.0, 260.0, 330.0, 400.0, 500.0, 650.0
 NOTES = (
     "The paper prints neither camera, sign size, spacing nor the coefficients of its curve. Ours: signs of"
     f" {DIAMETER} m (speed limit, pedestrian crossing, stop) every {APART:.0f} m, images of 1400x600 px every"
-    f" {STEP:.0f} m, {IMAGES} in each fog, and two cameras. The map errs by 0.5 m, the heading by 0.2°, the told pitch"
-    " by 0.1° (standard deviations).",
+    f" {STEP:.0f} m, {IMAGES} in each fog, and two cameras. The map errs by 0.5 m, the heading by 0.2°, the stated"
+    " pitch by 0.1° (standard deviations).",
     "Calibration: drives of their own up to single signs (`fogsim calibrate signs`), with other numbers drawn. 'ours'"
     " is a monotone curve through the distances of first detection; it abstains where resolution and not fog sets them"
-    " ('at least'). 'cubic' is the paper's polynomial of third degree through the distances of 80 % detection; nothing"
-    " tells where it is flat.",
+    " ('at least'). 'cubic' is the paper's polynomial of third degree through the distances of 80 % detection; no"
+    " mark shows where it is flat.",
     "With 1400 px a sign of 0.9 m comes out at 209 m, three pixels in radius, in any fog from about 175 m on: the"
     " paper's range to 400 m needs a lens such as the second one, or larger signs.",
 )
@@ -174,18 +174,18 @@ def _track(setup: Setup, measured: OperatingRange, images: int) -> Iterator[list
     last: dict[float, dict[str, Cell]] = {v: {} for v in PUBLISHED}
     for image, seen in enumerate(observed(drive, tuple(PUBLISHED), rng)):
         for visibility, observation in seen.items():
-            told, published = ours[visibility].update(observation), cubic[visibility].update(observation)
-            least = told.diagnostics.get("visibility_at_least")
+            estimate, published = ours[visibility].update(observation), cubic[visibility].update(observation)
+            least = estimate.diagnostics.get("visibility_at_least")
             last[visibility] = {
                 "camera": setup.name,
                 "visibility_m": visibility,
                 "images": image + 1,
-                "ours_m": round(told.visibility, 1) if told.valid else None,
-                "ours_deviation_m": round(told.visibility * told.standard_deviation / told.extinction, 1)
-                if told.valid
+                "ours_m": round(estimate.visibility, 1) if estimate.valid else None,
+                "ours_deviation_m": round(estimate.visibility * estimate.standard_deviation / estimate.extinction, 1)
+                if estimate.valid
                 else None,
                 "at_least_m": None if least is None else round(float(str(least)), 1),
-                "signs": int(str(told.diagnostics.get("signs", 0))),
+                "signs": int(str(estimate.diagnostics.get("signs", 0))),
                 "cubic_m": round(published.visibility, 1) if published.valid else None,
             }
         yield list(last.values())

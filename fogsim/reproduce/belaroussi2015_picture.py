@@ -42,8 +42,8 @@ def _draw_ranges(axes: Axes, ranges: Sequence[tuple[str, OperatingRange]]) -> No
         low, high = measured.reach
         if low < high:
             distances = np.linspace(low, high, 100).tolist()
-            told = [measured.visibility_at(distance) for distance in distances]
-            axes.plot(distances, [np.nan if one is None else one[0] for one in told], color=colour)
+            found = [measured.visibility_at(distance) for distance in distances]
+            axes.plot(distances, [np.nan if one is None else one[0] for one in found], color=colour)
         reach = np.linspace(min(measured.operating_range), max(measured.operating_range), 100)
         axes.plot(reach, np.polyval(measured.cubic, reach), ":", color=colour)
     axes.set(xlabel="distance of first detection (open: of 80 % detection) [m]", ylabel="V_met [m]", ylim=(0.0, 700.0))
@@ -56,7 +56,7 @@ def _draw_estimates(
 ) -> None:
     truth = list(published)
     axes.plot(truth, truth, color="0.6", lw=1)
-    known = [(v, told) for v, told in published.items() if told is not None]
+    known = [(v, value) for v, value in published.items() if value is not None]
     axes.plot(*zip(*known, strict=True), "x", color="black", ms=9, label="the paper's text")
     for number, name in enumerate(names):
         mine = [record for record in records if record["camera"] == name]

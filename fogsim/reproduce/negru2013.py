@@ -146,9 +146,9 @@ def _table(records: list[Mapping[str, Cell]]) -> tuple[tuple[str, ...], ...]:
     rows = [heading]
     for record in records:
         found = [_metres(record[f"{name}_visibility_m"], float(str(record["visibility_m"]))) for name in VARIANTS]
-        true, told = str(record["category"]), record["corrected_category"]
+        true, category = str(record["category"]), record["corrected_category"]
         start = (str(record["scene"]), f"{record['extinction_per_m']:.2f}", f"{record['visibility_m']:.0f}")
-        rows.append((*start, *found, true, "cannot tell" if told is None else str(told)))
+        rows.append((*start, *found, true, "no estimate" if category is None else str(category)))
     return tuple(rows)
 
 
@@ -171,6 +171,6 @@ def _picture(image: NDArray[np.uint8], estimate: Estimate) -> NDArray[np.uint8]:
         for side in (left, right):
             draw.line([(side, top), (side, bottom)], fill=BLUE, width=2)
         draw.line([(float(value), top + i) for i, value in enumerate(profile)], fill=BLACK, width=2)
-    told = f"V = {estimate.visibility:.1f} m" if estimate.valid else "cannot tell"
-    draw.text((12, 12), told, fill=BLACK, font=font(22, bold=True))
+    text = f"V = {estimate.visibility:.1f} m" if estimate.valid else "no estimate"
+    draw.text((12, 12), text, fill=BLACK, font=font(22, bold=True))
     return np.asarray(picture)

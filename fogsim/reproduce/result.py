@@ -54,7 +54,7 @@ class Reproduction:
     """A paper's evaluation on our frames."""
 
     paper: str  # Its name
-    # One flat record for each case: what was set, what each variant of the method found; None where it cannot tell
+    # One flat record for each case: what was set, what each variant of the method found; None without an estimate
     records: tuple[Mapping[str, Cell], ...]
     # What is shown: the headings, then the rows; the paper's figure is next to ours. The first of `tables`, if there
     # are several

@@ -21,7 +21,7 @@ VISIBILITIES = (50.0, 100.0, 200.0, 400.0)
 """Of every drive [m]."""
 
 DRIVES, FRAMES = 6, 3
-"""Drives of each setting, and their frames, of which the last one's estimate counts."""
+"""Drives of each setting, and their frames; the last one's estimate counts."""
 
 GROWTHS = (0.5, 1.0, 2.0, 4.0, 6.0, 8.0, 12.0, 20.0, 40.0)
 """G_max of region growing as published [grey levels]."""
@@ -147,17 +147,17 @@ def swept(
 def _record(
     method: str, setting: Setting, form: str, visibility: float, estimates: Sequence[Estimate]
 ) -> dict[str, Cell]:
-    told = [one.extinction for one in estimates if one.valid and one.extinction > 0.0]
-    apart = extinction_from_visibility(visibility) / np.array(told) - 1.0
+    extinctions = [one.extinction for one in estimates if one.valid and one.extinction > 0.0]
+    apart = extinction_from_visibility(visibility) / np.array(extinctions) - 1.0
     return {
         "paper": method,
         "table": "sweep",
         "setting": setting.name,
         "form": form,
         "visibility_m": visibility,
-        "told_share": len(told) / len(estimates),
-        "median_error_pct": 100.0 * float(np.median(np.abs(apart))) if told else None,
-        "bias_pct": 100.0 * float(np.median(apart)) if told else None,
+        "told_share": len(extinctions) / len(estimates),
+        "median_error_pct": 100.0 * float(np.median(np.abs(apart))) if extinctions else None,
+        "bias_pct": 100.0 * float(np.median(apart)) if extinctions else None,
     }
 
 

@@ -249,9 +249,9 @@ def right_share(records: Sequence[Mapping[str, Cell]], variant: str) -> float:
 
 
 def _errors(records: Sequence[Mapping[str, Cell]]) -> tuple[float, NDArray[np.float64]]:
-    """Share of the corrected method's estimates in fog within ±10 m, and the relative errors of what it tells."""
+    """Share of the corrected method's estimates in fog within ±10 m, and their relative errors."""
     foggy = [r for r in records if r["visibility_m"] is not None]
     true = np.array([r["visibility_m"] for r in foggy], np.float64)
     found = np.array([np.inf if (v := r["corrected_visibility_m"]) is None else v for r in foggy], np.float64)
-    told = np.isfinite(found)
-    return float(np.mean(np.abs(found - true) <= TOLERANCE)), np.abs(found[told] / true[told] - 1.0)
+    valid = np.isfinite(found)
+    return float(np.mean(np.abs(found - true) <= TOLERANCE)), np.abs(found[valid] / true[valid] - 1.0)

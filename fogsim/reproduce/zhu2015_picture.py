@@ -50,10 +50,10 @@ def _panel(seen: Observation, camera: Camera, visibility: float, *, as_published
         if isinstance(row, int | float):
             draw.line([(0, row), (camera.width, row)], fill=colour, width=2)
     name = "published" if as_published else "corrected"
-    told = f"{_metres(estimate.visibility)}, {estimate.diagnostics['class']}" if estimate.valid else "cannot tell"
+    text = f"{_metres(estimate.visibility)}, {estimate.diagnostics['class']}" if estimate.valid else "no estimate"
     top = max(round(camera.horizon_row) - SKY, 0)
     draw.rectangle((0, top, camera.width, top + TITLE), fill=WHITE)
-    draw.text((10, top + 2), f"{name}: {told} (true: {_metres(visibility)})", fill=BLACK, font=font(18, bold=True))
+    draw.text((10, top + 2), f"{name}: {text} (true: {_metres(visibility)})", fill=BLACK, font=font(18, bold=True))
     return np.asarray(drawing)[top:]
 
 

@@ -16,7 +16,7 @@ FARTHEST = 1e6
 """Distance that stands for the sky's [m]."""
 
 BLOCK = 4
-"""Side of the blocks over which what stands on the road is looked for [px]: noise of single pixels tells nothing."""
+"""Side of the blocks searched for things that stand on the road [px]: noise makes single pixels meaningless."""
 
 DARK, SURE = 0.5, 0.04
 """Share of the road's luminance below which the foot of something may be, and how far below black, relative to the
@@ -26,8 +26,8 @@ BRIGHT_HEIGHT = 1.0
 """Height over which something dark may be bright and still one [m]: a boot between shadow and rear window."""
 
 SEEN, USUAL_ROAD, DARKEST_ROAD = 0.5, 0.25, 0.05
-"""Transmission from which on road tells its luminance, and what that is, relative to the airlight, where none does, and
-at least [-]."""
+"""Least transmission at which road shows its luminance; its luminance relative to the airlight where no road does, and
+its lower limit [-]."""
 
 
 def planar(picture: FoggyPicture) -> Floats:

@@ -109,8 +109,8 @@ def _airlight(
         raise InputError(f"airlight must be one pixel value or {channels}, got {values.size}")
     light = exposure_of(values / full, camera.response, camera.black_level)
     if not ((light >= LEAST_LIGHT).all() and (values <= full).all()):
-        told = ", ".join(f"{value:g}" for value in values)
+        listed = ", ".join(f"{value:g}" for value in values)
         raise InputError(
-            f"airlight must be brighter than black and at most {full:g}, the largest pixel value, got {told}"
+            f"airlight must be brighter than black and at most {full:g}, the largest pixel value, got {listed}"
         )
     return np.broadcast_to(light, (channels,)).copy()

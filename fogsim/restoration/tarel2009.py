@@ -15,7 +15,7 @@ KEPT = 0.95
 """p: share of the veil that is taken away."""
 
 LEAST_VISIBILITY = 50.0
-"""V_min: the densest fog that the planar assumption reckons with [m]."""
+"""V_min: the densest fog that the planar assumption allows for [m]."""
 
 
 def tarel2009(picture: FoggyPicture) -> Floats:

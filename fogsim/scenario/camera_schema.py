@@ -82,7 +82,7 @@ class MotionBlur(Section):
 
 
 class BodySection(Section):
-    """How the vehicle's body moves the camera, of which the estimators are told nothing."""
+    """How the vehicle's body moves the camera, unknown to the estimators."""
 
     pitch_deg_per_mps2: Number = Field(default=0.0, ge=0, le=2)
     """Pitch, nose down, for each m/s² of deceleration; cars have about 0.1 to 0.3."""
@@ -98,7 +98,7 @@ class StereoSection(Section):
     """Distance between the optical centres."""
 
     baseline_error_percent: Number = Field(default=0.0, ge=-50, le=50)
-    """Told over true baseline, minus 1."""
+    """Stated over true baseline, minus 1."""
 
     yaw_error_deg: Number = Field(default=0.0, ge=-2, le=2)
     """How far its axis truly turns to the left of the first one's, where the calibration has them parallel."""
@@ -174,7 +174,7 @@ class CameraSection(Section):
     """Read noise in electrons at very high gain, to which it falls; if not given, it is the same at every gain."""
 
     black_level_percent: Number = Field(default=0.0, ge=0, le=25)
-    """Share of full scale at which the sensor reads no light; estimators are told. 0 cuts noise about the dark off."""
+    """Share of full scale at which the sensor reads no light; estimators know it. 0 cuts noise about the dark off."""
 
     response: Response = Response.SRGB
     """Curve from light to pixel values: `linear`, `gamma` (2.2) or `srgb`."""

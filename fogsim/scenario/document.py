@@ -111,8 +111,8 @@ def _place(block: object, key: str, path: tuple[str, ...], text: str) -> int:
 class Document:
     """Plain data from a file; `origins` has each key's ``file:line``, or the override that set it.
 
-    An OpenSCENARIO file that varies another one's parameters has `cases`, values of all of them, of which the first is
-    in `data`, and `of_case` reads another. `are_runs` if they are random test runs.
+    An OpenSCENARIO file that varies another one's parameters has `cases`, values of all of them. `data` is the first
+    case, and `of_case` reads another. `are_runs` if they are random test runs.
     """
 
     path: Path
@@ -153,11 +153,11 @@ class Document:
         """
         origins = dict(self.origins)
         for text in overrides:
-            at, told = _override_path(text), _shown_override(text)
+            at, origin = _override_path(text), _shown_override(text)
             origins = {key: origin for key, origin in origins.items() if key[: len(at)] != at}
             for block in (at[:length] for length in range(1, len(at))):
-                origins[block] = f"{origins[block]} with {told}" if block in origins else told
-            origins[at] = told
+                origins[block] = f"{origins[block]} with {origin}" if block in origins else origin
+            origins[at] = origin
         return replace(self, origins=origins)
 
 

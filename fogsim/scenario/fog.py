@@ -196,8 +196,8 @@ class Fog(Section):
         for key in ("base_m", "top_m"):
             given = [getattr(change, key) is not None for change in self.changes]
             if any(given) and not all(given):
-                told = f"got it in {sum(given)} of {len(given)}"
-                raise ValueError(f"{key} must be given in all changes or in none, {told}")
+                counts = f"got it in {sum(given)} of {len(given)}"
+                raise ValueError(f"{key} must be given in all changes or in none, {counts}")
         return self
 
     @model_validator(mode="after")

@@ -73,11 +73,13 @@ def _open(block: dict[str, Any]) -> None:
         written[key] = _opened(value)
         stem, _, suffix = key.rpartition("_")
         if stem and suffix in UNIT_OF_SUFFIX and stem not in block["properties"]:
-            told = f"{value.get('description', '')} A number with its unit: `10 {UNIT_OF_SUFFIX[suffix]}`.".strip()
+            description = (
+                f"{value.get('description', '')} A number with its unit: `10 {UNIT_OF_SUFFIX[suffix]}`.".strip()
+            )
             ways = [_WITH_UNIT, {"const": 0}, _VARIED, *endless]
             if any(way.get("type") == "array" for way in (value, *value.get("anyOf", ()))):
                 ways.append({"type": "array", "items": {"anyOf": [_WITH_UNIT, {"const": 0}, _VARIED]}})
-            written[stem] = {"anyOf": ways, "description": told}
+            written[stem] = {"anyOf": ways, "description": description}
             if key in required:
                 either.append({"anyOf": [{"required": [key]}, {"required": [stem]}]})
         elif key in required:
@@ -89,15 +91,15 @@ def _open(block: dict[str, Any]) -> None:
 
 def _opened(value: dict[str, Any]) -> dict[str, Any]:
     """What a value may be, and a name of ``vary`` in place of a number or a word."""
-    told: dict[str, Any] = {key: value[key] for key in ("description", "title") if key in value}
+    annotations: dict[str, Any] = {key: value[key] for key in ("description", "title") if key in value}
     plain = {key: part for key, part in value.items() if key not in {"description", "title", "default", "or"}}
     default = value.get("default")
     if isinstance(default, float) and math.isinf(default):
-        told["default"] = "inf"
+        annotations["default"] = "inf"
     elif "default" in value and not isinstance(default, dict | list):
-        told["default"] = default
+        annotations["default"] = default
     if "const" in plain:
-        return {**plain, **told}
+        return {**plain, **annotations}
     ways = list(plain["anyOf"]) if "anyOf" in plain else [plain]
     for way in tuple(ways):
         if way.pop("or", value.get("or")) == "inf":
@@ -111,9 +113,9 @@ def _opened(value: dict[str, Any]) -> dict[str, Any]:
                 way["additionalProperties"] = _opened(way["additionalProperties"])
     is_varied = any(way.get("type") in _SCALARS or "enum" in way for way in ways)
     return (
-        {"anyOf": [*ways, _VARIED] if is_varied else ways, **told}
+        {"anyOf": [*ways, _VARIED] if is_varied else ways, **annotations}
         if len(ways) > 1 or is_varied
-        else {**ways[0], **told}
+        else {**ways[0], **annotations}
     )
 
 

@@ -409,7 +409,7 @@ def _check_departures(document: Document, scenario: Scenario) -> None:
         for number, entry in enumerate(scenario.timeline):
             if error.actor in entry.do:
                 at: KeyPath = ("timeline", number, "do", error.actor)
-                raise InputError(f"{document.where(at)}: {dotted(at)}.depart: {error.told}") from error
+                raise InputError(f"{document.where(at)}: {dotted(at)}.depart: {error.message}") from error
         raise
 
 
@@ -420,7 +420,7 @@ def _check_placement(document: Document, scenario: Scenario) -> None:
         traffic_files(scenario)
     except (PlacementError, DemandError) as error:
         at = ("actors", error.actor) if isinstance(error, PlacementError) else ("demand", *error.key.split("."))
-        raise InputError(f"{document.where(at)}: {dotted(at)}: {error.told}") from error
+        raise InputError(f"{document.where(at)}: {dotted(at)}: {error.message}") from error
     except InputError as error:
         raise InputError(f"{document.where(('road',))}: road: {error}") from error
 

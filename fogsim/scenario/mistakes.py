@@ -55,12 +55,12 @@ def mistake_lines(
 ) -> str:
     """One line for each mistake, followed by `further` lines; `beside` are top-level keys outside the schema."""
     found = mistakes_in(model, error, document.data, beside)
-    told = [
+    lines = [
         ": ".join((document.where(path), *([dotted(path)] if path else []), text)) for path, text in found[:MOST_LISTED]
     ]
     if len(found) > MOST_LISTED:
-        told.append(f"{document.path}: and {len(found) - MOST_LISTED} more mistakes")
-    return "\n".join([*told, *further])
+        lines.append(f"{document.path}: and {len(found) - MOST_LISTED} more mistakes")
+    return "\n".join([*lines, *further])
 
 
 def mistakes_in(schema: object, error: ValidationError, data: object, beside: Sequence[str] = ()) -> list[Mistake]:

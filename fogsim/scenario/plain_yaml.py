@@ -93,8 +93,8 @@ def parse_yaml(text: str) -> tuple[Any, dict[KeyPath, int]]:
         return loader.construct_document(root), lines
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        told = ", ".join(part for part in (error.context, error.problem) if part)
-        raise PlainYamlError(told, None if mark is None else mark.line + 1) from error
+        message = ", ".join(part for part in (error.context, error.problem) if part)
+        raise PlainYamlError(message, None if mark is None else mark.line + 1) from error
     except ReaderError as error:
         line = 1 + text[: error.position].count("\n")
         raise PlainYamlError(f"the character {shown(text[error.position])} is not allowed", line) from error
@@ -125,8 +125,8 @@ class _Walk:
             key.tag = TEXT
         here = (*at, key.value)
         if here in self._lines:
-            told = f"{dotted(here)}: this key stands twice, first on line {self._lines[here]}"
-            raise PlainYamlError(told, _line(key))
+            message = f"{dotted(here)}: duplicate key, first on line {self._lines[here]}"
+            raise PlainYamlError(message, _line(key))
         self._lines[here] = _line(key)
 
 

@@ -37,7 +37,7 @@ NO_RENDERER = "none"
 
 
 class InformedMethod(Method):
-    """A method that goes by the fog, known from the ego's belief or, as of a meter next to the road, in truth.
+    """A method that uses the fog, known from the ego's belief or, with a meter next to the road, in truth.
 
     Advice may also go by the reports of sensors next to the road, where sections of road are advised.
     """
@@ -188,7 +188,7 @@ class Scenario(Section):
     """Longest time that one call of a user's method may take; a longer one fails the run. By default any."""
 
     expect: Expectations = Field(default_factory=dict)
-    """What must hold in the run, by name; `fogsim test` tells whether it does."""
+    """What must hold in the run, by name; `fogsim test` checks it."""
 
     directory: Path = Field(default=Path(), exclude=True)
 
@@ -264,7 +264,9 @@ class Scenario(Section):
     @model_validator(mode="after")
     def _sensors_that_inform(self) -> Self:
         if self.lighting.informed_by == "sensors":
-            raise ValueError("lighting.informed_by: sensors beside the road choose no lamps; write belief or truth")
+            raise ValueError(
+                "lighting.informed_by: sensors next to the road cannot control lamps; write belief or truth"
+            )
         if self.advice.informed_by == "sensors":
             if self.sensors.reports.roadside is None:
                 raise ValueError(

@@ -230,8 +230,10 @@ def _check_parameters(factory: Callable[..., Any], parameters: object, folder: P
         paths = paths_in(factory, given, folder)
         found += [(name, f"there is no file {path}") for name, path in paths.items() if not path.is_file()]
     mistakes = [
-        InitErrorDetails(type=PydanticCustomError(MISTAKE, "{told}", {"told": told}), loc=("parameters", name), input=0)
-        for name, told in found
+        InitErrorDetails(
+            type=PydanticCustomError(MISTAKE, "{message}", {"message": message}), loc=("parameters", name), input=0
+        )
+        for name, message in found
     ]
     if mistakes:
         raise ValidationError.from_exception_data("parameters", mistakes)

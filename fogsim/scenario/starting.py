@@ -31,7 +31,7 @@ def begin_scenario(name: str, source: str, parent: Path) -> tuple[Path, ...]:
     old, text = load_scenario(source, may_import=import_nothing), scenario_file(source).read_text(encoding="utf-8")
     folder = parent / name
     if folder.exists():
-        raise InputError(f"{folder} is there already; give another name")
+        raise InputError(f"{folder} already exists; give another name")
     traffic = old.traffic
     beside = [path for path in (traffic.config, traffic.net, *traffic.routes, *traffic.additional) if path is not None]
     outside = [path for path in beside if path.is_absolute() or ".." in path.parts]

@@ -60,11 +60,11 @@ def option_lines(document: Document, scenario: Scenario, *, own_simulation: bool
     """One line for each SUMO option of a scenario that it does not accept."""
     options = scenario.traffic.sumo_options
     if own_simulation:
-        told = option_mistakes(options)
+        mistakes = option_mistakes(options)
     else:
-        told = dict.fromkeys(options, "the simulation runs already; give the option to SUMO when it is started")
+        mistakes = dict.fromkeys(options, "the simulation runs already; give the option to SUMO when it is started")
     at = ("traffic", "sumo_options")
-    return [f"{document.where((*at, name))}: {dotted((*at, name))}: {text}" for name, text in told.items()]
+    return [f"{document.where((*at, name))}: {dotted((*at, name))}: {text}" for name, text in mistakes.items()]
 
 
 def trigger_mistakes(document: Document, scenario: Scenario) -> list[str]:
@@ -90,18 +90,18 @@ def demand_mistakes(document: Document, scenario: Scenario, end: float) -> list[
     watched += scripted_vehicles(scenario.timeline)
     demand = _demand(scenario, frozenset((*named.values(), *(vehicle for _, vehicle in watched))))
     asked = (*named.items(), *watched)
-    told = {at: _unknown_vehicle(vehicle, demand) for at, vehicle in asked if demand.lacks(vehicle)}
+    mistakes = {at: _unknown_vehicle(vehicle, demand) for at, vehicle in asked if demand.lacks(vehicle)}
     edges = _edges(scenario, demand)
     if edges is not None:
         places = {vehicle: at for at, vehicle in reversed(named.items())}
         unfit = {places[v]: _unfit_way(v, demand.routes[v], edges) for v in named.values() if v in demand.routes}
-        told |= {at: text for at, text in unfit.items() if text}
-        told |= _wide_changes(scenario, demand, edges)
-        told |= _unknown_signals(scenario, edges)
+        mistakes |= {at: text for at, text in unfit.items() if text}
+        mistakes |= _wide_changes(scenario, demand, edges)
+        mistakes |= _unknown_signals(scenario, edges)
         way = _way(scenario, demand)
-        told |= _unknown_edges(scenario, edges) or _places_aside(scenario, way, edges)
-        told |= _pointless(document, scenario, _limits(end, way, edges))
-    return [f"{document.where(at)}: {dotted(at)}: {text}" for at, text in told.items()]
+        mistakes |= _unknown_edges(scenario, edges) or _places_aside(scenario, way, edges)
+        mistakes |= _pointless(document, scenario, _limits(end, way, edges))
+    return [f"{document.where(at)}: {dotted(at)}: {text}" for at, text in mistakes.items()]
 
 
 def _named_vehicles(scenario: Scenario) -> Iterator[tuple[KeyPath, str]]:
@@ -195,17 +195,17 @@ def _unfit_way(vehicle: str, way: VehicleRoute, edges: NetEdges) -> str | None:
 
 def _wide_changes(scenario: Scenario, demand: Demand, edges: NetEdges) -> dict[KeyPath, str]:
     """Changes over more lanes than any road on the vehicle's route has."""
-    told: dict[KeyPath, str] = {}
+    mistakes: dict[KeyPath, str] = {}
     for i, event in enumerate(scenario.traffic.events):
         way = demand.routes.get(event.vehicle)
         on = [edge for edge in (way.edges if way else edges.lanes) if edge in edges.lanes]
         widest = max((edges.lanes[edge] for edge in on), default=None)
         if isinstance(event, ChangeLane) and widest is not None and abs(event.lanes) >= widest:
             where = f"on the way of {shown(event.vehicle)}" if way else "of the net"
-            told["traffic", "events", i, "lanes"] = (
+            mistakes["traffic", "events", i, "lanes"] = (
                 f"the widest road {where} has lanes 0 to {widest - 1}; got {event.lanes}"
             )
-    return told
+    return mistakes
 
 
 def _limits(end: float, way: tuple[str, ...], edges: NetEdges) -> Limits:
@@ -219,10 +219,10 @@ def _limits(end: float, way: tuple[str, ...], edges: NetEdges) -> Limits:
 
 def _pointless(document: Document, scenario: Scenario, limits: Limits) -> dict[KeyPath, str]:
     """Conditions that can never be true, or never matter, on this network."""
-    told: dict[KeyPath, str] = {}
+    mistakes: dict[KeyPath, str] = {}
     for name, expectation in scenario.expect.items():
-        told |= {("expect", name, key): text for key, text in expectation.pointless(limits, scenario.traffic.ego)}
-    return told | dict(pointless_triggers(document, scenario, limits))
+        mistakes |= {("expect", name, key): text for key, text in expectation.pointless(limits, scenario.traffic.ego)}
+    return mistakes | dict(pointless_triggers(document, scenario, limits))
 
 
 def _places_aside(scenario: Scenario, way: tuple[str, ...], edges: NetEdges) -> Mapping[KeyPath, str]:
@@ -231,30 +231,32 @@ def _places_aside(scenario: Scenario, way: tuple[str, ...], edges: NetEdges) -> 
         return {}
     length, drivers = edges.route_length(way), scenario.drivers
     stretch, signs = drivers.advised_stretch, drivers.signs
-    told = {} if scenario.fog.wind is not None else _banks_aside(scenario, length)
+    mistakes = {} if scenario.fog.wind is not None else _banks_aside(scenario, length)
     if stretch.start_m >= length:
-        told["drivers", "advised_stretch", "start_m"] = (
+        mistakes["drivers", "advised_stretch", "start_m"] = (
             f"the stretch begins beyond the ego's route, which is {length:.0f} m long; got {stretch.start_m:g}"
         )
     first = min(signs.at_m, default=signs.from_m)
     if drivers.advised == "signs" and first >= length:
-        told["drivers", "signs", "at_m" if signs.at_m else "from_m"] = (
+        mistakes["drivers", "signs", "at_m" if signs.at_m else "from_m"] = (
             f"the first sign stands beyond the ego's route, which is {length:.0f} m long; got {first:g}"
         )
-    return told
+    return mistakes
 
 
 def _banks_aside(scenario: Scenario, length: float) -> dict[KeyPath, str]:
     """Banks entirely before the start or beyond the end of the ego's route; no wind brings them in."""
-    told: dict[KeyPath, str] = {}
+    mistakes: dict[KeyPath, str] = {}
     for i, bank in enumerate(scenario.fog.banks):
         if bank.start_m - bank.edge_m > length:
-            told["fog", "banks", i, "start_m"] = (
+            mistakes["fog", "banks", i, "start_m"] = (
                 f"the bank lies beyond the ego's route, which is {length:.0f} m long; got {bank.start_m:g}"
             )
         elif bank.end_m + bank.edge_m < 0.0:
-            told["fog", "banks", i, "end_m"] = f"the bank lies before the ego's route, from 0 m on; got {bank.end_m:g}"
-    return told
+            mistakes["fog", "banks", i, "end_m"] = (
+                f"the bank lies before the ego's route, from 0 m on; got {bank.end_m:g}"
+            )
+    return mistakes
 
 
 def _suggested(name: str, known: tuple[str, ...] | Mapping[str, int]) -> str:

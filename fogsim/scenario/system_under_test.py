@@ -28,7 +28,7 @@ def without_sut(document: Document) -> Document:
     if mistakes:
         raise InputError("\n".join(mistakes))
     data = {key: value for key, value in document.data.items() if key != BLOCK}
-    origins = {at[1:] if at[:1] == (BLOCK,) and len(at) > 1 else at: told for at, told in document.origins.items()}
+    origins = {at[1:] if at[:1] == (BLOCK,) and len(at) > 1 else at: origin for at, origin in document.origins.items()}
     return replace(document, data={**data, **block}, origins=origins)
 
 

@@ -22,8 +22,8 @@ def without_ego(written: object) -> object:
     if not isinstance(written, dict) or not isinstance(traffic, dict) or traffic.get("ego") != NO_EGO:
         return written
     mistakes = [
-        InitErrorDetails(type=PydanticCustomError(MISTAKE, "{told}", {"told": told}), loc=place, input=0)
-        for place, told in (*_of_camera(written), *_of_place(written), *_of_events(traffic))
+        InitErrorDetails(type=PydanticCustomError(MISTAKE, "{message}", {"message": message}), loc=place, input=0)
+        for place, message in (*_of_camera(written), *_of_place(written), *_of_events(traffic))
     ]
     if mistakes:
         raise ValidationError.from_exception_data("scenario", mistakes)
@@ -54,7 +54,7 @@ def _of_camera(written: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
     if _method(written.get("advice")).get("informed_by") == "belief":
         yield (
             ("advice", "informed_by"),
-            f"belief {_NEEDS}; leave it out, or write truth, a visibility meter at the road, or sensors beside it",
+            f"belief {_NEEDS}; leave it out, or write truth (a meter at the road) or sensors (next to the road)",
         )
     sensors = written.get("sensors")
     if isinstance(sensors, dict) and sensors.get("faults"):

@@ -240,7 +240,7 @@ class Traffic(Section):
         if self.config is not None and beside:
             raise ValueError(
                 f"give either config (a SUMO configuration, which names its own files) or net with routes, not both: "
-                f"config is {str(self.config)!r}, and beside it there is {', '.join(beside)}"
+                f"config is {str(self.config)!r}, and there is also {', '.join(beside)}"
             )
         return self
 
@@ -341,7 +341,7 @@ class Signs(Section):
     def _in_order(self) -> Self:
         placed = {"from_m", "spacing_m"} & self.model_fields_set
         if self.at_m and placed and not {"from_m", "spacing_m", "to_m", "at_m"} <= self.model_fields_set:
-            raise ValueError(f"give at_m, or from_m with spacing_m, not both: beside at_m there is {min(placed)}")
+            raise ValueError(f"give at_m, or from_m with spacing_m, not both: got at_m and {min(placed)}")
         if any(following - one < NEAREST_SIGNS for one, following in itertools.pairwise(self.at_m)):
             raise ValueError(f"at_m must ascend by at least {NEAREST_SIGNS:g} m, got {list(self.at_m)!r}")
         if not max((self.from_m, *self.at_m)) < self.to_m:
@@ -356,7 +356,7 @@ class Harmonisation(Section):
     """Largest step from one section to the next."""
 
     deceleration_mps2: Deceleration = 1.0
-    """How hard somebody has to brake steadily from the beginning of one section to that of the next, at most."""
+    """Greatest deceleration needed to brake steadily from the beginning of one section to that of the next."""
 
 
 def _shares_of_kinds(value: object) -> object:

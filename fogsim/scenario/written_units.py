@@ -72,14 +72,14 @@ class _Conversion:
     ) -> tuple[str, float]:
         name, number = _converted(suffixed, value)
         if name in written:
-            self._tell(at, f"the key {name} stands beside it; one of them must go")
+            self._report(at, f"the key {name} is given too; remove one of them")
         elif isinstance(number, ValueError):
-            self._tell(at, number)
+            self._report(at, number)
         if at in self.origins:
             self.origins[*at[:-1], name] = self.origins[at]
         return name, 0.0 if isinstance(number, ValueError) else number
 
-    def _tell(self, at: KeyPath, what: object) -> None:
+    def _report(self, at: KeyPath, what: object) -> None:
         self.mistakes.append(f"{self._document.where(at)}: {dotted(at)}: {what}")
 
 

@@ -59,7 +59,7 @@ class ScenePlan:
     ground : GroundPlan
         The ground.
     shapes, scenery, pavement
-        As of `Scene`.
+        See `Scene`.
     lanes : int
         Number of lanes.
 
@@ -129,7 +129,7 @@ def _with_length(lanes: Sequence[Lane]) -> list[Lane]:
 
 
 def _free_sides(lanes: Sequence[Lane], index: LaneIndex) -> list[Edge]:
-    """Free sides of lanes, as of `free_edges`."""
+    """Free sides of lanes, see `free_edges`."""
     limits = {_place(lane.centreline[-1]): lane.speed_limit for lane in lanes if lane.kind is LaneKind.CARRIAGEWAY}
     found = list[Edge]()
     for lane in lanes:

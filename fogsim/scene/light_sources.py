@@ -68,7 +68,7 @@ that of `LIT_AREAS`, as the third stop lamp, have less in proportion.
 
 _FOG_HEIGHT, _FOG_INSET = 0.55, 1.0  # front fog lamps lie below the head lamps: share of their height, and of their y
 _FOG_AREA = 0.010  # [m²]
-_SIGNALS = ~int(Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.FRONT_FOG)  # lamps whose intensity no beam tells
+_SIGNALS = ~int(Lamp.LOW_BEAM | Lamp.HIGH_BEAM | Lamp.FRONT_FOG)  # lamps whose intensity no beam defines
 
 _LOBES: Mapping[Lamp, SignalLobe] = {Lamp.REAR_FOG: SignalLobe.REAR_FOG, Lamp.DAYTIME: SignalLobe.DAYTIME}
 """How lamps shine; those that are not named as signals do."""

@@ -251,7 +251,7 @@ def _parallel(points: Points, left: NDArray[np.float64], lift: float) -> Points:
 
 @kernel
 def _draw_together(line: Points, forward: NDArray[np.float64]) -> None:
-    """Put all vertices of each span of pieces that do not lead forward, of which one leads backward, in one place."""
+    """Collapse all vertices of each span of pieces that do not lead forward, at least one backward, into one point."""
     first = 0
     while first < len(forward):
         end, backward = first, False

@@ -15,7 +15,7 @@ T = TypeVar("T")
 REACH = 1700.0
 """What is nearer to a line than this [m] belongs to its surroundings; renderers show little that is farther away."""
 
-_SQUARE = 250.0  # side of the squares by which it is told what is near [m]
+_SQUARE = 250.0  # side of the squares that index what is near [m]
 _ORIGINS = 10_000.0  # origins are multiples of this [m], so that networks near the origin of theirs keep it
 
 
@@ -112,7 +112,7 @@ Nearness = Corridor
 
 
 def _dense_lines(lines: Sequence[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
-    """Lines as of `_dense`: few are so long that they need it."""
+    """Lines as from `_dense`: few are so long that they need it."""
     places = np.concatenate([line[:, :2] for line in lines])
     owner = np.repeat(np.arange(len(lines)), [len(line) for line in lines])
     far = (np.abs(np.diff(places, axis=0)) > _SQUARE).any(axis=1) & (owner[1:] == owner[:-1])

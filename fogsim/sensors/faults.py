@@ -74,7 +74,7 @@ def faulty_fix(fix: Fix, faults: Iterable[RunningFault]) -> Fix | None:
 
 
 def faulty_scattering(measured: float, faults: Iterable[RunningFault]) -> float | None:
-    """What a scatterometer with faults tells of the extinction coefficient [1/m]; None if nothing.
+    """Extinction coefficient that a scatterometer with faults reports [1/m]; None if it reports nothing.
 
     Takes `measured` [1/m].
     """

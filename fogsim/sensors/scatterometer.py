@@ -1,4 +1,4 @@
-"""A forward-scatter visibility sensor on board: light that a little air scatters tells the extinction there."""
+"""A forward-scatter visibility sensor on board: it measures the extinction by the light that a little air scatters."""
 
 import math
 
@@ -8,9 +8,9 @@ import numpy as np
 class Scatterometer:
     """Averages the extinction where it is, with an error of its calibration and noise.
 
-    Both are factors e^(σ x), as of the sensors next to the road. The noise is averaged as the fog is, so that its
+    Both are factors e^(σ x), as for the sensors next to the road. The noise is averaged as the fog is, so that its
     deviation is that of the values that come out, however often they are asked for. The volume that it looks at is some
-    0.1 dm³ (of Vaisala's FD12P: de Haij, KNMI): it tells the fog at its place and nothing of the road ahead.
+    0.1 dm³ (of Vaisala's FD12P: de Haij, KNMI): it measures the fog at its place and nothing of the road ahead.
 
     Takes `averaging_time` [s].
     """
@@ -29,7 +29,7 @@ class Scatterometer:
     def measure(self, extinction: float, time: float) -> float:
         """Measure.
 
-        Returns what it tells of the extinction coefficient [1/m]. Takes `extinction` [1/m], `time` [s].
+        Returns the extinction coefficient that it reports [1/m]. Takes `extinction` [1/m], `time` [s].
         """
         noise = float(self._rng.standard_normal())
         if self._average is not None:

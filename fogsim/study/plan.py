@@ -68,7 +68,7 @@ class StudyFile(Section):
     """Metrics of the comparison and the report; by default all, the main ones first."""
 
     wanted_interval: Annotated[float, Field(gt=0, le=10)] = 0.1
-    """Half-width of an interval, as a share of the baseline's mean, for which the seeds needed are told."""
+    """Half-width of an interval, as a share of the baseline's mean, for which the seeds needed are given."""
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:

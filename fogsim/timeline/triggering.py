@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from fogsim.conditions import History, Moment, Watch
 from fogsim.scenario import Scenario
 from fogsim.scenario.roads.departures import Entries, entering_vehicles
-from fogsim.scenario.timeline import TimelineEntry, actions_of, entry_name, fog_reference, told, vehicles_of
+from fogsim.scenario.timeline import TimelineEntry, actions_of, entry_name, entry_text, fog_reference, vehicles_of
 from fogsim.scenario.timeline.schema import DepartAction
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Ending, Reason, TrafficStep, Unplayed, UnplayedEvent
@@ -94,7 +94,7 @@ class Timeline:
         reasons = [(entry, entry.why_not(self._seen, step)) for entry in self._entries]
         names = {vehicle for entry in self._entries for vehicle in entry.vehicles(step)}
         return Unplayed(
-            tuple(UnplayedEvent(f"{e.name} ({told(e.written)})", why) for e, why in reasons if why is not None),
+            tuple(UnplayedEvent(f"{e.name} ({entry_text(e.written)})", why) for e, why in reasons if why is not None),
             tuple(sorted(names.difference(self._seen))),
         )
 
@@ -119,10 +119,10 @@ class _Entry:
         self._held = holds
         self._has_held |= holds
         if comes:
-            self._waiting.append((moment.step.time + self.written.delay_s, self._watch.told()))
+            self._waiting.append((moment.step.time + self.written.delay_s, self._watch.readings()))
 
     def is_due(self, time: float) -> bool:
-        """Tell whether it is time to begin."""
+        """Whether it is time to begin."""
         return bool(self._waiting) and self._waiting[0][0] <= time + _TICK
 
     def begin(self, time: float, moment: Moment) -> Begun:
@@ -130,7 +130,7 @@ class _Entry:
         _, why = self._waiting.pop(0)
         self._has_begun = True
         who = tuple(moment.vehicle_id(vehicle) for vehicle in vehicles_of(self.written))
-        return Begun(self.name, time, told(self.written), why, who, self.key)
+        return Begun(self.name, time, entry_text(self.written), why, who, self.key)
 
     def vehicles(self, step: TrafficStep) -> tuple[str, ...]:
         """Ids of its vehicles."""
@@ -201,7 +201,7 @@ def _end(begun: Begun, actions: Actions) -> Begun | None:
 
 
 def _duration(action: TrafficAction | ChangeFog | ChangeLight) -> float:
-    """How long an action lasts [s]; 0 for what is done at once, or over when no one can tell beforehand."""
+    """How long an action lasts [s]; 0 for what is done at once, or whose end is unknown beforehand."""
     match action:
         case ChangeSpeed() | Follow() | SetSignal():
             return action.hold

@@ -1,4 +1,4 @@
-"""Collisions, each pair of vehicles once, whichever simulation tells them in every step."""
+"""Collisions, each pair of vehicles once, for simulations that report them in every step."""
 
 from collections.abc import Iterable
 

@@ -24,7 +24,7 @@ class AnyTraffic(Protocol):
         """Move by one traffic step with a command in force."""
 
     def unplayed(self) -> Unplayed:
-        """Tell what of the script has not been played since the start; before `close`."""
+        """List what of the script has not been played since the start; before `close`."""
 
     def close(self) -> None:
         """End the simulation; closing twice is allowed."""
@@ -43,7 +43,7 @@ class Traffic(AnyTraffic, Protocol):
         """Roads and signs; after `start`."""
 
     def observe(self) -> TrafficSnapshot | None:
-        """Tell where everyone is and what has happened since the last call; None once the ego has left."""
+        """Report where everyone is and what has happened since the last call; None once the ego has left."""
 
 
 class NetworkTraffic(AnyTraffic, Protocol):
@@ -53,4 +53,4 @@ class NetworkTraffic(AnyTraffic, Protocol):
         """Begin, or begin again."""
 
     def observe_network(self) -> NetworkSnapshot:
-        """Tell where everyone is and what has happened since the last call."""
+        """Report where everyone is and what has happened since the last call."""

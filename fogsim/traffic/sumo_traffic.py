@@ -321,7 +321,7 @@ class SumoTraffic:
 
     @_translates_errors
     def obey(self, command: Command) -> None:
-        """Put a command in force for the next step of a simulation that somebody else steps."""
+        """Put a command in force for the next step of a simulation that another program steps."""
         run = self._running
         self._command = command
         orders = self._play_script(run, command)
@@ -334,7 +334,7 @@ class SumoTraffic:
 
     @_translates_errors
     def look(self) -> None:
-        """Read the last step of a simulation that somebody else steps."""
+        """Read the last step of a simulation that another program steps."""
         self._read_step(self._running)
 
     def _play_script(self, run: _Run, command: Command) -> dict[str, Order]:
@@ -383,7 +383,7 @@ class SumoTraffic:
 
     @_translates_errors
     def observe(self) -> TrafficSnapshot | None:
-        """Tell where everyone near the ego is; see `Traffic.observe`."""
+        """Report where everyone near the ego is; see `Traffic.observe`."""
         run, ego = self._running, self._setup.ego
         teleported, self._teleported = self._teleported, False
         run.roster.update()
@@ -413,7 +413,7 @@ class SumoTraffic:
 
     @_translates_errors
     def observe_network(self) -> NetworkSnapshot:
-        """Tell where everyone is; see `NetworkTraffic.observe_network`."""
+        """Report where everyone is; see `NetworkTraffic.observe_network`."""
         run = self._running
         run.roster.update()
         state = run.reader.state(self._command.lamps, self._heard(run))

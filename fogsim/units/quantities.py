@@ -31,7 +31,7 @@ _UNIT = re.compile(r"[^\W\d_][^\W_]*(?:\s?[/*·^]?\s?-?[^\W_]+)*\Z|%\Z|°\Z")
 
 
 def is_quantity(text: object) -> bool:
-    """Tell whether something is text that begins like a number."""
+    """Whether something is text that begins like a number."""
     return isinstance(text, str) and _WRITTEN.match(text) is not None
 
 

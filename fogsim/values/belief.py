@@ -73,7 +73,7 @@ class FogProfile:
         Parameters
         ----------
         distance, share : float
-            As of `visibility_quantile`.
+            See `visibility_quantile`.
         widest : float
             Largest standard deviation of ln k to act on [-].
         """
@@ -94,11 +94,11 @@ class Belief:
     probability : (n,) float64
         Probability of each cell; sums to 1.
     denser : DenserFog or None
-        Denser fog ahead that several estimates have told of.
+        Denser fog ahead that several estimates have reported.
     profile : FogProfile or None
-        What is believed of places along the way, by a fusion that tells.
+        Belief about places along the way, from fusions that provide one.
     age : float
-        Time since an estimate or a report last said anything about the fog [s]; ``inf`` if none has.
+        Time since the last estimate or report with information on the fog [s]; ``inf`` if none has.
     """
 
     log_extinction: NDArray[np.float64]
@@ -128,7 +128,7 @@ class Belief:
         Parameters
         ----------
         share, widest : float
-            As of `visibility_quantile` and `is_informed`.
+            See `visibility_quantile` and `is_informed`.
         """
         return self.visibility_quantile(share) if self.is_informed(widest) else None
 
@@ -209,5 +209,5 @@ THINNEST = 1e-6
 
 
 def certain_belief(extinction: float) -> Belief:
-    """Belief of somebody who knows the fog, as a visibility meter next to the road does (`extinction` [1/m])."""
+    """Belief of an observer who knows the fog, as a visibility meter next to the road does (`extinction` [1/m])."""
     return Belief(np.log([max(extinction, THINNEST)]), np.ones(1))

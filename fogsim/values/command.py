@@ -166,7 +166,7 @@ class Command:
     advice : SpeedAdvice
         The advice to the ego vehicle.
     lamps : Lamp
-        Lamps that the ego vehicle is to light; dipped head lamps until somebody decides.
+        Lamps that the ego vehicle is to light; dipped head lamps until a policy decides.
     advised_speeds : mapping from vehicle id to float
         Advice to other vehicles [m/s].
     lamps_of : mapping from vehicle id to Lamp

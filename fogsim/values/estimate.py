@@ -147,7 +147,7 @@ class Estimate:
     standard_deviation : float
         Standard deviation of k [1/m]; ``inf`` if not valid.
     valid : bool
-        False if the method cannot tell from this frame; the numbers then say nothing.
+        False if the method gives no estimate for this frame; the numbers are then meaningless.
     diagnostics : mapping
         What the method found on the way (rows, bands, reasons), for overlays and debugging.
     bounds : ExtinctionBounds or None
@@ -155,9 +155,9 @@ class Estimate:
     reach : float
         Distance up to which the estimate speaks of the fog [m]: what lies beyond was not seen.
     optical_depths : OpticalDepths or None
-        How the fog varies along the road, of a method that tells.
+        How the fog varies along the road, from methods that estimate it.
     denser : DenserFog or None
-        Denser fog ahead, of a method that tells.
+        Denser fog ahead, from methods that detect it.
     common_deviation : float
         Standard deviation of ln k that all images of a drive have in common, as by the droplets or the pattern of the
         own beam [-], a part of the whole: averaging over images does not reduce it.
@@ -176,14 +176,14 @@ class Estimate:
 
     @classmethod
     def invalid(cls, method: str, reason: str, **diagnostics: object) -> "Estimate":
-        """Build the statement that a method cannot tell, with the reason in the diagnostics.
+        """Build an invalid estimate, with the reason in the diagnostics.
 
         Parameters
         ----------
         method : str
             Name of the estimator in the registry.
         reason : str
-            Why it cannot tell.
+            Why the method gives no estimate.
         **diagnostics : object
             What else it found.
         """

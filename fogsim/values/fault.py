@@ -50,7 +50,7 @@ class Latency:
 
 @dataclass(frozen=True, slots=True)
 class Miscalibration:
-    """A camera that is knocked out of place, or whose lens slips, of which the estimators are told nothing."""
+    """A camera that is knocked out of place, or whose lens slips, unknown to the estimators."""
 
     name: ClassVar[str] = "camera calibration"
     # pitch, roll: what is added to the true angles [rad]
@@ -185,13 +185,13 @@ class Fouled:
     """A scatterometer with dirt or water on its windows, or an insect in its beam."""
 
     name: ClassVar[str] = "scatterometer fouled"
-    # What it tells over what it should [-]: below 1 by windows that let less light through, above by what scatters
+    # Reported over correct value [-]: below 1 by windows that let less light through, above by what scatters
     factor: float
 
 
 @dataclass(frozen=True, slots=True)
 class NoSignal:
-    """A scatterometer that tells nothing."""
+    """A scatterometer that reports nothing."""
 
     name: ClassVar[str] = "scatterometer no_signal"
 

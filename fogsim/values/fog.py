@@ -9,7 +9,7 @@ from fogsim.errors import InputError
 from fogsim.parameters import NUMBER, checked_parameters
 
 GROUND_ALBEDO = 0.1
-"""Albedo of the land around where nothing is said of it [-]: in visible light, grass and asphalt have about as much."""
+"""Default albedo of the land around [-]: in visible light, grass and asphalt have about as much."""
 
 
 def airlight_share(ground_albedo: float = GROUND_ALBEDO) -> float:
@@ -21,7 +21,7 @@ def airlight_share(ground_albedo: float = GROUND_ALBEDO) -> float:
 
 
 AIRLIGHT_SHARE = airlight_share()
-"""Airlight over that of a white horizontal diffuser where nothing is said of the land around [-]."""
+"""Default airlight over that of a white horizontal diffuser, with the default land around [-]."""
 
 
 @checked_parameters

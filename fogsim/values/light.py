@@ -44,7 +44,7 @@ NEVER_APART = 62
 """A shift by which no bit is left, for lamps in the middle that are the only ones of their kind."""
 
 MIDDLE_LAMPS = Lamp.STOP
-"""Kinds of which a lamp in the middle is switched apart."""
+"""Kinds whose lamp in the middle is switched separately."""
 
 ALL_LAMPS = Lamp(sum(Lamp))
 """Every kind of lamp."""
@@ -56,7 +56,7 @@ def lamp_names(lamps: Lamp) -> str:
 
 
 def dark_shift(across: float, is_stop_lamp: bool) -> int:
-    """Shift, as of `DARK_SHIFT`, for a lamp by its place."""
+    """Shift (see `DARK_SHIFT`) for a lamp by its place."""
     if abs(across) >= MIDDLE:
         return DARK_SHIFT[Side.LEFT if across > 0.0 else Side.RIGHT]
     return DARK_SHIFT[Side.MIDDLE] if is_stop_lamp else NEVER_APART

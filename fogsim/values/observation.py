@@ -18,7 +18,7 @@ SIGN_MAP_REACH, SIGN_MAP_SIZE = 255.0, 2.0
 """Distance at which a sign's distance is 1 in the picture of the map, and size at which its size is 255 [m]."""
 
 Measured = Annotated[float, NUMBER_OR_NAN]
-"""What a sensor or a map tells; each method sees for itself whether it can use infinity or NaN."""
+"""A value from a sensor or a map; each method decides whether it can use infinity or NaN."""
 
 FROM_ABOVE = (64, 64)
 """Rows and columns of the map from above: 4 m and 1 m each, the vehicle below the middle of the last row."""
@@ -53,7 +53,7 @@ class SignSighting:
     kind : str
         Sign code ("speed_limit", …).
     value : float
-        What it says, for a speed limit the speed [m/s]; NaN where the map does not tell.
+        What it says, for a speed limit the speed [m/s]; NaN where the map has no value.
     distance : float
         Distance ahead along the vehicle's heading [m].
     lateral : float
@@ -79,7 +79,7 @@ class SignSighting:
 @checked_parameters
 @dataclass(frozen=True, slots=True)
 class LightMeasurement:
-    """What the light sensor behind the windscreen tells: how bright the sky is, and whether others' lamps are ahead.
+    """Readings of the light sensor behind the windscreen: how bright the sky is, and whether others' lamps are ahead.
 
     Attributes
     ----------
@@ -114,7 +114,7 @@ class FogReport:
     extinction : float
         Extinction coefficient [1/m].
     relative_deviation : float
-        Standard deviation of that relative to it, as the source tells it [-].
+        Standard deviation of that relative to it, as stated by the source [-].
     """
 
     source: str
@@ -135,7 +135,7 @@ class SecondView:
     image : (rows, cols, 3) or (rows, cols) uint8, or uint16 of a camera of 10 or 12 bits
         Its pixels, of the same instant and camera model as the first one's; rows of both show the same things.
     baseline : float
-        Told distance between the optical centres [m].
+        Stated distance between the optical centres [m].
     """
 
     image: NDArray[np.uint8] | NDArray[np.uint16]
@@ -164,17 +164,17 @@ class Observation:
     camera_setback : float
         Distance of the camera behind the front bumper, from which distances count [m].
     lamps : Lamp or None
-        Own lamps that are switched on, whether each of them burns or not; None where the vehicle does not tell.
+        Own lamps that are switched on, whether each of them burns or not; None where the vehicle does not report them.
     light : LightMeasurement or None
-        What the light sensor tells; None without one.
+        Reading of the light sensor; None without one.
     reports : tuple of FogReport
-        What others have told of the fog since the instant before.
+        Reports of others on the fog since the previous instant.
     right : SecondView or None
         What the second camera of a stereo rig shows; None without one.
     scattering : float or None
-        What a forward-scatter sensor on board tells of the extinction coefficient at its place [1/m]; None without one.
+        Extinction coefficient that a forward-scatter sensor on board measures at its place [1/m]; None without one.
     camera_trouble : str
-        Why the frame does not show the road of now, as far as the vehicle itself can tell; empty if it seems to.
+        Why the frame does not show the road of now, as far as the vehicle itself can detect; empty if it seems to.
     """
 
     frame: Frame | NDArray[np.uint8] | NDArray[np.uint16]
@@ -214,7 +214,7 @@ class Observation:
         Raises
         ------
         InputError
-            If the frame is a bare array, of which no camera is known.
+            If the frame is a bare array, whose camera is unknown.
         """
         if not isinstance(self.frame, Frame):
             raise InputError("sign_map: expected a fogsim.Frame, whose camera says where signs are; got a bare array")

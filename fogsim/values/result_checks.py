@@ -42,7 +42,7 @@ def checked_estimate(method: str, value: object) -> Estimate:
     if not isinstance(estimate.diagnostics, Mapping):
         raise InputError(f"{who}: diagnostics must be a mapping, got {shown(estimate.diagnostics)}")
     if estimate.valid:
-        _check_number(who, "extinction", estimate.extinction, " [1/m]; say Estimate.invalid where it cannot tell")
+        _check_number(who, "extinction", estimate.extinction, " [1/m]; return Estimate.invalid if there is no estimate")
         _check_number(who, "standard_deviation", estimate.standard_deviation, " [1/m]")
         _check_number(who, "common_deviation", estimate.common_deviation, " [-]")
     return estimate

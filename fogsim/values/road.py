@@ -164,7 +164,7 @@ class Structure:
 
 @dataclass(frozen=True, slots=True)
 class SignalHead:
-    """Three lenses one above the other that tell the drivers on a lane to stop or to go; or two that tell persons.
+    """Three lenses one above the other that signal stop or go to the drivers on a lane; or two for pedestrians.
 
     Attributes
     ----------

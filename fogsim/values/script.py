@@ -221,7 +221,7 @@ TrafficAction = (
     | Leave
     | Walk
 )
-"""What a traffic simulation can be told to do at once."""
+"""Instantaneous actions that a traffic simulation can carry out."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -215,7 +215,7 @@ class EquippedVehicle:
     place : float
         How far along the ego's route its front bumper is [m].
     extinction, extinction_ahead : float
-        The truth at its camera, and ahead of it, as of `Truth` [1/m].
+        The truth at its camera, and ahead of it, see `Truth` [1/m].
     estimates : tuple of Estimate
         What its estimators make of its picture.
     belief : Belief
@@ -243,7 +243,7 @@ class Step(TrafficStep):
     Attributes
     ----------
     index, time, traffic, collisions, truth, command, ending, unplayed, begun, waiting, cohort
-        As of `TrafficStep`.
+        See `TrafficStep`.
     ego : int
         Row of the ego vehicle in `traffic`.
     route_position : float

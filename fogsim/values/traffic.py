@@ -374,7 +374,7 @@ class NetworkSnapshot:
     waiting : tuple of str
         Ids of vehicles that are due and find no room to enter the road.
     is_ended : bool
-        As of `TrafficSnapshot`.
+        See `TrafficSnapshot`.
     """
 
     state: TrafficState

@@ -52,7 +52,7 @@ def test_a_file_that_is_there_is_replaced_only_when_it_is_asked_for(folder: Path
     given = ("--depth-kind", "range", "--visibility", "80", "--airlight", "240")
     refused = fog(folder, *given)
     assert refused.returncode == 2
-    assert "--out out.png is there already" in refused.stderr
+    assert "--out out.png already exists" in refused.stderr
     assert (folder / "out.png").read_text(encoding="utf-8") == "of the user"
     assert fog(folder, *given, "--overwrite").returncode == 0
     assert cv2.imread(str(folder / "out.png")) is not None

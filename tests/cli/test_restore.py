@@ -68,7 +68,7 @@ def test_several_images_go_into_a_folder_and_are_replaced_only_when_it_is_asked_
     assert sorted(path.name for path in (folder / "clear").iterdir()) == ["fog.png", "other.png"]
     refused = command(*line, cwd=folder)
     assert refused.returncode == 2
-    assert "fog.png is there already" in refused.stderr
+    assert "fog.png already exists" in refused.stderr
     assert command(*line, "--overwrite", cwd=folder).returncode == 0
 
 

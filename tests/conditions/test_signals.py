@@ -176,7 +176,7 @@ def test_lamps() -> None:
     assert read("ego.lamps", step) == read("lamps", step) == {"low_beam", "rear_fog"}
     watch = Watch(parse_condition("lamps include rear_fog and not lamps include stop"))
     assert watch.update(step) is True
-    assert watch.told() == "lamps = low_beam rear_fog"
+    assert watch.readings() == "lamps = low_beam rear_fog"
 
 
 def test_warning() -> None:
@@ -185,7 +185,7 @@ def test_warning() -> None:
     warned = replace(step, command=replace(step.command, warning=DriverWarning.FOG_AHEAD))
     watch = Watch(parse_condition("warning is fog_ahead and warning is not cannot_see"))
     assert watch.update(warned) is True
-    assert watch.told() == "warning = fog_ahead"
+    assert watch.readings() == "warning = fog_ahead"
 
 
 def test_advice() -> None:

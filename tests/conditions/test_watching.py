@@ -65,10 +65,10 @@ def test_a_value_that_comes_back_is_compared_with_the_last_that_was_known() -> N
 def test_values_are_told_in_the_units_that_were_written() -> None:
     watch = Watch(parse_condition("ego.speed > 20 m/s and ego.speed <= advice and belief.error < 20 %"))
     assert watch.update(make_step(speed=25.0, advised=15.0)) is False
-    assert watch.told() == "ego.speed = 25 m/s, advice = 15 m/s, belief.error = unknown"
+    assert watch.readings() == "ego.speed = 25 m/s, advice = 15 m/s, belief.error = unknown"
     level = Watch(parse_condition("ego.speed > 0"))
     level.update(make_step(speed=25.0))
-    assert level.told() == "ego.speed = 90 km/h"
+    assert level.readings() == "ego.speed = 90 km/h"
 
 
 TRUE, FALSE, BOTH = {True}, {False}, {True, False}

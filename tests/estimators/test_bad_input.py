@@ -311,7 +311,7 @@ def test_a_frame_of_another_camera_is_told(method):
     estimator = make(method, CAMERA)
     for changes in ({"pitch": 0.03}, {"response": "srgb"}, {"principal_point": (160.0, 119.5)}, {"bits": 10}):
         other = Frame(0.0, GREY, dataclasses.replace(CAMERA, **changes))
-        with pytest.raises(InputError, match="camera must be the told one"):
+        with pytest.raises(InputError, match="camera must be that of the estimator"):
             estimator.update(observation(GREY, frame=other))
 
 

@@ -149,7 +149,7 @@ def test_whenever() -> None:
 def test_whenever_tells_how_often_and_when_it_was_not_so() -> None:
     found = find(whenever(1.5), reaction(2.0))
     assert (found.time, found.came) == (3.5, "advice = inf")
-    assert found.reason == "not so 2 of 2 times; the first began at 2 s"
+    assert found.reason == "failed 2 of 2 times, first from 2 s"
     assert found.expected == "advice <= 70 km/h within 1.5 s whenever fog.visibility_at_camera falls below 100 m"
     assert find(whenever(2.0), reaction(2.0)).came == "2 of 2 times"
 

@@ -93,7 +93,7 @@ FILES: Mapping[str, str] = {
     "/proc/a": "cannot be written: No such file or directory",
     "camera.yaml": "would replace what is read",
     "link": "would replace what is read",
-    "mine": "is there already; give another name, or replace it with --overwrite",
+    "mine": "already exists; give another name, or replace it with --overwrite",
     "socket": "is a disk or a socket",
     "/dev/fd/999": "cannot be written: Bad file descriptor",
     "a\0": "embedded null",

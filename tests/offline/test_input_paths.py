@@ -61,7 +61,7 @@ def test_what_was_found_is_told(folder: Path) -> None:
         ("nowhere/a.png", {}, "there is no such file or folder"),
         ("f99.png", {}, "did you mean 'f9.png'?"),
         ("*.bmp", {}, "no file fits this pattern"),
-        ("empty", {}, "no image is in this folder; looked for .png"),
+        ("empty", {}, "the folder contains no image with one of the endings .png"),
         ("f9.png", {"rate": 0.0}, "--rate must be a positive"),
         ("f9.png", {"rate": float("nan")}, "--rate must be a positive"),
         ("bad.mp4", {}, "bad.mp4: this is no video that can be read"),

@@ -110,7 +110,7 @@ def test_an_error_leaves_no_file(drive, tmp_path: Path) -> None:
         ("a", "got no ending"),
         ("a.png", "a picture holds one image"),
         ("nowhere/a.mp4", "there is no folder"),
-        ("there.mp4", "is there already"),
+        ("there.mp4", "already exists"),
     ],
 )
 def test_mistakes_are_told_before_anything_is_read(drive, tmp_path: Path, name: str, told: str) -> None:

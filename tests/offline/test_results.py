@@ -81,6 +81,6 @@ def test_rows_stand_under_their_heading() -> None:
     )
     heading = table_heading(source, methods)
     first, second = table_rows(source, methods, FrameEstimates(Picture("a.png", 0.0, IMAGE), estimates))
-    assert "cannot tell: the road is hidden" in second
+    assert "no estimate: the road is hidden" in second
     for word, cell in (("visibility", "100 m"), ("90 % interval", "86 – 120 m"), ("horizon", "row 219.5")):
         assert heading.index(word) + len(word) == first.index(cell) + len(cell), word

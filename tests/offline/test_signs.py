@@ -185,7 +185,7 @@ def test_what_the_map_does_not_tell_is_assumed_and_said(folder: Path) -> None:
     assert (signs.signs[0].height, signs.signs[0].diameter) == (USUAL_HEIGHT, USUAL_DIAMETER)
     assert len(signs.remarks) == 5
     assert "1 sign with no height_m: 2.2 m above the road are assumed" in signs.remarks[0]
-    assert "kinds that FogSim does not know, looked for as any sign: parking" in signs.remarks[3]
+    assert "unknown kinds, searched as signs of any kind: parking" in signs.remarks[3]
     sightings = watch("bare.geojson").sightings(0.0)
     assert sightings is not None
     assert abs(sightings[0].facing) < 1e-6

@@ -56,7 +56,7 @@ def test_a_missing_map_is_told_with_what_is_there(tmp_path: Path, maps: Path) ->
     told = f"RoadNetwork/LogicFile: there is no map 'Town02' in {maps}; did you mean 'Town01.xodr'? Known: Town01.xodr"
     assert told in str(refused.value)
     (maps / "Town01.xodr").unlink()
-    with pytest.raises(InputError, match=r"there is no \.xodr or \.net\.xml file at all"):
+    with pytest.raises(InputError, match=r"it contains no \.xodr or \.net\.xml file"):
         read_openscenario(file)
 
 

@@ -99,7 +99,10 @@ def test_what_cannot_be_driven_is_refused(tmp_path: Path) -> None:
         (_routing(_route(_on(1, 20), _on(3, 10), strategy="random")), "routeStrategy: FogSim has no 'random' here"),
         (_routing(_route(_on(1, 20), _on(3, 10), closed="true")), "closed: write the waypoints of each lap"),
         (_routing("<Route/>"), "expected Waypoint inside"),
-        (_routing(_route(_on(1, 20), _on_route(NORTH, 10.0))), "a waypoint has a place of its own, not one on a route"),
+        (
+            _routing(_route(_on(1, 20), _on_route(NORTH, 10.0))),
+            "a waypoint needs an absolute position, not one on a route",
+        ),
         (_routing("<TrajectoryRef/>", "FollowTrajectoryAction"), "expected Trajectory or CatalogReference inside"),
         (_routing(FROM_CATALOG), "there is no catalog 'Ways'"),
     ]:

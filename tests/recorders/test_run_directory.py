@@ -89,5 +89,5 @@ def test_a_folder_left_when_all_results_were_in_their_places_is_cleared_away(tmp
         RunDirectory(tmp_path)
     assert recover_run(tmp_path) == ["manifest.json"]
     assert not (tmp_path / "unfinished").exists()
-    with pytest.raises(InputError, match="no run that did not come to its end"):
+    with pytest.raises(InputError, match="contains no unfinished run"):
         recover_run(tmp_path)

@@ -91,7 +91,7 @@ def test_parameters_of_a_users_method_are_checked_in_the_file(tmp_path):
         "versions"
     ]
     assert versions["adas_fog:Cautious"].startswith("sha256:")
-    with pytest.raises(InputError, match="goes by a vehicle's own sensors"):
+    with pytest.raises(InputError, match="uses a vehicle's own sensors"):
         build.road_adviser(scenario)
 
 

@@ -43,7 +43,7 @@ def test_the_command_refuses_before_it_works(tmp_path: Path) -> None:
     out.write_text("mine", encoding="utf-8")
     run = CliRunner().invoke
     for options, message in (
-        (["--camera", str(camera), "--out", str(out)], "is there already"),
+        (["--camera", str(camera), "--out", str(out)], "already exists"),
         (["--camera", str(camera), "--out", str(tmp_path / "no" / "range.json")], "there is no folder"),
         (["--camera", str(tmp_path / "none.yaml"), "--out", str(tmp_path / "new.json")], "none.yaml"),
     ):

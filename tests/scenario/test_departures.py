@@ -90,7 +90,7 @@ def test_python_says_the_same(tmp_path: Path) -> None:
         ("lane: left", "lane: 5", "timeline.0.do.lorry.depart: there are lanes 0 to 1, got 5"),
         ("on: ramp", "edges: [a]", "timeline.0.do.merging.depart: edges go with a network"),
         ("like: ego, gap: 100 m", "like: ego", "timeline.0.do.near.depart: like and gap_m go together"),
-        ("like: ego", "position: 5 m, like: ego", "give like, or a way of its own (position_m), not both"),
+        ("like: ego", "position: 5 m, like: ego", "give like, or a route (position_m), not both"),
     ],
 )
 def test_mistakes_are_told_at_their_place(tmp_path: Path, old: str, new: str, told: str) -> None:

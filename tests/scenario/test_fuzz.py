@@ -250,7 +250,7 @@ def test_no_key_stands_twice(folder: Path, depth: int) -> None:
     data, once = copy.deepcopy(PLAIN), f'"{key.path[-1]}": 1'
     written(key, 1, data)
     (folder / "scenario.yaml").write_text(yaml_of(data).replace(once, f"{once}, {once}"), encoding="utf-8")
-    with pytest.raises(InputError, match=rf"{key.path[-1]}: this key stands twice"):
+    with pytest.raises(InputError, match=rf"{key.path[-1]}: duplicate key"):
         load_scenario(folder / "scenario.yaml")
 
 

@@ -83,7 +83,7 @@ def test_a_scenario_of_ones_own_begins_as_the_one_it_is_begun_from(tmp_path):
     assert mine.name == "mine"
     assert "# the lead stops inside the bank" in files[0].read_text()
     assert {file.name for file in files} >= {"scenario.yaml", "motorway.net.xml", "fogsim.schema.json"}
-    with pytest.raises(InputError, match="is there already"):
+    with pytest.raises(InputError, match="already exists"):
         begin_scenario("mine", "motorway_fog_bank", tmp_path)
 
 

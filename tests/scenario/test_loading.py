@@ -188,7 +188,7 @@ def test_every_mistake_is_told_at_once(folder: Path) -> None:
         ("a: [1, 2", "not valid YAML"),
         ("just words", "expected a mapping of keys to values, got str"),
         ("", "expected a mapping of keys to values, got NoneType"),
-        ("name: a\nname: b\n", "name: this key stands twice, first on line 1"),
+        ("name: a\nname: b\n", "name: duplicate key, first on line 1"),
     ],
 )
 def test_what_is_no_scenario_at_all(tmp_path: Path, text: str, message: str) -> None:

@@ -23,7 +23,7 @@ def test_mistakes_are_told_with_their_key() -> None:
         ("{lead: {brakes: {}}}", "do.lead.brakes: unknown key; did you mean 'brake'"),
         ("{lead: {brake: {to: 80 m}}}", "do.lead.brake.to: "),
         ("{lead: {brake: {to_kmh: -3}}}", "do.lead.brake.to_kmh: input should be greater than or equal to 0; got -3"),
-        ("{lead: {}}", "do.lead: says nothing to do; allowed: speed, brake, follow"),
+        ("{lead: {}}", "do.lead: no action given; allowed: speed, brake, follow"),
         ("{lead: {brake: {}, speed: {to: 3 m/s}}}", "do.lead: speed and brake cannot begin together"),
         ("{lead: {change_lane: {}}}", "do.lead.change_lane: say where: lanes"),
         (
@@ -48,7 +48,7 @@ def test_mistakes_are_told_with_their_key() -> None:
             "do.lead.path: at_s has a time for each of points",
         ),
         ("{ego: {take_route: [bank]}}", "do.ego: take_route: positions count along the ego's route"),
-        ("{lead: {leave: true, brake: {}}}", "do.lead: leave stands by itself"),
+        ("{lead: {leave: true, brake: {}}}", "do.lead: leave must be the only key"),
         ("{lead: {change_lane: {to: 1, to_lane_of: ego}}}", "do.lead.change_lane: say where: lanes"),
         ("{lead: {speed: {like: nobody}}}", "there is no vehicle 'nobody' in "),
         ("{lead: {change_lane: {to_lane_of: nobody}}}", "there is no vehicle 'nobody' in "),
@@ -60,7 +60,7 @@ def test_mistakes_are_told_with_their_key() -> None:
         ("{lead: {follow: {vehicle: nobody, headway: 1 s}}}", "there is no vehicle 'nobody' in "),
         ("{signal.C: {state: red}}", "do.signal.C: the net has no traffic lights 'C'; it has none"),
         ("{new: {depart: {like: leed, gap: 9 m}}}", "do.leed: there is no vehicle 'leed' in "),
-        ("{new: {depart: {like: ego, gap: 9 m}, brake: {}}}", "do.new: depart stands by itself"),
+        ("{new: {depart: {like: ego, gap: 9 m}, brake: {}}}", "do.new: depart must be the only key"),
         ("{}", "do: "),
     ]:
         text = mistake(f"{{when: time > 1 s, do: {do}}}")
@@ -76,13 +76,17 @@ def test_mistakes_of_conditions_and_names() -> None:
     assert "timeline.0.when: happened(timeline.7): unknown event 'timeline.7'" in unknown
     assert "timeline.0.when: this key is missing" in mistake(f"{{{brake}}}")
     two = f"{{name: a, when: time > 1 s, {brake}}}, {{name: a, when: time > 1 s, {brake}}}"
-    assert "timeline.1.name: names of entries must differ, and 'a' stands there twice" in mistake(two)
+    assert "timeline.1.name: names of entries must differ, but 'a' occurs twice" in mistake(two)
 
 
 @pytest.mark.parametrize(
     ("do", "setting", "told"),
     [
-        ("fog: {density: 2}", "fog={visibility_m: inf}", "there is no fog of which this could be a multiple"),
+        (
+            "fog: {density: 2}",
+            "fog={visibility_m: inf}",
+            "this multiplies the scenario's fog",
+        ),
         (
             "fog: {visibility: 30 m}",
             "fog={outside_visibility_m: inf, banks: [{start_m: 100, end_m: 900, visibility_m: 40}]}",

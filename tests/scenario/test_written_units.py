@@ -49,5 +49,5 @@ def test_a_value_out_of_range_is_told_where_it_is_written(written):
 
 
 def test_a_quantity_that_stands_twice_is_refused(written):
-    with pytest.raises(InputError, match=r"fog\.visibility: the key visibility_m stands beside it"):
+    with pytest.raises(InputError, match=r"fog\.visibility: the key visibility_m is given too"):
         written("fog: {visibility: 150 m, visibility_m: 150}\n")

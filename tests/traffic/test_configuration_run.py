@@ -102,7 +102,7 @@ def test_a_configuration_with_a_port_and_a_seed_of_its_own_runs_as_one_without(t
 def test_a_configuration_without_vehicles_is_told(tmp_path: Path) -> None:
     routes = tmp_path / "empty.rou.xml"
     routes.write_text("<routes/>", encoding="utf-8")
-    with pytest.raises(SimulationError, match="no vehicle at all did"):
+    with pytest.raises(SimulationError, match="no vehicle did"):
         town(configuration(tmp_path, routes=routes)).start(1)
 
 

@@ -1,4 +1,4 @@
-"""Policies of one message sign to compare agents with; all signs do the same each by what it is told."""
+"""Policies of one message sign to compare agents with; all signs follow the same one, each on its observation."""
 
 import math
 from collections.abc import Callable, Mapping

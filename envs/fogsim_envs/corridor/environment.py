@@ -79,7 +79,7 @@ class FogCorridorEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is not ty
 
     ### Episodes
     Fog and demand are drawn at each reset; ``options`` of `reset` fix ``visibility``, ``scenario``, ``overrides`` or a
-    whole ``episode``, as of `fogsim_envs.task.FogAdvisoryV1Env`. Vehicles are on the road from the beginning; the signs
+    whole ``episode``, as in `fogsim_envs.task.FogAdvisoryV1Env`. Vehicles are on the road from the beginning; the signs
     are dark for the first period, in which the loops count. Truncated after the scenario's duration.
 
     ### Arguments

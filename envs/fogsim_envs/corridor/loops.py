@@ -42,7 +42,7 @@ class InductionLoops:
         self._time += elapsed
 
     def read(self) -> tuple[LoopReading, ...]:
-        """Tell what was counted since the last reading, loop by loop, and begin again."""
+        """Return what was counted since the last reading, loop by loop, and start again."""
         hours = self._time / SECONDS_PER_HOUR
         counted = zip(self._count.tolist(), self._speeds.tolist(), strict=True)
         readings = tuple(

@@ -21,10 +21,10 @@ FLOW_SCALE = 2500.0
 """Vehicles per hour and lane that are 1: about what a motorway lane carries [1/h]."""
 
 METER_RANGE = 2000.0
-"""Visibility beyond which a meter tells its range [m], as forward scatter sensors of roads do."""
+"""Largest visibility that a meter reports [m], as forward scatter sensors of roads do."""
 
 METER_DEVIATION = 0.1
-"""Standard deviation of what a meter tells, in ln V [-]; FogSim's own choice."""
+"""Standard deviation of a meter's value, in ln V [-]; FogSim's own choice."""
 
 CORRIDOR_FEATURES = (
     "upstream_flow",
@@ -70,7 +70,7 @@ def loop_places(starts: Sequence[float], length: float) -> tuple[float, ...]:
 
 
 def measured_visibilities(sections: Sequence[RoadSection], rng: np.random.Generator) -> list[float]:
-    """What the meters at the signs tell [m]."""
+    """Readings of the meters at the signs [m]."""
     errors = rng.normal(0.0, METER_DEVIATION, len(sections)).tolist()
     true = (visibility_from_extinction(section.extinction) for section in sections)
     return [min(visibility * math.exp(error), METER_RANGE) for visibility, error in zip(true, errors, strict=True)]

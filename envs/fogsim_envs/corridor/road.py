@@ -1,4 +1,4 @@
-"""A road with message signs, as far as it is known before anybody drives on it."""
+"""A road with message signs, as far as it is known before any vehicle drives on it."""
 
 from typing import NamedTuple
 

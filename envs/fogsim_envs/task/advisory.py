@@ -83,7 +83,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
     ### Arguments
     scenario : name in the catalogue, file, `fogsim.Scenario`, or a function that makes one with overrides; None for the
         default task's motorway
-    scenario_distribution : `ScenarioDistribution`, or a sequence of scenarios of which one is taken; None with
+    scenario_distribution : `ScenarioDistribution`, or a sequence of scenarios to draw from; None with
         a scenario is that scenario alone
     fog_distribution : `FogDistribution`; None with a scenario, or several to draw from, is that scenario's own fog
     split : "train" or "test"
@@ -272,7 +272,7 @@ class FogAdvisoryV1Env(gymnasium.Env[Any, Any]):
         return command_of(action, self._continuous)
 
     def _completed(self, step: Step) -> Step:
-        """A step with all that an agent is told of it; here it has that from the loop."""
+        """A step with all that an agent gets to know about it; here it has that from the loop."""
         return step
 
     def _drive(self, before: Step) -> Step:

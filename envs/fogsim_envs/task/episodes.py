@@ -209,7 +209,7 @@ class ScenarioDistribution:
     drivers : mapping from str to float
         Weights of the ego's own driver, by `fogsim.traffic.SPEED_CHOICES`: how fast one goes in fog without advice.
     pitch_error, focal_length_error : float
-        Standard deviation of what the estimators are told of the camera's pitch [rad], and share of its focal length.
+        Standard deviation of the error of the camera's pitch in the calibration [rad], and share of its focal length.
 
     Raises
     ------

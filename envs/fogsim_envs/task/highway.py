@@ -78,8 +78,8 @@ class FogHighwayV1Env(FogAdvisoryV1Env):
     has one frame and is about 0.5 s, in whole steps of highway-env: 0.4 s in ``highway-fast-v0``.
 
     ### Episodes
-    Fog, light, whether the leader brakes to a standstill for a while, the ego's own driver and the errors of the told
-    calibration are drawn at each reset (`FogDistribution`, `HighwayDistribution`), traffic by highway-env from the same
+    Fog, light, whether the leader brakes to a standstill for a while, the ego's own driver and the calibration's
+    errors are drawn at each reset (`FogDistribution`, `HighwayDistribution`), traffic by highway-env from the same
     seed. ``split`` "test" draws from other random numbers than "train".
 
     ### Start and end

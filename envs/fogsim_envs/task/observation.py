@@ -16,7 +16,7 @@ OBSERVATIONS = ("dict", "state", "camera", "camera+sign_map", "dict+sign_map")
 """What can be asked for: all of it, the numbers alone, or the picture alone; these with the picture of the sign map."""
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-"""Quantiles of the believed visibility that an agent is told."""
+"""Quantiles of the believed visibility in an agent's observation."""
 
 SPEED, LEAD, WAY, TIME, VISIBILITY = 25.0, 100.0, 2500.0, 300.0, 100.0
 """What is 0 in ``state``: speed [m/s], lead's distance [m], way [m], time [s], visibility [m]. Nothing is −1, twice
@@ -124,7 +124,7 @@ def _estimate(step: Step) -> tuple[float, float, float]:
 
 
 def _ambient_light(step: Step) -> float:
-    """What the light sensor tells, on a logarithmic scale: bright day without one."""
+    """Reading of the light sensor, on a logarithmic scale: bright day without one."""
     light, (darkest, brightest) = step.observation.light, LIGHT_RANGE
     if light is None:
         return 1.0

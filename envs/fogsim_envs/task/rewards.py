@@ -40,7 +40,7 @@ class TaskWeights:
     discomfort : float
         Against each second of braking by 1 m/s² more than 2 m/s².
     collision : float
-        Against a collision in which the ego strikes somebody.
+        Against a collision in which the ego strikes another road user.
     rear_fog_lamp : float
         Against the whole way driven with the rear fog lamp lit above 50 m, where it dazzles those behind, or dark
         below, where the ego is not seen.
@@ -130,7 +130,7 @@ def fault(step: Step) -> str:
 
 
 def strikes(step: Step) -> bool:
-    """Whether the ego strikes somebody."""
+    """Whether the ego strikes another road user."""
     ego = step.traffic.ids[step.ego]
     return any(ego == one.collider for one in step.collisions)
 

@@ -18,7 +18,7 @@ MOTORWAY = Path(__file__).with_name("motorway.yaml")
 """The road of the default task."""
 
 SPLITS = ("train", "test")
-"""Random numbers of which those of one are never those of another."""
+"""Streams of random numbers that never overlap."""
 
 AnyScenario = str | Path | Scenario | Callable[[Sequence[str]], Scenario]
 """A name in the catalogue, a file, a scenario, or what makes one with ``key.path=value`` each."""
@@ -65,7 +65,7 @@ class Drawn(NamedTuple):
 def is_own_motorway(
     scenario: AnyScenario | None, distribution: ScenarioDistribution | Sequence[AnyScenario] | None
 ) -> bool:
-    """Whether episodes are drawn on the task's own motorway, whose fog is drawn too unless told otherwise."""
+    """Whether episodes are drawn on the task's own motorway, whose fog is drawn too by default."""
     return scenario is None and (distribution is None or isinstance(distribution, ScenarioDistribution))
 
 

@@ -143,7 +143,7 @@ def _node_distances(eye: NDArray[np.float64], directions: NDArray[np.float64], m
     """Distances of nodes [m] such that linear interpolation of τ between them errs about equally everywhere.
 
     The error of the transmittance T in an interval Δ is T |dk/dr| Δ² / 8, so that nodes should be as dense as
-    √(T |dk/dr|), of which some probing rays, `directions`, give the largest. They ascend from 0; the last two are
+    √(T |dk/dr|), taken as the largest over some probing rays, `directions`. They ascend from 0; the last two are
     `FARTHEST` and `ENDLESS`.
     """
     probes = np.ascontiguousarray(directions.reshape(-1, 3))

@@ -188,7 +188,7 @@ def _shelter_row(shelter: FogShelter) -> tuple[float, ...]:
 
 
 def has_closed_form(field: FogField) -> bool:
-    """Tell whether nothing but banks and a sharp top makes a field uneven, so that τ has a closed form."""
+    """Whether only banks and a sharp top make a field uneven, so that τ has a closed form."""
     return (
         not field.shelters
         and (field.patches is None or field.patches.strength == 0)
@@ -200,5 +200,5 @@ def has_closed_form(field: FogField) -> bool:
 
 
 def is_uniform_below(field: FogField, height: float) -> bool:
-    """Tell whether fog is the same everywhere below a height (`height` [m])."""
+    """Whether fog is the same everywhere below a height (`height` [m])."""
     return has_closed_form(field) and not field.banks and height <= field.top

@@ -127,7 +127,7 @@ def distance_at_depth(
     field : FogField
         The fog now.
     start, direction
-        As of `optical_depth_along`.
+        See `optical_depth_along`.
     distances : (n,) float64
         Ascending distances of places [m].
     depth : float

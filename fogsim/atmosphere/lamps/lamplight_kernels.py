@@ -182,7 +182,7 @@ def _light_surfaces(
 
 @kernel
 def _any_lit(response: NDArray[np.float32]) -> bool:
-    """Whether a row (cols · 3) answers to light at all: bits, of which compilers make vector instructions."""
+    """Whether a row (cols · 3) reacts to light at all. Bitwise, so that compilers emit vector instructions."""
     lit = np.int32(0)
     for j in range(response.shape[0]):
         lit |= np.int32(response[j] > _ZERO)
@@ -200,7 +200,7 @@ def _cut_lengths(distance: NDArray[np.float32], length: NDArray[np.float32]) -> 
 def _node_places(
     count: np.uint64, length: NDArray[np.float32], last: np.float32, fold: np.float32, node: NDArray[np.float32]
 ) -> None:
-    """Where between the nodes of their rays, of which `last` is the last, the things are that chosen pixels see."""
+    """Positions between the nodes of their rays (the last is `last`) of the surfaces that the chosen pixels see."""
     for u in range(count):
         node[u] = min(last - np.float32(1e-3), last * length[u] / (length[u] + fold))
 

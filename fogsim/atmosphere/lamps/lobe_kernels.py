@@ -69,7 +69,7 @@ def find_unknown(
     known: NDArray[np.bool_],
     unknown: NDArray[np.bool_],
 ) -> int:
-    """Find the directions to the eye of which tables are asked and do not tell; their count.
+    """Mark the directions to the eye that are looked up but not yet in the tables; return their count.
 
     Takes `known`, `unknown` (kinds, azimuths, elevations) bool.
     """
@@ -133,7 +133,7 @@ def set_glow_light(
 
 
 class Angles(NamedTuple):
-    """Where the entries of a profile lie among the angles for which the light of glows is told."""
+    """Positions of a profile's entries among the angles at which the light of glows is tabulated."""
 
     entry: NDArray[np.int64]  # (entries,) int64: The angle before each
     share: NDArray[np.float32]  # (entries,): Share of the next one

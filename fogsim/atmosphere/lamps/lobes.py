@@ -79,9 +79,9 @@ def _mean_glow(depths: NDArray[np.float64], seen: NDArray[np.float64], droplets:
 
 
 def _edges(lines: list[str], name: str) -> NDArray[np.float64]:
-    """Edges of bins that a comment of the table tells [rad]."""
-    told = next(line for line in lines if line.startswith(f"# {name} ")).split()[2:]
-    return np.radians([float(edge) for edge in told])
+    """Edges of bins, read from a comment of the table [rad]."""
+    words = next(line for line in lines if line.startswith(f"# {name} ")).split()[2:]
+    return np.radians([float(edge) for edge in words])
 
 
 def mean_intensity(
@@ -131,7 +131,7 @@ def lobe_glow(
 ) -> NDArray[np.float64]:
     """Luminance scattered about a lamp, times R² [cd].
 
-    Returns by the side of the lamp on which the line of sight passes, as of `mean_intensity`. Takes `angle` (n,) [rad],
+    Returns by the side of the lamp on which the line of sight passes, like `mean_intensity`. Takes `angle` (n,) [rad],
     `eye` [rad].
     """
     origins, gamma = light_origins(droplets), np.asarray(angle, dtype=np.float64)
@@ -143,7 +143,7 @@ def lobe_glow(
 
 
 def table_directions() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Azimuths and elevations (AZIMUTHS, ELEVATIONS) to the eye for which tables tell what a lamp's glow is made of.
+    """Azimuths and elevations (AZIMUTHS, ELEVATIONS) to the eye at which tables describe a lamp's glow.
 
     Azimuths a lie evenly over a / (|a| + AZIMUTH_FOLD), from straight back to straight back, and elevations, too.
     """

@@ -47,7 +47,7 @@ class _Patches:
 
 
 class RoadGlow:
-    """Tells what of the own lamps' light the road sends back up; it remembers what the lamps light last."""
+    """Light of the own lamps that the road reflects upwards; caches the lit patches."""
 
     def __init__(self) -> None:
         self._known: _Patches | None = None

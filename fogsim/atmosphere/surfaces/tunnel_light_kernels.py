@@ -19,7 +19,7 @@ BEFORE = 40.0
 """Farther before a portal than this, a tunnel takes less than a thousandth of the sky's light from the road [m]."""
 
 STEP = 0.05
-"""From one to the next place of which the daylight is known; between them it is interpolated [m]."""
+"""Spacing of the points at which daylight is computed; it is interpolated in between [m]."""
 
 _UNDER_CEILING = 0.25
 """What a ceiling gets of the road's light, over what renderers give undersides [-]: a tenth, which the road returns."""

@@ -54,7 +54,7 @@ class Observer:
     lamp_height : float
         Of the lamps above the road [m].
     lamp_half_spacing : float
-        Distance of each lamp from the middle of the car, straight ahead of which the target stands [m].
+        Distance of each lamp from the middle of the car; the target stands straight ahead of the middle [m].
     age : float
         [years]
     exposure_time : float

@@ -294,7 +294,7 @@ def _show_signs(watch: "SignWatch", *, quiet: bool) -> None:
 
 
 class _Rows:
-    """Results image by image: as JSON, as CSV, or for stills, each of which is an answer of its own, as a table."""
+    """Results image by image, as JSON or CSV; for stills, where each one stands alone, as a table."""
 
     def __init__(self, source: "Source", methods: tuple[str, ...], outputs: _Outputs) -> None:
         self._source, self._methods, self._outputs = source, methods, outputs

@@ -65,12 +65,12 @@ def fog_command(
     layer_height: Annotated[
         float | None, typer.Option(min=0.001, max=1e6, help="For --ground-albedo: metres of fog; else 250.")
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it is there already.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
 ) -> None:
     """Put homogeneous fog on an image or video from disk: Koschmieder's law on light and slant range."""
     light = None if airlight is None else pixel_values(airlight)
     layer = _layer(ground_albedo, layer_height)
-    told = {"--horizon-row": horizon_row, "--focal-length": focal_length, "--mount-height": mount_height}
+    geometry = {"--horizon-row": horizon_row, "--focal-length": focal_length, "--mount-height": mount_height}
     if (depth is None) != road_plane:
         what = "both are given" if road_plane else "neither is given"
         raise InputError(f"how far things are comes from --depth FILE or from --road-plane, the flat road; {what}")
@@ -78,9 +78,9 @@ def fog_command(
         for option, value in (("--depth-kind", depth_kind), ("--depth-scale", depth_scale)):
             if value is not None:
                 raise InputError(f"{option} goes with --depth; --road-plane reads no depth map")
-        used = _fog_road(image, _road(image, camera, told), visibility, out, light, layer, overwrite)
+        used = _fog_road(image, _road(image, camera, geometry), visibility, out, light, layer, overwrite)
     else:
-        for option, value in told.items():
+        for option, value in geometry.items():
             if value is not None:
                 raise InputError(f"{option} goes with --road-plane; with --depth the camera file has it")
         used = _fog_depth(image, depth, depth_kind, depth_scale, camera, visibility, out, light, layer, overwrite)
@@ -130,20 +130,20 @@ def _fog_depth(
     )
 
 
-def _road(image: Path, camera: Path | None, told: dict[str, float | None]) -> "RoadPlane":
+def _road(image: Path, camera: Path | None, geometry: dict[str, float | None]) -> "RoadPlane":
     from fogsim.offline.camera_file import load_calibration
     from fogsim.offline.road_plane import RoadPlane, calibration_from_options
 
-    given = {option: value for option, value in told.items() if value is not None}
+    given = {option: value for option, value in geometry.items() if value is not None}
     if camera is not None:
         if given:
             raise InputError(f"{', '.join(given)} and --camera are both given: the camera file has it")
         calibration = load_calibration(camera)
     else:
-        lacking = [option for option in told if option not in given]
+        lacking = [option for option in geometry if option not in given]
         if lacking:
             raise InputError(
-                f"--road-plane needs --camera camera.yaml, or {', '.join(told)}; lacking: {', '.join(lacking)}"
+                f"--road-plane needs --camera camera.yaml, or {', '.join(geometry)}; lacking: {', '.join(lacking)}"
             )
         calibration = calibration_from_options(
             image, given["--horizon-row"], given["--focal-length"], given["--mount-height"]

@@ -36,9 +36,9 @@ def restore_command(
     airlight: Annotated[
         str | None, typer.Option(metavar="R,G,B", help="Its pixel values; else those above the horizon.")
     ] = None,
-    tone_map: Annotated[bool, typer.Option("--tone-map", help="Make the result to be looked at.")] = False,
-    beside: Annotated[bool, typer.Option("--beside", help="The original and the restored side by side.")] = False,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what is there already.")] = False,
+    tone_map: Annotated[bool, typer.Option("--tone-map", help="Compress brightness for viewing.")] = False,
+    beside: Annotated[bool, typer.Option("--beside", help="Write original and restored image side by side.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")] = False,
 ) -> None:
     """Restore the contrast that daytime fog took from your own images or video (docs/how_to/restoration.md)."""
     from fogsim.offline import find_source, load_calibration, straightened
@@ -54,7 +54,7 @@ def restore_command(
     given = find_source(images)
     source, pinhole = straightened(given, calibration)
     restore = restore_files if isinstance(given, ImageFiles) else restore_video
-    lacking, told = list["Restored"](), Counter[str]()
+    lacking, counts = list["Restored"](), Counter[str]()
     with (
         progress_bar(stderr) as progress,
         contextlib.closing(restore(source, pinhole, wish, out, overwrite=overwrite)) as results,
@@ -62,27 +62,27 @@ def restore_command(
         task = progress.add_task(source.description, total=source.count)
         for one in results:
             lacking += [one] if one.image is None else []
-            told["restored" if one.image is not None else "lacking"] += 1
-            told["held"] += one.held
+            counts["restored" if one.image is not None else "lacking"] += 1
+            counts["held"] += one.held
             last = one
             progress.advance(task)
-    _tell(out, wish, told, last)
+    _print_counts(out, wish, counts, last)
     _report_missing(lacking, isinstance(given, ImageFiles))
 
 
-def _tell(out: Path, wish: "RestorationWish", told: "Counter[str]", last: "Restored") -> None:
+def _print_counts(out: Path, wish: "RestorationWish", counts: "Counter[str]", last: "Restored") -> None:
     from fogsim.units import visibility_from_extinction
 
-    if not told["restored"]:
+    if not counts["restored"]:
         return
-    number = told["restored"]
+    number = counts["restored"]
     text = f"{out}: {'1 image' if number == 1 else f'{number} images'} restored by {wish.method}"
     if last.extinction is not None and number == 1:
         text += f", visibility {visibility_from_extinction(last.extinction):.4g} m"
         text += " (estimated by joint_road)" if wish.estimates else ""
     stdout.print(escape(text), soft_wrap=True)
-    if told["held"]:
-        print_remarks("held", (f"in {told['held']} images had no estimate; the last one was used",))
+    if counts["held"]:
+        print_remarks("held", (f"in {counts['held']} images had no estimate; the last one was used",))
 
 
 def _report_missing(lacking: "list[Restored]", files: bool) -> None:

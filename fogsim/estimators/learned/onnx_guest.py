@@ -27,8 +27,8 @@ class OnnxGuest:
     averaging over areas (the sides need not keep their ratio); a grey image has its channel three times. Deviations are
     multiplied by the model's calibration, metadata ``fogsim.conformal`` (`conformal_factor`). The interval of k is
     symmetric and contains that of ln k. Errors of a network repeat from frame to frame of a drive, so that its whole
-    deviation counts as common (`Estimate.common_deviation`). A number that is not finite, a deviation that is not
-    positive, and values beyond any fog mean that the network cannot tell.
+    deviation counts as common (`Estimate.common_deviation`). The estimate is invalid if a number is not finite, a
+    deviation is not positive, or values are beyond any fog.
 
     Parameters
     ----------

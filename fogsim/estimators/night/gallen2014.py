@@ -48,8 +48,8 @@ def fog_class(visibility: float) -> int:
 class Gallen2014:
     """Halos about lamps first, the own head lamps' veil without lamps (figure 9).
 
-    Where lamps are seen, their halos tell whether there is fog, but not how much: estimates are then not valid and have
-    bounds. Where none is, the veil is compared with references, which tells how much.
+    Where lamps are seen, their halos show whether there is fog, but not how much: estimates are then not valid and have
+    bounds. Where none are, the veil is compared with references, which gives the density.
 
     Gallen, Cord, Hautière, Dumont & Aubert, "Nighttime Visibility Analysis and Estimation Method in the Presence of
     Dense Fog", IEEE Transactions on Intelligent Transportation Systems, 2014.
@@ -140,7 +140,7 @@ class Gallen2014:
         Estimate
             Diagnostics: ``by``, "halos" or "veil"; ``detected``, whether there is fog; by halos ``value`` of this
             picture, ``smoothed`` over pictures [levels a pixel], and ``lamps``, how many; by the veil what
-            `Gallen2014Veil` tells, and ``fog_class`` 1 … 3; or ``reason``.
+            `Gallen2014Veil` reports, and ``fog_class`` 1 … 3; or ``reason``.
 
         Raises
         ------
@@ -230,4 +230,4 @@ class Gallen2014Halo(Gallen2014):
         super().__init__(camera, halos=halos, window=window, as_published=as_published)
 
     def _by_veil(self, observation: Observation) -> Estimate:  # noqa: ARG002 - what the combination is given
-        return Estimate.invalid(self.method, "no lamp is seen whose halo could tell")
+        return Estimate.invalid(self.method, "no lamp is seen whose halo could be measured")

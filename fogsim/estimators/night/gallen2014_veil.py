@@ -33,7 +33,7 @@ LIGHT_FOG = 300.0
 """Visibility from which fog is light, and is not to be detected [m] (table I)."""
 
 MOST_CLIPPED = 0.3
-"""Share of the cells that may be as bright as can be told."""
+"""Share of the cells that may be clipped."""
 
 LEAST_ROWS = 4
 """Rows that must be seen above and below the horizon."""
@@ -116,7 +116,7 @@ class Gallen2014Veil:
         Parameters
         ----------
         observation : Observation
-            Its image, lamps and the camera's place are used; if it does not tell lamps, low beams are assumed.
+            Its image, lamps and the camera's place are used; without lamps, low beams are assumed.
 
         Returns
         -------

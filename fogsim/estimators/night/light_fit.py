@@ -121,7 +121,7 @@ def log_likelihoods(
 
 @kernel
 def _terms(is_day: bool, has_others: bool) -> Terms:
-    """Terms of which the light consists."""
+    """Terms that add up to the light."""
     terms = np.arange(OTHERS + 1)
     if is_day:
         return terms if has_others else terms[:OTHERS].copy()

@@ -349,7 +349,7 @@ def _of_cells(own: OwnLight, used: NDArray[np.bool_]) -> OwnLight:
 
 
 def _too_little(seen: Seen, used: NDArray[np.bool_], is_sky: NDArray[np.bool_]) -> str:
-    """Why nothing can be told from the cells of use; empty if something may."""
+    """Why the usable cells give no estimate; empty if they may."""
     if np.count_nonzero(used) < LEAST_CELLS or np.count_nonzero(used & ~is_sky) < LEAST_ROAD:
         return "too little is seen that is neither too bright nor too dark"
     if float(seen.luminance[used].max()) < LEAST_PEAK:

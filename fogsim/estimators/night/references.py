@@ -1,4 +1,4 @@
-"""What own head lamps show in fog of any density, as a method is told it."""
+"""Reference images of the own head lamps in fog of any density, as a method gets them."""
 
 from dataclasses import dataclass
 

@@ -30,8 +30,8 @@ class VeilScores(NamedTuple):
 class VeilTemplates:
     """References as a camera has them, each with the mask of its veil.
 
-    Each is a luminance map of veil and road, normalised to 0 … 255 and bent by the camera's response, of which Otsu's
-    threshold keeps what is bright.
+    Each is a luminance map of veil and road, normalised to 0 … 255 and bent by the camera's response; Otsu's threshold
+    keeps its bright part.
 
     Takes `nearest_to` [m].
     """

@@ -1,4 +1,4 @@
-"""Gabb et al. (2014): the radar follows the vehicle ahead through any fog; where the camera loses it tells the fog."""
+"""Gabb et al. (2014): the radar follows the vehicle ahead through any fog; the camera's range limit gives k."""
 
 import math
 from typing import Annotated
@@ -45,7 +45,7 @@ NEW_RANGE, NEW_TIME = 5.0, 3.0
 
 @checked_parameters
 class Gabb2014:
-    """A vehicle that the radar follows is looked for in the picture; the range at which it is lost tells the fog.
+    """Track a vehicle by radar and look for it in the image; the range at which it is lost gives the visibility.
 
     The range and the calibration say where in the picture the vehicle must be and how wide it is. There two upright
     edges stand out of noise and clutter, or not. The contrast C0 of a vehicle fades as e^(−kd) (Duntley's law), and it
@@ -64,8 +64,8 @@ class Gabb2014:
     camera : Camera
         The assumed calibration.
     setback : float or None
-        Distance of the camera behind the front bumper, from which the range counts [m]; None for what observations
-        tell.
+        Distance of the camera behind the front bumper, from which the range counts [m]; None to use what observations
+        report.
     pitch_deviation : float
         Standard deviation of the true pitch about the assumed one [rad].
     fading_way, fading_time : float
@@ -95,7 +95,7 @@ class Gabb2014:
         self.reset()
 
     def reset(self) -> None:
-        """Forget all vehicles and what they told."""
+        """Forget all vehicles and their measurements."""
         self._check.reset()
         self._learnt = LossLikelihood()
         self._time: float | None = None
@@ -110,12 +110,12 @@ class Gabb2014:
         Parameters
         ----------
         observation : Observation
-            Its image, time, speed, lead and, if no setback was told, camera_setback are used.
+            Its image, time, speed, lead and, if no setback was given, camera_setback are used.
 
         Returns
         -------
         Estimate
-            Diagnostics: ``found``, whether the vehicle was found in this picture, absent if that could not be told;
+            Diagnostics: ``found``, whether the vehicle was found in this image, absent if that is unknown;
             ``threshold``, the least contrast that is found [-]; ``distance`` of the vehicle [m]; ``note``, why nothing
             was looked for; or ``reason``.
 
@@ -176,7 +176,7 @@ class Gabb2014:
         if seen.found and abs(seen.aside) <= NEARLY_AHEAD:
             self._ahead_until = observation.time + SEEN_BEFORE
         if not seen.found and not self._is_lost(level, crop, observation.time):
-            return "the vehicle ahead may be beside where it is looked for, or be too small"
+            return "the vehicle ahead may be outside the searched area, or too small"
         left = self._left(depth, observation.time)
         if seen.found and seen.step >= left:
             self._last = observation.time, depth, seen.step

@@ -23,14 +23,14 @@ TRUSTED = 0.07
 """Contrast of the best edges of a class below which noise counts among them [-]."""
 
 FARTHEST = 0.6
-"""Disparity below which no distance is told [px]."""
+"""Disparity below which no distance is given [px]."""
 
 NEAR = 30.0
 """Distance within which the best contrasts are those of road marks and vehicles' edges, and of nothing dark enough, if
 there is contrast at twice that [m]."""
 
 DEEP_ENOUGH = 0.5
-"""Optical depth to the farthest class from which on contrasts tell k [-]."""
+"""Least optical depth to the farthest class at which contrasts determine k [-]."""
 
 LEAST_DEVIATION = 0.08
 """Relative standard deviation that no fit comes below: what scenes have of dark things [-]."""
@@ -54,7 +54,7 @@ class Hautiere2006Stereo:
     Parameters
     ----------
     camera : Camera
-        The told calibration of both cameras.
+        The stated calibration of both cameras.
     as_published : bool
         Take the distance of the farthest class of 5 % for the visibility.
     disparity_deviation : float

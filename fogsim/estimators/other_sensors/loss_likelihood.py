@@ -17,8 +17,8 @@ USUAL_CONTRAST, CONTRAST_DEVIATION = -0.45, 0.35
 """Mean and standard deviation of the ln of a vehicle's contrast to its surroundings, over the airlight."""
 
 LIGHT_SHARE, LEAST_CONTRAST = 0.1, 0.05
-"""Share of vehicles of which nothing is known of it, for light paint before light airlight may vanish at any range [-],
-and the least that it then is [-]."""
+"""Share of vehicles with an unknown contrast, since light paint in front of light airlight may vanish at any range [-],
+and its least value then [-]."""
 
 SLOPE = 0.25
 """Deviation, in ln of the contrast, of the threshold at which a vehicle is found [-]."""
@@ -48,7 +48,7 @@ def _contrast_prior() -> Floats:
 
 
 class LossLikelihood:
-    """What looks at vehicles at known ranges tell of k; each vehicle's contrast C0 is unknown, and one in all looks.
+    """Evidence on k from looks at vehicles at known ranges; each vehicle has an unknown contrast C0 in all looks.
 
     A look finds the vehicle with the probability that C0 e^(−kd) exceeds a threshold.
     """
@@ -88,7 +88,7 @@ class LossLikelihood:
         return np.asarray(self._past + most + np.log(np.exp(joint - most).sum(axis=1)))
 
     def result(self) -> tuple[float, float, float] | ExtinctionBounds | None:
-        """What all looks tell: k, its standard deviation and how far they reached [1/m, 1/m, m]; bounds; or nothing."""
+        """k, its standard deviation and how far all looks reached [1/m, 1/m, m]; bounds; or nothing."""
         learnt = self._learnt()
         likelihood = np.exp(learnt - learnt.max())
         if max(likelihood[0], likelihood[-1]) < END:

@@ -1,4 +1,4 @@
-"""Fog by a forward-scatter sensor on board: what it tells of the air at the vehicle."""
+"""Fog by a forward-scatter sensor on board, which measures the air at the vehicle."""
 
 import math
 from collections import deque
@@ -60,7 +60,7 @@ class Scatterometer:
         self._values: deque[tuple[float, float]] = deque()
 
     def update(self, observation: Observation) -> Estimate:
-        """Take over what the sensor tells.
+        """Use the sensor's value as it is.
 
         Parameters
         ----------
@@ -81,7 +81,7 @@ class Scatterometer:
         self._check.image_of(observation)
         scattering = observation.scattering
         if scattering is None:
-            why = "no forward-scatter sensor tells of the fog here: sensors.scatterometer puts one on the vehicle"
+            why = "no forward-scatter sensor measures the fog here: sensors.scatterometer adds one to the vehicle"
             return Estimate.invalid(self.method, why)
         if not 0.0 <= scattering < math.inf:
             raise InputError(

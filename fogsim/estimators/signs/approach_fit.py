@@ -15,7 +15,7 @@ from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 Floats = NDArray[np.float64]
 
 GRID = OPTICAL_DEPTH_AT_VISIBILITY / np.geomspace(8000.0, 10.0, 900)
-"""Extinction coefficients that are weighed [1/m], evenly in their logarithms, nearer than any sign tells them."""
+"""Extinction coefficients to weigh [1/m], evenly spaced in ln k, more finely than any sign can resolve."""
 
 SIGN_DEVIATION = 0.015
 """Relative deviation of k that a sign has to itself, whatever its looks agree on [-]."""
@@ -164,7 +164,7 @@ def _solved(matrix: Floats, right: Floats) -> Floats:
 
 
 def extinction_of(fits: Sequence[ApproachFit], wrong_share: float) -> tuple[float, float]:
-    """Mean and standard deviation of k [1/m] after several signs, some of which may be wrong."""
+    """Mean and standard deviation of k [1/m] after several signs; some may be wrong."""
     likelihoods = [np.exp(np.maximum(fit.log_likelihood, -700.0)) for fit in fits]
     likelihoods = [one / one.mean() for one in likelihoods]
     shares = [np.log((1.0 - wrong_share) * one + wrong_share) for one in likelihoods]

@@ -1,4 +1,4 @@
-"""Belaroussi & Gruyer (2015): the distance at which signs of the map are first detected tells the visibility."""
+"""Belaroussi & Gruyer (2015): visibility from the distance at which signs of the map are first detected."""
 
 import math
 from collections.abc import Mapping
@@ -52,13 +52,13 @@ class _Seen:
 
 @checked_parameters
 class Belaroussi2015:
-    """Signs of the map are detected in the picture; where each was first detected tells the fog.
+    """Detect the signs of the map; the distance at which each is first detected gives the visibility.
 
-    A sign comes out of the fog at d_sign, the operating range of the detector, of which the visibility is a function
-    that is calibrated for the camera and the size of the sign. Each sign gives one measurement; k-means with three
+    A sign comes out of the fog at d_sign, the operating range of the detector; the visibility is a function of it,
+    calibrated for the camera and the size of the sign. Each sign gives one measurement; k-means with three
     clusters sets outliers aside, and a mixture of normal distributions is reduced to one (sections 4.2 to 4.4). What a
-    sign says fades with the way driven since and with time. Where the curve is flat, or was not measured, a sign tells
-    nothing: the distance at which it came out was set by the camera's resolution.
+    sign says fades with the way driven since and with time. Where the curve is flat, or was not measured, a sign has no
+    information: the camera's resolution set the distance at which it came out.
 
     Belaroussi & Gruyer, "Road sign-aided estimation of visibility conditions", MVA 2015. The detector is `fogsim.vision
     .symmetry`, after the Bilateral Chinese Transform.
@@ -74,7 +74,7 @@ class Belaroussi2015:
         Whether the curve is the paper's cubic through the distances of 80 % detection, in place of the monotone one
         through the distances of first detection, and p(c) is 1.
     setback : float or None
-        Distance of the camera behind the front bumper [m]; None for what observations tell.
+        Distance of the camera behind the front bumper [m]; None to use what observations report.
     position_deviation : float
         Standard deviation of a sign's place by map and own position [m].
     heading_deviation, pitch_deviation : float
@@ -270,7 +270,7 @@ class Belaroussi2015:
         return Estimate(self.method, k, k * deviation / mean, diagnostics=found)
 
     def _bounds(self, found: Mapping[str, object]) -> ExtinctionBounds | None:
-        """What signs tell that were seen from beyond the curve's end, or not at all: at least, or at most, so much.
+        """Bounds from signs that were first seen beyond the curve's end, or not at all: at least, or at most, so much.
 
         A sign that is not seen where it should be has not come out of the fog, unless it is missing or hidden; so there
         must be two of them, and signs must have been found on the map before.

@@ -31,7 +31,7 @@ SYMBOL = 0.12
 """Standard deviation of a symbol's mean light, relative to the picture's there [-]."""
 
 UNKNOWN = 1e6
-"""Variance of what a face does not tell [linear grey levels²]."""
+"""Variance that a face leaves unexplained [linear grey levels²]."""
 
 # Place [px], relative size and blur [px].
 _LEAST, _MOST = np.array([-1.5, -1.5, 0.9, 0.3]), np.array([1.5, 1.5, 1.1, 2.0])
@@ -99,7 +99,7 @@ def face_light(
     """Fit a face of known layout, before a background with an even slope, to a part of a picture.
 
     By Koschmieder's law the fog turns L0 = E ρ into L = A (1 − T) + E ρ T whatever the reflectance, so white, red and
-    dark parts of a face lie on one line, whose height and slope each tell the transmittance T.
+    dark parts of a face lie on one line; its height and its slope each give the transmittance T.
 
     Returns None if too little of it is in the picture. Takes `light` (rows, cols) [linear grey levels], `place` (float,
     float) [px], `radius` [px].
@@ -173,7 +173,7 @@ def _placed(
 
 
 def _line(face: Face, columns: Floats, solved: Floats, covariance: Floats) -> FaceLight:
-    """Luminance over reflectance; of what is even, or too small to tell its areas, only one point of that line."""
+    """Line of luminance over reflectance; only a point of it for even faces, or those too small to separate areas."""
     is_small = face.radius < SEPARABLE
     if not face.is_even and not is_small:
         return FaceLight(float(solved[0]), float(solved[4]), tuple(covariance[[0, 4, 0], [0, 4, 4]].tolist()))

@@ -60,7 +60,7 @@ LAYOUTS = {
     "warning": _warning((0.09, 0.41, -0.5)),
     **dict.fromkeys(("fog_warning", "slippery", "curve_left", "curve_right", "queue"), _warning((0.4, 0.4, -0.2))),
 }
-"""Faces by the kind of the sign; one that is not known is taken for a disc of which nothing more is known."""
+"""Faces by the kind of the sign; an unknown kind is taken for a plain disc."""
 
 UNKNOWN = Layout(Outline.DISC, ((1.0, WHITE),), (0.8, 0.8, 0.0))
 

@@ -16,7 +16,7 @@ from fogsim.files.readers import number_within, read_json
 from fogsim.linear_algebra import inverse_of, matrix_product, times
 
 FLAT = 0.35
-"""Deviation of one sign's visibility, relative to it, from which on the curve is flat: distances tell no more [-]."""
+"""Relative deviation of one sign's visibility beyond which the curve is flat and distances are uninformative [-]."""
 
 _MARGIN = 1.5
 """Deviations before the distance that resolution sets at which the curve ends [-]."""
@@ -81,7 +81,7 @@ class OperatingRange:
 
     @property
     def reach(self) -> tuple[float, float]:
-        """Distances of first detection between which the curve tells the visibility [m]."""
+        """Distances of first detection between which the curve gives the visibility [m]."""
         return _Curve(self).reach
 
     @property
@@ -126,7 +126,7 @@ def _column(key: str, values: Any) -> tuple[float, ...]:
 
 
 class _Curve:
-    """Visibility over distance, monotone, as far as it tells anything."""
+    """Visibility over distance, monotone, over its informative range."""
 
     def __init__(self, measured: OperatingRange) -> None:
         visibility = np.array(measured.visibility)

@@ -55,7 +55,7 @@ def project_sightings(
 ) -> tuple[ProjectedSign, ...]:
     """Project what the map says through the assumed camera.
 
-    Returns signs of which the picture may show something, in the order of the sightings: none that is behind the
+    Returns signs that the image may show, in the order of the sightings: none that is behind the
     camera, outside the picture by more than it can be off its place, or too small. Takes `setback` [m].
     """
     known = PoseDeviation() if deviation is None else deviation

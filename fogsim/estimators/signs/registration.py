@@ -37,7 +37,7 @@ def register_signs(signs: Sequence[ProjectedSign], detections: Sequence[SignDete
 
     A pair is possible within `LIMIT` standard deviations of column, row and size together. Its likelihood q is that of
     the offsets over that of a false alarm anywhere in the sign's region: p(c) = P q / (P q + λ) with the share P of
-    signs that are detected and the false alarms λ in a region, as of a probabilistic data association with one target.
+    signs that are detected and the false alarms λ in a region, as in probabilistic data association with one target.
 
     Returns In the order of the signs; signs without a detection are left out.
     """

@@ -76,7 +76,7 @@ class SignContrast:
 
     Where the map has a sign ahead the picture is searched for it; its face, of the kind's known layout, is fitted to
     the picture at each look, before whatever stands behind it: which luminance its black has, and how much its white
-    sends more. Black tells the airlight between, A (1 − e^(−kd)), and white over black fades as e^(−kd). A sign's own
+    sends more. Black gives the airlight between, A (1 − e^(−kd)), and white over black fades as e^(−kd). A sign's own
     brightness and a wrong distance of the map change no rate. Signs are weighed together, and each may be wrong:
     missing, moved, turned or another.
 
@@ -87,7 +87,7 @@ class SignContrast:
     camera : Camera
         The assumed calibration.
     setback : float or None
-        Distance of the camera behind the front bumper [m]; None for what observations tell.
+        Distance of the camera behind the front bumper [m]; None to use what observations report.
     position_deviation : float
         Standard deviation of a sign's place by map and own position [m].
     heading_deviation : float

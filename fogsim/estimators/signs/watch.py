@@ -1,4 +1,4 @@
-"""Looks for the signs of the map in frame after frame, and tells why nothing can be made of them."""
+"""Search frame after frame for the signs of the map, and give the reason when they cannot be used."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -21,13 +21,13 @@ from fogsim.vision.strips.sky import Sky, sky_above
 from fogsim.vision.symmetry.detection import detect_signs
 
 STRANGE = 3
-"""Signs in a row of which none was found where the map has it, from which on the map is doubted."""
+"""Successive signs not found at their position in the map after which the map is doubted."""
 
 MIN_AIRLIGHT = 6.0
 """Sky darker than this is no day [linear grey levels]."""
 
 WELL_SEEN = 30.0
-"""Distance within which a sign must have been looked for to be told from one that is too far to see [m]."""
+"""Range within which a sign must have been searched to know that it is not simply too far to see [m]."""
 
 Detector = Callable[..., tuple[object, ...]]
 
@@ -101,10 +101,10 @@ class SignWatch:
         """Why no sign can be seen; empty if one might be."""
         if self._lost >= STRANGE:
             return (
-                f"none of the last {self._lost} signs was found where the map has it: the map may be in another "
-                "coordinate frame, or the camera be told wrongly"
+                f"the last {self._lost} signs were not found at their positions in the map: the map may be in another "
+                "coordinate frame, or the camera's calibration be wrong"
             )
-        return "" if self._has_signs else "the map tells of no sign ahead; sensors.sign_reach_m and the map decide that"
+        return "" if self._has_signs else "no sign ahead in the map within sensors.sign_reach_m"
 
 
 def sign_looks(watched: Watched, tracks: Iterable[SignTrack]) -> tuple[SignLook, ...]:

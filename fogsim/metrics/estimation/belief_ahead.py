@@ -50,12 +50,12 @@ class BeliefAheadError:
 
     def result(self) -> dict[str, JsonValue]:
         """Say error and coverage at each distance."""
-        said: dict[str, JsonValue] = {}
+        results: dict[str, JsonValue] = {}
         for distance in PLACES:
             errors = self._errors[distance]
-            said[f"belief_{distance}_m_ahead_median_error_percent"] = quantile(errors, 0.5)
-            said[f"belief_{distance}_m_ahead_coverage_share"] = share(self._held[distance], len(errors))
-        return said
+            results[f"belief_{distance}_m_ahead_median_error_percent"] = quantile(errors, 0.5)
+            results[f"belief_{distance}_m_ahead_coverage_share"] = share(self._held[distance], len(errors))
+        return results
 
 
 @dataclass(slots=True)

@@ -27,7 +27,7 @@ _MOST_WAITING = 64
 """Beliefs that are gathered before they are judged: one after another they cost half of one in each step."""
 
 LEAST_CHANGE = 0.1
-"""Standard deviation of ln V over a run from which a latency can be told; a tenth is a change of 10 %."""
+"""Standard deviation of ln V over a run above which a latency can be measured; a tenth is a change of 10 %."""
 
 
 @dataclass(slots=True)
@@ -43,19 +43,19 @@ class Errors:
     percent: list[float] = field(default_factory=list)
     covered: int = 0
     _ratios: list[float] = field(default_factory=list)
-    _said: list[tuple[float, float]] = field(default_factory=list)
+    _estimates: list[tuple[float, float]] = field(default_factory=list)
     _truths: list[tuple[float, float]] = field(default_factory=list)
 
-    def follow(self, time: float, truth: float, said: float | None) -> None:
+    def follow(self, time: float, truth: float, estimate: float | None) -> None:
         """Add the visibility ahead [m] at a time [s], and the reported one, if any."""
         self._truths.append((time, math.log(min(truth, FOG_LIMIT))))
-        if said is not None:
-            self._said.append((time, math.log(min(said, FOG_LIMIT))))
+        if estimate is not None:
+            self._estimates.append((time, math.log(min(estimate, FOG_LIMIT))))
 
-    def judge(self, truth: float, said: float, low: float, high: float) -> None:
+    def judge(self, truth: float, estimate: float, low: float, high: float) -> None:
         """Add a visibility reported in fog, ``inf`` for clear air, and its 90 % interval [m]."""
-        self.percent.append(relative_error(said, truth))
-        self._ratios.append(math.log(said / truth))
+        self.percent.append(relative_error(estimate, truth))
+        self._ratios.append(math.log(estimate / truth))
         self.covered += low <= truth <= high
 
     @property
@@ -67,9 +67,9 @@ class Errors:
     @property
     def latency(self) -> float | None:
         """How long after a change of the fog it is followed [s]; None where the fog does not change."""
-        if len(self._said) < 2:
+        if len(self._estimates) < 2:
             return None
-        (when, said), (times, truths) = np.array(self._said).T, np.array(self._truths).T
+        (when, estimate), (times, truths) = np.array(self._estimates).T, np.array(self._truths).T
         if truths.std() < LEAST_CHANGE:
             return None
         # At every lag the same part of the run is compared: that before which the longest lag reaches.
@@ -78,7 +78,7 @@ class Errors:
         if not settled.any():
             return None
         lags = np.arange(0.0, longest, float(np.diff(times).min()))
-        costs = [np.abs(said[settled] - np.interp(when[settled] - lag, times, truths)).mean() for lag in lags]
+        costs = [np.abs(estimate[settled] - np.interp(when[settled] - lag, times, truths)).mean() for lag in lags]
         return float(lags[int(np.argmin(costs))])
 
     def result(self) -> dict[str, JsonValue]:
@@ -142,11 +142,11 @@ class BeliefError:
 
     def _judge_waiting(self) -> None:
         for time, truth, belief in self._waiting:
-            low, said, high = belief.visibility_quantiles((0.05, 0.5, 0.95))
-            self._errors.follow(time, truth, said)
+            low, estimate, high = belief.visibility_quantiles((0.05, 0.5, 0.95))
+            self._errors.follow(time, truth, estimate)
             if truth < FOG_LIMIT:
                 self._errors.asked += 1
-                self._errors.judge(truth, said, low, high)
+                self._errors.judge(truth, estimate, low, high)
         self._waiting.clear()
 
     def result(self) -> dict[str, JsonValue]:

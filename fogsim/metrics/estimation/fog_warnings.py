@@ -54,7 +54,7 @@ class FogWarnings:
             self._warned.append(step.route_position)
 
     def _enter_banks(self, step: Step) -> None:
-        """Note the lead of each bank of which half the density is reached."""
+        """Note the lead of each bank once half its density is reached."""
         while self._warned and self._warned[0] < step.route_position - LONGEST_LEAD:
             self._warned.popleft()
         for number, bank in enumerate(_banks(step)):

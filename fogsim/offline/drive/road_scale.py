@@ -34,7 +34,7 @@ FACTORS = np.geomspace(0.5, 2.0, 139)
 """Assumed over true distances that are tried [-], 1 % apart."""
 
 LEAST_PAIRS, LEAST_CORRELATION, CLOSE = 5, 0.3, 0.15
-"""Pairs of images and mean correlation below which nothing is said [-], and how close in ln to the best factor those of
+"""Least pairs of images and mean correlation with a result [-], and how close in ln to the best factor those of
 single pairs count [-]."""
 
 LEAST_DEVIATION = 0.03

@@ -64,7 +64,7 @@ def load_sign_file(path: Path) -> SignFile:
     signs = tuple(_sign(f"{path}: feature {number}", number, one) for number, one in points)
     twice = [sign_id for sign_id, count in Counter(sign.sign_id for sign in signs).items() if count > 1]
     if twice:
-        raise InputError(f"{path}: two signs have the id {twice[0]!r}; each needs one of its own, or none")
+        raise InputError(f"{path}: two signs have the id {twice[0]!r}; ids must be unique, or left out")
     return SignFile(path, signs, tuple(_remarks(path, signs, points, len(features) - len(points))))
 
 
@@ -83,7 +83,7 @@ def _refuse_other_frames(path: Path, content: Mapping[str, Any]) -> None:
     """Refuse a map that declares other coordinates than longitude and latitude."""
     if content.get("coordinates") == NET:
         raise InputError(
-            f"{path}: its points are x and y of a SUMO network, which tells no projection; expected longitude and "
+            f"{path}: its points are x and y of a SUMO network, which has no projection; expected longitude and "
             "latitude, WGS 84"
         )
     frame = content.get("crs") or "CRS84"
@@ -155,9 +155,9 @@ def _remarks(path: Path, signs: tuple[GeographicSign, ...], points: list[tuple[i
     remarks = [f"{path}: {_count(count)} with {what}" for count, what in assumed if count]
     unknown = sorted({sign.kind for sign in signs if sign.kind.removeprefix("xodr.") not in SIGN_KINDS})
     if unknown:
-        remarks.append(f"{path}: kinds that FogSim does not know, looked for as any sign: {', '.join(unknown[:5])}")
+        remarks.append(f"{path}: unknown kinds, searched as signs of any kind: {', '.join(unknown[:5])}")
     if others:
-        remarks.append(f"{path}: {others} features that are no points are passed over")
+        remarks.append(f"{path}: {others} features that are not points are skipped")
     return remarks
 
 

@@ -230,7 +230,7 @@ def watch_signs(
         If a file cannot be used, the images are stills, or the track ends before the first image.
     """
     if source.count > 1 and not source.temporal:
-        raise InputError("--track tells places at times, and these images are stills, which have none: add --sequence")
+        raise InputError("--track has positions by time, but these images are stills without times: add --sequence")
     if not math.isfinite(offset):
         raise InputError(f"--track-offset must be a number of seconds, got {offset!r}")
     mapped, driven = load_sign_file(signs), load_track(track)

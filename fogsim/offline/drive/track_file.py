@@ -102,12 +102,12 @@ def load_track(path: Path) -> Track:
     points = [one for number, one in enumerate(points) if number == 0 or one[0] != points[number - 1][0]]
     if len(points) < 2:
         raise InputError(f"--track {path}: expected two positions with different times or more, got {len(points)}")
-    time, latitude, longitude, told = np.array(points).T
+    time, latitude, longitude, headings = np.array(points).T
     back = np.flatnonzero(np.diff(time) < 0)
     if back.size:
         raise InputError(f"--track {path}: time goes back after position {back[0] + 1} of {len(points)}")
     longitude, latitude = np.unwrap(np.radians(longitude)), np.radians(latitude)
-    return Track(path, time, longitude, latitude, _headings(path, longitude, latitude, told))
+    return Track(path, time, longitude, latitude, _headings(path, longitude, latitude, headings))
 
 
 Point = tuple[float, float, float, float]
@@ -118,10 +118,10 @@ def _gpx_points(path: Path) -> Iterator[Point]:
     start = None
     for number, point in enumerate(read_tree(path, "gpx").iter("trkpt")):
         where = f"--track {path}: point {number}"
-        told = (point.findtext("time") or "").strip()
-        if not told:
+        text = (point.findtext("time") or "").strip()
+        if not text:
             raise InputError(f"{where} has no <time>, so nothing says which image it belongs to")
-        time = _instant(where, told)
+        time = _instant(where, text)
         start = time if start is None else start
         yield time - start, *_degrees(where, point.get("lat"), point.get("lon")), math.nan
 
@@ -134,8 +134,8 @@ def _csv_points(path: Path) -> Iterator[Point]:
         counted, start = column["time"] == "time_s", None
         for row in rows:
             where = f"--track {path}: line {rows.line_num}"
-            told = row[column["time"]] or ""
-            time = _float(where, "time_s", told) if counted else _instant(where, told)
+            text = row[column["time"]] or ""
+            time = _float(where, "time_s", text) if counted else _instant(where, text)
             start = (0.0 if counted else time) if start is None else start
             heading = _float(where, "heading_deg", row["heading_deg"]) if row.get("heading_deg") else math.nan
             yield time - start, *_degrees(where, row[column["latitude"]], row[column["longitude"]]), heading
@@ -150,11 +150,11 @@ def _column(path: Path, names: Sequence[str], known: Sequence[str]) -> str:
     raise InputError(f"--track {path}: expected a column {' or '.join(known)}, got {', '.join(names) or 'none'}")
 
 
-def _instant(where: str, told: str) -> float:
+def _instant(where: str, text: str) -> float:
     try:
-        return datetime.fromisoformat(told).timestamp()
+        return datetime.fromisoformat(text).timestamp()
     except (ValueError, OverflowError) as error:
-        raise InputError(f"{where}: expected a time as 2026-05-04T07:08:09.5Z, got {shown(told)}") from error
+        raise InputError(f"{where}: expected a time as 2026-05-04T07:08:09.5Z, got {shown(text)}") from error
 
 
 def _degrees(where: str, latitude: str | None, longitude: str | None) -> tuple[float, float]:
@@ -164,16 +164,16 @@ def _degrees(where: str, latitude: str | None, longitude: str | None) -> tuple[f
     return north, east
 
 
-def _float(where: str, name: str, told: str | None) -> float:
-    return number_in_text(where, name, told or "", -LONGEST_TIME, LONGEST_TIME)
+def _float(where: str, name: str, text: str | None) -> float:
+    return number_in_text(where, name, text or "", -LONGEST_TIME, LONGEST_TIME)
 
 
 def _headings(
-    path: Path, longitude: NDArray[np.float64], latitude: NDArray[np.float64], told: NDArray[np.float64]
+    path: Path, longitude: NDArray[np.float64], latitude: NDArray[np.float64], headings: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Directions of travel: as given, otherwise from the position before to the one after."""
-    if not np.isnan(told).any():
-        return np.unwrap(np.radians(90.0 - told))
+    if not np.isnan(headings).any():
+        return np.unwrap(np.radians(90.0 - headings))
     east, north = metres_per_radian(float(latitude.mean()))
     place = np.stack((east * longitude, north * latitude), axis=1)
     found = np.full(len(place), math.nan)

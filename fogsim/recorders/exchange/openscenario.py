@@ -18,7 +18,7 @@ CHANGE = 0.01
 """Change of the visibility that becomes an event of its own, as a share [-]."""
 
 FARTHEST = 100_000.0
-"""Visibility that stands for clear air, of which the format has none [m]."""
+"""Visibility that stands for clear air, which the format cannot express [m]."""
 
 _CATEGORIES = {"car": "car", "van": "van", "truck": "truck", "bus": "bus", "motorcycle": "motorbike"}
 

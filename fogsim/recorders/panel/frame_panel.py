@@ -120,7 +120,7 @@ class FramePanel:
         frame.paste(self._speed.draw(), (_LEFT, 398))
 
     def _reported(self, step: Step) -> list[tuple[float, float]]:
-        """Distance ahead and visibility of what others have told lately [m, m]."""
+        """Distance ahead and visibility of the latest reports from others [m, m]."""
         self._reports = [one for one in (*self._reports, *step.observation.reports) if step.time - one.time <= _NEWS]
         return [(one.place - step.route_position, visibility_from_extinction(one.extinction)) for one in self._reports]
 
@@ -225,7 +225,7 @@ def _draw_visibilities(draw: ImageDraw.ImageDraw, step: Step) -> None:
 
 def _say_estimate(estimate: Estimate) -> tuple[str, str]:
     if not estimate.valid:
-        return "—", "cannot tell"
+        return "—", "no estimate"
     low, high = estimate.visibility_interval
     return _metres(estimate.visibility), f"{_metres(low)} – {_metres(high)}"
 

@@ -13,7 +13,7 @@ _MOST = 8  # arrays of a size that are kept
 class Memory:
     """A pool of arrays: one is used again when no other reference to it or to a view of it exists.
 
-    CPython's reference counts tell that; on an implementation without them every array is new.
+    This relies on CPython's reference counts; on an implementation without them every array is new.
     """
 
     def __init__(self) -> None:

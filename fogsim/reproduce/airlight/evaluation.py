@@ -30,7 +30,7 @@ ROAD_METHODS = (*PUBLISHED, EVEN_AIRLIGHT, "joint_road")
 CHASE_METHODS = ("lead_contrast",)
 
 FRAMES, PERIOD = 10, 1.0
-"""Frames of a drive alone, of which the last one's estimate counts, and the time between [s]."""
+"""Frames of a drive alone, whose last estimate counts, and the time between [s]."""
 
 EXPOSED, BRIGHTEST = 0.65, 95.0
 """Share of saturation at which the camera holds a percentile of the picture's luminance, as FogSim's does."""
@@ -97,10 +97,11 @@ def reproduce(
                 for case, method, estimate in followed(renderer, camera, plan.cases, number):
                     found.setdefault((case, method), []).append(estimate)
                 steps.advance()
-            records += [_record(height, case, method, told) for (case, method), told in found.items()]
+            records += [_record(height, case, method, estimates) for (case, method), estimates in found.items()]
     tables = tuple(
         TitledTable(
-            f"V_met as read [m] (share of drives that tell), camera {height:g} m high", _rows(records, plan, height)
+            f"V_met as read [m] (share of drives with one), camera {height:g} m high",
+            _rows(records, plan, height),
         )
         for height in plan.heights
     )
@@ -156,9 +157,9 @@ def _image(view: View, pose: CameraPose, camera: Camera, case: Case, rng: np.ran
 
 
 def _record(height: float, case: Case, method: str, estimates: Sequence[Estimate]) -> dict[str, Cell]:
-    told = [one for one in estimates if one.valid and one.extinction > 0.0]
-    read = float(np.median([one.visibility for one in told])) if told else None
-    held = [one.visibility_interval[0] <= case.visibility <= one.visibility_interval[1] for one in told]
+    valid = [one for one in estimates if one.valid and one.extinction > 0.0]
+    read = float(np.median([one.visibility for one in valid])) if valid else None
+    held = [one.visibility_interval[0] <= case.visibility <= one.visibility_interval[1] for one in valid]
     return {
         "paper": "airlight",
         "fog": "koschmieder" if case.albedo is None else "photons",
@@ -166,7 +167,7 @@ def _record(height: float, case: Case, method: str, estimates: Sequence[Estimate
         "mount_height_m": height,
         "visibility_m": case.visibility,
         "method": method,
-        "told_share": len(told) / len(estimates),
+        "told_share": len(valid) / len(estimates),
         "read_m": read,
         "bias_pct": None if read is None else 100.0 * (read / case.visibility - 1.0),
         "interval_coverage": float(np.mean(held)) if held else None,
@@ -189,5 +190,5 @@ def _rows(records: Sequence[Mapping[str, Cell]], plan: Plan, height: float) -> R
 
 def _cell(record: Mapping[str, Cell]) -> str:
     read, share = record["read_m"], float(record["told_share"] or 0.0)
-    told = "" if share == 1.0 else f" ({100.0 * share:.0f} %)"
-    return "—" if read is None else f"{read:.0f}{told}"
+    suffix = "" if share == 1.0 else f" ({100.0 * share:.0f} %)"
+    return "—" if read is None else f"{read:.0f}{suffix}"

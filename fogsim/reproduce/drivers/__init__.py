@@ -17,7 +17,7 @@ NOTES = (
     "* one of the six sizes that are to be met within 30 %; of the reports only abstracts and summaries were seen",
     "free: 5 s or more behind the vehicle ahead (speeds at the smallest demand); followers: less (the middle demand)",
     "overdrives: too fast to stop within V_met by the Highway Code (0.67 s, 6.57 m/s²), by which the M4 was judged",
-    "the M4's flows are not told, and shares of headways depend on them: ours are those of 600 vehicles/h in a lane",
+    "M4 flows are not published, and shares of headways depend on them: ours are those of 600 vehicles/h in a lane",
     "headways in clear air (0.5 to 2 s over the gap, in equal shares) and speeds (70 mph ± 10 %) belong to the demand, "
     "not to FogSim's drivers",
     "the free speed falls a little at 200 m already: who does not see a leader has no wish to overtake, and stays left",

@@ -6,11 +6,11 @@ Of the reports only abstracts and summaries have been seen:
 - SR281: Sumner, Baguley & Burton 1977, the same; 1780 vehicles on the M4
 - M4 1976: Commercial Motor, 10 December 1976, on the study that became SR281
 - C-6: Hogema & van der Horst 1994, TNO-TM; loops on a two-lane motorway near Breda, by day, a year
-- A16: Hogema & van der Horst 1997, as the US DOT's database of benefits tells it
-- Broughton: Broughton, Switzer & Scott 2007, a simulator, behind leaders of 13.4 and 22.4 m/s; its fogs are not told
+- A16: Hogema & van der Horst 1997, as quoted in the US DOT's database of benefits
+- Broughton: Broughton, Switzer & Scott 2007, a simulator, behind leaders of 13.4 and 22.4 m/s; fogs not given
 - van der Hulst: van der Hulst, Rothengatter & Meijman 1999, a simulator
 - Cavallo: Cavallo & Beaudoin, a simulator; leaders of 50 to 90 km/h in a visibility of 30 m, by night
-- SHRP2: Transportation Research Record 2018, doi 10.1177/0361198118774748; how near its "near fog" is, is not told
+- SHRP2: Transportation Research Record 2018, doi 10.1177/0361198118774748; visibility of its "near fog" not given
 """
 
 import itertools

@@ -53,8 +53,8 @@ def _place(visibility: float) -> float:
 def _curve(axes: Axes, results: Results, plan: Plan, case: Case, measure: str, factor: float, style: str) -> None:
     """Means with their intervals over visibility, of the case's population and demand."""
     cases = [Case(case.population, case.demand, v) for v in sorted(plan.visibilities)]
-    told = [interval(results.over_seeds(one, measure)) for one in cases]
-    mean, low, high = (factor * np.array([getattr(one, name) for one in told]) for name in ("mean", "low", "high"))
+    intervals = [interval(results.over_seeds(one, measure)) for one in cases]
+    mean, low, high = (factor * np.array([getattr(one, name) for one in intervals]) for name in ("mean", "low", "high"))
     places = [_place(one.visibility) for one in cases]
     colour = _COLOURS.get(case.population, "tab:green")
     axes.fill_between(places, low, high, color=colour, alpha=0.2, linewidth=0.0)

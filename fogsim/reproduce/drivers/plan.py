@@ -36,7 +36,7 @@ SLOW, FAST = 13.4, 22.4
 """Speeds of leaders in the simulator of Broughton, Switzer & Scott (2007) [m/s]."""
 
 PAIRS_IN = 40.0
-"""V_met in which drivers follow one leader each [m]; the study's fogs are not told in what we have seen."""
+"""V_met in which drivers follow one leader each [m]; the excerpts that we have seen do not give the study's fogs."""
 
 SIGNS: Mapping[float, float] = {100.0: 80.0, 50.0: 60.0, 30.0: 60.0}
 """What the A16's signs show [km/h] by V_met [m]: 80 from 70 to 140 m, 60 below (Hogema & van der Horst 1997)."""

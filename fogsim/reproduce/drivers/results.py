@@ -25,12 +25,12 @@ class Interval:
 
 def interval(values: NDArray[np.float64]) -> Interval:
     """Mean over seeds (n,) and its interval; runs without a value do not count."""
-    told = values[np.isfinite(values)]
-    if not told.size:
+    finite = values[np.isfinite(values)]
+    if not finite.size:
         return Interval(np.nan, np.nan, np.nan)
-    means = np.random.default_rng(0).choice(told, (RESAMPLES, told.size)).mean(axis=1)
+    means = np.random.default_rng(0).choice(finite, (RESAMPLES, finite.size)).mean(axis=1)
     low, high = np.percentile(means, (2.5, 97.5))
-    return Interval(float(told.mean()), float(low), float(high))
+    return Interval(float(finite.mean()), float(low), float(high))
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,8 +35,8 @@ def tables(results: Results, plan: Plan) -> tuple[TitledTable, ...]:
         f"What is published, and ours ({seeds}, mean [95 % interval])", findings_table(results, populations)
     )
     names = [*populations, *dict.fromkeys(c.population for c in plan.cases if c.population not in populations)]
-    told = f"({seeds}, mean ± half the 95 % interval)"
-    traffic = (TitledTable(f"Traffic: {name} {told}", _traffic(results, plan, name)) for name in names)
+    note = f"({seeds}, mean ± half the 95 % interval)"
+    traffic = (TitledTable(f"Traffic: {name} {note}", _traffic(results, plan, name)) for name in names)
     return (found, *traffic)
 
 
@@ -99,8 +99,8 @@ def records(results: Results, plan: Plan) -> tuple[Mapping[str, Cell], ...]:
         *((pair, _pair_record(pair), PairMeasures._fields) for pair in plan.pairs),
     ]
     found: list[Mapping[str, Cell]] = [
-        told | _interval_record(measure, interval(results.over_seeds(case, measure)))
-        for case, told, measures in described
+        record | _interval_record(measure, interval(results.over_seeds(case, measure)))
+        for case, record, measures in described
         for measure in measures
     ]
     for population in plan.populations:

@@ -223,10 +223,10 @@ def _drive_rows(records: Sequence[Record]) -> Rows:
     rows: list[tuple[str, ...]] = [(*heading, "mean Br50 < 9", "mean, calibrated", "sharpest, calibrated")]
     for one in records:
         visibility = "clear" if one["visibility_m"] is None else f"{one['visibility_m']:.0f}"
-        told = [str(one[key]) for key in ("drive", "with_halos", "halos_a_frame", "median_br50")]
+        cells = [str(one[key]) for key in ("drive", "with_halos", "halos_a_frame", "median_br50")]
         count = 0.01 * max(one["with_halos"], 1.0)
         shares = (", ".join(f"{one[f'{name}_{span}'] / count:.1f}" for span in ("each", "of_25")) for name in _HALOS)
-        rows.append((told[0], visibility, *told[1:], *shares))
+        rows.append((cells[0], visibility, *cells[1:], *shares))
     return tuple(rows)
 
 

@@ -27,7 +27,7 @@ def check_expectations(scenario: "Scenario", *, is_shortened: bool = False) -> N
     """
     end = math.inf if is_shortened else last_time(scenario)
     mistakes = expectation_mistakes(scenario.expect, run_content(scenario), end, scenario.traffic.ego)
-    refuse((("expect", *place), told) for place, told in mistakes)
+    refuse((("expect", *place), mistake) for place, mistake in mistakes)
 
 
 def last_time(scenario: "Scenario") -> float:
@@ -60,8 +60,8 @@ def expectation_mistakes(
     """Expectations that a run could not evaluate, by key path; `duration` is the time of its last frame [s]."""
     for name, expectation in expect.items():
         for key, condition in expectation.conditions():
-            yield from (((name, key), told) for told in condition_mistakes(condition, content))
-        yield from (((name, key), told) for key, told in expectation.pointless({"time": (0.0, duration)}, ego))
+            yield from (((name, key), mistake) for mistake in condition_mistakes(condition, content))
+        yield from (((name, key), mistake) for key, mistake in expectation.pointless({"time": (0.0, duration)}, ego))
         for key, time in (("within_s", expectation.within_s), ("for_at_least_s", expectation.for_at_least_s)):
             if time is not None and time > duration:
                 yield (name, key), f"this cannot be decided: the run lasts {duration:g} s; got {time:g} s"

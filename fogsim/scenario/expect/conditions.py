@@ -26,9 +26,9 @@ WrittenCondition = Annotated[
 
 def refuse(mistakes: Iterable[tuple[KeyPath, str]]) -> None:
     """Raise ValidationError if there are mistakes, given as key path and message."""
-    told = [
-        InitErrorDetails(type=PydanticCustomError(MISTAKE, "{told}", {"told": text}), loc=place, input=0)
+    details = [
+        InitErrorDetails(type=PydanticCustomError(MISTAKE, "{message}", {"message": text}), loc=place, input=0)
         for place, text in mistakes
     ]
-    if told:
-        raise ValidationError.from_exception_data("expect", told)
+    if details:
+        raise ValidationError.from_exception_data("expect", details)

@@ -69,7 +69,7 @@ def road_adviser(scenario: Scenario) -> Adviser:
     advising = adviser(scenario)
     if isinstance(advising, VehicleAdviser):
         raise InputError(
-            f"advice: {scenario.advice.method!r} goes by a vehicle's own sensors (advise_vehicle), which roads do not "
+            f"advice: {scenario.advice.method!r} uses a vehicle's own sensors (advise_vehicle), which roads do not "
             f"have; with drivers.advised: {scenario.drivers.advised} take an adviser with advise()"
         )
     return advising

@@ -1,4 +1,4 @@
-"""From a scenario to the ego's sensors, and what they are told of themselves."""
+"""From a scenario to the ego's sensors, and what these know of themselves."""
 
 import dataclasses
 import math
@@ -15,7 +15,7 @@ AIRLIGHT_EXPOSURE = 0.6
 """Share of saturation at which the fixed exposure puts the airlight: bright fog, yet room for lamps above it."""
 
 CAR = "car"
-"""Body kind of an ego of which no more is known."""
+"""Body kind of an ego by default."""
 
 METERED_PERCENT = {Metering.HIGHLIGHTS: 65.0, Metering.LOG_AVERAGE: 18.0}
 """Share of saturation at which automatic exposure holds what it meters, where a scenario does not say [%]."""
@@ -50,13 +50,13 @@ def camera(scenario: Scenario, body: str = CAR) -> Camera:
 
 def assumed_camera(scenario: Scenario, body: str = CAR) -> Camera:
     """Calibration that the ego's estimators assume, with the scenario's errors in it."""
-    true, told = camera(scenario, body), scenario.camera.told
+    true, errors = camera(scenario, body), scenario.camera.told
     return dataclasses.replace(
         true,
-        mount_height=true.mount_height * (1.0 + told.mount_height_error_percent / 100.0),
-        pitch=true.pitch + math.radians(told.pitch_error_deg),
-        roll=true.roll + math.radians(told.roll_error_deg),
-        focal_length=true.focal_length * (1.0 + told.focal_length_error_percent / 100.0),
+        mount_height=true.mount_height * (1.0 + errors.mount_height_error_percent / 100.0),
+        pitch=true.pitch + math.radians(errors.pitch_error_deg),
+        roll=true.roll + math.radians(errors.roll_error_deg),
+        focal_length=true.focal_length * (1.0 + errors.focal_length_error_percent / 100.0),
     )
 
 

@@ -67,8 +67,8 @@ def _events(written: AnyEvent, place: int) -> tuple[Event, ...]:
     """What an event of a scenario file, at a place in its list, stands for."""
     vehicle = written.vehicle
     conditions = {key: value for key in _CONDITIONS if (value := getattr(written, key)) is not None}
-    told = " or ".join(f"{key}={value:g}" for key, value in conditions.items())
-    name = f"traffic.events.{place} ({written.kind} of {vehicle} {told})"
+    begins = " or ".join(f"{key}={value:g}" for key, value in conditions.items())
+    name = f"traffic.events.{place} ({written.kind} of {vehicle} {begins})"
     trigger = Trigger(written.at_position_m, written.at_time_s, written.at_gap_to_ego_m, name)
     match written:
         case Brake():

@@ -57,8 +57,8 @@ def _on_net(vehicle: str, action: DepartAction, scenario: Scenario) -> Enter:
     for edge in action.edges:
         if edge not in ways.edges:
             known = read_net_edges(net, ())
-            told = f"; {suggest(edge, known.lanes)}" if known else ""
-            raise PlacementError(vehicle, f"the net has no edge {edge!r}{told}")
+            hint = f"; {suggest(edge, known.lanes)}" if known else ""
+            raise PlacementError(vehicle, f"the net has no edge {edge!r}{hint}")
     length = ways.edges[first].length
     if (action.position_m or 0.0) > length:
         raise PlacementError(vehicle, f"position_m counts along {first!r}, which is {length:.0f} m long")

@@ -138,10 +138,10 @@ def _first(name: str, sections: Mapping[str, ActorSection], says_so: Callable[[A
 class DemandError(InputError):
     """Traffic on a way that a road does not have."""
 
-    def __init__(self, key: str, told: str) -> None:
-        super().__init__(f"demand.{key}: {told}")
+    def __init__(self, key: str, message: str) -> None:
+        super().__init__(f"demand.{key}: {message}")
         self.key = key
-        self.told = told
+        self.message = message
 
 
 def _check_ways(layout: Layout, section: DemandSection) -> None:

@@ -30,7 +30,7 @@ NO_MEASURES = frozenset({"template", "obstructions"})
 """Keys of a road that every template has, and that are none of its measures."""
 
 _SIZES = {"wall": (0.3, 3.0, 60.0), "hedge": (1.2, 2.2, 60.0), "building": (9.0, 7.0, 20.0), "truck": (2.5, 3.8, 12.0)}
-"""Width, height and length of each kind of obstruction, where nothing else is said [m]."""
+"""Default width, height and length of each kind of obstruction [m]."""
 
 
 class ObstructionSection(Section):
@@ -347,9 +347,9 @@ class ActorSection(Section):
 
     @model_validator(mode="after")
     def _has_the_lamps(self) -> Self:
-        told = lamp_mistake(self.type, self.lamps) if isinstance(self.lamps, LampActions) else None
-        if told is not None:
-            raise ValueError(told)
+        mistake = lamp_mistake(self.type, self.lamps) if isinstance(self.lamps, LampActions) else None
+        if mistake is not None:
+            raise ValueError(mistake)
         return self
 
 

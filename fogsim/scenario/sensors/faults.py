@@ -335,14 +335,14 @@ class ScatterometerFouled(ScatterometerFaultSection, kind=Fouled):
     """`fouled`: its values are wrong by a factor, by dirt or water on its windows, or what else scatters its light."""
 
     factor: Annotated[Number, Field(ge=0, le=1000)] = 0.5
-    """What it tells over what it should; below 1 it tells of thinner fog."""
+    """Reported over correct value; below 1 it reports thinner fog."""
 
 
 class ScatterometerNoSignal(ScatterometerFaultSection, kind=NoSignal):
-    """A scatterometer that tells nothing."""
+    """A scatterometer that reports nothing."""
 
     fault: Literal["no_signal"]
-    """`no_signal`: it tells nothing."""
+    """`no_signal`: it reports nothing."""
 
 
 AnyFault = Annotated[

@@ -1,4 +1,4 @@
-"""The keys of a scenario file about what others tell of the fog: sensors next to the road, and other vehicles."""
+"""The keys of a scenario file about fog reports from others: sensors next to the road, and other vehicles."""
 
 from typing import Annotated, Self
 
@@ -24,7 +24,7 @@ HALF_A_MILE = 804.672
 
 
 class ReportsFrom(Section):
-    """Whoever tells others of the fog."""
+    """Senders of fog reports."""
 
     delay_s: Time = 0.5
     """Time from a measurement to its arrival."""
@@ -37,7 +37,7 @@ class ReportsFrom(Section):
 
 
 class MeasuredReports(ReportsFrom):
-    """Whoever measures the fog where they are and tells others."""
+    """Senders that measure the fog where they are and report it to others."""
 
     deviation: Annotated[Number, Field(gt=0, le=2)] = 0.1
     """Standard deviation of a measurement of k, relative to it; a forward-scatter sensor has some 10 %."""
@@ -107,7 +107,7 @@ class RoadsideReports(MeasuredReports):
 
 
 class VehicleReports(MeasuredReports):
-    """Vehicles that measure the fog where they are, as by a camera of their own, and tell those behind by radio."""
+    """Vehicles that measure the fog where they are, such as by a camera, and report it to those behind by radio."""
 
     equipped: Share = 0.05
     """Share of the vehicles that do."""
@@ -123,7 +123,7 @@ class VehicleReports(MeasuredReports):
 
 
 class CameraReports(ReportsFrom):
-    """Equipped vehicles (`traffic.equipped`), which tell those behind by radio what their own cameras see."""
+    """Equipped vehicles (`traffic.equipped`), which report what their own cameras see to those behind by radio."""
 
     range_m: Length = 500.0
     """Distance over which they are heard."""
@@ -136,7 +136,7 @@ class CameraReports(ReportsFrom):
 
 
 class Reports(Section):
-    """Who tells the ego of the fog elsewhere; no one if not given. `fusion: field_filter` makes use of it."""
+    """Senders that report fog elsewhere to the ego; none by default. `fusion: field_filter` makes use of them."""
 
     roadside: RoadsideReports | None = None
     """Sensors next to the road."""
@@ -145,4 +145,4 @@ class Reports(Section):
     """Other vehicles on its road, whose measurement is the truth with noise."""
 
     cameras: CameraReports | None = None
-    """Other vehicles on its road with a camera of their own; what they tell is what their estimators say."""
+    """Other vehicles on its road with a camera of their own; they send what their estimators say."""

@@ -26,7 +26,7 @@ class Lead(Section):
 
 
 class GpsSection(Section):
-    """Satellite positioning, by which the map tells of signs ahead."""
+    """Satellite positioning, used to look up signs ahead in the map."""
 
     position_deviation_m: Annotated[Distance, Field(le=1000)] = 0.0
     """Standard deviation of the position, east and north."""
@@ -56,7 +56,7 @@ class ScatterometerSection(Section):
     """
 
     relative_deviation: Annotated[Number, Field(ge=0, le=2)] = 0.05
-    """Standard deviation of its values about what it tells on average in such fog, relative to k."""
+    """Standard deviation of its values about their mean in such fog, relative to k."""
 
     calibration_deviation: Annotated[Number, Field(ge=0, le=2)] = 0.1
     """Standard deviation of its calibration, relative to k: one error for all of a run."""
@@ -78,13 +78,13 @@ class Sensors(Section):
     """The light sensor, by which lighting policies go."""
 
     sign_reach_m: Length = 250.0
-    """Distance up to which the map tells of signs ahead."""
+    """Distance up to which the map lists signs ahead."""
 
     scatterometer: ScatterometerSection | None = None
     """The forward-scatter visibility sensor on board; none if not given."""
 
     reports: Reports = Reports()
-    """What others tell of the fog where they are."""
+    """Reports from others about the fog where they are."""
 
     faults: tuple[AnyFault, ...] = ()
     """What is wrong with sensors, the camera among them, and when."""

@@ -5,11 +5,11 @@ from fogsim.scenario.timeline.actions import (
     actions_of,
     departing_vehicles,
     entry_name,
+    entry_text,
     fog_reference,
     light_range,
     operations,
     scripted_fog,
-    told,
     vehicles_of,
 )
 from fogsim.scenario.timeline.checks import check_timeline, named_vehicles, pointless_triggers
@@ -25,12 +25,12 @@ __all__ = [
     "check_timeline",
     "departing_vehicles",
     "entry_name",
+    "entry_text",
     "fog_reference",
     "light_range",
     "named_vehicles",
     "operations",
     "pointless_triggers",
     "scripted_fog",
-    "told",
     "vehicles_of",
 ]

@@ -73,7 +73,7 @@ class Situation(Protocol):
 def actions_of(entry: TimelineEntry, now: Situation, reference: float) -> Actions | None:
     """What an entry begins.
 
-    Returns None while somebody of whom it tells is not on the road, or not at a place that it needs. Takes `reference`
+    Returns None while someone it involves is not on the road, or not at a place that it needs. Takes `reference`
     [1/m].
     """
     traffic: list[TrafficAction] = []
@@ -111,7 +111,7 @@ def entry_name(entry: TimelineEntry, number: int) -> str:
     return entry.name or f"timeline.{number}"
 
 
-def told(entry: TimelineEntry) -> str:
+def entry_text(entry: TimelineEntry) -> str:
     """What an entry does in a few words: ``slow: brake; fog: visibility_m``."""
     words = []
     for subject, doing in operations(entry):

@@ -34,10 +34,10 @@ DAYLIGHT_RENDERER = "reference"
 
 def check_timeline(scenario: "Scenario") -> None:
     """Refuse a timeline that a run of its scenario could not play."""
-    refuse((("timeline", *place), told) for place, told in _mistakes(scenario))
+    refuse((("timeline", *place), mistake) for place, mistake in _mistakes(scenario))
     if scenario.end_when is not None:
-        told = condition_mistakes(scenario.end_when, run_content(scenario))
-        refuse((("end_when",), one) for one in told)
+        mistakes = condition_mistakes(scenario.end_when, run_content(scenario))
+        refuse((("end_when",), one) for one in mistakes)
 
 
 def pointless_triggers(document: Document, scenario: "Scenario", limits: Limits) -> Iterator[tuple[KeyPath, str]]:
@@ -54,8 +54,8 @@ def pointless_triggers(document: Document, scenario: "Scenario", limits: Limits)
     triggers += [(("timeline", number, "when"), entry.when) for number, entry in enumerate(scenario.timeline)]
     for at, condition in triggers:
         if condition is not None and document.is_written(at):
-            for told in pointless_parts(condition, limits, scenario.traffic.ego):
-                yield at, f"this can never come: {told}"
+            for reason in pointless_parts(condition, limits, scenario.traffic.ego):
+                yield at, f"this can never come: {reason}"
 
 
 def _mistakes(scenario: "Scenario") -> Iterator[tuple[KeyPath, str]]:
@@ -63,19 +63,19 @@ def _mistakes(scenario: "Scenario") -> Iterator[tuple[KeyPath, str]]:
     content = run_content(scenario) if scenario.timeline else None
     for number, entry in enumerate(scenario.timeline):
         if names[number] in names[:number]:
-            yield (number, "name"), f"names of entries must differ, and {names[number]!r} stands there twice"
+            yield (number, "name"), f"names of entries must differ, but {names[number]!r} occurs twice"
         if content is not None:
-            yield from (((number, "when"), told) for told in condition_mistakes(entry.when, content))
+            yield from (((number, "when"), mistake) for mistake in condition_mistakes(entry.when, content))
         if not scenario.traffic.has_ego and EGO in vehicles_of(entry):
-            yield (number, "do"), "it tells of the ego, and traffic.ego is none"
+            yield (number, "do"), "it refers to the ego, but traffic.ego is none"
         for subject, doing in operations(entry):
-            told = (
+            mistake = (
                 _mistake(doing, scenario)
                 or _person_mistake(subject, doing, scenario)
                 or _lamp_mistake(subject, doing, scenario)
             )
-            if told:
-                yield (number, "do", subject), told
+            if mistake:
+                yield (number, "do", subject), mistake
 
 
 def _person_mistake(subject: str, doing: Doing, scenario: "Scenario") -> str | None:
@@ -89,7 +89,8 @@ def _person_mistake(subject: str, doing: Doing, scenario: "Scenario") -> str | N
         return "take_route: positions count along the ego's route, which is known from the beginning"
     if doing.walk and (subject == EGO or (actor is not None and not actor.is_person)):
         persons = [name for name, one in scenario.actors.items() if one.is_person]
-        return f"{subject} is a vehicle, and persons walk; {suggest(subject, persons) if persons else 'there are none'}"
+        there = suggest(subject, persons) if persons else "the scenario has no persons"
+        return f"{subject} is a vehicle, and only persons walk; {there}"
     return None
 
 
@@ -140,7 +141,7 @@ def _fog_mistake(doing: FogActions, scenario: "Scenario") -> str | None:
     visibility = scenario.fog.visibility_m or scenario.fog.outside_visibility_m or math.inf
     is_clear, has_banks = math.isinf(visibility), bool(scenario.fog.banks)
     if doing.density is not None and is_clear and not has_banks:
-        return "there is no fog of which this could be a multiple; write visibility_m, or give the scenario fog"
+        return "this multiplies the scenario's fog, and the scenario has none; write visibility_m, or add fog"
     if doing.visibility_m is not None and is_clear and has_banks:
         return "outside the banks the air is clear; write density, which is that of the banks"
     return None

@@ -34,19 +34,19 @@ class LampSides(Section):
     @model_validator(mode="after")
     def _says_something(self) -> Self:
         if not self.model_fields_set:
-            raise ValueError(f"says nothing to do; allowed: {', '.join(type(self).model_fields)}")
+            raise ValueError(f"no action given; allowed: {', '.join(type(self).model_fields)}")
         return self
 
 
 class StopLampSides(LampSides):
-    """Stop lamps, of which cars, vans and buses have a third one."""
+    """Stop lamps; cars, vans and buses have a third one."""
 
     middle: Lit = None
     """The third one, in the middle."""
 
 
 def _word_or_sides(sides: type[LampSides]) -> WrapValidator:
-    """Tell a word from a block of sides, so that a mistake in one is not told of the other as well."""
+    """Distinguish a word from a block of sides, so that an error in one is not reported for the other as well."""
 
     def check(value: object, _: object) -> Switch | LampSides:
         if isinstance(value, dict | LampSides):
@@ -100,10 +100,10 @@ class LampActions(Section):
     """Daytime running lamps."""
 
     all: Lit = None
-    """Every lamp but those of which something else is said."""
+    """Every lamp that has no key of its own here."""
 
     def kinds_by_side(self) -> tuple[str, ...]:
-        """Kinds of which the sides are distinguished."""
+        """Kinds whose sides are distinguished."""
         return tuple(key for key in type(self).model_fields if isinstance(getattr(self, key), LampSides))
 
 

@@ -230,7 +230,7 @@ class DepartAction(Section):
     """Gap to it along the road, bumper to bumper: positive ahead, negative behind."""
 
     type: str | None = None
-    """Its type, as of actors; by default that of the other one, or a car."""
+    """Its type, as for actors; by default that of the other one, or a car."""
 
     on: Id | None = None
     """Without another one, its way on a road by template; by default `same_way`."""
@@ -260,9 +260,9 @@ class DepartAction(Section):
             raise ValueError("like and gap_m go together: near whom, and how far")
         own = [key for key in ("on", "edges", "position_m") if key in self.model_fields_set]
         if self.like is not None and own:
-            raise ValueError(f"give like, or a way of its own ({' and '.join(own)}), not both")
+            raise ValueError(f"give like, or a route ({' and '.join(own)}), not both")
         if self.like is not None and isinstance(self.lane, str):
-            raise ValueError("lane: beside like it is a number from the right, from 0")
+            raise ValueError("lane: with like it must be a number, counted from 0 at the right")
         if self.on is not None and self.edges:
             raise ValueError("give on (a road by template) or edges (a network), not both")
         return self
@@ -359,11 +359,11 @@ class VehicleActions(Section):
         if len(given) > 1:
             raise ValueError(f"{' and '.join(given)} cannot begin together: each sets the speed; take two entries")
         if self.walk and len(self.model_fields_set) > 1:
-            raise ValueError("walk stands by itself: a person does nothing else")
+            raise ValueError("walk must be the only key: a person does nothing else")
         if self.leave and len(self.model_fields_set) > 1:
-            raise ValueError("leave stands by itself: the vehicle is gone")
+            raise ValueError("leave must be the only key: the vehicle is gone")
         if self.depart and len(self.model_fields_set) > 1:
-            raise ValueError("depart stands by itself: what the vehicle does then is another entry")
+            raise ValueError("depart must be the only key: add another entry for what the vehicle does then")
         return self
 
 
@@ -449,7 +449,7 @@ def _by_subject(written: object) -> object:
             except ValidationError as error:
                 mistakes += [
                     InitErrorDetails(
-                        type=PydanticCustomError(MISTAKE, "{told}", {"told": text}), loc=(*at, *inner), input=0
+                        type=PydanticCustomError(MISTAKE, "{message}", {"message": text}), loc=(*at, *inner), input=0
                     )
                     for inner, text in mistakes_in(_schema_of(subject), error, block)
                 ]
@@ -476,8 +476,10 @@ def _read(subject: str, block: object) -> object:
     kind = _kind_of(subject)
     read = kind.model_validate(block)
     if not read.model_fields_set:
-        told = f"says nothing to do; allowed: {', '.join(kind.model_fields)}"
-        mistake = InitErrorDetails(type=PydanticCustomError(MISTAKE, "{told}", {"told": told}), loc=(), input=0)
+        message = f"no action given; allowed: {', '.join(kind.model_fields)}"
+        mistake = InitErrorDetails(
+            type=PydanticCustomError(MISTAKE, "{message}", {"message": message}), loc=(), input=0
+        )
         raise ValidationError.from_exception_data("do", [mistake])
     return read
 

@@ -171,12 +171,12 @@ def _misplaced(document: Document, named: Mapping[str, object], varied: Mapping[
         for name in _names(text):
             used.add(name)
             if name not in named:
-                told = f"unknown name ${name}; {suggest(name, named)}"
-                mistakes.append(f"{document.where(at)}: {dotted(at)}: {told}")
+                reason = f"unknown name ${name}; {suggest(name, named)}"
+                mistakes.append(f"{document.where(at)}: {dotted(at)}: {reason}")
     for name, values in varied.items():
         if name not in used and not isinstance(values, SeedLevels):
-            told = f"${name} stands nowhere in the file, so that its cases would not differ"
-            mistakes.append(f"{document.where(('vary', name))}: vary.{name}: {told}")
+            reason = f"${name} stands nowhere in the file, so that its cases would not differ"
+            mistakes.append(f"{document.where(('vary', name))}: vary.{name}: {reason}")
     return mistakes
 
 

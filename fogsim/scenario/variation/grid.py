@@ -17,5 +17,5 @@ def grid_mistake(sizes: Mapping[str, int]) -> str | None:
         return None
     named = [f"{size} {name}" for name, size in sizes.items() if size > 1]
     factors = " × ".join([*named[:_MOST_NAMED], *(["…"] if len(named) > _MOST_NAMED else [])])
-    told = f"{number:,}" if number < 10**_MOST_DIGITS else f"more than 10^{_MOST_DIGITS}"
-    return f"{factors} are {told} runs; at most {MOST_RUNS:,} are allowed"
+    shown = f"{number:,}" if number < 10**_MOST_DIGITS else f"more than 10^{_MOST_DIGITS}"
+    return f"{factors} are {shown} runs; at most {MOST_RUNS:,} are allowed"

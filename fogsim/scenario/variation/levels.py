@@ -31,8 +31,8 @@ Value = str | float | int | bool
 class LevelsError(ValueError):
     """What is wrong with the values of a name, and at which key or index below it."""
 
-    def __init__(self, told: str, *below: str | int) -> None:
-        super().__init__(told)
+    def __init__(self, message: str, *below: str | int) -> None:
+        super().__init__(message)
         self.below = below
 
 
@@ -173,9 +173,9 @@ def _listed(written: list[object]) -> Levels:
 
 
 def _refuse_repeated(written: list[object], *below: str) -> None:
-    told = [(type(one), one) for one in written]
-    for place, one in enumerate(told):
-        if one in told[:place]:
+    typed = [(type(one), one) for one in written]
+    for place, one in enumerate(typed):
+        if one in typed[:place]:
             raise LevelsError(f"{shown(one[1])} stands twice", *below, place)
 
 

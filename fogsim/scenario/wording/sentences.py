@@ -218,4 +218,4 @@ SENTENCES: Mapping[str, Callable[[Scenario], str]] = {
     "Advice": _advice_words,
     "Drivers": _driver_words,
 }
-"""What is said about a scenario, by heading."""
+"""Sentences on a scenario, by heading."""

@@ -60,7 +60,7 @@ def _head(sides: int) -> Mesh:
 
 
 def _trunk(swing: float, sides: int) -> Mesh:
-    """Jacket and both arms, of which each swings with the other side's leg."""
+    """Jacket and both arms; each arm swings with the opposite leg."""
     parts = [
         rod(
             (

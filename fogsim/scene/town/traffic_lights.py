@@ -204,7 +204,7 @@ def signal_light_sources(signals: SignalState, eye: NDArray[np.float64], time: f
 
 @cache
 def _lens() -> Beam:
-    """How a lens of 200 mm shines, of which those above its axis are not distinguished from its axis."""
+    """How a lens of 200 mm shines; directions above its axis count as its axis."""
     azimuth, elevation = np.radians(np.linspace(-90.0, 90.0, 61)), np.radians(np.linspace(-90.0, 30.0, 61))
     share = directed_share(*np.broadcast_arrays(azimuth, -elevation[:, None]))
     return Beam(azimuth, elevation, SIGNAL_INTENSITY * share)

@@ -39,7 +39,7 @@ class Trigger:
     name: str = ""  # What the event is called in messages
 
     def fires(self, time: float, driven: float, gap: float | None, earlier_gap: float | None) -> bool:
-        """Tell whether the event begins (`time` [s], `driven` [m], `gap`, `earlier_gap` [m])."""
+        """Whether the event begins (`time` [s], `driven` [m], `gap`, `earlier_gap` [m])."""
         return (
             (self.at_position is not None and driven >= self.at_position)
             or (self.at_time is not None and time >= self.at_time)
@@ -48,7 +48,7 @@ class Trigger:
 
 
 def _reaches(wanted: float, gap: float, earlier: float | None) -> bool:
-    """Tell whether a gap has come to a wanted one, or is nearer on the same side at the first look [m]."""
+    """Whether a gap has reached a wanted one, or is nearer on the same side at the first look [m]."""
     if earlier is not None:
         return min(earlier, gap) <= wanted <= max(earlier, gap)
     return 0.0 < gap / wanted <= 1.0 if wanted else gap == 0.0
@@ -149,7 +149,7 @@ class Script:
         )
 
     def unplayed(self, seen: Collection[str], present: Collection[str], others: Iterable[str] = ()) -> Unplayed:
-        """Tell what has not been played so far."""
+        """List what has not been played so far."""
 
         def why(event: Event) -> Reason:
             if event in self._without_lane:
@@ -159,12 +159,12 @@ class Script:
             return Reason.LEFT if event.vehicle in seen else Reason.NEVER_SEEN
 
         missed = [event for event in self._events if event in self._waiting or event in self._without_lane]
-        # What stands for one event of a scenario bears one name, and is told once.
-        told = dict.fromkeys(
+        # What stands for one event of a scenario has one name, and is listed once.
+        names = dict.fromkeys(
             UnplayedEvent(event.trigger.name or f"event of {event.vehicle}", why(event)) for event in missed
         )
         expected = {*others, *(event.vehicle for event in self._events)}
-        return Unplayed(tuple(told), tuple(sorted(expected.difference(seen))))
+        return Unplayed(tuple(names), tuple(sorted(expected.difference(seen))))
 
     def _begin(self, situation: Situation) -> list[Event]:
         measured = {event.vehicle for event in self._waiting if event.trigger.at_gap_to_ego is not None}

@@ -1,4 +1,4 @@
-"""How drivers follow the vehicle ahead in fog: published kinds of drivers, of which a population is a mixture.
+"""How drivers follow the vehicle ahead in fog: published kinds of drivers, mixed in a population.
 
 Above some speed fog parts drivers into those who keep the leader in sight, at headways shorter than recommended, and
 those who fall back out of sight (Broughton, Switzer & Scott 2007, at 22.4 m/s and not at 13.4 m/s; the first are the

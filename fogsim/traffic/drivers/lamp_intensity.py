@@ -46,7 +46,7 @@ down has 0.52, 0.22, 0.05 at 5°, 10°, 20°, the mean of both sides."""
 
 @functools.lru_cache(maxsize=1024)
 def kinds_that_burn(lamps: int) -> int:
-    """Kinds of lamps of which that on the left or that on the right burns, bits of `Lamp`."""
+    """Kinds of lamps that burn on the left or on the right, bits of `Lamp`."""
     return burning(lamps, Side.LEFT) | burning(lamps, Side.RIGHT)
 
 

@@ -14,7 +14,7 @@ POSITION_LAMP = 8.0
 """Luminous intensity of a rear position lamp [cd]."""
 
 REFERENCE_LAMP = 2.0
-"""Luminous intensity of the rear light by whose range visibility by night was told (White & Jeffery 1980) [cd]."""
+"""Luminous intensity of the rear light whose range gives the visibility by night (White & Jeffery 1980) [cd]."""
 
 _STEPS_PER_E_FOLD = 100
 

@@ -156,13 +156,13 @@ class Lamps:
 
     @property
     def dark(self) -> frozenset[str]:
-        """Vehicles of which nothing can be seen but the body: no lamp that would shine by itself is lit."""
+        """Vehicles that show nothing but their body: no lamp that would shine by itself is lit."""
         seen = int(Lamp.POSITION | Lamp.LOW_BEAM)
         return frozenset(vehicle for vehicle in self._switches if not settled(self.switched(vehicle, seen)))
 
     @property
     def vehicles(self) -> frozenset[str]:
-        """Vehicles of which a lamp is, or was once, not their own."""
+        """Vehicles with a lamp that is, or was once, switched for them."""
         return frozenset(self._switches)
 
     def switch(self, action: SetLamps) -> None:

@@ -97,7 +97,7 @@ class DriverSight:
         return adaptation(self.illuminance, glare, self.airlight_share)
 
     def _eyes(self, glare: float) -> tuple[Adaptation, float, float]:
-        """What kernels are told of eyes and head lamps; whole numbers would be compiled for again."""
+        """Parameters of eyes and head lamps for kernels; whole numbers would trigger another compilation."""
         return self._adapted(glare), float(self.contrast_threshold), float(self.headlamp_reach)
 
     def seen_distance(

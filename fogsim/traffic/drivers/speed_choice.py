@@ -1,6 +1,6 @@
 """How fast drivers drive in fog by themselves, and what sets one apart from another.
 
-Sources, of which only abstracts and summaries have been seen: White & Jeffery 1980 (TRL LR958) and TRL SR281 on the M4;
+Sources (we have seen only abstracts and summaries): White & Jeffery 1980 (TRL LR958) and TRL SR281 on the M4;
 Hogema & van der Horst 1994 (TNO-TM C-6, C-7) and 1997 (A16); McCann & Fontaine 2016 (VTRC 17-R4) and Gonzales &
 Fontaine 2018 (VTRC 19-R6) on I-77; Pretto, Bresciani, Rainer & Bülthoff 2012 (eLife 1:e00031); the SHRP2 naturalistic
 study (Transportation Research Record 2018, doi 10.1177/0361198118774748).
@@ -88,7 +88,7 @@ def too_fast(visibility: float) -> float:
 class ObservedSpeed:
     """Slow down as drivers were seen to: a little on any road, and to what sight allows only in the densest fog.
 
-    Two tendencies, of which the slower holds. Fog makes people drive slower than they otherwise would, by a share that
+    Two tendencies; the slower one holds. Fog makes people drive slower than they otherwise would, by a share that
     grows from nothing at 200 m (White & Jeffery 1980) to 18 % in severe fog (Pretto et al. 2012: 70 km/h where 85 km/h
     was to be driven; SHRP2: 10 % in near fog, 3 % in distant fog); so it does in a town, too. And they drive no faster
     than so many times the safe speed: about twice (I-77: mean speeds were twice the safe speed), but not more than once

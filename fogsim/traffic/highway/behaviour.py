@@ -54,7 +54,7 @@ class DriverControl:
         return self._manoeuvres.begin(actions)
 
     def unplayed(self, keep_lane: Sequence[str]) -> Unplayed:
-        """Tell what has not been played so far; see `Manoeuvres.unplayed`."""
+        """List what has not been played so far; see `Manoeuvres.unplayed`."""
         return self._manoeuvres.unplayed(keep_lane)
 
     def __call__(self) -> None:
@@ -87,7 +87,7 @@ def control_drivers(
     Parameters
     ----------
     fleet, setup, events, seed, advice_deceleration, sight
-        As of `DriverControl`.
+        See `DriverControl`.
     """
     control = DriverControl(fleet, setup, events, seed, advice_deceleration, sight)
     # On this one road, not in the library: other environments of the process go on as they are.

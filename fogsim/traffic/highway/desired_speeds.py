@@ -141,5 +141,5 @@ class HighwayDesiredSpeeds:
 
 
 def _drives_itself(vehicle: Any) -> bool:
-    """Tell whether a vehicle's target speed is its driver's: that of one who gives way at a junction is the road's."""
+    """Whether a vehicle's target speed is its driver's: the road sets it for one that gives way at a junction."""
     return isinstance(vehicle, IDMVehicle) and not getattr(vehicle, "is_yielding", False)

@@ -72,7 +72,7 @@ class Fleet:
         return {self.name(vehicle): vehicle for vehicle in self.environment.road.vehicles}
 
     def paint(self, vehicle: Any) -> tuple[float, float, float]:
-        """Linear reflectance of a vehicle's paint, 0 … 1; highway-env's colours tell roles, not paints.
+        """Linear reflectance of a vehicle's paint, 0 … 1; highway-env's colours mark roles, not paints.
 
         Parameters
         ----------

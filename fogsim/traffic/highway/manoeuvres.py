@@ -80,7 +80,7 @@ class Manoeuvres:
             )
 
     def unplayed(self, keep_lane: Sequence[str]) -> Unplayed:
-        """Tell what has not been played so far, and which vehicles of `keep_lane` are not there either."""
+        """List what has not been played so far, and which vehicles of `keep_lane` are missing."""
         present = self._fleet.present()
         return self._script.unplayed(self._fleet.known(), present, keep_lane)
 

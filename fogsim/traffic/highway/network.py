@@ -110,7 +110,7 @@ def _route(network: Any, ego: Any) -> tuple[NDArray[np.float64], NDArray[np.floa
 
 
 def same_roads(one: RoadNetwork, other: RoadNetwork) -> bool:
-    """Tell whether two networks have the same lanes, whatever the routes.
+    """Whether two networks have the same lanes, whatever the routes.
 
     Parameters
     ----------

@@ -2,7 +2,7 @@
 
 Its drivers ask their road for the vehicles ahead and behind, in their own lane and in those to which they could change;
 in fog, a road answers with none where the driver sees none. IDM and MOBIL stay as they are. At junctions a road
-tells who gives way to whom; in fog no one does to a vehicle that they do not see.
+decides who gives way to whom; in fog drivers give way only to vehicles that they see.
 """
 
 import math
@@ -56,7 +56,7 @@ class VisibleNeighbours:
         return giving if self._perceives(giving, foe, near_end) else None
 
     def _perceives(self, vehicle: Any, other: Any, end: NDArray[np.float64]) -> bool:
-        """Tell whether a driver sees another's near end, and has for the reaction time if it was hidden before."""
+        """Whether a driver sees another's near end, and has for the reaction time if it was hidden before."""
         pair, now = (vehicle, other), self._fleet.time
         if not self._sees(vehicle, other, end):
             self._last_hidden[pair] = now

@@ -15,7 +15,7 @@ from fogsim.values import Collision, Leader, TrafficSnapshot, TrafficState
 from fogsim.values.traffic import advised_speeds
 
 HEIGHT = 1.5
-"""Height of every vehicle [m], as of SUMO's passenger cars; highway-env's have none."""
+"""Height of every vehicle [m], taken from SUMO's passenger cars; highway-env's have none."""
 
 LEADER_REACH = 300.0
 """How far ahead a leader is looked for [m]."""

@@ -27,7 +27,7 @@ class OtherRoadsError(SimulationError):
 
 
 def is_highway_environment(environment: object) -> bool:
-    """Tell whether something is one of highway-env's environments.
+    """Whether something is one of highway-env's environments.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ class HighwayTraffic:
             road.vehicles = [v for v in road.vehicles if v is fleet.ego or not v.crashed]
 
     def observe(self) -> TrafficSnapshot | None:
-        """Tell where everyone is and what has happened since the last call; None once the ego has left.
+        """Report where everyone is and what has happened since the last call; None once the ego has left.
 
         The impact speed of a collision is the length of the difference of both velocities.
         """

@@ -268,7 +268,7 @@ class OpenDriveLanes:
             for edge in self.followers.get(edges[-1], ()):
                 further = self.crossings.get((edges[-1], edge), 0.0) + lengths[edge]
                 heapq.heappush(ahead, (cost + further * costs[edge], (*edges, edge)))
-        raise ValueError(f"no way leads from {self._told(begin)} to {self._told(end)}")
+        raise ValueError(f"no way leads from {self._described(begin)} to {self._described(end)}")
 
     def starts(self, route: Sequence[str]) -> tuple[float, ...]:
         """Where along a route each of its edges begins, and where the last one ends [m]."""
@@ -276,7 +276,7 @@ class OpenDriveLanes:
         steps = [lengths[a] + self.crossings.get((a, b), 0.0) for a, b in itertools.pairwise((*route, ""))]
         return (0.0, *itertools.accumulate(steps))
 
-    def _told(self, edge: str) -> str:
+    def _described(self, edge: str) -> str:
         return f"lanes {', '.join(origin for one in self.lanes if one.edge == edge for origin in one.origins) or edge}"
 
     def _reference(self, road: str, s: float) -> tuple[float, float, float]:

@@ -65,10 +65,10 @@ class LibsumoLink:
             self._check_outputs()
             return sumo
         self.end()
-        said = " ".join(line.strip() for line in words if line.strip()) or str(failure)
+        message = " ".join(line.strip() for line in words if line.strip()) or str(failure)
         if self._outputs is not None:
-            said = self._outputs.shorten(said)
-        raise SimulationError(f"SUMO cannot load the scenario: {said}")
+            message = self._outputs.shorten(message)
+        raise SimulationError(f"SUMO cannot load the scenario: {message}")
 
     def _check_outputs(self) -> None:
         if self._outputs is None:

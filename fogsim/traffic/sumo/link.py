@@ -102,7 +102,7 @@ def subscribed(api: Api, names: Mapping[str, int]) -> tuple[Getter, ...]:
                 return simulation.getSubscriptionResults()[variable]
             except (AttributeError, KeyError):
                 # A simulation that is loaded again has forgotten what was subscribed, and
-                # traci stumbles over a connection that was closed; its getters tell it.
+                # traci fails on a closed connection; its getters raise.
                 return getattr(simulation, name)()
 
         return read

@@ -22,7 +22,7 @@ MOST_WARNINGS = 3
 def describe_seen(ego: str, seen: Collection[str]) -> str:
     """Say which vehicles there were instead of an ego that was not, those with a similar id first."""
     if not seen:
-        return "no vehicle at all did: are there vehicles in its route or additional files?"
+        return "no vehicle did: are there vehicles in its route or additional files?"
     near = difflib.get_close_matches(ego, sorted(seen), n=3, cutoff=0.5)
     some = [*near, *sorted(set(seen).difference(near))[: SHOWN - len(near)]]
     others = f" and {len(seen) - len(some)} more" if len(seen) > len(some) else ""

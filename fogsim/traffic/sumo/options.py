@@ -16,7 +16,7 @@ OptionValue = bool | int | float | str
 
 _SEED = "a run must depend on its own seed alone (fogsim run --seed)"
 _NO_RUN = "SUMO would write that file and end"
-_TRACI = "SUMO runs inside FogSim, and waits for nobody"
+_TRACI = "SUMO runs inside FogSim, and waits for no clients"
 _WINDOW = "SUMO has no window here"
 
 OWN_OPTIONS: Mapping[str, str] = {
@@ -67,12 +67,12 @@ class KnownOption:
 def option_mistakes(options: Mapping[str, OptionValue]) -> dict[str, str]:
     """Say why options cannot be handed to SUMO, by their names; nothing of those that can.
 
-    Where SUMO is not installed, or runs in this process, so that it cannot be asked what it knows, only options of
-    FogSim's own are told; SUMO itself refuses what it does not know when it starts.
+    Where SUMO is not installed, or runs in this process and so cannot be asked for its options, only FogSim's own are
+    checked; SUMO itself refuses what it does not know when it starts.
     """
     known = known_options() if options else {}
-    told = {name: _mistake(name, value, known) for name, value in options.items()}
-    return {name: mistake for name, mistake in told.items() if mistake is not None}
+    mistakes = {name: _mistake(name, value, known) for name, value in options.items()}
+    return {name: mistake for name, mistake in mistakes.items() if mistake is not None}
 
 
 def _mistake(name: str, value: OptionValue, known: Mapping[str, KnownOption]) -> str | None:

@@ -53,7 +53,7 @@ class OutputFolder:
         self.warnings: tuple[str, ...] = ()
         self._own: Path | None = None
         self._way = ""
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
 
     def open(self) -> list[str]:
         """Make the folder, and give the arguments of SUMO's command line that lead there."""
@@ -93,7 +93,7 @@ class OutputFolder:
     def twice(self) -> list[str]:
         """Names of files that SUMO has open more than once, for outputs of one name in different folders.
 
-        Where the system does not tell what is open, and where nothing is kept, none.
+        Returns none where the system does not report open files, and where nothing is kept.
         """
         if self._folder is None or not _OPEN_FILES.is_dir():
             return []
@@ -109,9 +109,9 @@ class OutputFolder:
         """Warn of outputs that will not be kept, each once."""
         if self._folder is not None or self._own is None:
             return
-        lost = [name for name in _names(self._own) if name not in self._told]
+        lost = [name for name in _names(self._own) if name not in self._reported]
         if lost:
-            self._told.update(lost)
+            self._reported.update(lost)
             more = f" and {len(lost) - MOST_NAMED} more" if len(lost) > MOST_NAMED else ""
             warnings.warn(
                 f"SUMO writes {', '.join(lost[:MOST_NAMED])}{more}, which will not be kept: each run would replace the "

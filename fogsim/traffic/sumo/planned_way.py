@@ -33,7 +33,7 @@ def planned_way(setup: TrafficSetup) -> PlannedWay | None:
             net, additional = configured_files(setup.config)
             demand = read_configured_demand(setup.config, (setup.ego,))
         except InputError:
-            return None  # SUMO tells what is wrong with it
+            return None  # SUMO reports what is wrong with it
         additional = tuple(path for path in additional if path.is_file())
         if not net.is_file():
             return None

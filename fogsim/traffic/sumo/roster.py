@@ -66,7 +66,7 @@ class Roster:
             return
         self._check_mark(often=True)
         self.teleported = self._teleporting()
-        # Lists of changes are of one step only: after a jump of time they do not tell all.
+        # Lists of changes are of one step only: after a jump of time they are incomplete.
         if not 0.0 < now - self.time < 1.5 * self._step:
             self.reload()
             return
@@ -85,7 +85,7 @@ class Roster:
             self.check_count()
 
     def check_count(self) -> None:
-        """Notice vehicles removed by hand, of which SUMO says nothing; asks for all ids if there are any."""
+        """Notice vehicles removed by hand, which SUMO does not report; asks for all ids if there are any."""
         self._check_mark(often=True)
         if self._count() != len(self.present):
             self.reload()

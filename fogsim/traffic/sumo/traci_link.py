@@ -102,7 +102,7 @@ class TraciLink:
         clients = int(self._connection.simulation.getOption("num-clients"))
         if clients > 1:
             raise SimulationError(
-                f"SUMO {self._where} has {clients} clients, and beginning anew would take the simulation away from the "
+                f"SUMO {self._where} has {clients} clients, and a restart would take the simulation away from the "
                 "others: start SUMO again for another run"
             )
         # Loaded again, a sumo-gui would wait for its button to be pressed, and forget whether to close at the end.
@@ -129,7 +129,7 @@ class TraciLink:
 
 
 class _LimitedSocket:
-    """A socket of traci's that tells a silent SUMO by an error of ours; traci takes silence for a closed connection.
+    """A traci socket that raises our error if SUMO is silent; traci takes silence for a closed connection.
 
     Takes `timeout` [s].
     """

@@ -164,9 +164,9 @@ class VehicleReader:
         constants = self._constants_of(now.ids)
         ego = constants.ego
         lamps = self._lamps(now.signals)
-        told = [] if ego is None else [(ego, ego_lamps)]
-        told += [(now.ids.index(other), lit) for other, lit in (lamps_of or {}).items() if other in now.ids]
-        for row, lit in told:
+        lit_lamps = [] if ego is None else [(ego, ego_lamps)]
+        lit_lamps += [(now.ids.index(other), lit) for other, lit in (lamps_of or {}).items() if other in now.ids]
+        for row, lit in lit_lamps:
             lamps[row] = int(lit) | (int(lamps[row]) & int(Lamp.STOP))
         return TrafficState(
             time=self._roster.time,
@@ -235,7 +235,7 @@ class VehicleReader:
         return np.asarray(np.hypot(offset[:, 0], offset[:, 1]) <= self._radius)
 
     def collisions(self) -> list[Collision]:
-        """Collisions of the last step; SUMO tells one in every step while the vehicles overlap."""
+        """Collisions of the last step; SUMO reports one in every step while the vehicles overlap."""
         hits, time = self._hits(), self._api.simulation.getTime
         return [Collision(time(), c.collider, c.victim, self._impact_speed(c)) for c in hits]
 

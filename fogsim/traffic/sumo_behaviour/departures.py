@@ -14,7 +14,7 @@ _UNLIMITED = 10.0
 
 
 def depart(api: Api, action: Depart, present: Collection[str]) -> bool:
-    """Bring a vehicle onto the road with the next step; SUMO waits with it as long as it would hit somebody.
+    """Bring a vehicle onto the road with the next step; SUMO delays it as long as it would hit another.
 
     Returns false if there is such a vehicle already, the other one is not on a lane, or the place is off its way.
     """
@@ -59,7 +59,7 @@ def _footways(api: Api, edge: str) -> int:
 
 
 def enter(api: Api, action: Enter, present: Collection[str]) -> bool:
-    """Bring a vehicle onto the road on a way of its own; SUMO waits with it as long as it would hit somebody.
+    """Bring a vehicle onto the road on a way of its own; SUMO delays it as long as it would hit another.
 
     Returns false if there is such a vehicle already, or no way leads along its edges.
     """

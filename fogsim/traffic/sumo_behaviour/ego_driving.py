@@ -5,13 +5,13 @@ from fogsim.traffic.sumo_behaviour.scripted_actions import has_lane
 from fogsim.values import EgoControl
 
 _NO_CHECKS = 0
-"""Speed mode and lane-change mode of a vehicle that does what it is told, whoever is in the way."""
+"""Speed mode and lane-change mode of a vehicle that follows commands, whoever is in the way."""
 _SUMO_DRIVES = -1.0
 _STAY = 1.0  # [s]
 
 
 class EgoDriving:
-    """Drives the ego as it is told; SUMO's driver has it back when nothing is told any more (`step_length` [s])."""
+    """Drives the ego by commands; without any, SUMO's driver takes over again (`step_length` [s])."""
 
     def __init__(self, api: Api, ego: str | None, step_length: float) -> None:
         self._api = api

@@ -16,7 +16,7 @@ from fogsim.traffic.sumo_lanes.leaders import Leaders
 
 
 class KeepingUp:
-    """Tells how fast leaders are who are kept up with."""
+    """Speeds of the leaders that drivers keep up with."""
 
     def __init__(self, api: Api, table: DriverTable, sight: DriverSight | None, remote: bool) -> None:
         self._leader = Leaders(api, remote).within(REACH)

@@ -1,4 +1,4 @@
-"""Which lamps the ego and other equipped vehicles have lit, told to SUMO."""
+"""Publishes to SUMO which lamps the ego and other equipped vehicles have lit."""
 
 from collections.abc import Mapping
 
@@ -11,7 +11,7 @@ LAMPS_PARAMETER = "fogsim-lamps"
 
 
 class LampPublisher:
-    """Tells SUMO vehicles' lamps whenever they change, for sumo-gui's parameter window, outputs and other clients.
+    """Publishes changes of vehicles' lamps to SUMO, for sumo-gui's parameter window, outputs and other clients.
 
     A parameter says it and not SUMO's own signals of the vehicle: who sets those takes braking and turning out of
     SUMO's hands, so that its stop lamps would stay dark.
@@ -19,11 +19,11 @@ class LampPublisher:
 
     def __init__(self, api: Api) -> None:
         self._api = api
-        self._told: dict[str, Lamp] = {}
+        self._published: dict[str, Lamp] = {}
 
     def publish(self, lamps: Mapping[str, Lamp], present: set[str]) -> None:
-        """Tell the lamps that are other ones than before."""
+        """Publish the lamps that have changed."""
         for vehicle, lit in lamps.items():
-            if lit != self._told.get(vehicle) and vehicle in present:
+            if lit != self._published.get(vehicle) and vehicle in present:
                 self._api.vehicle.setParameter(vehicle, LAMPS_PARAMETER, lamp_names(lit))
-                self._told[vehicle] = lit
+                self._published[vehicle] = lit

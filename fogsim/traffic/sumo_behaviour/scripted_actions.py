@@ -169,9 +169,9 @@ class ScriptedActions:
 
 
 def has_lane(api: Api, vehicle: str, lanes: int) -> bool:
-    """Tell whether a vehicle could go so many lanes to the left, negative to the right, where it is."""
+    """Whether a vehicle could go so many lanes to the left, negative to the right, where it is."""
     if is_off_lanes(api, vehicle):
         return False
     edge, lane = str(api.vehicle.getRoadID(vehicle)), int(api.vehicle.getLaneIndex(vehicle)) + lanes
-    # Lanes of a junction tell nothing of those behind it, where SUMO makes the change.
+    # Lanes of a junction say nothing about those behind it, where SUMO makes the change.
     return lane >= 0 and (edge.startswith(":") or lane < int(api.edge.getLaneNumber(edge)))

@@ -37,7 +37,7 @@ _IMPOSED_CLOSE = _IMPOSED - 1
 """That of one who follows as closely as the script says, and whose leader is watched here."""
 
 _LEADER_RANGE = 200.0
-"""Distance up to which somebody ahead is looked for [m]."""
+"""Distance up to which a vehicle ahead is searched [m]."""
 
 _SAME = 1e-6  # [m/s], [m/s²]
 
@@ -94,7 +94,7 @@ class SpeedControl:
         return bool(get.getSpeedWithoutTraCI(vehicle) < get.getSpeed(vehicle) - hardest - _SAME)
 
     def _is_in_danger(self, vehicle: str) -> bool:
-        """Whether somebody ahead is so near, or so slow, that the type's deceleration hardly does to hit no one."""
+        """Whether a vehicle ahead is so near, or so slow, that the type's deceleration barely avoids a collision."""
         get = self._vehicles
         found = self._leader(vehicle, _LEADER_RANGE)
         if not found or not found[0]:

@@ -25,7 +25,7 @@ class PerceivedPart(Protocol):
     """What drivers perceive of one kind of thing; it does nothing where everything is certainly seen."""
 
     def update(self, own_lamps: OwnLamps) -> None:
-        """Tell SUMO's drivers, before a step, what they do not see."""
+        """Pass to SUMO's drivers, before a step, what they do not see."""
 
     def release(self) -> None:
         """Let everyone on the road see everything again, as SUMO's own drivers do."""
@@ -37,9 +37,9 @@ class DriversPerception:
     def __init__(self, parts: Sequence[PerceivedPart]) -> None:
         self._parts = tuple(parts)
 
-    def update(self, told: Mapping[str, Lamp], lamps: Lamps) -> None:
-        """Tell SUMO's drivers, before a step, what they do not see."""
-        own_lamps: OwnLamps = {vehicle: int(lit) for vehicle, lit in told.items()}
+    def update(self, lamps_of: Mapping[str, Lamp], lamps: Lamps) -> None:
+        """Pass to SUMO's drivers, before a step, what they do not see."""
+        own_lamps: OwnLamps = {vehicle: int(lit) for vehicle, lit in lamps_of.items()}
         own_lamps.update((v, lamps.switched(v, own_lamps.get(v, int(OTHERS_LAMPS)))) for v in lamps.vehicles)
         for part in self._parts:
             part.update(own_lamps)

@@ -20,7 +20,7 @@ _CORNERS = np.array(list(itertools.product((-1.0, 0.0), (-0.5, 0.5), (0.5, 1.0))
 
 
 class HiddenVehicles:
-    """Tells whom obstructions hide: those of whose body no corner is in sight, neither halfway up nor at the top."""
+    """Finds vehicles hidden by obstructions: no corner of the body is in sight, neither halfway up nor at the top."""
 
     def __init__(self, api: Api, obstructions: Obstructions, remote: bool = False) -> None:
         self._obstructions = obstructions
@@ -64,7 +64,7 @@ class HiddenVehicles:
 
 
 def _corners(parts: Sequence[Part], sizes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Corners of parts of bodies (n, 8, 3) [m], of which the lower ones are halfway up."""
+    """Corners of parts of bodies (n, 8, 3) [m]; the lower ones are halfway up."""
     heading = np.array([part.heading for part in parts])
     forward = np.stack([np.cos(heading), np.sin(heading)], axis=1)[:, None]
     left = forward[..., ::-1] * (-1.0, 1.0)

@@ -89,7 +89,7 @@ class StandingLeaders:
         if leader != hidden or gap > STANDING_REACH:
             return False
         lane = self._vehicles.getLaneID(driver)
-        # SUMO tells of each lane of the edge how many lanes away the best one for the route is.
+        # SUMO reports for each lane of the edge how many lanes away the best one for the route is.
         return any(best[0] == lane and best[3] == 0 for best in self._vehicles.getBestLanes(driver))
 
     def restart(self, drivers: Sequence[str], present: set[str]) -> None:
@@ -193,7 +193,7 @@ class LaneChanging:
                 switch.restart(drivers, self._roster.present)
 
     def _free_to_the_left(self, drivers: Sequence[str], own_lamps: OwnLamps) -> dict[str, None]:
-        """Drivers to whom the lane to the left looks free ahead, though there is somebody who is hardly faster."""
+        """Drivers to whom the lane to the left looks free ahead, though a vehicle there is hardly faster."""
         unseen: dict[str, None] = {}
         doubtful: list[tuple[str, str]] = []
         left_leader, speed, sure = self._neighbours.left_leader, self._leaders.speed, self._certainly_seen
@@ -233,7 +233,7 @@ class LaneChanging:
             switch.decide(drivers, unhelpful)
 
     def _is_held_back_for_certain(self, change: WantedChange) -> bool:
-        """Whether somebody is in the way who is near enough to be seen in any case."""
+        """Whether a vehicle in the way is near enough to be seen in any case."""
         return any(
             gap < NEAR or (gap <= self._certainly_seen and not self._sight.was_hidden(change.driver, other))
             for other, gap in change.blockers

@@ -98,7 +98,7 @@ def _nearest(neighbours: Sequence[tuple[str, float]]) -> tuple[str, float]:
 
 
 def _is_blocked(side: Side, state: int) -> bool:
-    """Whether a state says that somebody blocks what the driver's own model wants."""
+    """Whether a state says that another vehicle blocks what the driver's own model wants."""
     return bool(state & side.wanted and state & (side.leader | side.follower)) and not state & _TRACI
 
 

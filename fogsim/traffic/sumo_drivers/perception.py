@@ -104,7 +104,7 @@ class Perception:
     Attributes
     ----------
     leader, speed : Getter
-        Leaders as SUMO's ``getLeader`` tells them, to be asked with `REACH`, and SUMO's ``getSpeed``.
+        Leaders as SUMO's ``getLeader`` reports them, to be asked with `REACH`, and SUMO's ``getSpeed``.
     hidden : mapping from str to str
         Leaders that are not reacted to, by follower, as they are at any time.
     """
@@ -152,7 +152,7 @@ class Perception:
         self._schedule.bring_forward(follower)
 
     def update(self, own_lamps: OwnLamps) -> None:
-        """Tell SUMO's drivers which leader they do not see."""
+        """Make SUMO's drivers ignore a leader that they do not see."""
         due = self._due()
         doubtful = self._decide_by_gap(due) if due else ()
         if doubtful:

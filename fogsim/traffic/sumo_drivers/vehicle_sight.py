@@ -38,7 +38,7 @@ class LineOfSight(NamedTuple):
 
 
 class VehicleSight:
-    """Tells which vehicles drivers see, along straight lines through the fog and past what stands next to the road.
+    """Finds which vehicles drivers see, along straight lines through the fog and past what stands next to the road.
 
     Other vehicles hide no one.
     """
@@ -125,7 +125,7 @@ class VehicleSight:
 def _nearest_point(x: float, y: float, part: Part, width: float) -> tuple[float, float, float, float, float]:
     """Point of a part of a body that is nearest to a place, the height of its road, and where the place is [m].
 
-    The last two are as of `LineOfSight`, with the distance along the body up to where the part begins.
+    For the last two see `LineOfSight`; the distance along the body up to where the part begins is added.
     """
     front_x, front_y, front_z = part.front
     east, north = math.cos(part.heading), math.sin(part.heading)

@@ -1,4 +1,4 @@
-"""Which vehicles follow one another, told with the state of the traffic."""
+"""Which vehicles follow one another, added to the state of the traffic."""
 
 from dataclasses import replace
 

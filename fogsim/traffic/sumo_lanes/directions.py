@@ -25,7 +25,7 @@ class OppositeEdges:
 
 
 class LaneDirections:
-    """Tells which vehicles drive against the direction of their lane, as those that overtake on the oncoming one."""
+    """Finds vehicles that drive against the direction of their lane, such as those overtaking on the oncoming one."""
 
     def __init__(self, api: Api) -> None:
         self._get = api.vehicle

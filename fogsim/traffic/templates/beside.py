@@ -1,4 +1,4 @@
-"""What stands next to a road by template, and tunnels over it: lines of structures, and the file that tells of them."""
+"""What stands next to a road by template, and tunnels over it: lines of structures, and their file."""
 
 import itertools
 from collections.abc import Sequence

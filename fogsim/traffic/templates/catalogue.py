@@ -43,7 +43,7 @@ ROAD_TEMPLATES: Registry[type[RoadTemplate]] = Registry(
 
 
 def usual_mix(template: str) -> tuple[tuple[str, float], ...]:
-    """Shares of types of vehicles on a template's roads, where nothing else is said."""
+    """Default shares of types of vehicles on a template's roads."""
     return TOWN_MIX if issubclass(ROAD_TEMPLATES[template], Streets) else USUAL_MIX
 
 

@@ -40,7 +40,7 @@ class CrossingWay:
 
     @property
     def length(self) -> float:
-        """Length [m], of which SUMO wants some."""
+        """Length [m]; SUMO requires more than 0."""
         return max(0.1, line_length(self.line))
 
     @property

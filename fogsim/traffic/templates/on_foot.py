@@ -11,10 +11,10 @@ from fogsim.traffic.templates.placement import PlacementError, edge_at, way_leng
 from fogsim.traffic.templates.xml_text import element, opening
 
 WALKING_SPEED = 5.0 / 3.6
-"""How fast persons walk where nothing else is said [m/s]."""
+"""Default walking speed of persons [m/s]."""
 
 WAITING_SPEED = 1e-3
-"""Of a person who waits to be told to walk [m/s]: SUMO's persons do not stand still on a footway."""
+"""Speed of a person who waits for an order to walk [m/s]: SUMO's persons do not stand still on a footway."""
 
 _BESIDE = 15.0  # from a crossing to where those who cross come from, and go to [m]
 _NEAR = 15.0  # as far as this from a crossing's middle a place means that crossing [m]
@@ -35,7 +35,7 @@ class Walker:
     depart: float = 0.0  # When it appears [s]
     # Place along that way of the crossing that it takes [m]; None if it walks on to the end of the way
     crosses_at: float | None = None
-    waits: bool = False  # Whether it waits where it begins until it is told to walk
+    waits: bool = False  # Whether it waits where it begins until an action makes it walk
 
 
 @dataclass(frozen=True, slots=True)

@@ -50,7 +50,7 @@ def read_ways(net: Path, ways: Mapping[str, tuple[str, ...]]) -> KnownWays:
     try:
         read_elements(net, reader, _MOST_BYTES)
     except InputError:
-        # SUMO tells what is wrong with it.
+        # SUMO reports what is wrong with it.
         return KnownWays(tuple(ways.items()), {})
     return KnownWays(tuple(ways.items()), reader.edges)
 

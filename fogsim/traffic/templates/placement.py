@@ -15,7 +15,7 @@ class EdgeMeasures(Protocol):
     """What actors need to know of an edge: how many lanes it has, its length [m] and its limit [m/s]."""
 
     @property
-    def lanes(self) -> int: ...  # noqa: D102 - told above
+    def lanes(self) -> int: ...  # noqa: D102 - described above
     @property
     def length(self) -> float: ...  # noqa: D102
     @property
@@ -88,10 +88,10 @@ class Placed:
 class PlacementError(InputError):
     """An actor that cannot be where it is to be."""
 
-    def __init__(self, actor: str, told: str) -> None:
-        super().__init__(f"{actor}: {told}")
+    def __init__(self, actor: str, message: str) -> None:
+        super().__init__(f"{actor}: {message}")
         self.actor = actor
-        self.told = told
+        self.message = message
 
 
 def place_actors(actors: Sequence[Actor]) -> tuple[Placed, ...]:
@@ -105,13 +105,13 @@ def _position(actor: Actor, by_name: Mapping[str, Actor], asked: tuple[str, ...]
     if not isinstance(relation, Relation):
         return relation
     if actor.name in asked:
-        raise PlacementError(actor.name, f"is placed by itself, through {', '.join(asked)}")
+        raise PlacementError(actor.name, f"is placed relative to itself, through {', '.join(asked)}")
     other = by_name.get(relation.other)
     if other is None:
         raise PlacementError(actor.name, f"there is no actor {relation.other!r}; {suggest(relation.other, by_name)}")
     if other.way != actor.way:
-        told = f"is on the way {actor.way!r}, and {other.name!r} on {other.way!r}; give a position in its place"
-        raise PlacementError(actor.name, told)
+        message = f"is on the way {actor.way!r}, and {other.name!r} on {other.way!r}; give a position in its place"
+        raise PlacementError(actor.name, message)
     place = _position(other, by_name, (*asked, actor.name))
     if relation.is_beside:
         return place + relation.gap
@@ -143,10 +143,10 @@ def _check_apart(placed: Sequence[Placed], layout: Ways) -> None:
             ahead, behind = (one, other) if one.position > other.position else (other, one)
             gap = ahead.position - ahead.actor.length - behind.position
             if gap < _LEAST_GAP:
-                told = (
+                message = (
                     f"must begin at least {_LEAST_GAP:g} m from {other.actor.name!r} in the same lane, got {gap:.1f} m"
                 )
-                raise PlacementError(one.actor.name, told)
+                raise PlacementError(one.actor.name, message)
 
 
 def _lane(one: Placed, layout: Ways) -> tuple[str, int]:

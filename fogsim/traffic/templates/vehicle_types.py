@@ -1,4 +1,4 @@
-"""Types of vehicles on roads by template: sizes and drivers as of the scenarios that come with FogSim."""
+"""Types of vehicles on roads by template, with the sizes and drivers of FogSim's own scenarios."""
 
 from dataclasses import dataclass
 
@@ -41,7 +41,7 @@ VEHICLE_KINDS: Registry[VehicleKind] = Registry(
 """Vehicles by the name of their type."""
 
 USUAL_MIX = (("car", 0.68), ("van", 0.14), ("truck", 0.15), ("coach", 0.03))
-"""Shares of types in traffic, where nothing else is said."""
+"""Default shares of types in traffic."""
 
 TOWN_MIX = (("car", 0.84), ("van", 0.10), ("lorry", 0.06))
 """Shares of types in the traffic of streets."""

@@ -247,8 +247,8 @@ USUAL = np.zeros((1, 2), np.int64)
 """The stated response and the usual surface."""
 
 HARDLY, LIKELY = 0.03, 2
-"""Probability below which a surface is not tried in later images of a drive [-], and how many responses are, besides
-the stated one: an image hardly tells them apart, and a camera keeps its own."""
+"""Probability below which a surface is not tried in later images of a drive [-], and how many responses are, in
+addition to the stated one: an image hardly separates them, and a camera keeps its own."""
 
 SUITS = 5.0
 """Logarithm of the evidence below the best at which a surface is not tried under other responses [-]."""

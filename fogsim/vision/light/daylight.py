@@ -104,7 +104,7 @@ def _sky_rows(camera: Camera) -> NDArray[np.int64]:
 
 
 def _strip(distance: NDArray[np.float64], camera: Camera, left: float, right: float) -> Strip:
-    """Columns of a strip between two sides [m, positive to the right] of which at least a half is seen."""
+    """Columns of a strip between two sides [m, positive to the right], at least half of them seen."""
     middle, scale = camera.principal_point[0], camera.focal_length / distance
     first = np.maximum(np.ceil(middle + left * scale), 0.0)
     last = np.minimum(np.floor(middle + right * scale), camera.width - 1.0)

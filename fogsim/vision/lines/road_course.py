@@ -53,7 +53,7 @@ WIDEST = 0.45
 
 FARTHEST_MARK = 6.0
 """How far to a side marks are sought [m]. What seems farther stands up, as a guard rail does. Edges of what is no
-narrow stripe, as of the verge, are faint and wander."""
+narrow stripe, such as the verge, are faint and wander."""
 
 LEAST_POINTS, MOST_SCATTER = 30, 0.6
 """Fewest points of a course, and greatest root mean square of their residuals [px]."""
@@ -115,7 +115,7 @@ def unseen_course(camera: Camera, horizon: Horizon) -> RoadCourse:
 def road_course(seen: SeenLines, image: LinearPixels, camera: Camera, horizon: Horizon) -> RoadCourse | None:
     """Fit bends, sags and crests to the lines along the road, followed from near to far.
 
-    A lane is as wide there as here, so the distance between its lines tells the distance of every row, whatever the
+    A lane is as wide there as here, so the distance between its lines gives the distance of every row, whatever the
     road's profile.
 
     Returns None if too few lines show one that is to be believed.

@@ -121,12 +121,12 @@ def _row_edges(slope: NDArray[np.float32], edge: NDArray[np.float64], sign: NDAr
 
 @kernel
 def may_lie_on_road(place: NDArray[np.float64], step: int) -> NDArray[np.bool_]:
-    """Tell points that may lie on the road from those of upright edges: sides of vehicles, posts and trunks.
+    """Separate points that may lie on the road from those of upright edges: sides of vehicles, posts and trunks.
 
     The side of a vehicle ahead ends near where the lines of its lane pass it. With a dash of such a line it makes a
     line that is straight within two pixels, and long, which the dash alone is not: the point in which the lines meet
     would move by several of its deviations. What lies on the road and seems upright is below the camera, within a tenth
-    of its height to either side, and tells nothing of the horizon.
+    of its height to either side, and has no information about the horizon.
 
     Returns false of points on upright edges (m,) bool. Takes `place` (m, 2) [px], `step` [px].
     """

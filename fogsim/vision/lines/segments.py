@@ -1,4 +1,4 @@
-"""The vanishing point of the line segments in an image of a camera of which nothing is known."""
+"""The vanishing point of the line segments in an image of an unknown camera."""
 
 import math
 from dataclasses import dataclass

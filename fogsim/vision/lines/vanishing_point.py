@@ -1,8 +1,8 @@
 """The vanishing point of straight lines: where they cross, which crossing most of them support, which point fits all.
 
 How lines are found, and which of them count, is what the methods differ in: `lane_lines` (zhu2015, huang2015),
-`gradient_lines` (negru2013), `road_lines` (near an assumed calibration) and `segments` (a camera of which nothing is
-known) each have a function ``…_vanishing_point``.
+`gradient_lines` (negru2013), `road_lines` (near an assumed calibration) and `segments` (an unknown camera)
+each have a function ``…_vanishing_point``.
 """
 
 import functools

@@ -29,7 +29,7 @@ AS_STRAIGHT = 1.05
 """Deviation from a straight line, over that from the law, up to which a curve may as well be a ramp [-]."""
 
 SURE_OF_FOG = 1.0
-"""Least k in its standard deviations that is told as fog [-]."""
+"""Least k in its standard deviations that is reported as fog [-]."""
 
 CLEAR = OPTICAL_DEPTH_AT_VISIBILITY / 300.0
 """Extinction that an estimate which may as well be none must surely be below to say "little fog" [1/m]."""

@@ -62,7 +62,7 @@ def slopes(curve: RoadCurve, luminance: Floats, reach: float) -> Floats:
 
 
 def _sums_up_to(sums: Floats, place: Floats) -> Floats:
-    """Sums up to places between rows, of which a part counts."""
+    """Sums up to places between rows; a part of the row after each place counts."""
     place = np.clip(place, 0.0, len(sums) - 1.0)
     row = np.minimum(place.astype(np.int64), len(sums) - 2)
     part = (place - row)[:, None]
@@ -128,7 +128,7 @@ def fog_of_steepest_rows(curve: RoadCurve, luminance: Floats, reach: float) -> F
     """Extinctions whose laws are steepest, over the same rows and windows, where some curves are.
 
     At the inflection itself that is k = 2 (v_i − v_h) / λ (zhu2015 eq. 21); a window of some width, and rows of one,
-    shift the steepest row by a share of v − v_h that the law itself tells.
+    shift the steepest row by a share of v − v_h that follows from the law itself.
 
     Returns k [1/m]; NaN where a curve never brightens upward (m,).
     """

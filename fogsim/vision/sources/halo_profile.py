@@ -36,7 +36,7 @@ MOST_HEIGHT = 127.5
 """H50 of a lamp that saturates before the dark [levels of 255]."""
 
 NARROWEST = 0.25
-"""Width below which no flank can be told [px]."""
+"""Width below which no flank is resolved [px]."""
 
 
 @dataclass(frozen=True, slots=True)

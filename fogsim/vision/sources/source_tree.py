@@ -34,7 +34,7 @@ LEAST_AREA, LARGEST_SHARE = 6.0, 0.06
 MOST_ELONGATED, LEAST_COMPACT = 2.5, 0.75
 """Longest axis of a source over its shortest, and its area over that of an ellipse of the same second moments [-].
 
-The border of a source is rough where noise carries pixels over the threshold, so that its length tells nothing.
+The border of a source is rough where noise carries pixels over the threshold, so that its length is meaningless.
 """
 
 MOST_COMPONENTS, MOST_SOURCES = 256, 48

@@ -1,1 +1,1 @@
-"""Two pictures side by side: disparities, and how contrast falls with the distance that they tell."""
+"""Two images side by side: disparities, and how contrast falls with the distance computed from them."""

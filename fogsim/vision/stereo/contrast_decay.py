@@ -14,7 +14,7 @@ STEP = 1.35
 """Ratio of the disparities at both ends of a class of distances [-]."""
 
 FEWEST = 20
-"""Fewest edges of a class that tell its contrast."""
+"""Fewest edges that a class needs for its contrast."""
 
 BEST = 0.95
 """Quantile of a class's contrasts that stands for its darkest things before the airlight [-]."""

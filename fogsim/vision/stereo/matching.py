@@ -23,7 +23,7 @@ UNIQUE = 10
 """By how much the best disparity must beat others [%]."""
 
 NEAREST = 10.0
-"""Nearest distance of which disparities are sought [m]."""
+"""Nearest distance whose disparities are searched [m]."""
 
 ROOM = 16
 """Numbers of disparities that are searched come in multiples of this [px]."""

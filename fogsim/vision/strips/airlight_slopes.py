@@ -2,7 +2,7 @@
 
 Over dark land a line of sight that points down gathers light that has come from below, and there it is dark. How
 much, goes by the albedo of the land, which is unknown, in one factor; and by the elevation and the optical height of
-the eye in a shape that is known. The sky's brightening upward in the same picture tells of that factor.
+the eye in a shape that is known. The sky's brightening upward in the same image informs about that factor.
 """
 
 import math
@@ -41,8 +41,8 @@ ANY_SLOPE = 2.0
 overcast sky behind thin fog."""
 
 DROPLET_CHANCES = (0.65, 0.25, 0.1)
-"""How likely droplets of moderate and heavy radiation fog and of advection fog are beforehand [-]. A picture hardly
-tells them apart, so that these weights are the bias: with 0.2 for advection fog, radiation fog was read 11 % too short
+"""How likely droplets of moderate and heavy radiation fog and of advection fog are beforehand [-]. An image hardly
+separates them, so that these weights are the bias: with 0.2 for advection fog, radiation fog was read 11 % too short
 over the darkest land, and by the right droplets alone 3 to 5 %."""
 
 USUAL_EXTINCTION = 0.03
@@ -143,7 +143,7 @@ class RowAirlight:
 
 
 def row_airlight(sky: Sky, camera: Camera, extinction: float = USUAL_EXTINCTION) -> RowAirlight | None:
-    """Airlight by rows, as the sky's brightening upward tells it; None where it is not seen whether that brightens.
+    """Airlight by rows from the sky's brightening upward; None where it is not seen whether that brightens.
 
     Over snow it hardly does, and yet a contrast that fog leaves 5 % of changes by a fifth.
 

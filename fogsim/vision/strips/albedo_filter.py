@@ -24,8 +24,8 @@ OUTLIER = 4.0
 """Innovation beyond which a row shows something else than this road, in standard deviations [-]."""
 
 LEFT_OUT_COST, HIDDEN_COST = 9.0, 3.5
-"""What a bin adds to minus twice the log likelihood that is an outlier, of which any luminance up to the airlight's is
-equally likely and few are expected, or that is behind an obstacle, compared to one in use [-]."""
+"""Added to minus twice the log likelihood for a bin that is an outlier (expected to be rare, with any luminance up to
+the airlight's equally likely), or that is behind an obstacle, compared to one in use [-]."""
 
 FIRST = 4
 """State of the first strip's constant: before it come drift, its slope, sheen and airlight."""

@@ -20,7 +20,7 @@ MOST_ASIDE = 0.6
 def course_geometry(geometry: StripGeometry, camera: Camera, course: RoadCourse) -> StripGeometry:
     """Lay strips along a road that bends, sags or crests.
 
-    Rows are told by where they would be seen were the road the plane that touches it under the camera, about the
+    Rows are given by where they would be seen were the road the plane that touches it under the camera, about the
     course's horizon; so the joint fit takes them as it takes those of a plane.
     """
     shift, unit, height = course.row - camera.horizon_row, camera.row_distance, camera.mount_height

@@ -1,4 +1,4 @@
-"""Which droplets a fog has, as picture after picture tells it: they last longer than what one picture sees."""
+"""Which droplets a fog has, accumulated over images: droplets last longer than what one image sees."""
 
 import math
 
@@ -7,7 +7,7 @@ import numpy as np
 from fogsim.vision.strips.airlight_slopes import DROPLET_CHANCES
 
 OTHER_ROAD = 30.0
-"""Way after which a picture shows so much other road that what it tells counts again [m]."""
+"""Way after which an image shows so much other road that its evidence counts again [m]."""
 
 LASTS = 1000.0
 """Way over which droplets stay the same [m]."""
@@ -19,7 +19,7 @@ MOST = 2.5
 class DropletMemory:
     """Chances of the kinds of droplets, learnt over the way.
 
-    A single picture hardly tells them, for a road whose albedo wanders may look like either. What it tells of them is
+    A single image hardly separates them, for a road whose albedo wanders may look like either. Its evidence is
     counted by the share of the road in it that is new.
     """
 

@@ -16,7 +16,7 @@ OVEREXPOSURE = 0.15
 """How far a sky without any unsaturated pixel may lie above saturation, as a deviation [-]."""
 
 HALF, MOSTLY = 0.5, 0.98
-"""Shares of saturated pixels beyond which a sky may be brighter, and beyond which it tells no more than that [-]."""
+"""Shares of saturated pixels beyond which a sky may be brighter, and beyond which it gives only a lower bound [-]."""
 
 EVEN_SKY, CLOUD, MOST_CLOUD = 0.02, 1.5, 0.015
 """Unevenness of a sky that trees before it and rounding make, how much of more of it the airlight before the road has,

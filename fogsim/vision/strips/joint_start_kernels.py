@@ -28,7 +28,7 @@ def darkness_of_slope(slope: float, rise: float, above: float) -> float:
 
 @kernel
 def darkness_by_sky(prior: JointPrior, k: float, eye: float) -> tuple[float, float]:
-    """By how much the airlight darkens toward the road, as the sky tells it, and its level at the horizon."""
+    """By how much the airlight darkens toward the road, estimated from the sky, and its level at the horizon."""
     if prior.rise.size == 0:
         return 0.0, prior.airlight
     level, on = eye_level(k, eye, prior.rise.size)

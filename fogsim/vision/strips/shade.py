@@ -2,7 +2,7 @@
 
 A shadow multiplies the road's luminance by some factor. Where its edge crosses the strips their bins mix both, which
 looks like fog, like uneven fog or like an obstacle. Each row has the same fog before both, so that a road which has
-two luminances without fog tells its extinction by either, and by how the contrast between both is lost.
+two luminances without fog gives its extinction by either, and by how the contrast between both is lost.
 """
 
 import math

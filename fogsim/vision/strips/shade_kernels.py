@@ -26,11 +26,11 @@ ROUNDS = 5
 """Rounds of telling sun from shade and of fitting both."""
 
 CLEAR, FEWEST, ENDS = 0.4, 20, 10
-"""Transmittance from which on pieces tell the first guess [-], how few tell none, and which part of them, the darkest
-and the brightest, is beyond that guess: one in so many."""
+"""Least transmittance of pieces used for the first guess [-], the count up to which pieces are too few, and which part
+of them, the darkest and the brightest, is beyond that guess: one in so many."""
 
 STEPS, MOST = 1024, 2.0
-"""Steps of luminance in which the first guess is told, and the most of it, over the airlight's [-]."""
+"""Luminance steps of the first guess, and its upper limit, over the airlight's [-]."""
 
 DARKEST = 0.02
 """Least luminance of a road over the airlight's [-]."""

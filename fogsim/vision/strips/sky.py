@@ -62,7 +62,7 @@ BRIGHTENS, SEEN_TO_BRIGHTEN = 0.6, 0.6
 must show that [-]: it is far from what the mean of its rows says."""
 
 LENS_UNEVENNESS = 0.026
-"""Unevenness of a sky up to which it tells of a lens's vignetting [-]."""
+"""Unevenness of a sky up to which it is used to estimate a lens's vignetting [-]."""
 
 SKY_ROWS = 24
 """Rows of sky that are looked at."""

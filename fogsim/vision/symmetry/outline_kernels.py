@@ -26,7 +26,7 @@ _BY_CHANCE = 0.35
 """Share of an outline that is no evidence for it [-]."""
 
 _WITHOUT_QUARTER = 0.5
-"""Most that is seen of an outline of which one quarter is not [-]."""
+"""Largest share seen of an outline with one quarter unseen [-]."""
 
 _ENOUGH = 6
 """Places seen from which on the outline is fitted."""

@@ -61,7 +61,7 @@ def pair_votes(points: Floats, number: Numbers, nearest: float, farthest: float)
 
 @kernel
 def triangle_votes(points: Floats, number: Numbers, radii: Floats, direction: float) -> Floats:
-    """Accumulate the middles of the upright triangles of which two points lie on two sides.
+    """Accumulate the middles of the upright triangles with two points on two sides.
 
     Returns votes for the middle between tip and base; see `pair_votes` for their weight (m, rows, cols). Takes `radii`
     (m,) [px].

@@ -1,1 +1,1 @@
-"""Fog that varies along the road, told from a road that sags or crests, and banks far ahead."""
+"""Fog that varies along the road, estimated from a road that sags or crests, and banks far ahead."""

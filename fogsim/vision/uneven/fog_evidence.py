@@ -21,7 +21,7 @@ UNEVEN_CHANCES = (0.1, 0.05, 0.05, 0.05, 0.05)
 """How likely each unevenness is beforehand; even fog is the rest [-]."""
 
 OBSTACLE_CHANCE = 0.01
-"""How likely it is that an obstacle that no sensor tells begins in a lane at one of its rows [-]."""
+"""How likely it is that an obstacle that no sensor reports begins in a lane at one of its rows [-]."""
 
 STRANGE = 2.0
 """What an outlier adds to a cost next to its luminance's chance, where even fog is weighed against uneven [-]."""
@@ -102,7 +102,7 @@ def thinned_bins(bins: Bins) -> Bins:
 
 
 def of_each_bin(thinned: NDArray[np.bool_], distance: Floats) -> NDArray[np.bool_]:
-    """(strips, n) bool: what is told of thinned bins, told of all.
+    """(strips, n) bool: values of thinned bins, repeated for all.
 
     Takes `thinned` (strips, thinned) bool, `distance` (n,) [m].
     """

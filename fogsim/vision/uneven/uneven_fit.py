@@ -42,8 +42,8 @@ SURELY_EVEN = 0.0
 """By how much the cost of the first uneven fits must lie above that of the even one for no other to be tried [-]."""
 
 SAME_DEPTH, TOLD = 0.04, 2.0
-"""Relative difference of optical depths up to which strips tell of the same fog, and depth up to which they tell [-].
-"""
+"""Relative difference of optical depths up to which strips agree on the fog, and depth up to which they are compared
+[-]."""
 
 UNLIKELY = 30.0
 """By how much the cost of even fog over an albedo must lie above the best for that albedo to be left out [-]."""
@@ -121,7 +121,7 @@ def fit_uneven(
 ) -> UnevenFit:
     """Fit strips with fog that may be uneven, weighed against even fog.
 
-    All strips count, unless even fog has left out much of them and the own lane tells of another fog than all together.
+    All strips count, unless even fog has left out much of them and the own lane disagrees with all together.
     """
     if even.used.mean() < LEAST_ROAD:
         return even_fog(even, geometry)
@@ -142,7 +142,7 @@ def _fits_all(even: JointFit, curves: StripCurves) -> bool:
 
 
 def _agree(own: UnevenFit, more: UnevenFit) -> bool:
-    """Whether more strips tell of the same optical depth as far as the own lane does."""
+    """Whether more strips agree on the optical depth as far as the own lane does."""
     last = max(int((own.depth < TOLD).sum()) - 1, 0)
     depth, deviation = float(own.depth[last]), float(own.deviation[last])
     apart = abs(depth - float(np.interp(own.distance[last], more.distance, more.depth)))

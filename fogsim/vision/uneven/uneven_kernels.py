@@ -44,7 +44,7 @@ HALVINGS = 4
 """How often a step that leads uphill is halved."""
 
 DEEPEST = 3.5
-"""Optical depth beyond which a bin's luminance tells nothing of it in the first guess [-]."""
+"""Optical depth beyond which a bin's luminance is ignored in the first guess [-]."""
 
 TOLERANCE, TOLERANT = 0.06, 4
 """Deviation of the first guess's luminance, relative to the airlight [-], and steps over which it is halved each time

@@ -29,7 +29,7 @@ SHADOW = 4.0
 """Length of the road before the vehicle ahead that it may darken, or its lamps light [m]."""
 
 LEAST_CONTRAST = 0.03
-"""Contrast of a row of road to the sky that still tells how it falls [-]."""
+"""Contrast of a row of road to the sky that still shows how it falls [-]."""
 
 UNEVEN, SHARE = 0.1, 0.1
 """By how much the logarithm of that contrast may fall less than the fog says: where the road's reflectance changes [-],

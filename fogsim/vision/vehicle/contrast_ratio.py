@@ -25,7 +25,7 @@ LARGE, HIGH = 2.25, (0.6, 1.6)
 differently from afar, so the part begins above the bar that keeps cars from running under it."""
 
 TOP = 2.2
-"""Height to which a rear may reach [m]: dark windows of vans tell the most, and sky above a car tells nothing."""
+"""Height to which a rear may reach [m]: dark windows of vans are most useful, sky above a car is useless."""
 
 FINEST = 0.02
 """Smallest cell on which pictures are compared [m]."""

@@ -42,7 +42,7 @@ CLUTTER = 6.0
 """Least step across either side of a vehicle, in medians of the steps between all columns [-]."""
 
 LEAST_STEP = 0.15
-"""Noise of a step that there is at least, as of rounding [linear grey levels]."""
+"""Least noise of a step, for instance by rounding [linear grey levels]."""
 
 SMOOTHING = (0.00962006, 0.2054237, 0.56991248, 0.2054237, 0.00962006)
 """A Gaussian of 0.7 px, with which rows are smoothed before edges are looked for in them [-]."""

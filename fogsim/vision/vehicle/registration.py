@@ -51,7 +51,7 @@ LEAST_PIXELS = 24
 """Fewest pixels that a regression is made of."""
 
 ASIDE, ABOVE, BELOW = 0.25, 0.15, 0.4
-"""What is placed reaches so far beyond that part, or beyond the vehicle's sides [m]: its outline tells the place."""
+"""Margin of the placed region beyond that part, or beyond the vehicle's sides [m]: its outline fixes the place."""
 
 
 @dataclass(frozen=True, slots=True)

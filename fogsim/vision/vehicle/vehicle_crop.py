@@ -258,7 +258,7 @@ def _daylight(day: _DaytimeFrame, depth: float) -> SkyReading:
     luminance = neighbouring_airlight(light, level, sky.noise, axis, hidden)
     clear = np.abs(light - luminance) <= 4.0 * max(sky.noise, 1.0)
     if not clear.any():
-        raise CannotTellError("nowhere is the sky as bright as it is beside the vehicle")
+        raise CannotTellError("no part of the sky is as bright as the sky next to the vehicle")
     lost = clipping(pixels.pixels[rows, camera.width // 6 : camera.width - camera.width // 6][clear], camera)
     # What clipping takes from the sky, its noise shows; then it is no longer clipped.
     is_clipped = not lost.noise > 0.0 and sky.is_clipped

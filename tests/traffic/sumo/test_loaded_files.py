@@ -21,7 +21,7 @@ def test_the_most_similar_ids_are_named_first() -> None:
     text = describe_seen("ego", seen)
     assert text.startswith("those that did: egon, ")
     assert text.endswith(" and 13 more")
-    assert "no vehicle at all" in describe_seen("ego", [])
+    assert "no vehicle did" in describe_seen("ego", [])
 
 
 def test_another_step_is_refused_but_not_the_rounding_of_sumos_clock() -> None:

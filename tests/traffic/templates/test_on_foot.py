@@ -114,7 +114,7 @@ def test_mistakes_about_persons_are_told(scenario: Path) -> None:
         ("speed: 90 km/h}", "side: left}", "a car has no side; "),
         ("type: person", "type: persn", "unknown type 'persn'"),
         ("{walk: {speed: 5 km/h}}", "{brake: {to: 0 km/h}}", "child is a person, who can walk and nothing else"),
-        ("{child: {walk", "{ego: {walk", "ego is a vehicle, and persons walk; "),
+        ("{child: {walk", "{ego: {walk", "ego is a vehicle, and only persons walk; "),
         ("never: child.collision", "never: chid.collision", "did you mean 'child'"),
         ("fog:", "demand: {persons: {along: 60 km/h}}\nfog:", "demand.persons.along: the unit 'km/h' does not fit"),
         (

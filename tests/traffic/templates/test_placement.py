@@ -31,7 +31,7 @@ def test_gaps_are_from_bumper_to_bumper() -> None:
 def test_what_cannot_be_is_refused() -> None:
     for actor, told in [
         (Actor("a", place=Relation("eggo", 10.0)), "there is no actor 'eggo'; did you mean 'ego'"),
-        (Actor("a", place=Relation("a", 10.0)), "is placed by itself, through a"),
+        (Actor("a", place=Relation("a", 10.0)), "is placed relative to itself, through a"),
         (Actor("a", way="oncoming", place=Relation("ego", 10.0)), "is on the way 'oncoming', and 'ego' on 'same_way'"),
         (Actor("a", way="ramp"), "the road has no way 'ramp'"),
         (Actor("a", place=3001.0), "must begin within 4.6 … 3000 m of its way, got 3001 m"),

@@ -57,7 +57,7 @@ def test_a_sky_that_is_nowhere_as_bright_as_beside_the_vehicle_is_told(monkeypat
     image = np.clip(np.rint(sky), 0, 255).astype(np.uint8)
     assert daytime_crop(image, CAMERA, 30.0, 0.002).sky.luminance == pytest.approx(200.0, abs=1.0)
     monkeypatch.setattr("fogsim.vision.vehicle.vehicle_crop.neighbouring_airlight", lambda *_: 150.0)
-    with pytest.raises(CannotTellError, match="nowhere is the sky as bright"):
+    with pytest.raises(CannotTellError, match="no part of the sky is as bright"):
         daytime_crop(image, CAMERA, 30.0, 0.002)
 
 

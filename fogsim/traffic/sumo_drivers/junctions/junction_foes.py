@@ -1,4 +1,4 @@
-"""Foes at junctions, as SUMO tells them, and none where it cannot.
+"""Foes at junctions, as SUMO reports them, and none where it cannot.
 
 Where no one has the right of way (junctions of type ``unregulated``, also those that netconvert makes so since they
 have too many lanes), no one yields; SUMO 1.28 ends with a segmentation fault if it is asked for foes there.

@@ -91,7 +91,7 @@ class JunctionSight:
         return {driver: frozenset(self._unseen.of(driver)) for driver in self._unseen.drivers}
 
     def update(self, own_lamps: OwnLamps) -> None:
-        """Tell SUMO's drivers which foes at junctions they do not see."""
+        """Make SUMO's drivers ignore foes at junctions that they do not see."""
         if self._certainly_seen >= FARTHEST_FOE:
             return
         due = self._due.take()

@@ -71,7 +71,7 @@ class PedestrianSight:
         self._next = 0.0
 
     def update(self, own_lamps: OwnLamps) -> None:
-        """Tell SUMO's drivers which pedestrians they do not see."""
+        """Make SUMO's drivers ignore pedestrians that they do not see."""
         self._roster.update()
         now = self._roster.time
         if self._certainly_seen >= FARTHEST_PERSON or now < self._next:

@@ -89,8 +89,8 @@ class SignalSight:
     def _seen_distance(self, extinction: float) -> float:
         return self._sight.seen_distance(extinction, 0.0, SIGNAL_INTENSITY, head_lamps=0.0)
 
-    def update(self, own_lamps: OwnLamps) -> None:  # noqa: ARG002 - every part is told the lamps
-        """Tell SUMO's drivers which lights they do not see."""
+    def update(self, own_lamps: OwnLamps) -> None:  # noqa: ARG002 - every part gets the lamps
+        """Make SUMO's drivers ignore lights that they do not see."""
         if self._certainly_seen >= REACH:
             return
         due = self._due.take()

@@ -55,7 +55,7 @@ class UnseenFoes:
 
     @property
     def drivers(self) -> Collection[str]:
-        """Drivers who do not react to somebody."""
+        """Drivers who do not react to some foe."""
         return self._since.keys()
 
     def decide(self, driver: str, is_seen: Mapping[str, bool], now: float) -> bool:

@@ -220,8 +220,7 @@ class NightRoad:
     def _look(self, image: Pixels, observation: Observation) -> tuple[Seen, NDArray[np.bool_], Floats]:
         """Means of the last frames in green light, for tail lamps are red; cells near others' lamps, and their glow."""
         green: NDArray[Any] = image if image.ndim == 2 else np.ascontiguousarray(image[:, :, 1])
-        camera = self._camera
-        table = linear_table(camera.response, camera.bits, camera.black_level).copy()
+        table = linear_table(self._camera.response, self._camera.bits, self._camera.black_level).copy()
         self._earlier.append(
             (cell_luminance(green, table, self._cells.box), *self._lamps_of_others(green, observation))
         )
@@ -236,8 +235,7 @@ class NightRoad:
             return np.zeros(len(below), np.bool_)
         height, depth = self._camera.mount_height, observation.lead.distance + observation.camera_setback
         upright = (below * depth < height + LEAD_MARGIN) & (below * depth > height - LEAD_HEIGHT)
-        hidden: NDArray[np.bool_] = upright & (np.abs(aside) * depth < half_width)
-        return hidden
+        return np.asarray(upright & (np.abs(aside) * depth < half_width))
 
     def _lamps_of_others(self, green: NDArray[Any], observation: Observation) -> tuple[NDArray[np.bool_], Floats, bool]:
         """Cells near lamps of others, which are clipped, shapes that their glow may have, and whether some are high."""
@@ -271,8 +269,7 @@ class NightRoad:
         sky = float(luminance[is_sky].mean()) if is_sky.any() else float(luminance.min())
         sky_scale = 0.0 if reported else sky
         seen_road = np.count_nonzero(~is_sky) / np.count_nonzero(~self._cells.is_sky)
-        independent = INDEPENDENT[self._lamps != "unknown"] * seen_road
-        scales = sky_scale, lamp_scale, PEDESTAL, independent
+        scales = sky_scale, lamp_scale, PEDESTAL, INDEPENDENT[self._lamps != "unknown"] * seen_road
         return Measured(luminance, self._up[used], others, *scales)
 
     def _estimate(self, measured: Measured, own: OwnLight, used: NDArray[np.bool_]) -> Estimate:

@@ -13,7 +13,6 @@ from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels
 CELLS_ACROSS = 80
 """About how many cells there are in a row."""
 
-
 DARK_SHARE = 0.06
 """Share of a cell's pixels that read no light from which on the mean of the rest's noise is not 0 [-]."""
 
@@ -56,11 +55,7 @@ def cell_means(image: LinearPixels, cell: int) -> CellMeans:
 
 @kernel
 def _add_cells(
-    pixels: Pixels,
-    tables: NDArray[np.float32],
-    cell: int,
-    luminance: NDArray[np.float64],
-    clipped: NDArray[np.bool_],
+    pixels: Pixels, tables: NDArray[np.float32], cell: int, luminance: NDArray[np.float64], clipped: NDArray[np.bool_]
 ) -> None:
     rows, cols = luminance.shape
     highest = tables.shape[1] - 1

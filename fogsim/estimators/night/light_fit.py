@@ -82,7 +82,7 @@ def log_likelihoods(
     power = (precision * seen * seen).sum()
     is_day = measured.sky_scale > 0.0 or measured.lamp_scale > 0.0
     terms = _terms(is_day, len(others) > 0)
-    even, gram, side = np.empty((3, cells)), np.zeros((OTHERS + 2, OTHERS + 2)), np.zeros(OTHERS + 2)
+    even, gram, side = np.ones((4, cells)), np.zeros((OTHERS + 2, OTHERS + 2)), np.zeros(OTHERS + 2)
     matrix, right, used = np.zeros((len(terms), len(terms))), np.zeros(len(terms)), np.zeros(len(terms))
     known, scratch = np.zeros((2, len(terms))), np.empty((len(terms), len(terms) + 1))
     highest = -np.inf
@@ -131,10 +131,10 @@ def _terms(is_day: bool, has_others: bool) -> Terms:
 
 @kernel
 def _even_light(up: Floats, depth: Templates, extinction: float, even: Floats) -> None:
-    """What daylight adds to cells: airlight, the road behind it, and how the sky brightens upward."""
+    """What daylight adds to cells, after the even light: airlight, the road behind it, and the brighter sky above."""
     for cell in range(len(up)):
         kept = math.exp(-extinction * depth[cell])
-        even[0, cell], even[1, cell], even[2, cell] = 1.0 - kept, kept, 4.0 * up[cell]
+        even[1, cell], even[2, cell], even[3, cell] = 1.0 - kept, kept, 4.0 * up[cell]
 
 
 @kernel
@@ -158,7 +158,7 @@ def _model(
             if terms[i] == OTHERS:
                 rest += used[i] * measured.others[draw % len(measured.others), cell]
             else:
-                rest += used[i] * even[terms[i] - AIRLIGHT, cell]
+                rest += used[i] * even[terms[i] - PEDESTAL, cell]
         best.luminance[cell] = lit + rest
         by_lamps += lit
         total += lit + rest
@@ -172,13 +172,11 @@ def _sums_of_light(even: Floats, seen: Floats, precision: Floats, gram: Floats, 
         for j in range(i, 4):
             total = 0.0
             for cell in range(len(seen)):
-                a = 1.0 if i == 0 else even[i - 1, cell]
-                b = 1.0 if j == 0 else even[j - 1, cell]
-                total += precision[cell] * a * b
+                total += precision[cell] * even[i, cell] * even[j, cell]
             gram[2 + i, 2 + j] = total
         total = 0.0
         for cell in range(len(seen)):
-            total += precision[cell] * (1.0 if i == 0 else even[i - 1, cell]) * seen[cell]
+            total += precision[cell] * even[i, cell] * seen[cell]
         side[2 + i] = total
 
 
@@ -206,11 +204,11 @@ def _sums_of_lamps(
         vy += v * seen[cell]
         ry += r * seen[cell]
         if is_day:
-            va += v * even[0, cell]
-            ra += r * even[0, cell]
-            vd += v * even[1, cell]
-            rd += r * even[1, cell]
-            vs += v * even[2, cell]
+            va += v * even[1, cell]
+            ra += r * even[1, cell]
+            vd += v * even[2, cell]
+            rd += r * even[2, cell]
+            vs += v * even[3, cell]
     gram[0, 0], gram[0, 1], gram[1, 1], gram[0, 2], gram[1, 2] = vv, vr, rr, v1, r1
     gram[0, 3], gram[1, 3], gram[0, 4], gram[1, 4], gram[0, 5], gram[1, 5] = va, ra, vd, rd, vs, 0.0
     side[0], side[1] = vy, ry
@@ -234,9 +232,8 @@ def _sums_of_others(
         g = precision[cell] * glow[cell]
         gram[0, last] += g * veil[cell]
         gram[1, last] += g * road[cell]
-        gram[2, last] += g
-        for i in range(3):
-            gram[3 + i, last] += g * even[i, cell]
+        for i in range(4):
+            gram[2 + i, last] += g * even[i, cell]
         gram[last, last] += g * glow[cell]
         side[last] += g * seen[cell]
 
@@ -281,10 +278,8 @@ def _of_lamps_alone(matrix: Floats, right: Floats, used: Floats) -> float:
 @kernel
 def _set_known(terms: Terms, scale: float, known: Floats) -> None:
     """Set means and precisions of amplitudes of daylight, before anything is seen, by its size."""
-    for i in range(2, len(terms)):
+    for i in range(2, len(terms) - (terms[-1] == OTHERS)):
         mean, deviation = 0.0, SLOPE_DEVIATION * scale
-        if terms[i] == OTHERS:
-            continue
         if terms[i] == AIRLIGHT:
             mean, deviation = AIRLIGHT_MEAN * scale, AIRLIGHT_DEVIATION * scale
         elif terms[i] == DAY_ROAD:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fogsim.errors import InputError, shown
 from fogsim.estimators.image_check import ObservationCheck
-from fogsim.estimators.night.light_fit import Fit, Measured, log_likelihoods, robust_weights
+from fogsim.estimators.night.light_fit import Fit, Measured, Templates, log_likelihoods, robust_weights
 from fogsim.estimators.night.own_light import (
     KNOWN_HEAD_LAMPS,
     SKY,
@@ -73,13 +73,14 @@ CLEAR, MAY_BE_CLEAR = 2000.0, {True: 0.15, False: 0.05}
 """Visibility above which own lamps show no fog [m], and its probability from which on there is no upper bound [-], by
 whether the beam is known."""
 
-GLOWS = [(1.2 + 0.2 * (i % 5), 20.0 * 6.0 ** (i % 4 / 3), 2.0 ** (i % 3 / 4)) for i in range(60)]
-"""Shapes of the glow of others' lamps: power of the angle by which it falls, distance of the lamps [m], and how much
-faster it falls upward and downward than sideways, for head lamps shine little above the horizon."""
+GLOW_POWERS, GLOW_FLATNESS = (1.2, 1.4, 1.6, 1.8, 2.0), (1.0, 2.0**0.25, 2.0**0.5)
+GLOW_DISTANCES = (20.0, 36.3, 66.0, 120.0)
+"""Shapes of the glow of others' lamps: power of the angle by which it falls, how much faster it falls upward and
+downward than sideways, for head lamps shine little above the horizon, and distance of the lamps [m]."""
 
-GLOWS_KEPT, SAMPLE = 6, (15, 6)
-"""Shapes that are like an image, in which all draws are tried; and which draws and visibilities find these, each so
-many."""
+GLOWS_KEPT, GLOW_SAMPLE, SAMPLE = 6, (15, 6), (5, 2)
+"""How many shapes that are like an image are used; and the steps between the draws and visibilities that find
+these, and the weights of the cells."""
 
 LAMPS_FROM, HALO = 40.0, 0.03
 """Distance on the road beyond which what is clipped may be a lamp [m], and how far from it cells are left out [rad]:
@@ -91,9 +92,9 @@ HIGH_LAMPS, STREET_LIGHT = 0.07, 10.0
 MAY_BE_DENSER = 0.25
 """Probability of the densest fog of the model from which on there may be denser fog [-]."""
 
-LEAD_HALF_WIDTH, LEAD_HEIGHT, LEAD_MARGIN, CLOSEST_LEAD = 1.5, 4.0, 0.4, 8.0
-"""What a vehicle ahead covers at most, below its wheels too, for they and the pitch are not known, and how near it
-leaves too little [m]."""
+LEAD_HALF_WIDTH, LIT_HALF_WIDTH, LEAD_HEIGHT, LEAD_MARGIN, CLOSEST_LEAD = 1.5, 1.2, 4.0, 0.4, 8.0
+"""What a vehicle ahead covers at most, and half the width of its rear, below its wheels too, for they and the pitch are
+not known, and how near it leaves too little [m]."""
 
 COMMON, MOST_COMMON = 0.95, 0.5
 """Part of the deviation of ln V that is of own lamps, droplets and pavement, the same in all frames of a drive, and the
@@ -109,6 +110,7 @@ BOUND_SOFTNESS = 0.1
 """Standard deviation of bounds in ln k [-]."""
 
 Floats = NDArray[np.float64]
+_Sample = tuple[Floats, Templates, Templates, Templates]
 
 
 @checked_parameters
@@ -199,8 +201,9 @@ class NightRoad:
         if lit != self._lit:
             self._earlier.clear()
             self._lit = lit
-        seen, beside, others = self._look(image)
-        used = (seen.clipped < MOST_CLIPPED) & ~self._hidden(observation) & ~beside
+        seen, beside, others = self._look(image, observation)
+        hidden = self._hidden(observation, self._below, self._aside, LEAD_HALF_WIDTH)
+        used = (seen.clipped < MOST_CLIPPED) & ~hidden & ~beside
         if why := _too_little(seen, used, self._cells.is_sky):
             return Estimate.invalid(self.method, why)
         if self._source is None:
@@ -214,28 +217,27 @@ class NightRoad:
             used,
         )
 
-    def _look(self, image: Pixels) -> tuple[Seen, NDArray[np.bool_], Floats]:
+    def _look(self, image: Pixels, observation: Observation) -> tuple[Seen, NDArray[np.bool_], Floats]:
         """Means of the last frames in green light, for tail lamps are red; cells near others' lamps, and their glow."""
         green: NDArray[Any] = image if image.ndim == 2 else np.ascontiguousarray(image[:, :, 1])
-        camera = self._camera
-        table = linear_table(camera.response, camera.bits, camera.black_level).copy()
-        self._earlier.append((cell_luminance(green, table, self._cells.box), *self._lamps_of_others(green)))
+        table = linear_table(self._camera.response, self._camera.bits, self._camera.black_level).copy()
+        self._earlier.append(
+            (cell_luminance(green, table, self._cells.box), *self._lamps_of_others(green, observation))
+        )
         frames, beside, glows, high = zip(*self._earlier, strict=True)
         glow, self._in_street = np.mean(glows, axis=0), any(high)
         seen = Seen(*(np.mean(part, axis=0) for part in zip(*frames, strict=True)))
         return without_cut_noise(seen), np.any(beside, axis=0), glow if glow.any() else glow[:0]
 
-    def _hidden(self, observation: Observation) -> NDArray[np.bool_]:
-        """Cells that the vehicle ahead may cover."""
+    def _hidden(self, observation: Observation, below: Floats, aside: Floats, half_width: float) -> NDArray[np.bool_]:
+        """Which directions, as slopes downward and aside, the vehicle ahead may cover (`half_width` [m])."""
         if observation.lead is None:
-            return np.zeros(len(self._depth), np.bool_)
+            return np.zeros(len(below), np.bool_)
         height, depth = self._camera.mount_height, observation.lead.distance + observation.camera_setback
-        below, aside = self._below * depth, np.abs(self._aside) * depth
-        upright = (below < height + LEAD_MARGIN) & (below > height - LEAD_HEIGHT)
-        hidden: NDArray[np.bool_] = upright & (aside < LEAD_HALF_WIDTH)
-        return hidden
+        upright = (below * depth < height + LEAD_MARGIN) & (below * depth > height - LEAD_HEIGHT)
+        return np.asarray(upright & (np.abs(aside) * depth < half_width))
 
-    def _lamps_of_others(self, green: NDArray[Any]) -> tuple[NDArray[np.bool_], Floats, bool]:
+    def _lamps_of_others(self, green: NDArray[Any], observation: Observation) -> tuple[NDArray[np.bool_], Floats, bool]:
         """Cells near lamps of others, which are clipped, shapes that their glow may have, and whether some are high."""
         camera = self._camera
         end = max(min(round(camera.horizon_row + camera.row_distance / LAMPS_FROM), camera.height), 0)
@@ -246,13 +248,18 @@ class NightRoad:
         below = (step * (square // 4096 + 0.5) - camera.horizon_row) / camera.focal_length
         aside = (camera.principal_point[0] - step * (square % 4096 + 0.5)) / camera.focal_length
         high = bool((below < -HIGH_LAMPS).any())
+        near = (np.hypot(self._below[:, None] - below, self._aside[:, None] - aside) < HALO).any(axis=1)
+        # What the own lamps light of the vehicle ahead is clipped, but does not glow.
+        others = ~self._hidden(observation, below, aside, LIT_HALF_WIDTH)
+        below, aside, count = below[others], aside[others], count[others]
         below, aside = self._below[:, None] - below, self._aside[:, None] - aside
         edge = np.sqrt(count / math.pi) / camera.focal_length
-        glow = np.zeros((len(GLOWS), len(self._below)))
-        for shape, (power, distance, flatness) in zip(glow, GLOWS, strict=True):
-            before, away = np.minimum(1.0, self._depth / distance), np.hypot(flatness * below, aside)
-            shape[:] = before * ((edge / np.maximum(away, edge)) ** power).sum(axis=1)
-        return (np.hypot(below, aside) < HALO).any(axis=1), glow, high
+        before = np.minimum(1.0, self._depth / np.array(GLOW_DISTANCES)[:, None])
+        glow = []
+        for flatness in GLOW_FLATNESS:
+            fall = np.log(edge / np.maximum(np.hypot(flatness * below, aside), edge))
+            glow += [before * np.exp(power * fall).sum(axis=1) for power in GLOW_POWERS]
+        return near, np.concatenate(glow), high
 
     def _measured(self, seen: Seen, used: NDArray[np.bool_], light: float, others: Floats) -> Measured:
         luminance, is_sky = seen.luminance[used], self._cells.is_sky[used]
@@ -262,24 +269,23 @@ class NightRoad:
         sky = float(luminance[is_sky].mean()) if is_sky.any() else float(luminance.min())
         sky_scale = 0.0 if reported else sky
         seen_road = np.count_nonzero(~is_sky) / np.count_nonzero(~self._cells.is_sky)
-        independent = INDEPENDENT[self._lamps != "unknown"] * seen_road
-        scales = sky_scale, lamp_scale, PEDESTAL, independent
+        scales = sky_scale, lamp_scale, PEDESTAL, INDEPENDENT[self._lamps != "unknown"] * seen_road
         return Measured(luminance, self._up[used], others, *scales)
 
     def _estimate(self, measured: Measured, own: OwnLight, used: NDArray[np.bool_]) -> Estimate:
         extinction = np.array([extinction_from_visibility(one) for one in VISIBILITIES.tolist()])
         is_sky, seen = self._cells.is_sky[used], measured.seen
         variance = (np.where(is_sky, SKY_TEXTURE, ROAD_TEXTURE) * seen) ** 2 + FLOOR**2 + (LEVEL * seen.mean()) ** 2
-        templates = own.veil, own.road, own.depth
         weight, best = np.ones(len(seen)), Fit(np.empty(len(seen)), np.empty(2))
+        sample = _sample(own, extinction, *SAMPLE)
         if len(measured.others) > GLOWS_KEPT:
-            measured = _with_likely_glows(measured, extinction, own, variance)
-        found = log_likelihoods(measured, extinction, *templates, variance, weight, best)
+            measured = _with_likely_glows(measured, _sample(own, extinction, *GLOW_SAMPLE), variance)
         for _ in range(ROUNDS):
+            log_likelihoods(measured, *sample, variance, weight, best)
             earlier, weight = weight, robust_weights(seen, best.luminance, variance)
             if np.abs(weight - earlier).max() < SETTLED:
                 break
-            found = log_likelihoods(measured, extinction, *templates, variance, weight, best)
+        found = log_likelihoods(measured, extinction, own.veil, own.road, own.depth, variance, weight, best)
         misfit, lamplight = best.summary.tolist()
         power, doubt = BY_DAYLIGHT if lamplight < MOSTLY_DAYLIGHT else (1.0, 1.0)
         likelihood = np.exp(power * (found - found.max())).mean(axis=0) ** (doubt / power)
@@ -322,14 +328,18 @@ def _why_not(observation: Observation, lit: Lamp, light: float) -> str:
     return ""
 
 
-def _with_likely_glows(measured: Measured, extinction: Floats, own: OwnLight, variance: Floats) -> Measured:
+def _sample(own: OwnLight, extinction: Floats, *every: int) -> _Sample:
+    """Extinctions, veil, road and depth of some draws and visibilities."""
+    draws, places = (slice(None, None, step) for step in every)
+    veil, road = (np.ascontiguousarray(one[draws, places]) for one in (own.veil, own.road))
+    return extinction[places], veil, road, np.ascontiguousarray(own.depth[draws])
+
+
+def _with_likely_glows(measured: Measured, sample: _Sample, variance: Floats) -> Measured:
     """The image with the shapes of others' glow that are most like it: too few draws would have each of all."""
-    draws, places = (slice(None, None, step) for step in SAMPLE)
-    veil, road = np.ascontiguousarray(own.veil[draws, places]), np.ascontiguousarray(own.road[draws, places])
-    rest = extinction[places], veil, road, np.ascontiguousarray(own.depth[draws]), variance, np.ones(len(variance))
-    unused = Fit(np.empty(len(variance)), np.empty(2))
+    weight, unused = np.ones(len(variance)), Fit(np.empty(len(variance)), np.empty(2))
     alone = (measured._replace(others=one[None]) for one in measured.others)
-    found = [np.exp(log_likelihoods(one, *rest, unused)).mean() for one in alone]
+    found = [np.exp(log_likelihoods(one, *sample, variance, weight, unused)).mean() for one in alone]
     return measured._replace(others=measured.others[np.argsort(found)[-GLOWS_KEPT:]])
 
 

@@ -33,9 +33,9 @@ from estimator_scenes import CAMERAS, Drive, Road, camera, drive, photograph, wi
 from estimator_tables import BINS, TIMED, records, tables
 from harness import Kept, Row, parse_options, progress, publish, timed
 
+from fogsim.core.registry import parameters
 from fogsim.estimators import ESTIMATORS, make
 from fogsim.estimators.zhu2015 import zhu_category
-from fogsim.registry import parameters
 from fogsim.values import Camera, Observation, Pavement, RoadSurface
 from fogsim.values.scene import USUAL_PAVEMENT
 

@@ -31,9 +31,9 @@ from staging import Board, Shot, Vehicle, network, signs, traffic
 from staging import scenario as staged
 
 from fogsim.camera import mounted_pose
-from fogsim.ego.view_rendering import ViewRenderer
 from fogsim.scenario import Scenario, build
 from fogsim.scene import build_scene, vehicle_batches
+from fogsim.simulation.ego.view_rendering import ViewRenderer
 from fogsim.values import Lamp, TrafficState
 
 VEHICLES, SIGNS, START, STEP, ROUND = 30, 10, 400.0, 2.5, 20

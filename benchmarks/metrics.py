@@ -24,10 +24,10 @@ from pathlib import Path
 from harness import Row, parse_options, publish
 from traffic import CONFIGURATIONS, timed
 
-from fogsim.loop import run
 from fogsim.metrics import METRICS, RunMetrics
 from fogsim.scenario import build
 from fogsim.scenario.loading import clock_settings, scenario_from_config
+from fogsim.simulation.loop import run
 from fogsim.study.profiles import RunProfiles
 from fogsim.values import Step
 

@@ -20,8 +20,8 @@ from harness import Row, lines_of, parse_options, publish
 from numpy.typing import NDArray
 from scipy.stats import ks_2samp, norm
 
-from fogsim.advised_driving import AdvisedDriving
-from fogsim.loop import ClosedLoop
+from fogsim.simulation.advised_driving import AdvisedDriving
+from fogsim.simulation.loop import ClosedLoop
 from fogsim.units import visibility_from_extinction
 from fogsim.values import Command, Estimate
 from fogsim_envs.task.sampling import EpisodeChoice, EpisodeSource

@@ -16,6 +16,7 @@ from pydantic_core import PydanticUndefined
 
 from fogsim.advice import ADVISERS
 from fogsim.conditions import SIGNALS
+from fogsim.core.parameters import accepted_parameters, mismatch
 from fogsim.estimators import ESTIMATORS
 from fogsim.estimators.huang2015_medians import Huang2015Repair
 from fogsim.estimators.negru2013 import Negru2013Repair
@@ -30,7 +31,6 @@ from fogsim.openscenario.elements import HARMLESS, REFUSED
 from fogsim.openscenario.entities import CLASSES
 from fogsim.openscenario.positions import POSITIONS
 from fogsim.openscenario.triggers import CONDITIONS
-from fogsim.parameters import accepted_parameters, mismatch
 from fogsim.recorders.events import EVENT_COLUMNS
 from fogsim.recorders.table_columns import Column, table_columns, traffic_table_columns
 from fogsim.recorders.trajectories import TRAJECTORY_COLUMNS

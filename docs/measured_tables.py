@@ -175,7 +175,7 @@ MEASUREMENTS = (
         5,
         ("returns fogsim/FogAdvisory-v1",),
         "fogsim/FogAdvisory-v1 --episodes 30",
-        "fogsim/loop.py",
+        "fogsim/simulation/loop.py",
         cores=2,
     ),
     environment("advisory_fast", 2, ("returns fogsim/FogAdvisoryFast-v1",), "fogsim/FogAdvisoryFast-v1", cores=2),

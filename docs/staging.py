@@ -15,8 +15,8 @@ from PIL import Image, ImageDraw, ImageFont
 
 import fogsim
 from fogsim.camera import mounted_pose
-from fogsim.ego.view_rendering import ViewRenderer
 from fogsim.scenario import Scenario, build
+from fogsim.simulation.ego.view_rendering import ViewRenderer
 from fogsim.traffic.road.network import read_net, road_network
 from fogsim.values import (
     CameraPose,

@@ -13,14 +13,14 @@ if TYPE_CHECKING:
     from fogsim.errors import MissingDependencyError as MissingDependencyError
     from fogsim.errors import SimulationError as SimulationError
     from fogsim.errors import UnplayedWarning as UnplayedWarning
-    from fogsim.loop import ClosedLoop as ClosedLoop
-    from fogsim.loop import run as run
-    from fogsim.plugin import attach as attach
-    from fogsim.plugin import connect as connect
     from fogsim.scenario import Scenario as Scenario
     from fogsim.scenario import catalogue as catalogue
     from fogsim.scenario import load_scenario as load_scenario
-    from fogsim.traffic_run import run_traffic as run_traffic
+    from fogsim.simulation.loop import ClosedLoop as ClosedLoop
+    from fogsim.simulation.loop import run as run
+    from fogsim.simulation.plugin import attach as attach
+    from fogsim.simulation.plugin import connect as connect
+    from fogsim.simulation.traffic_run import run_traffic as run_traffic
     from fogsim.values import Belief as Belief
     from fogsim.values import Camera as Camera
     from fogsim.values import Command as Command
@@ -68,14 +68,14 @@ _VALUES = (
 _LAZY = {
     **dict.fromkeys(_ERRORS, "fogsim.errors"),
     **dict.fromkeys(_VALUES, "fogsim.values"),
-    "ClosedLoop": "fogsim.loop",
-    "attach": "fogsim.plugin",
-    "connect": "fogsim.plugin",
+    "ClosedLoop": "fogsim.simulation.loop",
+    "attach": "fogsim.simulation.plugin",
+    "connect": "fogsim.simulation.plugin",
     "Scenario": "fogsim.scenario",
     "catalogue": "fogsim.scenario",
     "load_scenario": "fogsim.scenario",
-    "run": "fogsim.loop",
-    "run_traffic": "fogsim.traffic_run",
+    "run": "fogsim.simulation.loop",
+    "run_traffic": "fogsim.simulation.traffic_run",
     "semantic_mask": "fogsim.dataset",
     "transmission": "fogsim.dataset",
     "write_dataset": "fogsim.dataset",

@@ -1,7 +1,7 @@
 """``fogsim`` and ``python -m fogsim``: the command line, prepared for signals before its libraries are imported."""
 
-from fogsim.files.standard_streams import open_standard_streams
-from fogsim.interruption import leave_on_signals
+from fogsim.core.files.standard_streams import open_standard_streams
+from fogsim.core.interruption import leave_on_signals
 
 
 def main() -> None:

@@ -14,10 +14,10 @@ import yaml
 
 from fogsim.conditions import Condition
 from fogsim.conditions.terms import SignalTerm, all_of, any_of, condition, held, negated, signal
+from fogsim.core.files.atomic import write_text
+from fogsim.core.files.output_targets import refuse_unwritable
+from fogsim.core.parameters import checked_parameters
 from fogsim.errors import InputError, suggest
-from fogsim.files.atomic import write_text
-from fogsim.files.output_targets import refuse_unwritable
-from fogsim.parameters import checked_parameters
 from fogsim.scenario import Scenario, load_scenario
 from fogsim.scenario.camera_schema import CalibrationErrors, CameraSection, Exposure
 from fogsim.scenario.expect.schema import Expectation

@@ -7,9 +7,9 @@ import pytest
 
 import fogsim
 from fogsim.camera import mounted_pose
-from fogsim.ego.daylight import Ramp, in_daylight
-from fogsim.ego.view_rendering import ViewRenderer
 from fogsim.scenario import build
+from fogsim.simulation.ego.daylight import Ramp, in_daylight
+from fogsim.simulation.ego.view_rendering import ViewRenderer
 from fogsim.values import Lamp, SignMap
 from tests.test_grades import SETTINGS, road, traffic
 

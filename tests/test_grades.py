@@ -10,11 +10,11 @@ import pytest
 
 import fogsim
 from fogsim.camera import mounted_pose
-from fogsim.ego.equipment import EgoEquipment
-from fogsim.ego.fog_truth import fog_truth
-from fogsim.ego.view_rendering import ViewRenderer
-from fogsim.randomness import spawn_streams
+from fogsim.core.randomness import spawn_streams
 from fogsim.scenario import build, catalogue
+from fogsim.simulation.ego.equipment import EgoEquipment
+from fogsim.simulation.ego.fog_truth import fog_truth
+from fogsim.simulation.ego.view_rendering import ViewRenderer
 from fogsim.values import (
     Camera,
     Command,

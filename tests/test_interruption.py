@@ -12,8 +12,8 @@ import pytest
 from early_motorway import EARLY
 
 import fogsim
-from fogsim import interruption
-from fogsim.interruption import Interruption, ProgramSignals, interruptible
+from fogsim.core import interruption
+from fogsim.core.interruption import Interruption, ProgramSignals, interruptible
 
 
 def raise_as_numba_does() -> None:

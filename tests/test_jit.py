@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from numba.core import codegen
 
-import fogsim.jit  # noqa: F401 - lets numba use LinkedLibrary
-from fogsim.compiling.code_libraries import LinkedLibrary
+import fogsim.core.jit  # noqa: F401 - lets numba use LinkedLibrary
+from fogsim.core.compiling.code_libraries import LinkedLibrary
 
 CALLED = """
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 
 FACTOR = {factor}
 
@@ -23,7 +23,7 @@ def twice(x):
 
 CALLER = """
 import {called}
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from {called} import FACTOR, twice
 
 @kernel
@@ -78,7 +78,7 @@ def test_unchanged_sources_are_not_compiled_again(tmp_path: Path) -> None:
 def test_an_index_that_names_types_of_an_older_version_is_compiled_anew(tmp_path: Path) -> None:
     module = tmp_path / "renamed.py"
     text = (
-        "from typing import NamedTuple\n\nfrom fogsim.jit import kernel\n\n\n"
+        "from typing import NamedTuple\n\nfrom fogsim.core.jit import kernel\n\n\n"
         "class Old(NamedTuple):\n    x: float\n\n\n"
         "@kernel\ndef doubled(value):\n    return 2.0 * value.x\n\n\nprint(doubled(Old(21.0)))\n"
     )
@@ -127,18 +127,18 @@ import gc
 
 import numpy as np
 
-import fogsim.jit
-from fogsim.compiling.code_libraries import LinkedLibrary
+import fogsim.core.jit
+from fogsim.core.compiling.code_libraries import LinkedLibrary
 
-fogsim.jit.__package__ = "scratch"
+fogsim.core.jit.__package__ = "scratch"
 
-@fogsim.jit.kernel
+@fogsim.core.jit.kernel
 def root(x):
     if x < 0.0:
         raise ValueError("less than nothing", x)
     return np.sqrt(np.array([x]))[0]
 
-@fogsim.jit.kernel
+@fogsim.core.jit.kernel
 def doubled_root(x):
     return 2.0 * root(x)
 
@@ -185,8 +185,8 @@ def test_a_kernel_within_another_gets_no_code_of_its_own_until_python_calls_it(t
 OTHERS = """
 import numba
 
-import fogsim.jit
-from fogsim.compiling.code_libraries import LinkedLibrary
+import fogsim.core.jit
+from fogsim.core.compiling.code_libraries import LinkedLibrary
 
 made = []
 make_code = LinkedLibrary._make_code
@@ -219,7 +219,7 @@ def test_functions_that_others_compile_with_numba_are_compiled_as_ever() -> None
 
 
 LITERALS = """
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 
 @kernel
 def scaled(x, times, twice):

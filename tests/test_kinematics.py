@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from fogsim.kinematics import decelerated_speed, safe_speed, stopping_sight_distance
+from fogsim.core.kinematics import decelerated_speed, safe_speed, stopping_sight_distance
 
 
 @pytest.mark.parametrize(("kmh", "metres"), [(50, 63.1), (90, 154.4), (100, 182.9), (110, 213.7), (130, 282.0)])

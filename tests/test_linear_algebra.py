@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import fogsim
-from fogsim.linear_algebra import convolution, inverse_of, matrix_product, straight_line, times
+from fogsim.core.linear_algebra import convolution, inverse_of, matrix_product, straight_line, times
 
 RNG = np.random.default_rng(3)
 

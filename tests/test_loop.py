@@ -14,10 +14,10 @@ import pytest
 from early_motorway import EARLY, ROUTES
 
 import fogsim
-from fogsim.advised_driving import spread_advice
 from fogsim.errors import SimulationError
-from fogsim.loop import ClosedLoop, DriversFog
 from fogsim.scenario import Scenario
+from fogsim.simulation.advised_driving import spread_advice
+from fogsim.simulation.loop import ClosedLoop, DriversFog
 from fogsim.traffic.sumo_traffic import SumoTraffic
 from fogsim.values import Command, Display, Ending, FogChange, FogField, Lamp, SpeedAdvice, Step, Stretch, StretchAdvice
 
@@ -121,7 +121,7 @@ def test_in_homogeneous_fog_the_belief_follows_the_truth_and_advice_follows_the_
 def test_estimators_never_see_the_truth(monkeypatch: pytest.MonkeyPatch) -> None:
     """Deleting the truth from every step changes no estimate, belief or command."""
     honest = list(fogsim.run(small("fog.visibility_m=80"), seed=1))
-    monkeypatch.setattr("fogsim.ego.equipment.fog_truth", lambda *_: None)
+    monkeypatch.setattr("fogsim.simulation.ego.equipment.fog_truth", lambda *_: None)
     blind = list(fogsim.run(small("fog.visibility_m=80"), seed=1))
     for a, b in zip(honest, blind, strict=True):
         assert b.truth is None
@@ -189,7 +189,7 @@ def test_a_run_that_is_over_does_not_go_on() -> None:
 
 def test_importing_starts_no_sumo_and_no_gl() -> None:
     code = (
-        "import sys, fogsim, fogsim_envs, fogsim.loop; "
+        "import sys, fogsim, fogsim_envs, fogsim.simulation.loop; "
         "assert not {'libsumo', 'OpenGL', 'pyrender'} & set(sys.modules), sorted(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True, timeout=120)

@@ -7,14 +7,14 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import pytest
 
-from fogsim import registry
 from fogsim.advice import ADVISERS, FixedSpeed, StoppingSightDistance
+from fogsim.core import registry
+from fogsim.core.parameters import Range, accepted_parameters, checked_parameters, mismatch
+from fogsim.core.registry import Registry
 from fogsim.errors import InputError
 from fogsim.estimators import ESTIMATORS
 from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
-from fogsim.parameters import Range, accepted_parameters, checked_parameters, mismatch
-from fogsim.registry import Registry
 from fogsim.scenario import load_scenario
 from fogsim.values import Camera
 

@@ -11,8 +11,8 @@ import traci
 from early_motorway import EARLY
 
 import fogsim
+from fogsim.core.randomness import spawn_streams
 from fogsim.errors import InputError, SimulationError, UnplayedWarning
-from fogsim.randomness import spawn_streams
 from fogsim.scenario import build
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.traffic.sumo_traffic import command_line

@@ -8,7 +8,7 @@ import pytest
 import traci
 
 import fogsim
-from fogsim.plugin import AttachedSession
+from fogsim.simulation.plugin import AttachedSession
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.values import Step
 

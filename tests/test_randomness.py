@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from fogsim.randomness import spawn_streams
+from fogsim.core.randomness import spawn_streams
 
 
 def test_the_same_seed_gives_the_same_streams() -> None:

@@ -11,8 +11,8 @@ from pyarrow import parquet
 import fogsim
 from fogsim.errors import FogSimError, InputError, RecorderError, SimulationError, UnknownNameError
 from fogsim.recorders import ReportRecorder
-from fogsim.recording import record_run, record_traffic
 from fogsim.scenario import Scenario
+from fogsim.simulation.recording import record_run, record_traffic
 from fogsim.values import Step
 
 

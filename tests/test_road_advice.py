@@ -10,12 +10,12 @@ import pytest
 
 import fogsim
 from fogsim.atmosphere import extinction
-from fogsim.ego.road_meters import RoadMeters
 from fogsim.errors import InputError
-from fogsim.road_advice import RoadAdvice
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.parts import methods
 from fogsim.scenario.road_sections import road_sections, section_limits
+from fogsim.simulation.ego.road_meters import RoadMeters
+from fogsim.simulation.road_advice import RoadAdvice
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Display, FogField, RoadSection, SpeedAdvice, Step, Stretch
 from fogsim.values.belief import certain_belief

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from fogsim.loop import run
 from fogsim.metrics import RunMetrics
 from fogsim.scenario import load_scenario
+from fogsim.simulation.loop import run
 from fogsim.values import Ending
 
 CHILD = """

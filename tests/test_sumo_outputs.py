@@ -10,8 +10,8 @@ import pytest
 import fogsim
 from fogsim.errors import InputError
 from fogsim.recorders import RunDirectory, recover_run
-from fogsim.recording import record_run
 from fogsim.scenario import override, scenario_from_config
+from fogsim.simulation.recording import record_run
 from fogsim.study.execution import run_to_file
 from fogsim.traffic.sumo.output_folder import OutputFolder
 

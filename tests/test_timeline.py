@@ -10,9 +10,9 @@ from early_motorway import EARLY
 
 import fogsim
 from fogsim.errors import UnplayedWarning
-from fogsim.loop import ClosedLoop
 from fogsim.scenario import Scenario, load_scenario
-from fogsim.timeline import Timeline
+from fogsim.simulation.loop import ClosedLoop
+from fogsim.simulation.timeline import Timeline
 from fogsim.values import Command, Ending, Lamp, Reason, Step, TrafficState, TrafficStep, Truth
 from fogsim.values.script import Begun, ChangeFog, ChangeLane, ChangeSpeed, Depart, Stop
 

@@ -12,9 +12,9 @@ from fogsim.metrics import TrafficRunMetrics
 from fogsim.scenario import Scenario, load_scenario
 from fogsim.scenario.build import check_frames
 from fogsim.scenario.loading import scenario_from_config
+from fogsim.simulation.traffic_run import TrafficRun
 from fogsim.study.execution import measure_run
 from fogsim.study.plan import load_study, needs_camera
-from fogsim.traffic_run import TrafficRun
 from fogsim.values import Ending, TrafficStep
 
 ALONE = ("traffic.ego=none", "estimators=[]", "lighting=low_beam", "traffic.events=[]")

@@ -9,8 +9,8 @@ import pytest
 import fogsim
 from fogsim.cli.app import app
 from fogsim.errors import UnplayedWarning
-from fogsim.recording import record_run
 from fogsim.scenario import Scenario, scenario_from_config
+from fogsim.simulation.recording import record_run
 from fogsim.values import Ending, Reason
 
 GRID = Path(__file__).parent / "data" / "grid" / "grid.sumocfg"

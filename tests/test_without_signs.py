@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import fogsim
-from fogsim.recording import record_signs
+from fogsim.simulation.recording import record_signs
 
 RADIUS = 400.0
 SCENARIO = """

@@ -19,7 +19,7 @@ from pathlib import Path
 from types import ModuleType
 
 import fogsim
-from fogsim.registry import Registry
+from fogsim.core.registry import Registry
 
 ROOT = Path(__file__).resolve().parents[1]
 MOST_LINES, LONGER = 4, 520

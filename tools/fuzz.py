@@ -127,12 +127,12 @@ MODULE_TOKENS = [
 
 def entries() -> dict[str, Entry]:
     """All entry points, whose libraries are imported only here."""
+    from fogsim.core.registry.user_code import import_nothing  # noqa: PLC0415
     from fogsim.estimators.learned.onnx_model import read_model  # noqa: PLC0415 - the parent needs none of them
     from fogsim.offline.camera_file import load_calibration  # noqa: PLC0415
     from fogsim.offline.drive.sign_file import load_sign_file  # noqa: PLC0415
     from fogsim.offline.drive.track_file import load_track  # noqa: PLC0415
     from fogsim.offline.input_paths import find_source  # noqa: PLC0415
-    from fogsim.registry.user_code import import_nothing  # noqa: PLC0415
     from fogsim.scenario.loading import load_cases, load_scenario  # noqa: PLC0415
     from fogsim.study import load_study  # noqa: PLC0415
     from fogsim.study.run_file import STUDY_RUN, read_run  # noqa: PLC0415

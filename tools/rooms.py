@@ -241,7 +241,7 @@ def summary() -> dict[str, int]:
     texts = [path.read_text(encoding="utf-8") for path in sorted((ROOT / "fogsim").rglob("*.py"))]
     trees = [ast.parse(text) for text in texts]
     public = [node for tree in trees for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)]
-    loop = next(name for name in ("fogsim.simulation.loop", "fogsim.loop") if name in modules())
+    loop = next(name for name in ("fogsim.simulation.loop", "fogsim.simulation.loop") if name in modules())
     loaded = f"import sys, {loop}; print(sum(name.partition('.')[0] == 'fogsim' for name in sys.modules))"
     scripts = [path for folder in ("benchmarks", "docs", "tools") for path in (ROOT / folder).rglob("*.py")]
     pages = [*(ROOT / "docs").rglob("*.md"), *(ROOT / f"{name}.md" for name in ("README", "CONTRIBUTING", "CHANGELOG"))]

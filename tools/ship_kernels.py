@@ -19,7 +19,7 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 FOLDER = "fogsim/_kernels"
-"""Where the wheel has them, as `fogsim.compiling.shipped_code` finds them."""
+"""Where the wheel has them, as `fogsim.core.compiling.shipped_code` finds them."""
 
 SOURCES = ("fogsim", "envs", "scenarios")
 COMPILE = ("-c", "from fogsim.cli.compile import compile_kernels\nfor ready in compile_kernels():\n    print(ready)")
@@ -61,7 +61,7 @@ def compiled_for(root: Path) -> Mapping[str, str] | None:
         return None
     sys.path.insert(0, str(root))
     # What hatchling imports must not need what only the build needs.
-    from fogsim.compiling.shipped_code import compiled_for as variables  # noqa: PLC0415
+    from fogsim.core.compiling.shipped_code import compiled_for as variables  # noqa: PLC0415
 
     sys.path.remove(str(root))
     return variables()

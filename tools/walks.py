@@ -26,9 +26,9 @@ HERE = str(Path(fogsim.__file__).parent) + os.sep
 SETTINGS = ("duration_s=3", "camera.width=64", "camera.height=48", "renderer=cpu", "fog.outside_visibility_m=80")
 METHODS = ("negru2013", "zhu2015", "huang2015_rough", "joint_road")
 ROOMS = {
-    "fog": ("scenario", "units", "values", "loop", "ego", "atmosphere", "camera"),
+    "fog": ("scenario", "units", "values", "simulation", "atmosphere", "camera"),
     "estimate": ("estimators", "vision", "values", "units"),
-    "advice": ("loop", "ego", "advice", "values", "traffic", "fusion"),
+    "advice": ("simulation", "advice", "values", "traffic", "fusion"),
 }
 """Rooms that a walk leads through; what runs next to it in others is not of it."""
 

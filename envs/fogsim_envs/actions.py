@@ -7,8 +7,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from fogsim.core.parameters import parameter_mistakes
 from fogsim.errors import InputError, shown
-from fogsim.parameters import parameter_mistakes
 
 T = TypeVar("T")
 

@@ -8,11 +8,11 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from fogsim.advised_driving import spread_advice, warned
+from fogsim.core.parameters import checked_parameters
+from fogsim.core.randomness import Seed
 from fogsim.errors import InputError
-from fogsim.parameters import checked_parameters
-from fogsim.randomness import Seed
 from fogsim.scenario import Scenario, build
+from fogsim.simulation.advised_driving import spread_advice, warned
 from fogsim.values import Ending, Step
 from fogsim_envs.actions import checked_action, checked_options
 from fogsim_envs.hosting import Simulation, refuse_copies

@@ -4,7 +4,7 @@ import functools
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from fogsim.parameters import checked_parameters
+from fogsim.core.parameters import checked_parameters
 from fogsim.scenario import Scenario, load_scenario, override
 from fogsim_envs.advising import AdvisingEnv
 from fogsim_envs.hosting import TIMEOUT, Timeout, begin, checked_timeout

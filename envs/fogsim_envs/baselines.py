@@ -8,9 +8,9 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from fogsim.kinematics import stopping_sight_distance
+from fogsim.core.kinematics import stopping_sight_distance
+from fogsim.core.registry import Registry, make
 from fogsim.metrics import DEFAULT_STANDARD
-from fogsim.registry import Registry, make
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Lamp
 from fogsim_envs.spaces import ACTION_LEVELS, ADVISED_SPEEDS, LAMP_MODES, action_of

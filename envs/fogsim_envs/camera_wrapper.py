@@ -9,13 +9,13 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 
-from fogsim.ego.equipment import EgoEquipment
+from fogsim.core.parameters import checked_parameters
+from fogsim.core.randomness import Seed, spawn_streams
 from fogsim.errors import InputError
-from fogsim.loop import DriversFog
-from fogsim.parameters import checked_parameters
-from fogsim.randomness import Seed, spawn_streams
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.loading import clock_settings
+from fogsim.simulation.ego.equipment import EgoEquipment
+from fogsim.simulation.loop import DriversFog
 from fogsim.traffic.highway import (
     Fleet,
     RouteProgress,

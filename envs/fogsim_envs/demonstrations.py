@@ -9,8 +9,8 @@ from typing import Annotated, Any
 
 import gymnasium
 
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.errors import FogSimError, InputError, MissingDependencyError
-from fogsim.parameters import Range, checked_parameters
 from fogsim_envs.baselines import BASELINES, baseline
 
 

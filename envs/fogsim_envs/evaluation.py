@@ -10,9 +10,9 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.parameters import Range, checked_parameters
+from fogsim.core.randomness import Seed
 from fogsim.errors import InputError
-from fogsim.parameters import Range, checked_parameters
-from fogsim.randomness import Seed
 from fogsim_envs.baselines import Info, Policy, baseline
 from fogsim_envs.infos import reward_terms_of, word_of
 

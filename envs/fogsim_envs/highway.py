@@ -8,11 +8,11 @@ from typing import Annotated, Any
 
 import gymnasium
 
+from fogsim.core.parameters import Range, checked_parameters, mismatch
 from fogsim.errors import InputError, shown
-from fogsim.loop import ClosedLoop
-from fogsim.parameters import Range, checked_parameters, mismatch
 from fogsim.scenario import Scenario, attached_scenario, build
 from fogsim.scenario.loading import clock_settings
+from fogsim.simulation.loop import ClosedLoop
 from fogsim.traffic.highway import EGO, HighwayTraffic, OtherRoadsError, is_highway_environment
 from fogsim.values import Command, Step
 from fogsim_envs.advising import AdvisingEnv

@@ -8,9 +8,9 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from fogsim.errors import FogSimError, SimulationError
-from fogsim.loop import ClosedLoop
 from fogsim.scenario import Scenario
-from fogsim.traffic_run import TrafficRun
+from fogsim.simulation.loop import ClosedLoop
+from fogsim.simulation.traffic_run import TrafficRun
 from fogsim.values import Step, TrafficStep
 
 HEARTBEAT_PERIOD = 1.0

@@ -12,12 +12,12 @@ from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from typing import Annotated, Any, Protocol, cast
 
+from fogsim.core.files.standard_streams import open_standard_streams
+from fogsim.core.parameters import Range
 from fogsim.errors import InputError, SimulationError, SimulationRunningError
-from fogsim.files.standard_streams import open_standard_streams
-from fogsim.loop import ClosedLoop
-from fogsim.parameters import Range
 from fogsim.scenario import Scenario
-from fogsim.traffic_run import TrafficRun
+from fogsim.simulation.loop import ClosedLoop
+from fogsim.simulation.traffic_run import TrafficRun
 from fogsim.values import Command, Step, TrafficStep
 
 TIMEOUT = 60.0
@@ -34,10 +34,10 @@ class Simulation(Protocol):
     """What an environment needs of a closed loop, wherever it runs."""
 
     def start(self, seed: int) -> Step:
-        """Begin a run; see `fogsim.loop.ClosedLoop.start`."""
+        """Begin a run; see `fogsim.simulation.loop.ClosedLoop.start`."""
 
     def advance(self, command: Command) -> Step:
-        """Move by one camera period; see `fogsim.loop.ClosedLoop.advance`."""
+        """Move by one camera period; see `fogsim.simulation.loop.ClosedLoop.advance`."""
 
     def close(self) -> None:
         """End the simulation; closing twice is allowed."""
@@ -82,10 +82,10 @@ class TrafficSimulation(Protocol):
     """What an environment needs of traffic without an ego, wherever it runs."""
 
     def start(self, seed: int) -> tuple[TrafficStep, float]:
-        """Begin a run; see `fogsim.traffic_run.TrafficRun.start`."""
+        """Begin a run; see `fogsim.simulation.traffic_run.TrafficRun.start`."""
 
     def advance(self, command: Command) -> tuple[TrafficStep, float]:
-        """Move by one camera period; see `fogsim.traffic_run.TrafficRun.advance`."""
+        """Move by one camera period; see `fogsim.simulation.traffic_run.TrafficRun.advance`."""
 
     def close(self) -> None:
         """End the simulation; closing twice is allowed."""
@@ -191,11 +191,11 @@ class HostedLoop(_Host):
     """A closed loop in a child process; see `_Host` for parameters."""
 
     def start(self, seed: int) -> Step:
-        """Begin a run; see `fogsim.loop.ClosedLoop.start`."""
+        """Begin a run; see `fogsim.simulation.loop.ClosedLoop.start`."""
         return cast("Step", self._start(seed))
 
     def advance(self, command: Command) -> Step:
-        """Move by one camera period; see `fogsim.loop.ClosedLoop.advance`."""
+        """Move by one camera period; see `fogsim.simulation.loop.ClosedLoop.advance`."""
         return cast("Step", self._ask("advance", command))
 
 
@@ -203,11 +203,11 @@ class HostedTraffic(_Host):
     """Traffic without an ego in a child process; see `_Host` for parameters."""
 
     def start(self, seed: int) -> tuple[TrafficStep, float]:
-        """Begin a run; see `fogsim.traffic_run.TrafficRun.start`."""
+        """Begin a run; see `fogsim.simulation.traffic_run.TrafficRun.start`."""
         return cast("tuple[TrafficStep, float]", self._start(seed))
 
     def advance(self, command: Command) -> tuple[TrafficStep, float]:
-        """Move by one camera period; see `fogsim.traffic_run.TrafficRun.advance`."""
+        """Move by one camera period; see `fogsim.simulation.traffic_run.TrafficRun.advance`."""
         return cast("tuple[TrafficStep, float]", self._ask("advance", command))
 
 

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
+from fogsim.core.parameters import checked_parameters
 from fogsim.metrics import DEFAULT_STANDARD, SafetyStandard, stopping_sight_distance
-from fogsim.parameters import checked_parameters
 from fogsim.values import Lamp, Step
 
 COMFORTABLE_DECELERATION = 2.0

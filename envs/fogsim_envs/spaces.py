@@ -7,7 +7,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from fogsim.parameters import Range
+from fogsim.core.parameters import Range
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Camera, Command, Lamp, SpeedAdvice, Step
 

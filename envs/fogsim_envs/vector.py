@@ -17,8 +17,8 @@ import gymnasium
 from gymnasium.vector import AsyncVectorEnv
 from gymnasium.vector.async_vector_env import AsyncState
 
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.errors import SimulationError
-from fogsim.parameters import Range, checked_parameters
 from fogsim_envs.hosting import Timeout, checked_timeout
 
 TIMEOUT = 600.0

@@ -13,7 +13,7 @@ from fogsim.advice.step_tables import (
     TennesseeI75,
     VirginiaI77,
 )
-from fogsim.registry import Registry
+from fogsim.core.registry import Registry
 
 ADVISERS: Registry[Callable[..., Adviser | VehicleAdviser]] = Registry(
     "adviser",

@@ -5,7 +5,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
-from fogsim.parameters import Range
+from fogsim.core.parameters import Range
 from fogsim.values import Belief, FogProfile, SpeedAdvice
 from fogsim.values.belief import OLDEST, WIDEST
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 from fogsim.advice.presentation import PresentedAdviser
-from fogsim.kinematics import DECELERATION, REACTION_TIME, safe_speed
-from fogsim.parameters import Range, checked_parameters
+from fogsim.core.kinematics import DECELERATION, REACTION_TIME, safe_speed
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.units import GRAVITY, KMH_PER_MPS
 from fogsim.values import Belief, SpeedAdvice
 

@@ -8,9 +8,9 @@ from itertools import pairwise
 from typing import Annotated
 
 from fogsim.advice.presentation import PresentedAdviser
+from fogsim.core.kinematics import DECELERATION, REACTION_TIME, safe_speed
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.errors import InputError
-from fogsim.kinematics import DECELERATION, REACTION_TIME, safe_speed
-from fogsim.parameters import Range, checked_parameters
 from fogsim.units import KMH_PER_MPS, METRES_PER_MILE
 
 _MPH = METRES_PER_MILE / 3600.0

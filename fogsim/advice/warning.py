@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from fogsim.kinematics import DECELERATION, REACTION_TIME, stopping_sight_distance
+from fogsim.core.kinematics import DECELERATION, REACTION_TIME, stopping_sight_distance
 from fogsim.units import visibility_from_extinction
 from fogsim.values import Belief, Command, DriverWarning, Observation, WarningMemory
 from fogsim.values.belief import NO_FOG, OLDEST

@@ -15,9 +15,9 @@ from fogsim.atmosphere.lamps.phase_function import Droplets, PhaseFunction, blur
 from fogsim.atmosphere.lamps.road_glow import RoadGlow
 from fogsim.atmosphere.lamps.veil import FOLD_DISTANCE, INTERVALS, PHASE_SPREAD, SPREAD, ray_pieces
 from fogsim.atmosphere.lamps.veil_kernels import LitAir, ScatteringPhase, VeilRays, add_scattered_light, integrate_veil
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.estimators.night.own_light import SUB_ROWS, VISIBILITIES, Cells, OwnLight, cells_of
 from fogsim.lighting import LampMount, own_head_lamps
-from fogsim.linear_algebra import matrix_product
 from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.fog import FogField

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere import Air
 from fogsim.atmosphere.lamps.phase_function import Droplets
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.errors import UnknownNameError
 from fogsim.estimators.night.cells import camera_of_cells
 from fogsim.estimators.night.references import VeilReferences
 from fogsim.lighting import own_head_lamps
-from fogsim.linear_algebra import matrix_product
 from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.fog import FogField

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.camera.exposure_kernels import Exposure, develop, luminance_samples
-from fogsim.jit import Bands
+from fogsim.core.jit import Bands
 from fogsim.values import Camera, Response
 from fogsim.values.camera_response import respond
 

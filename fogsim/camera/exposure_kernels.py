@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.units import LUMINANCE_WEIGHTS
 
 _MEAN, _FIRST, _THIRD, _FIFTH = 510.0, 6.5477767300336385e-3, 1.2394842240073496e-9, 2.7005539623815466e-14

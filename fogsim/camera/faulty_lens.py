@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.camera.soiling import DirtyGlass, WetGlass
-from fogsim.linear_algebra import matrix_product
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.values import Camera, CameraPose, RunningFault
 from fogsim.values.fault import DirtyLens, Glare, WetLens
 from fogsim.values.pinhole import camera_axes

@@ -17,7 +17,7 @@ from fogsim.camera.glare_kernels import (
     share_among_cells,
     spread_core,
 )
-from fogsim.jit import Bands
+from fogsim.core.jit import Bands
 from fogsim.values import Camera
 
 BRIGHT = 32.0

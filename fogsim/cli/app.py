@@ -27,8 +27,8 @@ from fogsim.cli.starting import new_command, schema_command
 from fogsim.cli.study import study_command
 from fogsim.cli.test import check_command
 from fogsim.cli.view import view_command
+from fogsim.core.interruption import ProgramSignals, leave, leave_on_signals
 from fogsim.errors import FogSimError, MethodError
-from fogsim.interruption import ProgramSignals, leave, leave_on_signals
 
 app = typer.Typer(
     name="fogsim",

@@ -9,7 +9,7 @@ from rich.table import Table
 
 from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
 from fogsim.cli.progress import progress_bar
-from fogsim.interruption import interruptible
+from fogsim.core.interruption import interruptible
 
 calibrate = typer.Typer(no_args_is_help=True, help="Measure what a method must know of a camera.")
 
@@ -31,8 +31,8 @@ def calibrate_signs_command(
 ) -> None:
     """From how far signs are detected in fog: the operating range that belaroussi2015 turns into a visibility."""
     from fogsim.calibration.sign_calibration import measure_operating_range
-    from fogsim.files.atomic import write_bytes
-    from fogsim.files.output_targets import refuse_unwritable
+    from fogsim.core.files.atomic import write_bytes
+    from fogsim.core.files.output_targets import refuse_unwritable
     from fogsim.offline.camera_file import load_camera
 
     refuse_unwritable(out, "--out", overwrite=overwrite, read=[camera])
@@ -85,8 +85,8 @@ def calibrate_halos_command(
 ) -> None:
     """How steeply light falls off about lamps in clear air and in fog: below which Br50 gallen2014 sees fog."""
     from fogsim.calibration.halo_calibration import measure_halo_threshold
-    from fogsim.files.atomic import write_bytes
-    from fogsim.files.output_targets import refuse_unwritable
+    from fogsim.core.files.atomic import write_bytes
+    from fogsim.core.files.output_targets import refuse_unwritable
     from fogsim.offline.camera_file import load_camera
 
     refuse_unwritable(out, "--out", overwrite=overwrite, read=[camera])

@@ -62,7 +62,7 @@ def compile_command() -> None:
 
 def compile_kernels() -> Iterator[str]:
     """Compile and cache the kernels of drives by day and by night; yield a description of each finished part."""
-    from fogsim.jit import processors
+    from fogsim.core.jit import processors
 
     with ProcessPoolExecutor(min(2, processors()), multiprocessing.get_context("spawn"), _be_quiet) as pool:
         # Estimators share hardly any kernels with rendering; the other drives share many with the first.
@@ -96,9 +96,9 @@ def _drive(scenario: str, drives: Sequence[Sequence[str]]) -> None:
 
     For its metrics, all vehicles are in one junction.
     """
-    from fogsim.loop import run
     from fogsim.metrics import RunMetrics
     from fogsim.scenario import load_scenario
+    from fogsim.simulation.loop import run
 
     for overrides in drives:
         metrics = RunMetrics()
@@ -112,9 +112,9 @@ def _estimate_visibility() -> None:
     """Run every daytime method, also as published, on images of a foggy road with a vehicle ahead that leaves."""
     import numpy as np
 
+    from fogsim.core.parameters import accepted_parameters
     from fogsim.estimators import ESTIMATORS
     from fogsim.fusion import FUSIONS
-    from fogsim.parameters import accepted_parameters
     from fogsim.values import Camera
     from fogsim.vision.uneven.uneven_kernels import extinction_at
     from fogsim.vision.vehicle.decay_fit import fit_decay

@@ -34,7 +34,7 @@ def compiling_in_background() -> Iterator[Callable[["Scenario"], None]]:
     if process is None:
         yield lambda _: None
         return
-    from fogsim.jit import COMPILER_PROCESS
+    from fogsim.core.jit import COMPILER_PROCESS
 
     with ExitStack() as stack:
         stack.callback(_end, process)
@@ -95,7 +95,7 @@ def _methods(scenario: "Scenario") -> dict[str, Any]:
 
 def _is_first() -> bool:
     """Whether no kernel of those modules was ever compiled here, and kernels can be cached."""
-    from fogsim.jit import is_kept, processors
+    from fogsim.core.jit import is_kept, processors
 
     # Everything that the methods use was imported with them.
     modules = [module for name, module in tuple(sys.modules.items()) if name.startswith(PACKAGES)]

@@ -11,8 +11,8 @@ from rich.table import Table
 
 from fogsim.cli.printing import INTERRUPTED, escape, stderr, stdout
 from fogsim.cli.progress import progress_bar
+from fogsim.core.interruption import interruptible
 from fogsim.errors import InputError, UnknownNameError
-from fogsim.interruption import interruptible
 
 if TYPE_CHECKING:
     from fogsim.reproduce import Evaluation, Reproduction
@@ -36,7 +36,7 @@ def reproduce_command(
     as_json: Annotated[bool, typer.Option("--json", help="Flat records, one a line, in place of the tables.")] = False,
 ) -> None:
     """Run a paper's evaluation again on FogSim's frames or traffic; its figures stand next to ours."""
-    from fogsim.files.output_targets import refuse_unwritable, refuse_unwritable_folder
+    from fogsim.core.files.output_targets import refuse_unwritable, refuse_unwritable_folder
     from fogsim.reproduce import REPRODUCTIONS
 
     if paper != ALL and paper not in REPRODUCTIONS:

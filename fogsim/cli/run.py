@@ -28,8 +28,8 @@ from fogsim.cli.scenario_options import (
 from fogsim.errors import InputError, UnplayedWarning
 
 if TYPE_CHECKING:
-    from fogsim.recording import RecordedRun
     from fogsim.scenario import Scenario
+    from fogsim.simulation.recording import RecordedRun
 
 SHOWN = {
     "distance_m": ("distance driven", "m"),
@@ -111,8 +111,8 @@ def run_command(
     with compiling_in_background() as compile_for:
         loaded, of_file = chosen_case(scenario, sumocfg, ego, visibility, settings, case, seed)
         compile_for(loaded)
-        from fogsim.recording import record_run, record_traffic
         from fogsim.scenario.wording.sentences import empty_start
+        from fogsim.simulation.recording import record_run, record_traffic
 
         if warning := empty_start(loaded):
             stderr.print(f"[yellow]{escape(warning)}[/]", soft_wrap=True)
@@ -151,7 +151,7 @@ def _camera_processes(scenario: "Scenario", wanted: int | None) -> int:
     """Number of processes that render the cameras of other equipped vehicles, if any."""
     if not scenario.traffic.has_equipped:
         return 0
-    from fogsim.jit import processors
+    from fogsim.core.jit import processors
 
     return processors() - 1 if wanted is None else wanted
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from fogsim.cli.printing import print_remarks
+from fogsim.core.files.maps import MAPS
 from fogsim.errors import InputError
-from fogsim.files.maps import MAPS
 
 if TYPE_CHECKING:
     from fogsim.scenario import Scenario

@@ -45,7 +45,7 @@ def validate_command(
     maps: Maps = None,  # noqa: ARG001 - its callback does it
 ) -> None:
     """Check scenario files; every mistake is named with file, line, key, value and what is allowed."""
-    from fogsim.registry.user_code import import_nothing
+    from fogsim.core.registry.user_code import import_nothing
     from fogsim.scenario.loading import load_cases
 
     may_import = CodeNotice() if allow_code else import_nothing
@@ -71,9 +71,9 @@ def signs_command(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
 ) -> None:
     """Write the signs of a scenario's road network, additional files and OpenDRIVE signals as GeoJSON."""
-    from fogsim.recording import record_signs
-    from fogsim.registry.user_code import import_nothing
+    from fogsim.core.registry.user_code import import_nothing
     from fogsim.scenario import load_scenario
+    from fogsim.simulation.recording import record_signs
 
     loaded = load_scenario(scenario, settings or (), may_import=import_nothing)
     signs = record_signs(loaded, out, overwrite=overwrite).signs

@@ -44,7 +44,7 @@ def study_command(
     method_timeout: MethodTimeout = None,
 ) -> None:
     """Run a grid of policies, fogs, drivers and seeds, and write a table, differences with intervals, and a report."""
-    from fogsim.registry.user_code import import_nothing
+    from fogsim.core.registry.user_code import import_nothing
     from fogsim.scenario.wording.sentences import empty_start
     from fogsim.study import RayCluster, load_study, run_study
 

@@ -83,7 +83,7 @@ def check_command(
 
 def _refuse_outputs(read: Sequence[Path], out: Path, pages: Mapping[str, Path | None]) -> None:
     """Refuse before the first run what could not be written after the last."""
-    from fogsim.files.output_targets import refuse_clashes, refuse_unwritable, refuse_unwritable_folder
+    from fogsim.core.files.output_targets import refuse_clashes, refuse_unwritable, refuse_unwritable_folder
 
     refuse_unwritable_folder(out)
     named = {option: path for option, path in pages.items() if path is not None}

@@ -18,8 +18,8 @@ from fogsim.cli.scenario_options import (
 from fogsim.errors import InputError
 
 if TYPE_CHECKING:
-    from fogsim.ego.view_rendering import Surrounding
     from fogsim.scenario import Scenario
+    from fogsim.simulation.ego.view_rendering import Surrounding
 
 
 def view_command(
@@ -64,9 +64,9 @@ def view_command(
 
 def _surrounding(scenario: "Scenario", at: float, seed: int) -> "Surrounding":
     """Run a scenario with its own policy to an instant [s]."""
-    from fogsim.advised_driving import AdvisedDriving
-    from fogsim.loop import ClosedLoop
     from fogsim.scenario.build import check_ego
+    from fogsim.simulation.advised_driving import AdvisedDriving
+    from fogsim.simulation.loop import ClosedLoop
 
     check_ego(scenario, "fogsim view")
     # The viewer needs its own type of OpenGL context, so no frames are rendered.

@@ -9,8 +9,8 @@ from fogsim.conditions.bodies import Body, body_of, clearance
 from fogsim.conditions.moment import Moment
 from fogsim.conditions.route_places import Extent, gap_between, headway_between, time_to_meet
 from fogsim.conditions.signal import Kind, LanePlace, Need, Place, Signal
-from fogsim.kinematics import DECELERATION, REACTION_TIME, stopping_sight_distance
-from fogsim.registry import Registry
+from fogsim.core.kinematics import DECELERATION, REACTION_TIME, stopping_sight_distance
+from fogsim.core.registry import Registry
 from fogsim.units import KMH_PER_MPS
 from fogsim.units.quantities import parse_quantity
 from fogsim.values import DriverWarning, Ending, Estimate, FogBank, Lamp, Leader, SignalAhead, SignalColour, Step

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 from fogsim.conditions.parsing import parse_condition
 from fogsim.conditions.syntax import Condition
+from fogsim.core.parameters import checked_parameters
 from fogsim.errors import InputError, shown
-from fogsim.parameters import checked_parameters
 
 
 def _parsed(written: str | dict[str, object]) -> Condition:

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, NonNegativeInt, PositiveInt, ValidationError
 
+from fogsim.core.files.atomic import partial_path, write_bytes, write_json
+from fogsim.core.files.output_targets import refuse_unwritable_folder
+from fogsim.core.files.readers import read_bytes, read_json
+from fogsim.core.files.writer_lock import LOCK_NAME, WriterLock
 from fogsim.dataset.encoding import png
 from fogsim.errors import InputError, shown
-from fogsim.files.atomic import partial_path, write_bytes, write_json
-from fogsim.files.output_targets import refuse_unwritable_folder
-from fogsim.files.readers import read_bytes, read_json
-from fogsim.files.writer_lock import LOCK_NAME, WriterLock
 
 IDENTITY = "dataset.json"
 ANNOTATIONS = "annotations.json"

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.files.readers import read_bytes
 from fogsim.errors import FogSimError, InputError
-from fogsim.files.readers import read_bytes
 
 DEPTH_UNIT = 0.01
 """Distance per step of a depth image [m]."""

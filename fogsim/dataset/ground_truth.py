@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import Air
+from fogsim.core.linear_algebra import matrix_product
+from fogsim.core.parameters import checked_parameters
 from fogsim.errors import InputError
-from fogsim.linear_algebra import matrix_product
-from fogsim.parameters import checked_parameters
 from fogsim.values import Step, Truth, View
 from fogsim.values.observation import sign_map_values
 from fogsim.values.pinhole import ray_from_pixel

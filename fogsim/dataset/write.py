@@ -9,18 +9,18 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
 
-from fogsim.advised_driving import AdvisedDriving
+from fogsim.core.interruption import Interruption
+from fogsim.core.parameters import Range, checked_parameters
+from fogsim.core.randomness import Seed
 from fogsim.dataset.annotations import coco, frame_record, object_records
 from fogsim.dataset.directory import DatasetDirectory
 from fogsim.dataset.encoding import DEPTH_UNIT, TRANSMISSION_UNIT, encoded_depth, encoded_transmission
 from fogsim.dataset.ground_truth import SemanticClass, depth, instance_mask, semantic_mask, sign_picture, transmission
 from fogsim.dataset.inputs import identity
 from fogsim.errors import InputError
-from fogsim.interruption import Interruption
-from fogsim.loop import ClosedLoop
-from fogsim.parameters import Range, checked_parameters
-from fogsim.randomness import Seed
 from fogsim.scenario import Scenario, build
+from fogsim.simulation.advised_driving import AdvisedDriving
+from fogsim.simulation.loop import ClosedLoop
 from fogsim.values import Ending, Step
 
 Count = Annotated[int, Range(1, math.inf)]

@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from importlib import import_module
 
-from fogsim import registry
+from fogsim.core import registry
+from fogsim.core.parameters import checked_parameters
+from fogsim.core.registry import Registry
 from fogsim.estimators.cramer_rao import FoggyRoad, extinction_bound
 from fogsim.estimators.learned import OnnxGuest, conformal_factor, onnx_guest
 from fogsim.estimators.protocol import Estimator, TakesCalibrations
-from fogsim.parameters import checked_parameters
-from fogsim.registry import Registry
 from fogsim.values.camera import Camera
 
 

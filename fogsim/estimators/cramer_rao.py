@@ -7,8 +7,8 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.linear_algebra import inverse_of, matrix_product
-from fogsim.parameters import Range, checked_parameters
+from fogsim.core.linear_algebra import inverse_of, matrix_product
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
 
 Floats = NDArray[np.float64]

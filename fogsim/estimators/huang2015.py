@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.errors import InputError
 from fogsim.estimators.huang2015_lead import Huang2015Lead
 from fogsim.estimators.huang2015_rough import Huang2015Rough
 from fogsim.estimators.image_check import ObservationCheck
-from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate

@@ -7,8 +7,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.estimators.huang2015_ratios import RANGE_DEVIATION
-from fogsim.linear_algebra import matrix_product
 from fogsim.values.camera import Camera
 from fogsim.vision.light.clipped_sky import clipping, darker_by
 from fogsim.vision.light.luminance import linear_luminance

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.errors import InputError
 from fogsim.estimators.huang2015_comparison import Comparison, crop_vehicle
 from fogsim.estimators.huang2015_ratios import (
@@ -20,7 +21,6 @@ from fogsim.estimators.huang2015_ratios import (
 )
 from fogsim.estimators.huang2015_track import LeadTrack
 from fogsim.estimators.image_check import ObservationCheck
-from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation

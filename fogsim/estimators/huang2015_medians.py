@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.estimators.negru2013_band import fog_limits, fog_slope
 from fogsim.estimators.repairs import Repair
-from fogsim.linear_algebra import matrix_product
 from fogsim.values.camera import Camera
 from fogsim.values.observation import LeadMeasurement
 from fogsim.vision.light.luminance import linear_pixels

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.linear_algebra import inverse_of, matrix_product, straight_line
+from fogsim.core.linear_algebra import inverse_of, matrix_product, straight_line
 
 Floats = NDArray[np.float64]
 

@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.parameters import checked_parameters
 from fogsim.estimators.huang2015_medians import (
     BELOW_INFLECTION,
     ROWS_APART,
@@ -17,7 +18,6 @@ from fogsim.estimators.huang2015_medians import (
 )
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.repairs import chosen
-from fogsim.parameters import checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation

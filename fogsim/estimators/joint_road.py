@@ -6,8 +6,8 @@ from typing import Annotated
 
 import numpy as np
 
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.estimators.image_check import ObservationCheck
-from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import DenserFog, Estimate, OpticalDepths
 from fogsim.values.observation import Observation

@@ -7,10 +7,10 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.lead_contrast_track import DENSEST, SPACING, ContrastTrack, RearDetection
 from fogsim.estimators.tracked_vehicle import SmoothedRanges
-from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate

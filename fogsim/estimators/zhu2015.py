@@ -9,11 +9,11 @@ from typing import Annotated, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.linear_algebra import matrix_product
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.repairs import chosen
 from fogsim.estimators.zhu2015_road import SeenRoad, Zhu2015Repair, inflection_rows, seen_road, steepest_fog
-from fogsim.linear_algebra import matrix_product
-from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate, FogCategory, fog_category
 from fogsim.values.observation import Observation

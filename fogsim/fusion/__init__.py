@@ -2,14 +2,14 @@
 
 from collections.abc import Callable
 
-from fogsim import registry
+from fogsim.core import registry
+from fogsim.core.parameters import checked_parameters
+from fogsim.core.registry import Registry
 from fogsim.fusion.field_filter import FieldFilter
 from fogsim.fusion.grid_filter import GridFilter
 from fogsim.fusion.mixture_filter import MixtureFilter
 from fogsim.fusion.no_fusion import NoFusion
 from fogsim.fusion.protocol import DatedFusion, Fusion, LocatedFusion
-from fogsim.parameters import checked_parameters
-from fogsim.registry import Registry
 
 FUSIONS: Registry[Callable[..., Fusion | LocatedFusion]] = Registry(
     "fusion",

@@ -4,12 +4,12 @@ import math
 from collections.abc import Sequence
 from typing import Annotated
 
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.errors import InputError
 from fogsim.fusion.curve_stretches import curve_stretches
 from fogsim.fusion.grid_filter import GridFilter
 from fogsim.fusion.route_field import AHEAD, CELL, RouteField
 from fogsim.fusion.route_field_kernels import shares_in_cells
-from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.belief import Belief
 from fogsim.values.estimate import NORMAL_90_PERCENT, DenserFog, Estimate

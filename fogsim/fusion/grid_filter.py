@@ -7,11 +7,11 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.jit import kernel
+from fogsim.core.linear_algebra import convolution
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.errors import InputError
 from fogsim.fusion.announcements import Announcements
-from fogsim.jit import kernel
-from fogsim.linear_algebra import convolution
-from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY, extinction_from_visibility
 from fogsim.values.belief import Belief
 from fogsim.values.estimate import Estimate, ExtinctionBounds

@@ -9,10 +9,10 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.mixture import majority, reduced
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.errors import InputError
 from fogsim.fusion.grid_filter import CELLS, LOG_HIGH, LOG_LOW
-from fogsim.mixture import majority, reduced
-from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.belief import Belief
 from fogsim.values.estimate import Estimate

@@ -5,8 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.linear_algebra import inverse_of, matrix_product
 from fogsim.fusion import route_field_kernels
-from fogsim.linear_algebra import inverse_of, matrix_product
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY, extinction_from_visibility
 from fogsim.values.belief import FogProfile
 

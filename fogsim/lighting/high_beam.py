@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Annotated
 
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.lighting.rules import BY_DAY, CAREFUL, FogLampRules, Quantile
-from fogsim.parameters import Range, checked_parameters
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim.values import Belief, Lamp, LampChoice, LampWish, Observation
 

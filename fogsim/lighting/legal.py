@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.lighting.high_beam import HIGH_BEAMS, Metres, Seconds, is_dark, settled, would_dazzle
 from fogsim.lighting.rules import BY_DAY, CAREFUL, FogLampRules, Quantile
-from fogsim.parameters import Range, checked_parameters
 from fogsim.values import Belief, Lamp, LampChoice, Observation
 
 FOG_VISIBILITY = 1000.0

@@ -4,10 +4,10 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.lighting.high_beam import HIGH_BEAMS, Seconds, is_dark, settled
 from fogsim.lighting.own_sight import headlamp_sight_distance
 from fogsim.lighting.rules import BY_DAY, CAREFUL, FogLampRules, Quantile
-from fogsim.parameters import Range, checked_parameters
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Belief, Lamp, LampChoice, Observation
 from fogsim.values.eye import disability_glare

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from fogsim.parameters import Range, checked_parameters
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.values import Belief, Lamp
 
 BY_DAY = Lamp.POSITION | Lamp.LOW_BEAM

@@ -1,6 +1,6 @@
 """Safety, comfort and delay of the ego and of all vehicles near it, and the accuracy of estimators."""
 
-from fogsim.kinematics import stopping_sight_distance
+from fogsim.core.kinematics import stopping_sight_distance
 from fogsim.metrics.metric import Definition, JsonValue, Metric, Sample
 from fogsim.metrics.run_metrics import (
     METRICS,

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from fogsim.core.registry import Registry
 from fogsim.errors import SimulationError
 from fogsim.metrics.cross_sections import TrafficThroughput
 from fogsim.metrics.crossing import TrafficEncroachment
@@ -25,7 +26,6 @@ from fogsim.metrics.traffic_flow import TrafficFlow
 from fogsim.metrics.traffic_headways import TrafficHeadways
 from fogsim.metrics.traffic_sight import TrafficSight
 from fogsim.metrics.traffic_span import GatheredMetrics, SpanWatcher, TrafficMetric
-from fogsim.registry import Registry
 from fogsim.units import clock_time
 from fogsim.values import Step, TrafficStep
 from fogsim.values.result_checks import checked_values

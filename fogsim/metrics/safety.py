@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from fogsim.kinematics import stopping_sight_distance
+from fogsim.core.kinematics import stopping_sight_distance
 from fogsim.metrics.estimation import FOG_LIMIT
 from fogsim.metrics.metric import Definition, JsonValue, Sample, definitions_of, share
 from fogsim.metrics.surrogate import (

@@ -9,7 +9,7 @@ from importlib import import_module
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fogsim.kinematics import DECELERATION, REACTION_TIME
+from fogsim.core.kinematics import DECELERATION, REACTION_TIME
 
 QUEUE_SPEED = 5.0
 """Speed below which a vehicle counts as queued [m/s]; slower followers only close up and are in no conflict."""

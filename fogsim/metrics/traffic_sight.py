@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.kinematics import stopping_sight_distance
+from fogsim.core.kinematics import stopping_sight_distance
 from fogsim.metrics.estimation import FOG_LIMIT
 from fogsim.metrics.histogram import Histogram
 from fogsim.metrics.metric import Definition, JsonValue, definitions_of, share

@@ -9,7 +9,7 @@ that the part inside is what the three pairs of faces leave of it (Kay & Kajiya 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 
 NUMBERS = 10
 """Numbers of a box."""

@@ -7,9 +7,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field, ValidationError
 
+from fogsim.core.files.atomic import write_text
+from fogsim.core.files.output_targets import refuse_unwritable
 from fogsim.errors import InputError
-from fogsim.files.atomic import write_text
-from fogsim.files.output_targets import refuse_unwritable
 from fogsim.offline.calibration_deviations import EXACT, CalibrationDeviations
 from fogsim.offline.guess import CameraGuess
 from fogsim.scenario.document import read_document

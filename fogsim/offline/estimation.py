@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fogsim.core.parameters import accepted_parameters
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.estimators import ESTIMATORS, Estimator, make
 from fogsim.offline.calibration_deviations import EXACT, CalibrationDeviations
@@ -16,7 +17,6 @@ from fogsim.offline.image_files import Pixels
 from fogsim.offline.input_paths import find_source
 from fogsim.offline.rectification import straightened
 from fogsim.offline.source import Picture, Source
-from fogsim.parameters import accepted_parameters
 from fogsim.values import Camera, Estimate, Frame, Observation, SignLook, SignSighting
 
 ALL = "all"

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
+from fogsim.core.files.atomic import write_bytes
+from fogsim.core.files.output_targets import refuse_unwritable
+from fogsim.core.files.readers import read_bytes
 from fogsim.errors import InputError, UnknownNameError
-from fogsim.files.atomic import write_bytes
-from fogsim.files.output_targets import refuse_unwritable
-from fogsim.files.readers import read_bytes
 from fogsim.values import Camera
 
 DEPTH_KINDS = ("planar", "range")

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
+from fogsim.core.files.atomic import write_bytes
+from fogsim.core.files.output_targets import refuse_unwritable
 from fogsim.errors import InputError
-from fogsim.files.atomic import write_bytes
-from fogsim.files.output_targets import refuse_unwritable
 from fogsim.offline.estimation import FrameEstimates
 from fogsim.offline.image_files import Pixels
 from fogsim.offline.results import denser_text, interval_text, metres

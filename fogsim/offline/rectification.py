@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.errors import InputError
-from fogsim.linear_algebra import matrix_product
 from fogsim.offline.camera_file import Calibration
 from fogsim.offline.image_files import Pixels
 from fogsim.offline.source import Picture, Source

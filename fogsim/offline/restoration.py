@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.files.output_targets import refuse_unwritable_folder
 from fogsim.errors import InputError
-from fogsim.files.output_targets import refuse_unwritable_folder
 from fogsim.offline.estimation import estimates_of
 from fogsim.offline.image_files import Pixels, refuse_unwritable_image, write_image
 from fogsim.offline.source import Picture, Source

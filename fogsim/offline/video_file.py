@@ -7,9 +7,9 @@ from typing import Self
 
 import numpy as np
 
+from fogsim.core.files.atomic import partial_path, publish
+from fogsim.core.files.output_targets import refuse_unwritable
 from fogsim.errors import InputError
-from fogsim.files.atomic import partial_path, publish
-from fogsim.files.output_targets import refuse_unwritable
 from fogsim.offline.image_files import Pixels
 from fogsim.recorders.video import Encoder, encoding_command
 from fogsim.values import Camera

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from fogsim.core.randomness import named_generator
 from fogsim.errors import InputError, shown, suggest
 from fogsim.openscenario.parameters import Parameters, declared
 from fogsim.openscenario.xml_tree import Findings, Node, NodeError, read_xml
-from fogsim.randomness import named_generator
 
 MOST_CASES = 100_000  # of a file
 _SHAPES = ("Uniform", "Normal", "LogNormal", "Poisson")

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from fogsim.core.files.generated_files import write_generated
+from fogsim.core.files.maps import find_map
 from fogsim.errors import InputError
-from fogsim.files.generated_files import write_generated
-from fogsim.files.maps import find_map
 from fogsim.openscenario.actions import Actions
 from fogsim.openscenario.entities import CLASSES, Vehicle, read_vehicles
 from fogsim.openscenario.environment import fog_block

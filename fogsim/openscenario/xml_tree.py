@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from fogsim.core.files.xml_reader import XmlFile
 from fogsim.errors import InputError, LeftOutWarning, shown, suggest
-from fogsim.files.xml_reader import XmlFile
 from fogsim.openscenario.elements import HARMLESS, REFUSED
 
 MOST_BYTES, MOST_ELEMENTS = 20_000_000, 500_000  # of a file

@@ -2,7 +2,8 @@
 
 from collections.abc import Callable
 
-from fogsim.files.atomic import write_json
+from fogsim.core.files.atomic import write_json
+from fogsim.core.registry import Registry
 from fogsim.recorders.events import EventRecorder
 from fogsim.recorders.exchange.openscenario import OpenScenarioRecorder
 from fogsim.recorders.exchange.osi import OsiRecorder
@@ -28,7 +29,6 @@ from fogsim.recorders.table_columns import traffic_table_columns
 from fogsim.recorders.traffic_report import TrafficReportRecorder
 from fogsim.recorders.trajectories import TrajectoryRecorder, with_trajectories
 from fogsim.recorders.video import VideoRecorder, encoder_report
-from fogsim.registry import Registry
 
 RecorderFactory = Callable[[RunInformation], Recorder]
 """Makes a recorder for one run about an ego."""

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import pyarrow as pa
 
-from fogsim.files.row_log import RowLog, row_batches, row_schema
+from fogsim.core.files.row_log import RowLog, row_batches, row_schema
 from fogsim.recorders.protocol import Derived
 from fogsim.recorders.run_directory import EVENT_LOG
 from fogsim.recorders.table import write_table

@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from enum import StrEnum
 from importlib import metadata
 
-from fogsim.files.writer_lock import WritingProcess
+from fogsim.core.files.writer_lock import WritingProcess
 from fogsim.values import NOTHING_UNPLAYED, Ending, Unplayed
 
 _DISTRIBUTIONS = ("fogsim", "numpy", "libsumo", "pyrender", "opencv-python-headless", "gymnasium")

@@ -5,9 +5,9 @@ import shutil
 from datetime import UTC, datetime
 from pathlib import Path
 
+from fogsim.core.files.row_log import read_rows
+from fogsim.core.files.writer_lock import WriterLock
 from fogsim.errors import InputError
-from fogsim.files.row_log import read_rows
-from fogsim.files.writer_lock import WriterLock
 from fogsim.recorders.events import write_event_table
 from fogsim.recorders.manifest import Status
 from fogsim.recorders.run_directory import (

@@ -5,7 +5,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Generic
 
-from fogsim.files.atomic import write_text
+from fogsim.core.files.atomic import write_text
 from fogsim.recorders.manifest import versions
 from fogsim.recorders.panel.camera_picture import scale_image
 from fogsim.recorders.protocol import AnyStep_contra, Derived, RunInformation

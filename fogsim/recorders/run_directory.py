@@ -6,11 +6,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from fogsim.core.files.atomic import Reserve, partial_path, write_json
+from fogsim.core.files.output_targets import refuse_unwritable_folder
+from fogsim.core.files.readers import read_json
+from fogsim.core.files.writer_lock import WriterLock, WritingProcess
 from fogsim.errors import InputError
-from fogsim.files.atomic import Reserve, partial_path, write_json
-from fogsim.files.output_targets import refuse_unwritable_folder
-from fogsim.files.readers import read_json
-from fogsim.files.writer_lock import WriterLock, WritingProcess
 from fogsim.recorders.manifest import Status
 
 UNFINISHED = "unfinished"

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
-from fogsim.files.atomic import write_json
+from fogsim.core.files.atomic import write_json
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Sign, SignMap
 

@@ -11,8 +11,8 @@ from typing import Any, Generic
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from fogsim.files.atomic import write_bytes
-from fogsim.files.row_log import RowLog, read_rows
+from fogsim.core.files.atomic import write_bytes
+from fogsim.core.files.row_log import RowLog, read_rows
 from fogsim.recorders.protocol import AnyStep_contra, Derived
 from fogsim.recorders.run_directory import ROW_LOG
 from fogsim.recorders.table_columns import Column, table_columns

@@ -11,8 +11,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from fogsim.files.atomic import whole_file
-from fogsim.files.row_log import RowLog, row_batches, row_schema
+from fogsim.core.files.atomic import whole_file
+from fogsim.core.files.row_log import RowLog, row_batches, row_schema
 from fogsim.recorders.protocol import Derived
 from fogsim.recorders.run_directory import LOG_SUFFIX
 from fogsim.recorders.table import LOG_PERIOD

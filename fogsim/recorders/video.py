@@ -9,8 +9,8 @@ from pathlib import Path
 import imageio_ffmpeg
 from PIL import Image
 
+from fogsim.core.files.atomic import partial_path, publish
 from fogsim.errors import FogSimError, MissingDependencyError
-from fogsim.files.atomic import partial_path, publish
 from fogsim.recorders.panel.camera_picture import draw_camera_picture
 from fogsim.recorders.panel.frame_panel import FRAME_HEIGHT, FRAME_WIDTH, FramePanel
 from fogsim.recorders.protocol import Derived

@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
+from fogsim.core.registry import Registry
 from fogsim.errors import InputError
-from fogsim.registry import Registry
 from fogsim.render.best import best_renderer
 from fogsim.render.protocol import FARTHEST, Renderer, RenderError
 from fogsim.render.pyrender_scene import to_pyrender

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.linear_algebra import matrix_product
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.values import Camera, CameraPose, View
 from fogsim.values.pinhole import ray_from_pixel
 

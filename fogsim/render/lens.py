@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.linear_algebra import matrix_product
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.pinhole import camera_axes, ray_from_pixel
 

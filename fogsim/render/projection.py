@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.linear_algebra import matrix_product
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.render.drawing import NEAR
 from fogsim.values.camera import Camera, CameraPose
 from fogsim.values.pinhole import camera_axes, ray_from_pixel

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.errors import InputError
-from fogsim.linear_algebra import matrix_product
 from fogsim.render.opengl.context import Context, context
 from fogsim.render.photometry import SKY_TINT, zenith_luminance
 from fogsim.render.protocol import RenderError

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.errors import MissingDependencyError
-from fogsim.linear_algebra import matrix_product
 from fogsim.render.drawing import NEAR
 from fogsim.render.photometry import lamp_radiance, lighting_bits, zenith_luminance
 from fogsim.render.road_paint import painted_road

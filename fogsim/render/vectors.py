@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 
 Vector = tuple[float, float, float]
 """Three numbers."""

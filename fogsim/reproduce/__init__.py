@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from fogsim.registry import Registry
+from fogsim.core.registry import Registry
 from fogsim.reproduce import airlight, belaroussi2015, drivers, huang2015, negru2013, zhu2015
 from fogsim.reproduce.night import gallen2014
 from fogsim.reproduce.result import Reproduction, Watch, unwatched

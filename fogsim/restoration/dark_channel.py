@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from fogsim.linear_algebra import matrix_product
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.restoration import light_kernels
 from fogsim.restoration.guided_filter import guided_filter
 from fogsim.restoration.picture import Floats, FoggyPicture

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from fogsim.registry import Registry
+from fogsim.core.registry import Registry
 from fogsim.restoration.airlight import dark_channel_airlight, horizon_airlight
 from fogsim.restoration.dark_channel import dark_channel
 from fogsim.restoration.picture import Floats, FoggyPicture, Light, Pixels

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from fogsim.core.files.readers import read_text
 from fogsim.errors import InputError, shown
-from fogsim.files.readers import read_text
 from fogsim.openscenario import is_openscenario, read_openscenario, read_parameter_cases
 from fogsim.scenario.plain_yaml import DEEPEST, MOST_BYTES, KeyPath, PlainYamlError, parse_yaml
 from fogsim.units.quantities import UNIT_OF_SUFFIX

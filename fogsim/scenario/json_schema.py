@@ -7,10 +7,10 @@ from typing import Any
 from pydantic import BaseModel
 
 from fogsim.advice import ADVISERS
+from fogsim.core.registry import Registry
 from fogsim.estimators import ESTIMATORS
 from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
-from fogsim.registry import Registry
 from fogsim.scenario.schema import Scenario
 from fogsim.scenario.system_under_test import BLOCK, KEYS
 from fogsim.scenario.variation import VariationKeys

@@ -10,9 +10,9 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from fogsim.core.parameters import checked_parameters
+from fogsim.core.registry.user_code import MayImport, import_anything
 from fogsim.errors import InputError, UnknownNameError, nearest, shown, suggest
-from fogsim.parameters import checked_parameters
-from fogsim.registry.user_code import MayImport, import_anything
 from fogsim.scenario.document import Document, apply_overrides, read_scenario_document
 from fogsim.scenario.expect.checks import last_time
 from fogsim.scenario.mistakes import mistake_lines

@@ -28,10 +28,10 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError
 
+from fogsim.core.parameters import parameter_mistakes, paths_in
+from fogsim.core.registry import Registry
+from fogsim.core.registry.user_code import import_anything
 from fogsim.errors import InputError, is_name
-from fogsim.parameters import parameter_mistakes, paths_in
-from fogsim.registry import Registry
-from fogsim.registry.user_code import import_anything
 from fogsim.units.quantities import is_quantity, parse_quantity
 
 FARTHEST = 1e6

@@ -4,10 +4,10 @@ import re
 import shutil
 from pathlib import Path
 
+from fogsim.core.files.atomic import write_json, write_text
+from fogsim.core.files.output_targets import refuse_unwritable_folder
+from fogsim.core.registry.user_code import import_nothing
 from fogsim.errors import InputError, shown
-from fogsim.files.atomic import write_json, write_text
-from fogsim.files.output_targets import refuse_unwritable_folder
-from fogsim.registry.user_code import import_nothing
 from fogsim.scenario.json_schema import scenario_json_schema
 from fogsim.scenario.loading import SCENARIO_FILE, load_scenario, scenario_file
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.garbage import no_garbage_collection
 from fogsim.errors import InputError
-from fogsim.garbage import no_garbage_collection
 from fogsim.scene.bodies import body_shapes, box_shapes
 from fogsim.scene.edges import Edge, lane_edge
 from fogsim.scene.ground import Border, GroundPlan, Rail

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.scene.polyline import all_cleaned, arc_length, project
 from fogsim.values.road import Lane
 

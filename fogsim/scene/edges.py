@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.polyline import Points, arc_length, left_normals, parallel, refined, true_spans
 from fogsim.scene.road import FAST, KERB, LINE_CODE, LONGEST, TOWN, footway_mesh, strip

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.scene.edges import Edge, border_edge
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.polyline import Points, cleaned, refined, true_spans

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 
 FORWARD, LEFT, UP, INTENSITY, AREA, FULL_INTENSITY, AXIS = range(3, 10)
 FOUND = 13

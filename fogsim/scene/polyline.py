@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 
 Points = NDArray[np.float64]
 

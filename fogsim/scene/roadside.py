@@ -8,8 +8,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
-from fogsim.linear_algebra import matrix_product
+from fogsim.core.jit import kernel
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.polyline import arc_length, at_distance, left_normals
 from fogsim.scene.solids import Material, box, merge

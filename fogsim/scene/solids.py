@@ -8,8 +8,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fogsim.jit import kernel
-from fogsim.linear_algebra import matrix_product
+from fogsim.core.jit import kernel
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.values.scene import Instance, Mesh, Surface
 
 Vector = tuple[float, float, float]

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fogsim.linear_algebra import matrix_product
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.scene.edges import Edge
 from fogsim.scene.lane_index import LaneIndex
 from fogsim.scene.polyline import Points, arc_length

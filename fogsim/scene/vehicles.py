@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.scene.bodies import body_of
 from fogsim.scene.town import person_batches, signal_batches
 from fogsim.values.scene import Batch, Instance

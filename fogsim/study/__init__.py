@@ -5,9 +5,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
+from fogsim.core.files.writer_lock import WriterLock
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.errors import InputError
-from fogsim.files.writer_lock import WriterLock
-from fogsim.parameters import Range, checked_parameters
 from fogsim.study.comparison import Difference
 from fogsim.study.directory import StudyDirectory
 from fogsim.study.engine import Engine

@@ -6,10 +6,10 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
+from fogsim.core.files.atomic import partial_path, write_json
+from fogsim.core.files.output_targets import refuse_unwritable_folder
+from fogsim.core.files.readers import read_json
 from fogsim.errors import InputError, shown
-from fogsim.files.atomic import partial_path, write_json
-from fogsim.files.output_targets import refuse_unwritable_folder
-from fogsim.files.readers import read_json
 from fogsim.recorders.manifest import versions
 from fogsim.study.engine import result_file
 from fogsim.study.plan import Study, StudyRun

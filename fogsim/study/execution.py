@@ -6,16 +6,16 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from fogsim.ego.fog_reports import FogReports
-from fogsim.ego.road_meters import RoadMeters
+from fogsim.core.files.atomic import write_json
 from fogsim.errors import FogSimError, UnplayedWarning
-from fogsim.files.atomic import write_json
-from fogsim.loop import run
 from fogsim.metrics import MetricsOfRun, RunMetrics, RunSummary, TrafficRunMetrics
 from fogsim.scenario import Scenario, build
+from fogsim.simulation.ego.fog_reports import FogReports
+from fogsim.simulation.ego.road_meters import RoadMeters
+from fogsim.simulation.loop import run
+from fogsim.simulation.traffic_run import TrafficRun, run_traffic
 from fogsim.study.profiles import RunProfiles
 from fogsim.traffic import libsumo_traffic
-from fogsim.traffic_run import TrafficRun, run_traffic
 from fogsim.values import TrafficStep
 
 

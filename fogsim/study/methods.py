@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fogsim.files.atomic import write_text
+from fogsim.core.files.atomic import write_text
 from fogsim.recorders.manifest import versions
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.wording.non_defaults import Setting, non_default_settings

@@ -12,10 +12,10 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
+from fogsim.core.files.readers import open_regular
+from fogsim.core.parameters import checked_parameters
+from fogsim.core.registry.user_code import MayImport, import_anything
 from fogsim.errors import InputError, UnknownNameError, shown, suggest
-from fogsim.files.readers import open_regular
-from fogsim.parameters import checked_parameters
-from fogsim.registry.user_code import MayImport, import_anything
 from fogsim.scenario import Scenario, build, catalogue, scenario_from_config
 from fogsim.scenario.document import Document, read_document
 from fogsim.scenario.expect.conditions import refuse

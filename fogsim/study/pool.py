@@ -11,8 +11,8 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
 
-from fogsim.files.atomic import write_json
-from fogsim.files.standard_streams import open_standard_streams
+from fogsim.core.files.atomic import write_json
+from fogsim.core.files.standard_streams import open_standard_streams
 from fogsim.scenario import Scenario
 from fogsim.study.engine import PROCESS_DIED, RunWatch, result_file
 from fogsim.study.execution import failure, run_to_file

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fogsim.core.files.atomic import write_bytes, write_json
 from fogsim.errors import FogSimError, InputError, MissingDependencyError, SimulationError, shown
-from fogsim.files.atomic import write_bytes, write_json
 from fogsim.recorders.manifest import versions
 from fogsim.scenario import Scenario, build
 from fogsim.study.engine import PROCESS_DIED, RunWatch, result_file

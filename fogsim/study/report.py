@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fogsim.files.atomic import write_text
+from fogsim.core.files.atomic import write_text
 from fogsim.metrics import metric_topics
 from fogsim.recorders.templating import render
 from fogsim.study.comparison import (

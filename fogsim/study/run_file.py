@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
+from fogsim.core.files.readers import read_json
 from fogsim.errors import InputError
-from fogsim.files.readers import read_json
 from fogsim.metrics.road_speeds import ROAD_COLUMNS
 from fogsim.study.profiles import CLASSES, COLLISION_COLUMNS, PATH_COLUMNS
 

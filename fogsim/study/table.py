@@ -8,8 +8,8 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from fogsim.core.files.atomic import write_bytes, write_text
 from fogsim.errors import InputError
-from fogsim.files.atomic import write_bytes, write_text
 from fogsim.metrics import metric_definitions
 from fogsim.study.main_metrics import METHODS_KEY
 from fogsim.study.run_file import Value

@@ -11,14 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from fogsim.conditions import Condition
+from fogsim.core.files.atomic import write_json, write_text
 from fogsim.expectations import Always, Eventually, Finding, Whenever
-from fogsim.files.atomic import write_json, write_text
-from fogsim.loop import run
 from fogsim.metrics import step_metrics
 from fogsim.recorders import VideoRecorder
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.expect.schema import clauses_of
 from fogsim.scenario.schema import NO_RENDERER
+from fogsim.simulation.loop import run
+from fogsim.simulation.traffic_run import run_traffic
 from fogsim.study.execution import outcome_of
 from fogsim.study.plan import StudyRun
 from fogsim.study.pool import ProcessPool
@@ -26,7 +27,6 @@ from fogsim.testing.collection import FogTest, label_of
 from fogsim.testing.judgement import Outcome
 from fogsim.testing.session import FileOutcome
 from fogsim.testing.signal_plot import SignalLog, plot_signals
-from fogsim.traffic_run import run_traffic
 from fogsim.values import Step, TrafficStep
 
 BEFORE, AFTER = 6.0, 2.0

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from fogsim.core.registry.user_code import MayImport, import_anything
 from fogsim.errors import InputError
-from fogsim.registry.user_code import MayImport, import_anything
 from fogsim.scenario import build
 from fogsim.scenario.document import read_scenario_document
 from fogsim.scenario.loading import SCENARIO_FILE, CountWatch, ScenarioCases, deciding, load_cases, scenario_file

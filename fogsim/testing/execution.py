@@ -5,16 +5,16 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+from fogsim.core.files.atomic import write_json
 from fogsim.errors import UnplayedWarning
 from fogsim.expectations import ExpectationWatch
-from fogsim.files.atomic import write_json
-from fogsim.loop import run
 from fogsim.metrics import RunMetrics, TrafficRunMetrics
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.expect.schema import clauses_of
+from fogsim.simulation.loop import run
+from fogsim.simulation.traffic_run import run_traffic
 from fogsim.study.execution import outcome_of
 from fogsim.testing.results import finding_to_json
-from fogsim.traffic_run import run_traffic
 
 
 def check_case(scenario: Scenario, seed: int, sumo_outputs: Path | None = None) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from fogsim.files.atomic import write_text
+from fogsim.core.files.atomic import write_text
 from fogsim.testing.collection import label_of
 from fogsim.testing.judgement import Judgement, Outcome
 from fogsim.testing.results import CaseResult

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from fogsim.files.atomic import write_text
+from fogsim.core.files.atomic import write_text
 from fogsim.recorders.manifest import versions
 from fogsim.recorders.templating import data_url, render
 from fogsim.testing.artefacts import Artefacts

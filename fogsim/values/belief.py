@@ -8,7 +8,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY, extinction_from_visibility
 from fogsim.values.estimate import DenserFog
 

@@ -5,8 +5,8 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
+from fogsim.core.parameters import NUMBER, checked_parameters
 from fogsim.errors import InputError
-from fogsim.parameters import NUMBER, checked_parameters
 
 GROUND_ALBEDO = 0.1
 """Default albedo of the land around [-]: in visible light, grass and asphalt have about as much."""

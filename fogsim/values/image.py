@@ -6,7 +6,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.parameters import checked_parameters
+from fogsim.core.parameters import checked_parameters
 from fogsim.values.camera import Camera
 
 T = TypeVar("T")

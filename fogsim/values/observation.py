@@ -8,8 +8,8 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.parameters import NUMBER_OR_NAN, checked_parameters
 from fogsim.errors import InputError
-from fogsim.parameters import NUMBER_OR_NAN, checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.image import Frame, read_only
 from fogsim.values.light import Lamp

@@ -9,7 +9,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.linear_algebra import matrix_product
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.values.camera import Camera, CameraPose
 
 OWN_FRAME = CameraPose((0.0, 0.0, 0.0), 0.0)

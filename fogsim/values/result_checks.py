@@ -8,8 +8,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.jit import kernel
 from fogsim.errors import InputError, shown
-from fogsim.jit import kernel
 from fogsim.values import (
     Belief,
     Command,

@@ -9,7 +9,7 @@ import pytest
 
 from fogsim.advice import ADVISERS
 from fogsim.advice.presentation import PresentedAdviser
-from fogsim.kinematics import safe_speed
+from fogsim.core.kinematics import safe_speed
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import Belief, FogProfile, SpeedAdvice
 from fogsim.values.belief import certain_belief

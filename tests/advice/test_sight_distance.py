@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fogsim.advice import ADVISERS, FixedSpeed, NoAdvice, StoppingSightDistance
-from fogsim.kinematics import stopping_sight_distance
+from fogsim.core.kinematics import stopping_sight_distance
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import Belief, SpeedAdvice
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fogsim.advice import ADVISERS, StepTable
+from fogsim.core.kinematics import stopping_sight_distance
 from fogsim.errors import InputError
-from fogsim.kinematics import stopping_sight_distance
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import Belief, SpeedAdvice
 

@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from fogsim.advice.warning import choose_warning, is_fog_in_the_way
-from fogsim.kinematics import stopping_sight_distance
+from fogsim.core.kinematics import stopping_sight_distance
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Belief, Command, DenserFog, DriverWarning, FogProfile, Observation
 from fogsim.values.belief import certain_belief

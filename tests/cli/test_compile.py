@@ -14,9 +14,9 @@ from fogsim.estimators import ESTIMATORS
 
 COMPILE = """
 import numpy as np
-import fogsim.jit
+import fogsim.core.jit
 from fogsim.vision.light.medians import median_of_few
-fogsim.jit._PATIENCE = 0.0
+fogsim.core.jit._PATIENCE = 0.0
 numbers = np.arange(5, dtype=np.float32)
 for kind in (np.float32, np.float64, np.int64):
     median_of_few(numbers.astype(kind), np.empty(5, kind))

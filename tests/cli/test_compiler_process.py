@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fogsim.jit import CompilerProcess, processors
+from fogsim.core.jit import CompilerProcess, processors
 
 START = """
 import os, subprocess, sys

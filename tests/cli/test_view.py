@@ -9,8 +9,8 @@ from PIL import Image
 
 from fogsim.cli.view import view_command
 from fogsim.errors import InputError
-from fogsim.loop import ClosedLoop
 from fogsim.scenario import load_scenario
+from fogsim.simulation.loop import ClosedLoop
 
 
 def test_the_picture_is_that_of_the_ego_in_clear_air(tmp_path: Path) -> None:

@@ -12,12 +12,12 @@ from pathlib import Path
 import numba
 import pytest
 
-from fogsim.compiling import shipped_code
-from fogsim.compiling.shipped_code import KINDS, compiled_for, usable_kind, why_not_taken
-from fogsim.files.cache_entries import write_entry
+from fogsim.core.compiling import shipped_code
+from fogsim.core.compiling.shipped_code import KINDS, compiled_for, usable_kind, why_not_taken
+from fogsim.core.files.cache_entries import write_entry
 
 SOURCE = """
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 
 @kernel
 def twice(x):
@@ -27,11 +27,11 @@ def twice(x):
 ASK = """
 import sys
 from pathlib import Path
-from fogsim.compiling import shipped_code
+from fogsim.core.compiling import shipped_code
 shipped_code.PACKAGE, shipped_code.FOLDER = Path("package").resolve(), Path("shipped").resolve()
 sys.path.insert(0, "package/part")
 from doubling import twice
-from fogsim.jit import is_kept
+from fogsim.core.jit import is_kept
 kept = is_kept(twice)
 print(twice(10.0), kept, sum(twice.stats.cache_hits.values()))
 """

@@ -15,10 +15,10 @@ from numba.core.errors import TypingError
 from numba.core.registry import cpu_target
 from numba.core.runtime import _nrt_python, rtsys
 
-from fogsim import compiling
-from fogsim.compiling import shortcuts
-from fogsim.compiling.code_libraries import LinkedLibrary
-from fogsim.jit import kernel
+from fogsim.core import compiling
+from fogsim.core.compiling import shortcuts
+from fogsim.core.compiling.code_libraries import LinkedLibrary
+from fogsim.core.jit import kernel
 
 pytestmark = pytest.mark.skipif(
     numba.version_info.short not in compiling.KNOWN, reason="nothing stands in for functions of this version of numba"

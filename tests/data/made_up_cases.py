@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fogsim.files.atomic import write_json
+from fogsim.core.files.atomic import write_json
 from fogsim.scenario import Scenario
 from fogsim.scenario.variation import NONE_FAILS, Verdict
 from fogsim.study.engine import RunWatch, result_file

@@ -302,7 +302,7 @@ def test_imports_are_followed_where_they_are_late_or_lazy(docs: Callable[[str], 
     files = checkout.files(["benchmarks/belief.py"])
     for path in (
         "benchmarks/harness.py",
-        "fogsim/loop.py",  # as fogsim.ClosedLoop or fogsim.run, of which nothing is imported
+        "fogsim/simulation/loop.py",  # as fogsim.ClosedLoop or fogsim.run, of which nothing is imported
         "fogsim/vision/strips/joint_kernels.py",
         "fogsim/vision/data/airlight_slopes.npz",
         "scenarios/motorway_fog_bank/scenario.yaml",

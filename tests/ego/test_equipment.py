@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.ego.fog_truth import KnownWay, fog_truth
+from fogsim.simulation.ego.fog_truth import KnownWay, fog_truth
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, CameraPose, FogBank, FogField, SignMap
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import fogsim
-from fogsim.ego.fog_reports import FogReports
 from fogsim.errors import InputError
+from fogsim.simulation.ego.fog_reports import FogReports
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import FogBank, FogField, FogReport, TrafficState
 from tests.data.early_motorway import EARLY

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fogsim.ego.frame_watch import FrameWatch, LeadHistory, why_useless
+from fogsim.simulation.ego.frame_watch import FrameWatch, LeadHistory, why_useless
 from fogsim.values import Camera, Frame, LeadMeasurement
 
 CAMERA = Camera(40, 30, 50.0, (20.0, 15.0), 1.4)

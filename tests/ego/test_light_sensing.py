@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.ego.light_sensing import LightSensing, lamp_effects
 from fogsim.scenario import load_scenario
+from fogsim.simulation.ego.light_sensing import LightSensing, lamp_effects
 from fogsim.units import extinction_from_visibility
 from fogsim.values import FogField, Lamp, LightMeasurement, TrafficState
 from fogsim.values.eye import disability_glare

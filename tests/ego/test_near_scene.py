@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from fogsim.ego.near_scene import NearScene
 from fogsim.render import make_renderer
 from fogsim.scene import ScenePlan, Squares
+from fogsim.simulation.ego.near_scene import NearScene
 from fogsim.values import Camera, CameraPose, Lane, LaneKind, LaneMarking, PavedArea, RoadNetwork, Sign, SignMap
 
 CAMERA = Camera(96, 72, 110.0, (47.5, 35.5), mount_height=1.3, pitch=0.03)

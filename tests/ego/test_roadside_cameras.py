@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import fogsim
-from fogsim.ego.road_meters import RoadMeters
-from fogsim.ego.roadside_cameras import RoadsideCameras, as_log_normal, over_road
 from fogsim.errors import InputError
+from fogsim.simulation.ego.road_meters import RoadMeters
+from fogsim.simulation.ego.roadside_cameras import RoadsideCameras, as_log_normal, over_road
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, Estimate, FogReport, Step
 from tests.data.early_motorway import EARLY

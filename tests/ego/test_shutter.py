@@ -7,7 +7,7 @@ import pytest
 
 import fogsim
 from fogsim.camera import AutoExposure, CameraSensor, Metering, Sensor
-from fogsim.ego.shutter import Shutter, exposed, moved
+from fogsim.simulation.ego.shutter import Shutter, exposed, moved
 from fogsim.values import Camera, CameraPose, TrafficState, View
 
 POSE = CameraPose((100.0, 50.0, 1.4), 0.0)

@@ -5,9 +5,9 @@ import pytest
 
 import fogsim
 from fogsim.camera import mounted_pose
-from fogsim.ego import view_rendering
-from fogsim.ego.view_rendering import ViewRenderer
 from fogsim.scenario import build
+from fogsim.simulation.ego import view_rendering
+from fogsim.simulation.ego.view_rendering import ViewRenderer
 from fogsim.values import Lane, LaneMarking, RoadNetwork, SignMap, TrafficState
 
 SETTINGS = ("renderer=cpu", "camera.width=80", "camera.height=60", "fog={visibility_m: 200}")

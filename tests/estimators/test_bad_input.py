@@ -10,9 +10,9 @@ from itertools import islice, product
 import numpy as np
 import pytest
 
+from fogsim.core.registry import parameters
 from fogsim.errors import FogSimError, InputError
 from fogsim.estimators import ESTIMATORS, make
-from fogsim.registry import parameters
 from fogsim.values import Camera, Estimate, Frame, LeadMeasurement, Observation, SignSighting
 
 METHODS = sorted(ESTIMATORS)

@@ -98,7 +98,7 @@ def test_the_drive_tells_each_method_apart(as_it_is: list[Step], methods: list[s
 def test_deleting_the_truth_changes_nothing(
     as_it_is: list[Step], methods: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fogsim.ego.equipment.fog_truth", lambda *_: None)
+    monkeypatch.setattr("fogsim.simulation.ego.equipment.fog_truth", lambda *_: None)
     blind = drive(methods)
     assert all(step.truth is None for step in blind)
     check_same(as_it_is, blind)
@@ -111,9 +111,9 @@ def test_a_false_truth_changes_nothing(
 
     Reports of roadside cameras stay the same too.
     """
-    from fogsim.ego.fog_reports import FogReports
-    from fogsim.ego.view_rendering import ViewRenderer
     from fogsim.sensors import measure_lead
+    from fogsim.simulation.ego.fog_reports import FogReports
+    from fogsim.simulation.ego.view_rendering import ViewRenderer
 
     rng = np.random.default_rng(4)
     render, heard = ViewRenderer.render, FogReports.heard
@@ -141,9 +141,9 @@ def test_a_false_truth_changes_nothing(
         there = dataclasses.replace(state, position=state.position + rng.normal(0.0, 100.0, state.position.shape))
         return heard(self, time, there, ego, dataclasses.replace(fog, extinction=float(rng.uniform(0.0, 0.2))), sent)
 
-    monkeypatch.setattr("fogsim.ego.equipment.fog_truth", false_truth)
+    monkeypatch.setattr("fogsim.simulation.ego.equipment.fog_truth", false_truth)
     monkeypatch.setattr(FogReports, "heard", hear_in_another_fog)
-    monkeypatch.setattr("fogsim.ego.measurements.measure_lead", measure_another)
+    monkeypatch.setattr("fogsim.simulation.ego.measurements.measure_lead", measure_another)
     monkeypatch.setattr(ViewRenderer, "render", render_falsely)
     misled = drive(methods)
     assert misled[3].truth.visibility != as_it_is[3].truth.visibility
@@ -246,7 +246,7 @@ def test_no_chain_of_imports_leads_to_the_truth(imports: grimp.ImportGraph, hone
 
 
 def test_the_check_of_imports_finds_what_it_looks_for(imports: grimp.ImportGraph) -> None:
-    assert imports.find_shortest_chains("fogsim.ego.view_rendering", "fogsim.render", as_packages=True)
+    assert imports.find_shortest_chains("fogsim.simulation.ego.view_rendering", "fogsim.render", as_packages=True)
     assert unseen_names("from fogsim.values import Camera, Truth") == {"Truth"}
 
 

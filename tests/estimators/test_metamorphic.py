@@ -16,11 +16,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fogsim.core.registry import parameters
 from fogsim.estimators import ESTIMATORS, make
 from fogsim.estimators.huang2015_medians import Huang2015Repair
 from fogsim.estimators.negru2013 import Negru2013Repair
 from fogsim.estimators.zhu2015_road import Zhu2015Repair
-from fogsim.registry import parameters
 from fogsim.values import Camera, Estimate, Frame, LeadMeasurement, Observation, Response
 
 NOT_BY_DAY = {

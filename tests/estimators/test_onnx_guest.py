@@ -14,9 +14,9 @@ from early_motorway import ROUTES
 from PIL import Image
 from tiny_network import NCHW, write_network
 
+from fogsim.core.registry.user_code import digest_of
 from fogsim.errors import InputError, MethodError, MissingDependencyError
 from fogsim.estimators import ESTIMATORS, conformal_factor, make
-from fogsim.registry.user_code import digest_of
 from fogsim.values import Camera, Estimate, Observation
 from fogsim.values.estimate import NORMAL_90_PERCENT
 

@@ -1,8 +1,8 @@
 import pytest
 
+from fogsim.core.registry import parameters
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.estimators import ESTIMATORS, make
-from fogsim.registry import parameters
 from fogsim.values import Camera
 
 CAMERA = Camera(64, 48, 60.0, (31.5, 23.5), 1.4)

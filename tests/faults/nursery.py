@@ -14,13 +14,13 @@ import time
 from pathlib import Path
 from typing import Any
 
-import fogsim.recording
+import fogsim.simulation.recording
 from fogsim.cli import app
-from fogsim.interruption import SIGNALS, leave_on_signals
+from fogsim.core.interruption import SIGNALS, leave_on_signals
 from fogsim.recorders import RECORDERS, TableRecorder
 from fogsim.recorders.protocol import RunInformation
-from fogsim.recording import record_run
 from fogsim.scenario import load_scenario
+from fogsim.simulation.recording import record_run
 from tests.faults.steps import drawn_run
 
 
@@ -36,7 +36,7 @@ def _command(command: dict[str, Any]) -> None:
     os.dup2(log, 1)
     os.dup2(log, 2)
     seen = Path(command["log"]).with_suffix(".seen")
-    fogsim.recording.run = lambda *_, **__: drawn_run(pause=0.002, seen=seen, hold=command["hold"])
+    fogsim.simulation.recording.run = lambda *_, **__: drawn_run(pause=0.002, seen=seen, hold=command["hold"])
     leave_on_signals()
     signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
     sys.argv = ["fogsim", *command["arguments"]]
@@ -76,7 +76,7 @@ def _send(child: int, command: dict[str, Any]) -> None:
 if __name__ == "__main__":
     RECORDERS._entries["table"] = _table
     # Whatever a run imports on its way is imported once.
-    fogsim.recording.run = lambda *_, **__: drawn_run(2)
+    fogsim.simulation.recording.run = lambda *_, **__: drawn_run(2)
     with tempfile.TemporaryDirectory() as folder:
         record_run(load_scenario("motorway_fog_bank"), 0, Path(folder), recorders=("table",))
     for line in sys.stdin:

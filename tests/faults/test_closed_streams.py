@@ -62,7 +62,7 @@ def test_a_stream_that_is_closed_or_full_ends_in_no_traceback(
 
 OPENED = """\
 import json, os, subprocess, sys
-from fogsim.files.standard_streams import open_standard_streams
+from fogsim.core.files.standard_streams import open_standard_streams
 open_standard_streams()
 print("lost", flush=True)
 sys.stdin.read(), sys.stderr.write("lost")

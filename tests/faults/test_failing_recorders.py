@@ -9,10 +9,10 @@ import pytest
 from pyarrow import parquet
 
 import fogsim
-from fogsim import recording
 from fogsim.errors import InputError, RecorderError
 from fogsim.recorders import RECORDERS, ReportRecorder, video
-from fogsim.recording import RecordedRun, record_run
+from fogsim.simulation import recording
+from fogsim.simulation.recording import RecordedRun, record_run
 from fogsim.values import Step
 from tests.faults.steps import drawn_run
 

@@ -7,10 +7,10 @@ import pytest
 from pyarrow import parquet
 
 import fogsim
-from fogsim import recording
 from fogsim.errors import RecorderError
 from fogsim.recorders import recover_run, run_directory
-from fogsim.recording import record_run
+from fogsim.simulation import recording
+from fogsim.simulation.recording import record_run
 from tests.faults.disk import SmallDisk
 from tests.faults.steps import drawn_run
 

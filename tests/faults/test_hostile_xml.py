@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from fogsim.core.files import xml_reader
 from fogsim.errors import InputError
-from fogsim.files import xml_reader
 from fogsim.offline.drive.track_file import load_track
 from fogsim.openscenario import read_openscenario, xml_tree
 from fogsim.scenario.loading import load_scenario, scenario_from_config

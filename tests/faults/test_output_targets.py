@@ -14,8 +14,8 @@ import pytest
 from typer.testing import CliRunner
 
 from fogsim.cli.app import app
+from fogsim.core.files.output_targets import refuse_clashes, refuse_unwritable, refuse_unwritable_folder
 from fogsim.errors import InputError
-from fogsim.files.output_targets import refuse_clashes, refuse_unwritable, refuse_unwritable_folder
 from fogsim.recorders.video import Encoder, encoder_command
 
 LONG = "x" * 300
@@ -76,7 +76,7 @@ def read_only(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(**_: object) -> None:
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
 
-    monkeypatch.setattr("fogsim.files.output_targets.tempfile.TemporaryFile", refuse)
+    monkeypatch.setattr("fogsim.core.files.output_targets.tempfile.TemporaryFile", refuse)
 
 
 FILES: Mapping[str, str] = {
@@ -229,7 +229,11 @@ def test_a_command_refuses_its_target_before_it_works(
     def work(*_: object, **__: object) -> None:
         raise AssertionError("the work has begun")
 
-    for name in ("fogsim.loop.ClosedLoop", "fogsim.study.pool.ProcessPool.run", "fogsim.offline.guess.guess_camera"):
+    for name in (
+        "fogsim.simulation.loop.ClosedLoop",
+        "fogsim.study.pool.ProcessPool.run",
+        "fogsim.offline.guess.guess_camera",
+    ):
         monkeypatch.setattr(name, work)
     monkeypatch.setattr("fogsim.cli.run.compiling_in_background", lambda: contextlib.nullcontext(lambda _: None))
     before = {path: path.read_bytes() if path.is_file() else None for path in folder.rglob("*")}

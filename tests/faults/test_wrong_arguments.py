@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 
 import fogsim
-import fogsim.parameters
+import fogsim.core.parameters
 import fogsim_envs
+from fogsim.core.parameters import NUMBER_OR_NAN, check_of, checked_parameters
 from fogsim.dataset import depth, instance_mask, write_dataset
 from fogsim.errors import InputError, SimulationError, UnknownNameError
 from fogsim.estimators import ESTIMATORS, extinction_bound, make
 from fogsim.fusion import make as make_fusion
-from fogsim.parameters import NUMBER_OR_NAN, check_of, checked_parameters
-from fogsim.recording import record_run
 from fogsim.script import all_of, negated, signal, to_yaml
+from fogsim.simulation.recording import record_run
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.values import FogField
 from fogsim.values.result_checks import checked_command
@@ -72,7 +72,7 @@ def test_arguments_of_environments() -> None:
     ]:
         for name in ENVIRONMENTS:
             module, _, kind = str(gymnasium.spec(name).entry_point).partition(":")
-            known = fogsim.parameters.accepted_parameters(getattr(__import__(module, fromlist=[kind]), kind))
+            known = fogsim.core.parameters.accepted_parameters(getattr(__import__(module, fromlist=[kind]), kind))
             for value in values:
                 told = refusal(gymnasium.make, name, **{argument: value})
                 if argument in known:

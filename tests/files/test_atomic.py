@@ -11,8 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from fogsim.errors import InputError
-from fogsim.files.atomic import (
+from fogsim.core.files.atomic import (
     Reserve,
     is_stream,
     naming,
@@ -23,6 +22,7 @@ from fogsim.files.atomic import (
     write_json,
     write_text,
 )
+from fogsim.errors import InputError
 
 
 def test_what_is_written_is_read_back_and_nothing_else_stays(tmp_path: Path) -> None:
@@ -43,7 +43,7 @@ def test_a_write_that_fails_leaves_the_old_file_and_no_part(tmp_path: Path, monk
         assert whole == path
         raise OSError("cut off")
 
-    monkeypatch.setattr("fogsim.files.atomic.publish", cut_off)
+    monkeypatch.setattr("fogsim.core.files.atomic.publish", cut_off)
     with pytest.raises(OSError, match="cut off"):
         write_bytes(path, b"new")
     assert path.read_bytes() == b"old"
@@ -150,7 +150,7 @@ def test_nothing_but_a_file_is_replaced_by_one_that_is_whole(tmp_path: Path) -> 
 PRINTS = """
 import os, sys
 from pathlib import Path
-from fogsim.files.atomic import write_text
+from fogsim.core.files.atomic import write_text
 print("before")
 for name in sys.argv[1:]:
     write_text(Path(name), f"{name}\\n")

@@ -5,8 +5,8 @@ from pathlib import Path
 import pyarrow as pa
 import pytest
 
+from fogsim.core.files.row_log import RowLog, read_rows
 from fogsim.errors import InputError
-from fogsim.files.row_log import RowLog, read_rows
 
 SCHEMA = pa.schema([("index", pa.int64()), ("speed", pa.float64())])
 

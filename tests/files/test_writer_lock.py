@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from fogsim.core.files.writer_lock import LOCK_NAME, WriterLock, WritingProcess
 from fogsim.errors import InputError
-from fogsim.files.writer_lock import LOCK_NAME, WriterLock, WritingProcess
 
 
 def test_one_holds_it_and_the_next_is_told_who(tmp_path: Path) -> None:

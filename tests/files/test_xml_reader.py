@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from fogsim.core.files.xml_reader import open_unpacked, read_elements, read_tree, root_tag
 from fogsim.errors import InputError
-from fogsim.files.xml_reader import open_unpacked, read_elements, read_tree, root_tag
 
 TEXT = '<a x="1"><b/><c y="2"></c></a>'
 

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import fogsim
-from fogsim.ego.route_places import RoutePlaces
 from fogsim.errors import InputError, SimulationError
-from fogsim.fleet import EquippedFleet, camera_messages
-from fogsim.fleet.equipped_fleet import _leader
-from fogsim.loop import ClosedLoop
 from fogsim.scenario import Scenario
+from fogsim.simulation.ego.route_places import RoutePlaces
+from fogsim.simulation.fleet import EquippedFleet, camera_messages
+from fogsim.simulation.fleet.equipped_fleet import _leader
+from fogsim.simulation.loop import ClosedLoop
 from fogsim.values import Command, Estimate, Lamp, Step
 
 SMALL = ("camera.width=160", "camera.height=120", "duration_s=2", "clocks.camera_period_s=0.5")

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from fogsim.core.mixture import majority
 from fogsim.errors import InputError
 from fogsim.fusion import make
-from fogsim.mixture import majority
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import Estimate
 

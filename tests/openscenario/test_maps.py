@@ -9,8 +9,8 @@ from typer.testing import CliRunner
 
 import fogsim
 from fogsim.cli.app import app
+from fogsim.core.files.maps import MAPS
 from fogsim.errors import InputError
-from fogsim.files.maps import MAPS
 from fogsim.openscenario import read_openscenario
 from fogsim.traffic.road.netconvert import opendrive_net
 from tests.openscenario.writing import CAR, ROAD, lane, speed, write

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from fogsim.compiling.shipped_code import usable_kind
+from fogsim.core.compiling.shipped_code import usable_kind
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 FEW_KERNELS = "estimators=[{method: negru2013, parameters: {as_published: true}}]"
@@ -53,14 +53,14 @@ def carry_kernels_over(checkout: Path, installed: Path) -> None:
 
 CONVOLVES = """
 import numpy as np
-from fogsim.linear_algebra import convolution
+from fogsim.core.linear_algebra import convolution
 print(convolution(np.ones(2), np.ones(2)), sum(convolution.stats.cache_hits.values()))
 """
 
 COMPILES_ONE = """
 
 def compile_kernels() -> Iterator[str]:
-    from fogsim.linear_algebra import convolution
+    from fogsim.core.linear_algebra import convolution
     import numpy as np
 
     convolution(np.ones(3), np.ones(2))

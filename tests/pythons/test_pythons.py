@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from fogsim.compiling.shipped_code import usable_kind
+from fogsim.core.compiling.shipped_code import usable_kind
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 VERSIONS = ("3.11", "3.12", "3.13")

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fogsim.core.files.writer_lock import WritingProcess
 from fogsim.errors import InputError
-from fogsim.files.writer_lock import WritingProcess
 from fogsim.recorders import Manifest, Status, versions, write_json
 from fogsim.values import Ending, Reason, Unplayed, UnplayedEvent
 

@@ -10,8 +10,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from fogsim.core.files.row_log import read_rows
 from fogsim.errors import InputError
-from fogsim.files.row_log import read_rows
 from fogsim.metrics import step_metrics
 from fogsim.recorders import TableRecorder
 from fogsim.recorders.table import ROWS_PER_GROUP

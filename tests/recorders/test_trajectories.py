@@ -148,7 +148,7 @@ def test_a_full_disk_leaves_the_log_to_be_recovered(tmp_path: Path, monkeypatch:
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("fogsim.files.atomic.publish", full)
+    monkeypatch.setattr("fogsim.core.files.atomic.publish", full)
     with pytest.raises(OSError, match="No space left"):
         recorder.close(complete=True)
     assert not path.exists()

@@ -1,7 +1,7 @@
 import pytest
 
+from fogsim.core.registry import Registry
 from fogsim.errors import InputError, UnknownNameError
-from fogsim.registry import Registry
 
 
 def test_an_unknown_name_answers_with_the_known_ones_and_the_nearest() -> None:

@@ -8,9 +8,9 @@ import pytest
 
 from fogsim import Belief, InputError, LeadMeasurement, Observation, SpeedAdvice, load_scenario
 from fogsim.advice import ADVISERS, VehicleAdviser
+from fogsim.core.registry.user_code import import_class
 from fogsim.errors import UnknownNameError
 from fogsim.recorders import Manifest, Status
-from fogsim.registry.user_code import import_class
 from fogsim.scenario import build
 from fogsim.values.belief import certain_belief
 

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fogsim import jit
 from fogsim.atmosphere.fog.koschmieder import fogged_radiance
 from fogsim.camera.exposure import Sensor, expose
-from fogsim.jit import Bands
+from fogsim.core import jit
+from fogsim.core.jit import Bands
 from fogsim.render import make_renderer
 from fogsim.scene import vehicle_batches
 from fogsim.values import Camera, FogBank, FogField, Response, View

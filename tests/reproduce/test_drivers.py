@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.kinematics import safe_speed
+from fogsim.core.kinematics import safe_speed
 from fogsim.reproduce import REPRODUCTIONS, Reproduction
 from fogsim.reproduce.drivers import reproduce
 from fogsim.reproduce.drivers.findings import FINDINGS, SIX

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from fogsim.atmosphere import extinction
-from fogsim.ego.daylight import in_daylight
 from fogsim.errors import InputError
 from fogsim.scenario import build, load_scenario, resolved
 from fogsim.scenario.drivers import driver_sight
+from fogsim.simulation.ego.daylight import in_daylight
 from fogsim.units import extinction_from_visibility
 from fogsim.values import FogChange, FogField, FogPatches
 

@@ -22,16 +22,16 @@ from hypothesis import strategies as st
 from pydantic import BaseModel
 
 from fogsim.advice import ADVISERS
-from fogsim.advised_driving import AdvisedDriving
+from fogsim.core.parameters import Range, accepted_parameters
 from fogsim.errors import InputError, SimulationError
 from fogsim.estimators import ESTIMATORS
 from fogsim.fusion import FUSIONS
 from fogsim.lighting import LIGHTING_POLICIES
-from fogsim.loop import ClosedLoop
-from fogsim.parameters import Range, accepted_parameters
 from fogsim.scenario import Scenario, load_scenario
 from fogsim.scenario.section import GIVEN_BY_THE_LOOP, Method
 from fogsim.scene import build as scene_build
+from fogsim.simulation.advised_driving import AdvisedDriving
+from fogsim.simulation.loop import ClosedLoop
 
 FUZZ = int(os.environ.get("FOGSIM_FUZZ", "0"))
 """How many sets of keys are tried in a long search; 0 for a short one."""

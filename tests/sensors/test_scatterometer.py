@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.randomness import spawn_streams
+from fogsim.core.randomness import spawn_streams
 from fogsim.sensors import Scatterometer, faulty_scattering
 from fogsim.values import Fault, RunningFault
 from fogsim.values.fault import Blackout, Fouled, NoSignal

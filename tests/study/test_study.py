@@ -14,8 +14,8 @@ from early_motorway import EARLY
 from typer.testing import CliRunner
 
 from fogsim.cli.app import app
+from fogsim.core.files.atomic import write_json
 from fogsim.errors import InputError
-from fogsim.files.atomic import write_json
 from fogsim.scenario.parts import methods
 from fogsim.study import StudyRun, load_study, run_study
 from fogsim.study.directory import StudyDirectory

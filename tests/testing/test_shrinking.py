@@ -8,7 +8,7 @@ import pytest
 from early_motorway import ROUTES
 from made_up_cases import complete
 
-from fogsim.files.atomic import write_json
+from fogsim.core.files.atomic import write_json
 from fogsim.study.engine import RunWatch, result_file
 from fogsim.study.plan import StudyRun
 from fogsim.testing import collect, run_tests

@@ -15,8 +15,8 @@ import fogsim
 from fogsim.atmosphere import FieldAccess
 from fogsim.errors import InputError, SimulationError
 from fogsim.metrics.run_metrics import RunMetrics
-from fogsim.recording import record_run
 from fogsim.scenario import Scenario, build, scenario_from_config
+from fogsim.simulation.recording import record_run
 from fogsim.traffic import libsumo_traffic
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 from fogsim.units import extinction_from_visibility

@@ -7,9 +7,9 @@ import pytest
 import fogsim
 from fogsim.errors import InputError, SimulationError
 from fogsim.scenario import Scenario, override, scenario_from_config
+from fogsim.simulation.traffic_run import run_traffic
 from fogsim.traffic.road.network import read_net
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
-from fogsim.traffic_run import run_traffic
 from fogsim.values import Ending
 
 DATA = Path(__file__).resolve().parents[1] / "data" / "off_lanes"

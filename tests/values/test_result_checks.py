@@ -6,11 +6,11 @@ import math
 import numpy as np
 import pytest
 
-from fogsim.advised_driving import AdvisedDriving
 from fogsim.errors import InputError
 from fogsim.fusion import make as make_fusion
 from fogsim.metrics import METRICS, RunMetrics
 from fogsim.scenario import load_scenario
+from fogsim.simulation.advised_driving import AdvisedDriving
 from fogsim.values import Command, Display, Estimate, Lamp, LampChoice, SpeedAdvice, Stretch, StretchAdvice
 from fogsim.values.result_checks import (
     checked_advice,
@@ -152,7 +152,7 @@ def test_the_rooms_that_ask_methods_check_them(monkeypatch: pytest.MonkeyPatch) 
         driving.decide(step)
     for method in ("lamps", "choose_lamps"):
         without_lamps = type("Mine", (), {method: lambda *_: None})()
-        monkeypatch.setattr("fogsim.loop.build.lighting_policy", lambda _, mine=without_lamps: mine)
+        monkeypatch.setattr("fogsim.simulation.loop.build.lighting_policy", lambda _, mine=without_lamps: mine)
         with pytest.raises(InputError, match=rf"'fog_lamp_rules': {method}\(\) must be of type"):
             AdvisedDriving(scenario).decide(step)
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.linear_algebra import matrix_product
+from fogsim.core.linear_algebra import matrix_product
 from vehicle_bodies.projection import COLUMNS, ROWS, Mask, Projection, Size, Wide, light_of
 
 _NARROW = 0.03  # runs of columns and gaps between them, and edges of panels, that are left out [units of the box]

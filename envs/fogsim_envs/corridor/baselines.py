@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from fogsim.registry import Registry
+from fogsim.core.registry import Registry
 from fogsim.units import KMH_PER_MPS
 from fogsim_envs.corridor.observation import SHOWN_SPEEDS
 

@@ -11,11 +11,11 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from fogsim.core.parameters import checked_parameters
+from fogsim.core.randomness import Seed
 from fogsim.errors import InputError, MissingDependencyError
-from fogsim.parameters import checked_parameters
-from fogsim.randomness import Seed
-from fogsim.road_advice import RoadAdvice, stretch_advices
 from fogsim.scenario import Scenario, build, load_scenario, override
+from fogsim.simulation.road_advice import RoadAdvice, stretch_advices
 from fogsim.values import Command, Display, Ending, TrafficStep
 from fogsim_envs.actions import checked_action, checked_options
 from fogsim_envs.corridor.loops import InductionLoops

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fogsim.kinematics import stopping_sight_distance
+from fogsim.core.kinematics import stopping_sight_distance
+from fogsim.core.parameters import checked_parameters
 from fogsim.metrics import DEFAULT_STANDARD, SafetyStandard, time_to_collision
 from fogsim.metrics.following import find_following
-from fogsim.parameters import checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values import TrafficStep
 

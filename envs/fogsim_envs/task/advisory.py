@@ -10,13 +10,13 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from fogsim.advised_driving import AdvisedDriving, spread_advice
-from fogsim.ego.view_rendering import prepare_lamplight
+from fogsim.core.parameters import checked_parameters
+from fogsim.core.randomness import Seed
 from fogsim.errors import InputError, UnknownNameError
 from fogsim.metrics import RunMetrics
-from fogsim.parameters import checked_parameters
-from fogsim.randomness import Seed
 from fogsim.scenario import Scenario, build
+from fogsim.simulation.advised_driving import AdvisedDriving, spread_advice
+from fogsim.simulation.ego.view_rendering import prepare_lamplight
 from fogsim.values import Command, Ending, Step
 from fogsim_envs.actions import checked_action, checked_options
 from fogsim_envs.hosting import TIMEOUT, Simulation, Timeout, begin, checked_timeout, refuse_copies, restart

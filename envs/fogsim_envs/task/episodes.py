@@ -9,8 +9,8 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.errors import InputError, UnknownNameError
-from fogsim.parameters import Range, checked_parameters
 from fogsim.traffic import SPEED_CHOICES
 
 _LIGHT = {"day": (2000.0, 40_000.0), "dusk": (10.0, 2000.0), "night": (0.1, 0.3)}

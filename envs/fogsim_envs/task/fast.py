@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere import extinction
+from fogsim.core.parameters import checked_parameters
 from fogsim.errors import InputError
 from fogsim.fusion import DatedFusion
-from fogsim.parameters import checked_parameters
 from fogsim.recorders import FramePanel, draw_view_from_above
 from fogsim.scenario import Scenario, build
 from fogsim.scenario.section import Method

@@ -9,9 +9,9 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from fogsim.core.parameters import NUMBER, checked_parameters
+from fogsim.core.randomness import Seed
 from fogsim.errors import InputError
-from fogsim.parameters import NUMBER, checked_parameters
-from fogsim.randomness import Seed
 from fogsim.scenario import Scenario
 from fogsim.traffic.highway import LEAD
 from fogsim.values import Ending, Step

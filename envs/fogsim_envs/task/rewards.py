@@ -3,9 +3,9 @@
 import math
 from dataclasses import dataclass
 
-from fogsim.kinematics import stopping_sight_distance
+from fogsim.core.kinematics import stopping_sight_distance
+from fogsim.core.parameters import checked_parameters
 from fogsim.metrics import DEFAULT_STANDARD, SafetyStandard
-from fogsim.parameters import checked_parameters
 from fogsim.values import Ending, Lamp, Step
 
 COMFORTABLE_DECELERATION = 2.0

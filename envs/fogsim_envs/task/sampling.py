@@ -8,8 +8,8 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
+from fogsim.core.parameters import Range
 from fogsim.errors import InputError, UnknownNameError, shown
-from fogsim.parameters import Range
 from fogsim.scenario import Scenario, load_scenario, override
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim_envs.task.episodes import Episode, FogDistribution, ScenarioDistribution, check_driver, fog_setting

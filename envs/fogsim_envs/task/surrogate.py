@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.files.readers import read_json
+from fogsim.core.parameters import checked_parameters
 from fogsim.errors import InputError, shown
-from fogsim.files.readers import read_json
-from fogsim.parameters import checked_parameters
 from fogsim.units import visibility_from_extinction
 from fogsim.values import Estimate
 

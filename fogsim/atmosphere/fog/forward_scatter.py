@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 
 _COARSEST = 2.0
 """The image is averaged to pixels of at most one such part of the blur's width before it is blurred."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fogsim.atmosphere.fog.frustum_kernels import PixelGrid, extinctions_on_rays, fog_rows_by_grid, grid_depths
 from fogsim.atmosphere.fog.koschmieder_kernels import ENDLESS
 from fogsim.atmosphere.fog.medium import Medium, medium_of
-from fogsim.linear_algebra import matrix_product
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.values import Camera, CameraPose, FogField, View
 from fogsim.values.pinhole import ray_from_pixel
 

@@ -16,7 +16,7 @@ from fogsim.atmosphere.fog.koschmieder_kernels import (
 )
 from fogsim.atmosphere.fog.medium import BASE, BASE_EDGE, DECAY, TOP, TOP_EDGE, Medium
 from fogsim.atmosphere.fog.optical_depth_kernels import extinctions_on_ray
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 
 OPAQUE = 60.0
 """Optical depth beyond which nothing is distinguished [-]."""

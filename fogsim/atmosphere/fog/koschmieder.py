@@ -13,7 +13,7 @@ from fogsim.atmosphere.fog.layer_airlight import slant_airlight
 from fogsim.atmosphere.fog.layer_airlight_kernels import LayeredFog, layered_fog_rows
 from fogsim.atmosphere.fog.medium import has_closed_form
 from fogsim.atmosphere.fog.shelters import is_sheltered, sheltered_pixels
-from fogsim.jit import Bands
+from fogsim.core.jit import Bands
 from fogsim.values import Camera, CameraPose, FogBank, FogField, View
 from fogsim.values.pinhole import ray_from_pixel
 

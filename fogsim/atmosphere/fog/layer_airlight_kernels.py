@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere.fog.koschmieder_kernels import ENDLESS, bilinear, transmittances
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 
 BEND = 0.05
 """Sine of an elevation at which a table's lines of sight are half as dense as at the horizon: s / (|s| + `BEND`)."""

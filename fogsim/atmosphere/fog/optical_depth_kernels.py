@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere.fog.medium import BASE, BASE_EDGE, DECAY, EXTINCTION, GROUND, TOP, TOP_EDGE, Medium
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 
 MOST_PIECES = 400
 """A line is cut into no more pieces than this between two edges: very long lines see no single patch."""

@@ -26,7 +26,7 @@ from fogsim.atmosphere.lamps.halo_lamps import (
     lamp_profile,
 )
 from fogsim.atmosphere.lamps.lobe_kernels import Angles, side_profiles
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.units import LUMINANCE_WEIGHTS
 
 _LAST_WIDE = np.float32(WIDE_SIZE - 1.001)

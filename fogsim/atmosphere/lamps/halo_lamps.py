@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 
 PLACE_U, PLACE_V, AHEAD, RANGE, DEPTH, STRENGTH, SHOWN, AREA, PIXELS = range(9)
 COLOUR, TOWARDS = 9, 12

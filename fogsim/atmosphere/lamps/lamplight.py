@@ -14,7 +14,7 @@ from fogsim.atmosphere.lamps.phase_function import Droplets
 from fogsim.atmosphere.lamps.plane_pieces import piece_length
 from fogsim.atmosphere.lamps.veil import FOLD_DISTANCE, INTERVALS, lit_air, node_distances, veil_along, veil_rays
 from fogsim.atmosphere.lamps.veil_kernels import LitAir, VeilRays, average_extinctions
-from fogsim.linear_algebra import matrix_product
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.values import Camera, CameraPose, FogField, HeadLamp, View
 from fogsim.values.pinhole import camera_axes, ray_from_pixel
 

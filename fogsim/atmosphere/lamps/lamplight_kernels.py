@@ -15,7 +15,7 @@ from fogsim.atmosphere.fog.koschmieder_kernels import (
 )
 from fogsim.atmosphere.lamps.lamp_tables import FOLD, SIZE
 from fogsim.atmosphere.lamps.plane_pieces import choose_pixels, row_points, spread_over_row
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 
 _ONE, _HALF, _THIRD = np.float32(1.0), np.float32(0.5), np.float32(1.0 / 3.0)
 _ZERO = np.float32(0.0)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere.lamps.halo_lamps import DEPTH, STRENGTH
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 
 
 class LobeTables(NamedTuple):

@@ -26,7 +26,7 @@ from fogsim.atmosphere.lamps.veil_kernels import (
     add_scattered_light,
     integrate_veil,
 )
-from fogsim.linear_algebra import matrix_product
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.values import Camera, CameraPose
 from fogsim.values.pinhole import camera_axes
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere.fog.koschmieder_kernels import transmittances
 from fogsim.atmosphere.lamps.lamp_tables import BLURS, FIRST_BLUR, FOLD, PHASE_SIZE, SIZE
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 
 PIECES = 4
 """Pieces of a ray between two of its nodes."""

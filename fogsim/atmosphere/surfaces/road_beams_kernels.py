@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere.surfaces.streetlight_kernels import GroundLight
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 
 
 class BeamsAlike(NamedTuple):

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fogsim.atmosphere.fog.koschmieder_kernels import bilinear, fill_channels, repeat_channels
 from fogsim.atmosphere.lamps.plane_pieces import choose_pixels, row_points, spread_over_row
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)
 _FARTHEST = np.float32(500.0)  # half the diagonal of a map, and more

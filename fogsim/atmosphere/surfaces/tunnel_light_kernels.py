@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.atmosphere.fog.shelter_kernels import FARTHEST, ray
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 
 _Array = NDArray[np.float64]
 _Picture = NDArray[np.float32]

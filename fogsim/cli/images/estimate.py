@@ -251,7 +251,7 @@ def _estimate(
 
 
 def _check_plot(outputs: _Outputs, source: "Source") -> None:
-    from fogsim.files.output_targets import refuse_unwritable
+    from fogsim.core.files.output_targets import refuse_unwritable
 
     if outputs.plot is None:
         return
@@ -263,7 +263,7 @@ def _check_plot(outputs: _Outputs, source: "Source") -> None:
 
 
 def _write_plot(clip: "Clip", path: Path, source: "Source") -> None:
-    from fogsim.files.atomic import write_bytes
+    from fogsim.core.files.atomic import write_bytes
 
     content = io.BytesIO()
     clip.plot(source.paths[0].name).savefig(content, format=path.suffix[1:].lower(), dpi=150)
@@ -331,7 +331,7 @@ def _say(line: str) -> None:
 
 
 def _guess(source: "Source", camera_file: Path, overwrite: bool, guessing: _Guessing) -> None:
-    from fogsim.files.output_targets import refuse_unwritable
+    from fogsim.core.files.output_targets import refuse_unwritable
     from fogsim.offline import camera_text, write_camera
 
     refuse_unwritable(camera_file, "--camera", overwrite=overwrite, read=source.paths)

@@ -5,8 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.parameters import checked_parameters
 from fogsim.errors import InputError
-from fogsim.parameters import checked_parameters
 from fogsim.values.estimate import NORMAL_90_PERCENT
 
 HELD = 0.9

@@ -5,10 +5,10 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
+from fogsim.core.parameters import checked_parameters
 from fogsim.errors import InputError
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.learned.onnx_model import OnnxModel, read_model
-from fogsim.parameters import checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate
 from fogsim.values.observation import Observation

@@ -12,10 +12,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.files.readers import number_in_text, read_bytes
+from fogsim.core.registry.guard import guarded_call
+from fogsim.core.registry.user_code import described
 from fogsim.errors import InputError, MethodError, MissingDependencyError, shown
-from fogsim.files.readers import number_in_text, read_bytes
-from fogsim.registry.guard import guarded_call
-from fogsim.registry.user_code import described
 
 CONFORMAL = "fogsim.conformal"
 """Key of a model's metadata: factor for its deviations with which 90 % intervals hold (`conformal_factor`)."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.values.camera import Camera
 from fogsim.vision.light.pixel_kernels import LinearPixels, Pixels
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Self
 
+from fogsim.core.parameters import FileName, Range, checked_parameters
 from fogsim.errors import InputError
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.night.gallen2014_veil import LEAST_ROWS, Gallen2014Veil
@@ -18,7 +19,6 @@ from fogsim.estimators.night.halos import (
 )
 from fogsim.estimators.night.own_light import HeadLamps
 from fogsim.estimators.protocol import Calibrations
-from fogsim.parameters import FileName, Range, checked_parameters
 from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate, ExtinctionBounds

@@ -7,13 +7,13 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.night.cells import CellMeans, cell_means, cell_size
 from fogsim.estimators.night.night_road import NightRoad
 from fogsim.estimators.night.own_light import HeadLamps, lit_head_lamps, setback_of, without_noise
 from fogsim.estimators.night.veil_correlation import VeilScores, VeilTemplates, visibility_by_parabola
 from fogsim.estimators.protocol import Calibrations
-from fogsim.parameters import Range, checked_parameters
 from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera, Response
 from fogsim.values.estimate import Estimate

@@ -11,8 +11,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from fogsim.core.files.readers import number_within, read_json
 from fogsim.errors import InputError, shown
-from fogsim.files.readers import number_within, read_json
 from fogsim.values.camera import Camera, Response
 from fogsim.vision.light.pixel_kernels import Pixels
 from fogsim.vision.sources.halo_profile import Halo, halos_of

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.errors import InputError, shown
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.night.light_fit import Fit, Measured, Templates, log_likelihoods, robust_weights
@@ -27,7 +28,6 @@ from fogsim.estimators.night.own_light import (
     without_noise,
 )
 from fogsim.estimators.protocol import Calibrations
-from fogsim.parameters import Range, checked_parameters
 from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate, ExtinctionBounds

@@ -10,8 +10,8 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
-from fogsim.parameters import FileName
+from fogsim.core.jit import kernel
+from fogsim.core.parameters import FileName
 from fogsim.values.camera import Camera, Response
 from fogsim.values.light import Lamp
 from fogsim.values.observation import Observation

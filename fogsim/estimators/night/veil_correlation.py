@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.linear_algebra import inverse_of, matrix_product
 from fogsim.estimators.night.references import VeilReferences
-from fogsim.linear_algebra import inverse_of, matrix_product
 from fogsim.values.camera import Camera, Response
 from fogsim.values.camera_response import respond
 

@@ -6,9 +6,9 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.other_sensors.loss_likelihood import LossLikelihood
-from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import LeadMeasurement, Observation

@@ -3,9 +3,9 @@
 import math
 from typing import Annotated
 
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.errors import InputError
 from fogsim.estimators.image_check import ObservationCheck, checked_image
-from fogsim.parameters import Range, checked_parameters
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import NORMAL_90_PERCENT, Estimate, ExtinctionBounds

@@ -4,9 +4,9 @@ import math
 from collections import deque
 from typing import Annotated
 
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.errors import InputError
 from fogsim.estimators.image_check import ObservationCheck
-from fogsim.parameters import Range, checked_parameters
 from fogsim.units import extinction_from_visibility
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.linear_algebra import convolution
 from fogsim.estimators.signs.face_light import FaceLight
-from fogsim.linear_algebra import convolution
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 
 Floats = NDArray[np.float64]

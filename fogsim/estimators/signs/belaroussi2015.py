@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Self
 
+from fogsim.core.mixture import majority, reduced
+from fogsim.core.parameters import FileName, Range, checked_parameters
 from fogsim.errors import InputError
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.protocol import Calibrations
@@ -13,8 +15,6 @@ from fogsim.estimators.signs.operating_range import OperatingRange
 from fogsim.estimators.signs.regions import PoseDeviation
 from fogsim.estimators.signs.track import SignTrack
 from fogsim.estimators.signs.watch import SignWatch, Watched, sign_looks
-from fogsim.mixture import majority, reduced
-from fogsim.parameters import FileName, Range, checked_parameters
 from fogsim.units import extinction_from_visibility, visibility_from_extinction
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate, ExtinctionBounds

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.linear_algebra import inverse_of, matrix_product, times
 from fogsim.estimators.signs.layout import Layout, face_maps
-from fogsim.linear_algebra import inverse_of, matrix_product, times
 
 Floats = NDArray[np.float64]
 

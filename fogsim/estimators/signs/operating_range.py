@@ -11,9 +11,9 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import isotonic_regression
 
+from fogsim.core.files.readers import number_within, read_json
+from fogsim.core.linear_algebra import inverse_of, matrix_product, times
 from fogsim.errors import InputError, shown
-from fogsim.files.readers import number_within, read_json
-from fogsim.linear_algebra import inverse_of, matrix_product, times
 
 FLAT = 0.35
 """Relative deviation of one sign's visibility beyond which the curve is flat and distances are uninformative [-]."""

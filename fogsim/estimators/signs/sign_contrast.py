@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.parameters import Range, checked_parameters
 from fogsim.estimators.image_check import ObservationCheck
 from fogsim.estimators.signs.approach_fit import (
     MAX_MISFIT,
@@ -21,7 +22,6 @@ from fogsim.estimators.signs.layout import layout_of
 from fogsim.estimators.signs.regions import PoseDeviation
 from fogsim.estimators.signs.registration import Registration
 from fogsim.estimators.signs.watch import SignWatch, sign_looks
-from fogsim.parameters import Range, checked_parameters
 from fogsim.values.camera import Camera
 from fogsim.values.estimate import Estimate
 from fogsim.values.observation import Observation

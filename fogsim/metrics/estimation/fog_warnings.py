@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from fogsim.kinematics import DECELERATION, REACTION_TIME, stopping_sight_distance
+from fogsim.core.kinematics import DECELERATION, REACTION_TIME, stopping_sight_distance
 from fogsim.metrics.estimation.errors import FOG_LIMIT
 from fogsim.metrics.metric import Definition, JsonValue, Sample, definitions_of, share
 from fogsim.units import visibility_from_extinction

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from fogsim.core.parameters import accepted_parameters
 from fogsim.estimators import ESTIMATORS
-from fogsim.parameters import accepted_parameters
 from fogsim.values import Lamp
 
 NIGHT_METHODS = ("gallen2014", "gallen2014_halo", "gallen2014_veil", "night_road")

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.files.readers import number_in_text, read_text
+from fogsim.core.files.xml_reader import read_tree
 from fogsim.errors import InputError, shown
-from fogsim.files.readers import number_in_text, read_text
-from fogsim.files.xml_reader import read_tree
 
 SEMI_MAJOR, FLATTENING = 6_378_137.0, 1.0 / 298.257223563
 """Ellipsoid of WGS 84: semi-major axis [m], flattening [-] (NIMA TR8350.2, 2000, table 3.1)."""

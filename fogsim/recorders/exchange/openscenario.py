@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-from fogsim.files.atomic import write_text
+from fogsim.core.files.atomic import write_text
 from fogsim.recorders.protocol import Derived
 from fogsim.recorders.templating import render
 from fogsim.values import Step, TrafficStep

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.render.cpu.triangles import Array, Drawn, Index, Pinhole, Triangles, Wide, Work
 
 _MANY = 40  # triangles from which looking at a copy's box costs less than looking at all of them

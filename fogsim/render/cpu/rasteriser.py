@@ -5,7 +5,7 @@ import sys
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import Bands
+from fogsim.core.jit import Bands
 from fogsim.render.cpu.rasteriser_kernels import rasterise
 from fogsim.render.cpu.triangles import Drawn, Pinhole, Triangles, Work
 from fogsim.render.drawing import NEAR, Drawing, MeshTable

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.render.cpu.occlusion import depth_key, gather_copies
 from fogsim.render.cpu.triangles import (
     Drawn,

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.render.vectors import Vector
 
 _SLACK = 1e-3  # by which boxes are widened, since corners are projected with 32 bits [px]

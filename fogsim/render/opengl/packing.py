@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.render.drawing import Drawing, MeshTable
 
 CORNER = np.dtype([("position", "<f4", (3,)), ("triangle", "<i4")])

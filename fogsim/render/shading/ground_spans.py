@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.render.shading import layout
 from fogsim.render.shading.layout import Picture, Spans, Wide
 from fogsim.render.shading.texture import Row

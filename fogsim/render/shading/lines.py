@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 
 LINE_WIDTH = 0.2
 """Width of a line [m]."""

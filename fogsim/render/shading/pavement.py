@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.render.shading.layout import Wide
 from fogsim.values.scene import Pavement, RoadSurface
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import Bands, kernel
+from fogsim.core.jit import Bands, kernel
 from fogsim.render.drawing import Drawing, MeshTable
 from fogsim.render.lens import Lens, lens_of
 from fogsim.render.photometry import SKY_TINT, lamp_radiance, lighting_bits, zenith_luminance

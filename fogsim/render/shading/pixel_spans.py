@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.render.shading.layout import Copies, Numbers, Spans, Wide
 
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.render.drawing import NEAR
 from fogsim.render.lens import Lens
 from fogsim.render.shading import layout

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.render.lens import Lens
 from fogsim.render.shading.layout import Array, Numbers
 from fogsim.render.shading.noise import GRAIN, PER_CELL, SMOOTH, Noise

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.kinematics import DECELERATION, REACTION_TIME, safe_speed
+from fogsim.core.kinematics import DECELERATION, REACTION_TIME, safe_speed
 from fogsim.units import KMH_PER_MPS
 
 FREE_ABOVE = 5.0

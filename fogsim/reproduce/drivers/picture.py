@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
-from fogsim.kinematics import DECELERATION, REACTION_TIME, safe_speed
+from fogsim.core.kinematics import DECELERATION, REACTION_TIME, safe_speed
 from fogsim.reproduce.drivers.passages import BRAKING, THINKING_TIME
 from fogsim.reproduce.drivers.plan import DEFAULT, MEDIUM, SEEING, SPARSE, Case, Plan
 from fogsim.reproduce.drivers.results import Results, interval

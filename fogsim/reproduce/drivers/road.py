@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from fogsim.atmosphere import FieldAccess
-from fogsim.files.xml_reader import read_tree
+from fogsim.core.files.xml_reader import read_tree
 from fogsim.scenario import build, load_scenario
 from fogsim.traffic import AfterCollision, Event, TrafficSetup, libsumo_traffic
 from fogsim.units import extinction_from_visibility

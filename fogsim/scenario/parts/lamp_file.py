@@ -5,8 +5,8 @@ from typing import Annotated
 
 from pydantic import Field, ValidationError
 
+from fogsim.core.files.readers import read_text
 from fogsim.errors import InputError
-from fogsim.files.readers import read_text
 from fogsim.lighting import LampMount
 from fogsim.lighting.beams import read_beam
 from fogsim.scenario.document import read_document

@@ -6,14 +6,14 @@ from importlib import import_module
 from typing import TypeVar
 
 from fogsim.advice import ADVISERS, Adviser, VehicleAdviser
+from fogsim.core.parameters import paths_in
+from fogsim.core.registry import Registry
 from fogsim.errors import InputError
 from fogsim.estimators import ESTIMATORS, Estimator
 from fogsim.estimators.protocol import TakesCalibrations
 from fogsim.fusion import FUSIONS, Fusion, LocatedFusion
 from fogsim.lighting import LIGHTING_POLICIES, LightingPolicy, VehicleLightingPolicy
 from fogsim.metrics import SafetyStandard
-from fogsim.parameters import paths_in
-from fogsim.registry import Registry
 from fogsim.scenario.parts.lamp_file import load_lamps
 from fogsim.scenario.schema import NO_RENDERER, Scenario
 from fogsim.scenario.section import Method

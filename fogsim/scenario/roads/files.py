@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from fogsim.core.files.generated_files import write_generated
 from fogsim.errors import InputError, suggest
-from fogsim.files.generated_files import write_generated
 from fogsim.scenario.roads.schema import NO_MEASURES, ActorSection, DemandSection, ObstructionSection, Road, measure_of
 from fogsim.scenario.schema import Scenario
 from fogsim.traffic.templates import (

@@ -5,8 +5,8 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from fogsim.core.randomness import named_generator
 from fogsim.errors import shown, suggest
-from fogsim.randomness import named_generator
 from fogsim.units.quantities import split_quantity
 
 MOST_VALUES = 100_000

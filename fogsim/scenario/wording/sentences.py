@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from fogsim.advice import ADVISERS
+from fogsim.core.registry import Registry
 from fogsim.errors import InputError
 from fogsim.estimators import ESTIMATORS
-from fogsim.registry import Registry
 from fogsim.scenario.fog import Fog
 from fogsim.scenario.parts.traffic import traffic_setup
 from fogsim.scenario.road_sections import DISPLAYS, stations

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fogsim.linear_algebra import matrix_product
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.scene.signs.symbols import BLACK, FIELD, RED, Corners, flat
 from fogsim.scene.solids import Material, merge
 from fogsim.values.scene import Instance, Mesh

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.linear_algebra import matrix_product
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.scene.polyline import cleaned
 from fogsim.scene.solids import Material, box, merge, moved
 from fogsim.scene.terrain import Terrain

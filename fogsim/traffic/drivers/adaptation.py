@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.units import DAY_ILLUMINANCE
 from fogsim.values.eye import flux_root, luminance_root
 from fogsim.values.fog import AIRLIGHT_SHARE

@@ -6,7 +6,7 @@ change of speed in FogSim, and the text of each preset says from what.
 
 from dataclasses import dataclass
 
-from fogsim.registry import Registry
+from fogsim.core.registry import Registry
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from fogsim.registry import Registry
+from fogsim.core.registry import Registry
 from fogsim.traffic.drivers.leader_reach import LeaderReach
 
 CATCHING_UP = 5.0

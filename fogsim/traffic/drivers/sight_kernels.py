@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.traffic.drivers.adaptation import NIGHT_EYE_THRESHOLD, Adaptation, contrast_ratio
 
 FARTHEST = 1e5

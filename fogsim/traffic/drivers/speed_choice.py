@@ -14,8 +14,8 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from fogsim.kinematics import DECELERATION, REACTION_TIME, safe_speed
-from fogsim.registry import Registry
+from fogsim.core.kinematics import DECELERATION, REACTION_TIME, safe_speed
+from fogsim.core.registry import Registry
 from fogsim.traffic.drivers.compliance import FULL, Compliance, complied_speed
 from fogsim.traffic.drivers.following import OBSERVED_MIXTURE
 from fogsim.values import Display

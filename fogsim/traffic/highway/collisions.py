@@ -7,7 +7,7 @@ from typing import Any
 
 from highway_env.utils import are_polygons_intersecting
 
-from fogsim.linear_algebra import matrix_product
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.traffic.highway.fleet import Fleet
 from fogsim.values import Collision
 

@@ -6,9 +6,9 @@ from typing import Any, TypeGuard
 
 from highway_env.vehicle.controller import ControlledVehicle
 
+from fogsim.core.kinematics import decelerated_speed
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.errors import InputError, suggest
-from fogsim.kinematics import decelerated_speed
-from fogsim.linear_algebra import matrix_product
 from fogsim.traffic.drivers.events import Event, Order, Script, Situation, signed_gap
 from fogsim.traffic.highway.fleet import LEAD, Fleet, acceleration
 from fogsim.values import Unplayed

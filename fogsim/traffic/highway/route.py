@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.linear_algebra import matrix_product
+from fogsim.core.linear_algebra import matrix_product
 
 FASTEST_GAIN = 1.5
 """Way along the route for each metre driven, at most [-]: who cuts a bend gains on the middle of the route's lane."""

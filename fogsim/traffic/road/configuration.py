@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
+from fogsim.core.files.xml_reader import read_tree, root_tag
 from fogsim.errors import InputError
-from fogsim.files.xml_reader import read_tree, root_tag
 
 _FIRST_ELEMENTS: Mapping[str, tuple[str, ...]] = {
     "config": ("configuration", "sumoConfiguration"),

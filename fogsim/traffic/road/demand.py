@@ -4,8 +4,8 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from fogsim.core.files.xml_reader import read_elements
 from fogsim.errors import InputError
-from fogsim.files.xml_reader import read_elements
 from fogsim.traffic.road.configuration import configured_demand
 
 MOST_BYTES = 50_000_000

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from fogsim.core.files.xml_reader import read_elements
 from fogsim.errors import InputError
-from fogsim.files.xml_reader import read_elements
 
 _HOUR = 3600.0
 _MOST_BYTES = 50_000_000

@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.files.cache_entries import keep_newest, read_entry, write_entry
-from fogsim.files.user_cache import cache_directory
+from fogsim.core.files.cache_entries import keep_newest, read_entry, write_entry
+from fogsim.core.files.user_cache import cache_directory
 from fogsim.traffic.road.road_map import RoadMap, edge_ranges
 from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, Sign, SignalHead
 

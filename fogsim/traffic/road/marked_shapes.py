@@ -3,9 +3,9 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from fogsim.core.files.readers import number_in_text
+from fogsim.core.files.xml_reader import XmlFile
 from fogsim.errors import InputError, shown
-from fogsim.files.readers import number_in_text
-from fogsim.files.xml_reader import XmlFile
 
 _MOST_BYTES, _MOST_ELEMENTS = 2_000_000_000, 20_000_000
 

@@ -6,8 +6,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from fogsim.core.files.xml_reader import read_elements
 from fogsim.errors import InputError
-from fogsim.files.xml_reader import read_elements
 
 MOST_BYTES = 50_000_000
 """Unpacked bytes of a network file after which reading stops."""

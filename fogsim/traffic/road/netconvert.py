@@ -10,9 +10,9 @@ import tempfile
 from pathlib import Path
 from xml.etree.ElementTree import Element, ElementTree
 
+from fogsim.core.files.generated_files import kept_text
+from fogsim.core.files.readers import read_text
 from fogsim.errors import InputError, MissingDependencyError, shown
-from fogsim.files.generated_files import kept_text
-from fogsim.files.readers import read_text
 from fogsim.traffic.road.opendrive import is_opendrive, read_opendrive
 
 USUAL_LIMIT = 130.0 / 3.6

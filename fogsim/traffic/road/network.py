@@ -7,10 +7,10 @@ import numpy as np
 import sumolib
 from numpy.typing import NDArray
 
+from fogsim.core.files.readers import FARTHEST
+from fogsim.core.files.xml_reader import read_elements, root_tag
+from fogsim.core.garbage import no_garbage_collection
 from fogsim.errors import InputError
-from fogsim.files.readers import FARTHEST
-from fogsim.files.xml_reader import read_elements, root_tag
-from fogsim.garbage import no_garbage_collection
 from fogsim.traffic.road.map_cache import cached_map, compacted, is_worth_caching, keep_map
 from fogsim.traffic.road.net_lanes import map_of
 from fogsim.traffic.road.road_map import RoadMap

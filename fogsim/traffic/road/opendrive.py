@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
+from fogsim.core.files.readers import number_in_text, number_within
+from fogsim.core.files.xml_reader import read_tree
 from fogsim.errors import InputError, shown
-from fogsim.files.readers import number_in_text, number_within
-from fogsim.files.xml_reader import read_tree
 from fogsim.traffic.road.plan_view import PlanView, plan_view
 from fogsim.units import KMH_PER_MPS
 from fogsim.values import Sign

@@ -11,8 +11,8 @@ from xml.etree.ElementTree import Element, fromstring
 import numpy as np
 from numpy.typing import NDArray
 
+from fogsim.core.files.xml_reader import read_tree
 from fogsim.errors import InputError
-from fogsim.files.xml_reader import read_tree
 from fogsim.traffic.road.opendrive import is_opendrive, read_opendrive
 from fogsim.traffic.road.plan_view import PlanView, plan_view
 

@@ -7,8 +7,8 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from fogsim.files.readers import number_in_text
-from fogsim.linear_algebra import matrix_product
+from fogsim.core.files.readers import number_in_text
+from fogsim.core.linear_algebra import matrix_product
 
 SPIRAL_NODES, SPIRAL_WEIGHTS = np.polynomial.legendre.leggauss(24)
 """Gauss-Legendre rule on −1 … 1; on a spiral that turns by π its error is far below a millimetre."""

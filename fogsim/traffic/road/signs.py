@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import sumolib
 
-from fogsim.files.readers import FARTHEST, number_in_text
+from fogsim.core.files.readers import FARTHEST, number_in_text
 from fogsim.traffic.road.limit_signs import SIGN_DIAMETER, SIGN_HEIGHT, SPEED_LIMIT
 from fogsim.traffic.road.marked_shapes import MarkedShape, marked_shapes
 from fogsim.traffic.road.opendrive import FASTEST, is_opendrive, opendrive_signs

@@ -8,8 +8,8 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from types import ModuleType
 
+from fogsim.core.files.standard_streams import open_standard_streams
 from fogsim.errors import MissingDependencyError, SimulationError, SimulationRunningError
-from fogsim.files.standard_streams import open_standard_streams
 from fogsim.traffic.sumo.link import Api, translated_errors
 from fogsim.traffic.sumo.output_folder import OutputFolder
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from fogsim.core.files.xml_reader import read_tree
 from fogsim.errors import MissingDependencyError, nearest, shown
-from fogsim.files.xml_reader import read_tree
 from fogsim.traffic.road.configuration import NO_LANES
 from fogsim.traffic.sumo.libsumo_link import load_libsumo
 

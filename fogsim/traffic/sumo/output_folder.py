@@ -7,8 +7,8 @@ import warnings
 import weakref
 from pathlib import Path
 
+from fogsim.core.files.xml_reader import root_tag
 from fogsim.errors import InputError
-from fogsim.files.xml_reader import root_tag
 
 _TO_THE_ROOT = "../" * 40
 """From any folder to the root: there is nothing above it."""

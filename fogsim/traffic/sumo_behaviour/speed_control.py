@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.kinematics import decelerated_speed
+from fogsim.core.kinematics import decelerated_speed
 from fogsim.traffic.appearance import TRAINS
 from fogsim.traffic.drivers.advice_hearing import AdviceHearing, Heard, advised_by_name, heard_since
 from fogsim.traffic.drivers.compliance import Compliance

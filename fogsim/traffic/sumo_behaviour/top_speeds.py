@@ -10,7 +10,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.kinematics import decelerated_speed
+from fogsim.core.kinematics import decelerated_speed
 from fogsim.traffic.sumo.claims import Claims
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable

@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Protocol
 
-from fogsim.registry import Registry
+from fogsim.core.registry import Registry
 from fogsim.traffic.templates.along_roads import Curve, Grade, Motorway, Rural, Straight, Tunnel
 from fogsim.traffic.templates.layout import Layout
 from fogsim.traffic.templates.ramp import Ramp

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from fogsim.core.files.xml_reader import read_elements
 from fogsim.errors import InputError
-from fogsim.files.xml_reader import read_elements
 
 _MOST_BYTES = 2_000_000_000
 

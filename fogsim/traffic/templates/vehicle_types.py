@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from fogsim.registry import Registry
+from fogsim.core.registry import Registry
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.vision.day.row_filters import road_pass, road_steps, sky_pass
 from fogsim.vision.day.row_kernels import (
     AIRLIGHT,

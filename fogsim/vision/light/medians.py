@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 
 MOST_SAMPLES = 64
 """Pixels that one row's statistic is made of; more cost time and gain little next to the road's own texture."""

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.units import LUMINANCE_WEIGHTS
 
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.vision.light.medians import columns_apart, median, row_medians
 
 Image = NDArray[np.float32]

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.vision.lines.edges import Gradient, peak_offset
 from fogsim.vision.lines.vanishing_point import Lines, VanishingPoint, all_pairs, crossings, supports
 

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.parameters import Range
+from fogsim.core.parameters import Range
 from fogsim.values.camera import Camera
 
 MIN_COLS, MIN_ROWS = 32, 16

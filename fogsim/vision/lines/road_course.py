@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.linear_algebra import inverse_of, matrix_product
+from fogsim.core.linear_algebra import inverse_of, matrix_product
 from fogsim.values.camera import Camera
 from fogsim.vision.light.pixel_kernels import LinearPixels
 from fogsim.vision.lines.horizon import Horizon

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
-from fogsim.linear_algebra import inverse_of, times
+from fogsim.core.jit import kernel
+from fogsim.core.linear_algebra import inverse_of, times
 from fogsim.vision.lines.road_line_kernels import LEAST_POINTS, LEAST_SCATTER, Points, RoadLines
 from fogsim.vision.lines.row_edges import FALLING, RIDGE, RISING
 

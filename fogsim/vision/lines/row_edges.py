@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.vision.light.medians import median_of_few
 from fogsim.vision.light.pixel_kernels import row_luminance
 from fogsim.vision.lines.edges import peak_offset

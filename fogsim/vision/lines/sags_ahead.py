@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.linear_algebra import inverse_of, matrix_product
+from fogsim.core.linear_algebra import inverse_of, matrix_product
 from fogsim.vision.lines.road_course_kernels import KNOTS, PIECES
 
 Floats = NDArray[np.float64]

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fogsim.jit import kernel
-from fogsim.linear_algebra import inverse_of, matrix_product
+from fogsim.core.jit import kernel
+from fogsim.core.linear_algebra import inverse_of, matrix_product
 from fogsim.vision.lines.horizon import Horizon
 
 Floats = NDArray[np.float64]

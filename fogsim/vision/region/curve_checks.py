@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from fogsim.linear_algebra import straight_line
+from fogsim.core.linear_algebra import straight_line
 from fogsim.units import OPTICAL_DEPTH_AT_VISIBILITY
 from fogsim.vision.region.law import law_fit
 from fogsim.vision.region.profile import RoadCurve

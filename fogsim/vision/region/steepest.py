@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.vision.region.law import slants, transmittance
 from fogsim.vision.region.profile import RoadCurve
 

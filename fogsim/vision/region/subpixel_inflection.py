@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.linear_algebra import matrix_product
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.vision.region.inflection import Parameters, inflection_parameters
 from fogsim.vision.region.law import slants, transmittance
 from fogsim.vision.region.profile import RoadCurve

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.vision.sources.source_tree import GROWTH, SourceTree
 from fogsim.vision.sources.tree_kernels import AREA
 

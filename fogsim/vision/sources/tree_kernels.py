@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 
 AREA, SUM_U, SUM_V, SUM_UU, SUM_VV, SUM_UV, LEFT, RIGHT, TOP, BOTTOM = range(10)
 """Columns of what is known of a component: number of pixels, sums of their columns and rows and of the products of

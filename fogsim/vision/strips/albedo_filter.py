@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 
 CONSTANT_DEVIATION = 0.5
 """Deviation of a strip's albedo from its first guess, relative to it [-]: all but free."""

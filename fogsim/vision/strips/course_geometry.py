@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fogsim.linear_algebra import matrix_product
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.values.camera import Camera
 from fogsim.vision.lines.road_course import RoadCourse
 from fogsim.vision.strips import course_kernels

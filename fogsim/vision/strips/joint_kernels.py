@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
-from fogsim.linear_algebra import times
+from fogsim.core.jit import kernel
+from fogsim.core.linear_algebra import times
 from fogsim.vision.strips.albedo_filter import (
     USED,
     Albedo,

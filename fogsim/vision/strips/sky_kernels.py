@@ -5,8 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
-from fogsim.linear_algebra import inverse_of, times
+from fogsim.core.jit import kernel
+from fogsim.core.linear_algebra import inverse_of, times
 from fogsim.vision.light.medians import MOST_SAMPLES, sort_few
 from fogsim.vision.light.pixel_kernels import LinearPixels, even_column, pixel_luminance
 

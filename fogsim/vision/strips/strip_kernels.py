@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.vision.light.medians import MOST_SAMPLES, median_of_few
 from fogsim.vision.light.pixel_kernels import LinearPixels, even_column, pixel_luminance
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 
 Floats = NDArray[np.float32]
 Picture = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32]

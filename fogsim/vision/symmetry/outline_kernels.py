@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
+from fogsim.core.jit import kernel
 from fogsim.vision.symmetry.edge_kernels import NX, NY, X, Y
 
 Floats = NDArray[np.float32]

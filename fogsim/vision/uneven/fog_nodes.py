@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from fogsim.linear_algebra import inverse_of
+from fogsim.core.linear_algebra import inverse_of
 from fogsim.vision.strips import joint_kernels
 from fogsim.vision.uneven.uneven_kernels import FogNodes
 

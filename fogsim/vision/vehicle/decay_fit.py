@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
-from fogsim.linear_algebra import straight_line
+from fogsim.core.jit import kernel
+from fogsim.core.linear_algebra import straight_line
 
 Floats = NDArray[np.float64]
 

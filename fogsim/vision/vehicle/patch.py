@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.jit import kernel
-from fogsim.linear_algebra import matrix_product
+from fogsim.core.jit import kernel
+from fogsim.core.linear_algebra import matrix_product
 
 Floats = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fogsim.linear_algebra import inverse_of, matrix_product
+from fogsim.core.linear_algebra import inverse_of, matrix_product
 from fogsim.vision.light.medians import median
 from fogsim.vision.vehicle.contrast_ratio import RearPicture, cell_centres, common_cell, resample
 from fogsim.vision.vehicle.patch import (

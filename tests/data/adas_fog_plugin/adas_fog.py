@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from fogsim import Belief, Observation, SpeedAdvice
-from fogsim.parameters import Range, checked_parameters
+from fogsim.core.parameters import Range, checked_parameters
 
 
 @checked_parameters

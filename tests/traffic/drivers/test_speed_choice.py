@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fogsim.kinematics import safe_speed
+from fogsim.core.kinematics import safe_speed
 from fogsim.traffic.drivers.compliance import COMPLIANCES, Compliance, complied_speed
 from fogsim.traffic.drivers.speed_choice import (
     SPEED_CHOICES,

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from fogsim.atmosphere import FieldAccess, airlight_from_illuminance
+from fogsim.core.kinematics import safe_speed
 from fogsim.errors import InputError
-from fogsim.kinematics import safe_speed
 from fogsim.traffic import Compliance, DriverSetup, DriverSight
 from fogsim.traffic.drivers.leader_reach import leader_reach
 from fogsim.traffic.drivers.speed_choice import HeardAdvice, desired_speed, driver_traits

@@ -9,7 +9,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from fogsim.files.xml_reader import open_unpacked
+from fogsim.core.files.xml_reader import open_unpacked
 from fogsim.traffic.sumo.link import Api, vehicle_getter
 from fogsim.traffic.sumo_lanes.route_position import RoutePlaces
 

@@ -1,0 +1,311 @@
+"""Compiled kernels: numba, cached on disk where a directory can be written, compiled again where none can.
+
+And what lets two of them work at once on a picture's rows.
+"""
+
+import _thread
+import functools
+import gc
+import hashlib
+import logging
+import multiprocessing
+import os
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import FunctionType, ModuleType
+from typing import Any, TypeVar, cast
+
+import numpy as np
+from numba.core import event, serialize
+
+# Where Intel's vector functions are installed, numba would take them, and they round otherwise than the C library does.
+os.environ["NUMBA_DISABLE_INTEL_SVML"] = "1"
+import numba
+from numba.core.types.misc import unliteral
+
+from fogsim.core.compiling import begin_economy, prepare_economy
+from fogsim.core.compiling.kept_code import KeptCode
+from fogsim.core.compiling.shipped_code import ShippedCache, shipped_cache, why_not_taken
+
+prepare_economy()
+
+# For the class of each array or named tuple that a kernel returns, numba calls this, and goes on whatever comes of it:
+# an exception of a signal's handler in it is lost, or the process is. Nothing is interrupted within a cache in C.
+serialize._numba_unpickle = functools.cache(serialize._numba_unpickle)
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_WORTHWHILE = 100_000
+"""Pixels from which a second thread gains more than the 50 µs that its start costs."""
+
+_GAIN = 0.05
+"""How far the middle moves towards the slower band, over the picture's rows and the bands' relative difference."""
+
+_PATIENCE = 0.5
+"""Time that a process compiles before it says so [s]: one kernel more is no news, a first run is."""
+
+_LOOKS_AGAIN = 0.05
+"""Time between two looks for a kernel that another process compiles [s]."""
+
+_NEWS_PERIOD = 10.0
+"""Time between two lines on what has been compiled [s]."""
+
+
+class Announcement(event.Listener):  # type: ignore[misc] # numba is untyped
+    """Explains to the user that the time goes into compiling, at the first run only; then shows the progress.
+
+    Takes `clock` [s].
+    """
+
+    def __init__(self, print_line: Callable[[str], object], clock: Callable[[], float] = time.monotonic) -> None:
+        self._print, self._clock = print_line, clock
+        self._depth = self._compiled = 0
+        self._spent = self._started = 0.0
+        self._printed: float | None = None
+
+    def on_start(self, _: Any) -> None:
+        """Begin to count at the outermost kernel; those that it calls are compiled within it."""
+        if self._depth == 0:
+            self._started = self._clock()
+            if self._printed is None and self._spent > _PATIENCE:
+                self._printed = self._started
+                why = why_not_taken()
+                self._print(
+                    "fogsim: compiling for this processor, a minute or two, the first time only "
+                    f"(ahead of time and on all cores: fogsim compile{f'; {why}' if why else ''})"
+                )
+        self._depth += 1
+
+    def on_end(self, compiling: Any) -> None:
+        """Count a compiled kernel, and report the count now and then."""
+        self._depth -= 1
+        if self._depth == 0 and compiling.data["dispatcher"].py_func.__module__.startswith(f"{__package__}."):
+            now = self._clock()
+            self._compiled += 1
+            self._spent += now - self._started
+            if self._printed is not None and now - self._printed > _NEWS_PERIOD:
+                self._printed = now
+                self._print(f"fogsim: compiled {self._compiled} functions in {self._spent:.0f} s")
+
+
+class CompileSpeedup(event.Listener):  # type: ignore[misc] # numba is untyped
+    """Leaves out what costs time while one of FogSim's kernels is compiled, with all that it calls.
+
+    It pauses garbage collection, which finds little among millions of objects, and skips what numba is spared
+    by `fogsim.core.compiling`.
+    """
+
+    def __init__(self) -> None:
+        self._depth = 0
+        self._collects = False
+        self._end: Callable[[], None] | None = None
+
+    def on_start(self, compiling: Any) -> None:
+        """Begin at the outermost kernel."""
+        if self._depth == 0 and compiling.data["dispatcher"].py_func.__module__.startswith(f"{__package__}."):
+            self._collects = gc.isenabled()
+            gc.disable()
+            self._end = begin_economy()
+        self._depth += 1
+
+    def on_end(self, _: Any) -> None:
+        """End where it began."""
+        self._depth -= 1
+        if self._depth == 0 and self._end is not None:
+            self._end()
+            self._end = None
+            if self._collects:
+                gc.enable()
+
+
+event.register("numba:compile", Announcement(logging.getLogger(__package__).warning))
+event.register("numba:compile", CompileSpeedup())
+
+
+class CompilerProcess:
+    """Another process that compiles kernels of some modules: who finds one of these not compiled waits for it."""
+
+    def __init__(self) -> None:
+        self._is_over: Callable[[], bool] | None = None
+        self._packages: tuple[str, ...] = ()
+
+    @contextmanager
+    def compiles(self, is_over: Callable[[], bool], packages: Sequence[str]) -> Iterator[None]:
+        """Reckon with another process."""
+        self._is_over, self._packages = is_over, tuple(packages)
+        try:
+            yield
+        finally:
+            self._is_over = None
+
+    def may_bring(self, module: str) -> bool:
+        """Whether a kernel of a module that was not on the disk is worth another look, after a short while."""
+        if self._is_over is None or not module.startswith(self._packages):
+            return False
+        if self._is_over():
+            self._is_over = None
+        else:
+            time.sleep(_LOOKS_AGAIN)
+        return True
+
+
+COMPILER_PROCESS = CompilerProcess()
+"""What is compiled next to this process, in another one."""
+
+
+def is_kept(compiled: object) -> bool | None:
+    """Whether anything of a kernel is on the disk, or came with the installation; None where nothing can be kept."""
+    shipped: ShippedCache | None = getattr(compiled, "shipped", None)
+    if shipped is not None and shipped.is_there():
+        return True
+    file: Any = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
+    path = getattr(file, "_index_path", None)
+    return None if path is None else Path(path).exists()
+
+
+def kernel(function: F) -> F:
+    """Compile a function on its first call, without Python's lock and without threads (forks must stay possible).
+
+    Code that came compiled with the installation is used. Other code is kept next to the module or, for a read-only
+    installation, in the user's cache directory; where neither can be written it is compiled again by each process.
+    """
+    options = {"nogil": True, "fastmath": False, "error_model": "numpy", "no_cfunc_wrapper": True}
+    plain = cast("FunctionType", function)
+    # numba names the file after the function, and compiles again when the function's module changes, but not when
+    # another does that it calls or takes constants from: so the name that numba sees says what those were.
+    name = plain.__qualname__
+    plain.__qualname__ = f"{name}-{_fingerprint(plain)}"
+    try:
+        shipped = shipped_cache(plain)
+        compiled: Any = numba.njit(cache=True, **options)(function)
+        KeptCode.take_over(compiled._cache)
+    except RuntimeError:
+        # numba found no place for its cache
+        compiled = numba.njit(cache=False, **options)(function)
+    finally:
+        plain.__qualname__ = name
+    compiled.shipped = shipped
+    _look_elsewhere(compiled)
+    # Other kernels take one in that Python cannot call and that is not kept: they are kept, and it is in them.
+    inner: Any = numba.njit(cache=False, no_cpython_wrapper=True, **options)(function)
+    compiled.get_call_template, compiled.get_overload = _without_literals(inner.get_call_template), inner.get_overload
+    return cast("F", compiled)
+
+
+def _without_literals(get_call_template: Callable[..., Any]) -> Callable[..., Any]:
+    """Let a kernel be compiled for numbers of a type, and not for 0, for 1 and for other numbers each again."""
+
+    def get(arguments: Sequence[Any], keywords: dict[str, Any]) -> Any:
+        return get_call_template([unliteral(a) for a in arguments], {k: unliteral(a) for k, a in keywords.items()})
+
+    return get
+
+
+def _look_elsewhere(compiled: Any) -> None:
+    """Let a kernel that was never compiled here be looked for in what came with the installation.
+
+    One that another process compiles meanwhile is looked for on the disk again when that has ended.
+    """
+    load, module, shipped = compiled._cache.load_overload, compiled.py_func.__module__, compiled.shipped
+
+    def load_overload(signature: Any, target: Any) -> Any:
+        found = load(signature, target)
+        if found is None and shipped is not None:
+            found = shipped.load_overload(signature, target)
+        while found is None and COMPILER_PROCESS.may_bring(module):
+            found = load(signature, target)
+        return found
+
+    compiled._cache.load_overload = load_overload
+
+
+def _fingerprint(function: FunctionType) -> str:
+    """Digest of all that is compiled into a function besides its own source."""
+    return hashlib.sha256("\n".join(_compiled_in(function, set())).encode()).hexdigest()[:12]
+
+
+def _compiled_in(function: FunctionType, seen: set[FunctionType]) -> Iterator[str]:
+    """Sources of the kernels that a function calls and of the modules that it names, and the constants it uses."""
+    seen.add(function)
+    for name in function.__code__.co_names:
+        value = function.__globals__.get(name)
+        called = getattr(value, "py_func", None)
+        if called is not None and called not in seen:
+            yield _digest(called.__code__.co_filename)
+            yield from _compiled_in(called, seen)
+        elif isinstance(value, ModuleType) and value.__name__.startswith(f"{__package__}."):
+            yield _digest(str(value.__file__))
+        elif isinstance(value, np.ndarray):
+            yield f"{name} {value.dtype} {value.tobytes().hex()}"
+        elif isinstance(value, int | float | complex | str | tuple | np.generic):
+            yield f"{name} {value!r}"
+
+
+@functools.cache
+def _digest(path: str) -> str:
+    """Digest of a file, empty if it cannot be read."""
+    try:
+        return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    except OSError:
+        return ""
+
+
+class Bands:
+    """Divides the rows of pictures between this thread and, for large pictures, a second one.
+
+    No thread outlives a call, so that a process may fork between calls. Where the rows are divided depends on the time
+    that the bands took before; so what is done to a row must not depend on it, and pictures are the same anywhere.
+
+    Attributes
+    ----------
+    middle : float
+        Share of the rows in the upper band.
+    """
+
+    def __init__(self) -> None:
+        self.middle = 0.5
+
+    def work(self, task: Callable[[int, int, int], None], rows: int, columns: int) -> None:
+        """Call a task for each band (`rows`, `columns` [px])."""
+        middle = int(self.middle * rows)
+        if rows * columns < _WORTHWHILE or not 0 < middle < rows or processors() < 2:
+            task(0, 0, rows)
+            return
+        times, failures, ended = [0.0, 0.0], list[BaseException](), _thread.allocate_lock()
+
+        def lower_band() -> None:
+            started = time.thread_time()
+            try:
+                task(1, middle, rows)
+            except BaseException as failure:  # noqa: BLE001 - raised again by the thread that asked
+                failures.append(failure)
+            times[1] = time.thread_time() - started
+            ended.release()
+
+        ended.acquire()
+        # A Thread of the module threading is started with 40 µs of ceremony, this one with 20.
+        _thread.start_new_thread(lower_band, ())
+        started = time.thread_time()
+        try:
+            task(0, 0, middle)
+        finally:
+            times[0] = time.thread_time() - started
+            ended.acquire()
+        if failures:
+            raise failures[0]
+        difference = (times[1] - times[0]) / max(sum(times), 1e-9)
+        self.middle = min(max(self.middle + _GAIN * difference, 0.1), 0.9)
+
+
+def processors() -> int:
+    """Number of processors that this process may use: one where it is a worker, next to others that draw too.
+
+    Ray sets ``OMP_NUM_THREADS`` for its workers, and so do others that share out a machine.
+    """
+    if multiprocessing.parent_process() is not None or os.environ.get("OMP_NUM_THREADS") == "1":
+        return 1
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

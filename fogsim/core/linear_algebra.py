@@ -1,0 +1,119 @@
+"""Products and inverses of small matrices that are the same on every processor.
+
+BLAS and LAPACK, which numpy's ``@`` and most of `numpy.linalg` call, round as it suits the processor that they find.
+Here every operation is one of IEEE 754, in an order that only the shapes decide.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.core.jit import kernel
+
+LEAST_PIVOT = 1e-14
+"""Share of a diagonal element below which what others leave of it counts as nothing [-]."""
+
+
+def matrix_product(left: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
+    """Product of two matrices, of a matrix and a vector, or of two vectors, as ``left @ right``.
+
+    Takes `left` (…, n), `right` (n,).
+    """
+    if right.ndim == 1:
+        return np.asarray((left * right).sum(axis=-1))
+    kind = np.result_type(left, right)
+    rows = np.ascontiguousarray(left, kind).reshape(math.prod(left.shape[:-1]), left.shape[-1])
+    out = np.zeros((len(rows), right.shape[1]), kind)
+    _add_product(rows, np.ascontiguousarray(right, kind), out)
+    return out.reshape(*left.shape[:-1], right.shape[1])
+
+
+@kernel
+def _add_product(left: NDArray[Any], right: NDArray[Any], out: NDArray[Any]) -> None:
+    for i in range(left.shape[0]):
+        for k in range(left.shape[1]):
+            share = left[i, k]
+            if share != 0.0:
+                for j in range(right.shape[1]):
+                    out[i, j] += share * right[k, j]
+
+
+@kernel
+def inverse_of(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Inverse (n, n) of a symmetric matrix (n, n) without negative eigenvalues, such as that of normal equations.
+
+    What it says nothing of, or nothing next to the others, has zeros in its row and column (a generalised inverse).
+    Beaton's sweep operator (Goodnight 1979, The American Statistician 33, 149–158), the largest pivots first.
+
+    Takes `matrix` (n, n).
+    """
+    count = len(matrix)
+    swept, left = matrix.copy(), np.ones(count, np.bool_)
+    for _ in range(count):
+        pivot, largest = -1, LEAST_PIVOT
+        for i in range(count):
+            # Relative to what it was, so that units do not matter.
+            if left[i] and swept[i, i] > largest * matrix[i, i]:
+                pivot, largest = i, swept[i, i] / matrix[i, i]
+        if pivot < 0:
+            break
+        left[pivot] = False
+        _sweep(swept, pivot)
+    for i in range(count):
+        for j in range(count):
+            swept[i, j] = 0.0 if left[i] or left[j] else -swept[i, j]
+    return swept
+
+
+@kernel
+def _sweep(matrix: NDArray[np.float64], pivot: int) -> None:
+    scale = 1.0 / matrix[pivot, pivot]
+    for i in range(len(matrix)):
+        if i != pivot:
+            share = scale * matrix[i, pivot]
+            for j in range(len(matrix)):
+                if j != pivot:
+                    matrix[i, j] -= share * matrix[pivot, j]
+    for i in range(len(matrix)):
+        matrix[i, pivot] *= scale
+        matrix[pivot, i] = matrix[i, pivot]
+    matrix[pivot, pivot] = -scale
+
+
+@kernel
+def times(matrix: NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Product (n,) of a matrix and a vector, for kernels (`matrix` (n, m), `vector` (m,))."""
+    out = np.zeros(len(matrix))
+    for i in range(len(matrix)):
+        for j in range(len(vector)):
+            out[i] += matrix[i, j] * vector[j]
+    return out
+
+
+@kernel
+def convolution(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Full convolution (n + m - 1,) of two series (`one` (n,), `other` (m,))."""
+    size, blocks = len(one) + len(other) - 1, (len(one) + 3) // 4
+    # Four terms of a sum at a time, in their order: what has been summed is read and written a quarter as often.
+    out, padded = np.zeros(size + 6), np.zeros(len(other) + 6)
+    padded[3 : 3 + len(other)] = other
+    parts = np.zeros(4 * blocks)
+    parts[: len(one)] = one
+    for block in range(blocks):
+        first, second, third, fourth = parts[4 * block : 4 * block + 4]
+        for j in range(len(other) + 3):
+            total = out[4 * block + j] + first * padded[j + 3]
+            total += second * padded[j + 2]
+            total += third * padded[j + 1]
+            out[4 * block + j] = total + fourth * padded[j]
+    return out[:size]
+
+
+def straight_line(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
+    """Slope and height at zero of the straight line of least squares (`x`, `y` (n,))."""
+    middle, level = float(x.mean()), float(y.mean())
+    apart = x - middle
+    slope = float(matrix_product(apart, y - level)) / float(matrix_product(apart, apart))
+    return slope, level - slope * middle

@@ -1,0 +1,89 @@
+"""A scenario's own policy: from what is believed of the fog to advice, lamps and warning."""
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+
+from fogsim.advice import Adviser, VehicleAdviser
+from fogsim.advice.warning import choose_warning
+from fogsim.lighting import LightingPolicy, VehicleLightingPolicy
+from fogsim.scenario import Scenario, build
+from fogsim.scenario.drivers import stretch_advice
+from fogsim.scenario.road_sections import DISPLAYS
+from fogsim.scenario.schema import InformedMethod
+from fogsim.simulation.road_advice import RoadAdvice, stretch_advices
+from fogsim.values import Belief, Command, LampChoice, RoadSection, SpeedAdvice, Step
+from fogsim.values.belief import certain_belief
+from fogsim.values.result_checks import checked_advice, checked_lamp_choice, checked_lamps
+
+
+class AdvisedDriving:
+    """The scenario's own policy: adviser, lighting rules and the driver's warning, asked once a decision period."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._scenario = scenario
+        self._ask_adviser = _questions_to(build.adviser(scenario))
+        self._ask_lighting = _lighting_questions(build.lighting_policy(scenario), scenario.lighting.method)
+        self._frames = build.periods(scenario).decision_frames
+        self._road = RoadAdvice(scenario) if scenario.drivers.advised in DISPLAYS else None
+
+    def decide(self, step: Step, previous: Command | None = None) -> Command:
+        """Command for the next camera period; the one before between decisions."""
+        previous = step.command if previous is None else previous
+        if step.index % self._frames:
+            return previous
+        lit = known_fog(step, self._scenario.lighting)
+        chosen = self._ask_lighting(step, lit, LampChoice(previous.lamps, previous.lamp_wish))
+        command = warned(Command(lamps=chosen.lamps, lamp_wish=chosen.wish), step, previous)
+        if self._road is not None:
+            advice, stretches = self._road.advise(step)
+            return dataclasses.replace(command, advice=advice, stretches=stretches)
+        known = known_fog(step, self._scenario.advice)
+        advice = checked_advice(self._scenario.advice.method, self._ask_adviser(step, known, previous.advice))
+        return spread_advice(dataclasses.replace(command, advice=advice), self._scenario)
+
+
+def warned(command: Command, step: Step, previous: Command) -> Command:
+    """Add the warning of the ego's driver to a command, by what the vehicle itself knows; none without estimators."""
+    if not step.estimates:
+        return command
+    warning, memory = choose_warning(step.belief, step.observation, step.time, previous)
+    return dataclasses.replace(command, warning=warning, warning_memory=memory)
+
+
+def _questions_to(adviser: Adviser | VehicleAdviser) -> Callable[[Step, Belief, SpeedAdvice], SpeedAdvice]:
+    """A function that gets an adviser's next advice after a step, from what is known of the fog and the last advice."""
+    if isinstance(adviser, VehicleAdviser):
+        return lambda step, known, previous: adviser.advise_vehicle(
+            known, step.observation, step.speed_limit, step.time, previous
+        )
+    return lambda step, known, previous: adviser.advise(known, step.speed_limit, step.time, previous)
+
+
+def _lighting_questions(
+    policy: LightingPolicy | VehicleLightingPolicy, name: str
+) -> Callable[[Step, Belief, LampChoice], LampChoice]:
+    """A function that asks a lighting policy in the same way."""
+    if isinstance(policy, VehicleLightingPolicy):
+        return lambda step, known, previous: checked_lamp_choice(
+            name, policy.choose_lamps(known, step.observation, step.time, previous)
+        )
+    return lambda _, known, previous: LampChoice(checked_lamps(name, policy.lamps(known, previous.lamps)))
+
+
+def known_fog(step: Step, method: InformedMethod) -> Belief:
+    """What a method goes by: what the ego believes, or the truth, as a visibility meter at the road has it."""
+    return step.belief if method.informed_by == "belief" else certain_belief(step.truth.extinction_ahead)
+
+
+def spread_advice(command: Command, scenario: Scenario, sections: Sequence[RoadSection] = ()) -> Command:
+    """Let others hear the ego's advice too, if the scenario says so."""
+    if scenario.drivers.advised == "ego" or not math.isfinite(command.advice.speed):
+        return command
+    if scenario.drivers.advised == "all":
+        return dataclasses.replace(command, advice_reach=scenario.traffic.reading_radius_m)
+    if scenario.drivers.advised in DISPLAYS:
+        stretches, speeds = [section.stretch for section in sections], [command.advice.speed] * len(sections)
+        advices = stretch_advices(stretches, speeds, DISPLAYS[scenario.drivers.advised])
+        return dataclasses.replace(command, stretches=advices)
+    return dataclasses.replace(command, stretches=(stretch_advice(scenario, command.advice.speed),))

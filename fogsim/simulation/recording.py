@@ -1,0 +1,245 @@
+"""A run with recorded results, which stay readable if it is interrupted."""
+
+import contextlib
+import dataclasses
+from collections.abc import Callable, Generator, Iterable, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogsim.core.files.output_targets import refuse_unwritable
+from fogsim.core.interruption import Interruption
+from fogsim.core.parameters import checked_parameters
+from fogsim.core.randomness import Seed
+from fogsim.core.registry import Registry
+from fogsim.errors import InputError, MethodError, RecorderError
+from fogsim.metrics import MetricsOfRun, RunMetrics, RunSummary, TrafficRunMetrics, metric_topics
+from fogsim.metrics.road_speeds import RoadSpeeds
+from fogsim.recorders import (
+    RECORDERS,
+    TRAFFIC_RECORDERS,
+    USUAL_RECORDERS,
+    USUAL_TRAFFIC_RECORDERS,
+    Manifest,
+    RunDirectory,
+    RunInformation,
+    Status,
+    StepRecorder,
+    write_sign_map,
+)
+from fogsim.scenario import Scenario, build, resolved
+from fogsim.scenario.wording.sentences import SENTENCES
+from fogsim.simulation.loop import Processes, run, warn_of_unplayed
+from fogsim.simulation.recording_steps import Recording
+from fogsim.simulation.traffic_run import run_traffic
+from fogsim.traffic.road.configuration import configured_files
+from fogsim.traffic.road.network import read_net
+from fogsim.traffic.road.signs import geographic_position, sign_map
+from fogsim.values import NOTHING_UNPLAYED, Ending, SignMap, Step, TrafficStep, Unplayed
+from fogsim.values.result_checks import checked_recorder
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class RecordedRun:
+    """Result of a recorded run.
+
+    `ending` is None and `unplayed` empty if it was interrupted; `files` are names in the directory, and none if it was
+    interrupted before its first step and earlier results are there.
+    """
+
+    status: Status
+    ending: Ending | None
+    summary: RunSummary
+    directory: Path
+    files: tuple[str, ...]
+    unplayed: Unplayed = NOTHING_UNPLAYED
+
+
+@checked_parameters
+def record_run(
+    scenario: Scenario,
+    seed: Seed,
+    out: str | Path,
+    *,
+    overwrite: bool = False,
+    recorders: Iterable[str] = USUAL_RECORDERS,
+    command_line: Sequence[str] = (),
+    watch: Callable[[Step], None] = lambda _: None,
+    camera_processes: Processes = 0,
+) -> RecordedRun:
+    """Run a scenario and write its results into a directory.
+
+    Files are written into its folder ``unfinished`` from the first step on, and replace earlier results at once when
+    the run is over; docs/reference/results.md describes them. `recorders` names members of `RECORDERS`, and `watch` is
+    called with each finished `Step` after them. KeyboardInterrupt gives an interrupted run and is not raised again; its
+    files are readable.
+
+    Other errors are raised again. Before the first step they leave the directory as it was; later they leave what was
+    recorded and a manifest of status "failed" with the message. An error of a user's method leaves that manifest in
+    either case, if there are no earlier results.
+    """
+
+    def of_ego() -> _Recorded[Step]:
+        return _Recorded(
+            lambda folder: run(scenario, seed, sumo_outputs=folder, camera_processes=camera_processes),
+            RunMetrics(build.safety_standard(scenario)),
+            RECORDERS,
+            watch,
+        )
+
+    return _record(of_ego, scenario, seed, Path(out), overwrite, recorders, command_line)
+
+
+@checked_parameters
+def record_traffic(
+    scenario: Scenario,
+    seed: Seed,
+    out: str | Path,
+    *,
+    overwrite: bool = False,
+    recorders: Iterable[str] = USUAL_TRAFFIC_RECORDERS,
+    command_line: Sequence[str] = (),
+    watch: Callable[[TrafficStep], None] = lambda _: None,
+) -> RecordedRun:
+    """Run a scenario without an ego and write its results into a directory, as `record_run` does.
+
+    There is no video; table and report cover all vehicles.
+    """
+
+    def alone() -> _Recorded[TrafficStep]:
+        road = RoadSpeeds()
+        return _Recorded(
+            lambda folder: run_traffic(scenario, seed, folder),
+            TrafficRunMetrics(build.safety_standard(scenario), watchers=[road]),
+            TRAFFIC_RECORDERS,
+            watch,
+            road,
+        )
+
+    return _record(alone, scenario, seed, Path(out), overwrite, recorders, command_line)
+
+
+AnyStep = TypeVar("AnyStep", bound=TrafficStep)
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class _Recorded(Generic[AnyStep]):
+    """How a run is recorded; `steps` starts it, given the folder of SUMO's outputs."""
+
+    steps: Callable[[Path], Generator[AnyStep, None, None]]
+    metrics: MetricsOfRun[AnyStep]
+    recorders: Registry[Callable[[RunInformation], StepRecorder[AnyStep]]]
+    watch: Callable[[AnyStep], None]
+    road: RoadSpeeds | None = None
+
+    def along_road(self) -> NDArray[np.float64]:
+        """Means along the road, as in `RunInformation`."""
+        # The summary makes the metrics hand over the last steps.
+        self.metrics.summary()
+        return np.zeros((0, 4)) if self.road is None else self.road.means()
+
+
+def _record(
+    make: Callable[[], _Recorded[AnyStep]],
+    scenario: Scenario,
+    seed: int,
+    out: Path,
+    overwrite: bool,
+    recorders: Iterable[str],
+    command_line: Sequence[str],
+) -> RecordedRun:
+    with Interruption() as interruption, RunDirectory(out, overwrite) as directory:
+        manifest = Manifest(
+            Status.RUNNING,
+            seed,
+            resolved(scenario),
+            datetime.now(UTC),
+            command_line=command_line,
+            own_methods=build.own_methods(scenario),
+        )
+        try:
+            what = make()
+        except MethodError as error:
+            _note_failure(directory, manifest, error)
+            raise
+        information = _information(what, scenario, seed, directory)
+        opened = {name: checked_recorder(name, what.recorders[name](information)) for name in recorders}
+        recording = Recording(directory, manifest, opened, what.metrics)
+        status, last, message = Status.FAILED, None, ""
+        try:
+            directory.clear_sumo_outputs()
+            with contextlib.closing(what.steps(directory.sumo_outputs)) as steps, interruption.allowed():
+                for step in steps:
+                    recording.record(step)
+                    what.watch(step)
+                    last = step
+                    if step.ending is not None:
+                        # With warnings as errors, a warning of the loop must not lose a finished run.
+                        break
+            status = Status.COMPLETE
+        except KeyboardInterrupt:
+            status = Status.INTERRUPTED
+            recording.begin_if_nothing_is_lost()
+        except RecorderError:
+            raise
+        except Exception as error:
+            message = f"{type(error).__name__}: {error}"
+            if isinstance(error, MethodError):
+                recording.begin_if_nothing_is_lost()
+            raise
+        finally:
+            ending, unplayed = (None, NOTHING_UNPLAYED) if last is None else (last.ending, last.unplayed)
+            ended = dataclasses.replace(manifest, status=status, ending=ending, message=message, unplayed=unplayed)
+            status = recording.close(ended, interruption)
+    if recording.failures and not message:
+        raise RecorderError(recording.failures, directory.path)
+    if last is not None and status is Status.COMPLETE:
+        warn_of_unplayed(scenario, last)
+    return RecordedRun(status, ending, what.metrics.summary(), directory.path, tuple(recording.files), unplayed)
+
+
+def _note_failure(directory: RunDirectory, manifest: Manifest, error: MethodError) -> None:
+    """Leave a manifest of a run that failed before it began, unless earlier results exist."""
+    if not (directory.earlier or directory.unfinished.exists()):
+        directory.begin(manifest.to_json())
+        ended = dataclasses.replace(
+            manifest, status=Status.FAILED, message=f"MethodError: {error}", ended=datetime.now(UTC)
+        )
+        directory.finish(ended.to_json())
+
+
+def _information(what: _Recorded[AnyStep], scenario: Scenario, seed: int, directory: RunDirectory) -> RunInformation:
+    return RunInformation(
+        directory=directory,
+        title=scenario.name,
+        description=scenario.description,
+        seed=seed,
+        methods=tuple(e.method for e in scenario.estimators),
+        frame_period=scenario.clocks.camera_period_s,
+        summary=lambda: what.metrics.summary().values,
+        meanings=what.metrics.summary().meanings,
+        along_road=what.along_road,
+        topics=metric_topics(),
+        settings=lambda: {heading: words(scenario) for heading, words in SENTENCES.items()},
+    )
+
+
+@checked_parameters
+def record_signs(scenario: Scenario, out: str | Path, *, overwrite: bool = False) -> SignMap:
+    """Write the sign map of a scenario as GeoJSON, without starting a simulation."""
+    out = Path(out)
+    refuse_unwritable(out, "--out", overwrite=overwrite, makes_folder=True)
+    setup = build.traffic_setup(scenario)
+    net_file, additional = setup.net, setup.additional
+    if net_file is None and setup.config is not None:
+        net_file, additional = configured_files(setup.config)
+    if net_file is None:
+        raise InputError(f"{scenario.name}: the scenario names neither a SUMO network nor a SUMO configuration")
+    net = read_net(net_file)
+    signs = sign_map(net, additional)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    write_sign_map(out, signs, scenario.name, geographic_position(net))
+    return signs

@@ -7,11 +7,96 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogsim.errors import InputError
+from fogsim.restoration import light_kernels
+from fogsim.restoration.guided_filter import box_mean
+from fogsim.restoration.light_kernels import Smoothing
 from fogsim.restoration.methods import METHODS, Method
-from fogsim.restoration.picture import FoggyPicture, Light, Pixels, Restoration, largest_value
-from fogsim.restoration.unveiling import without_veil
+from fogsim.restoration.picture import (
+    Floats,
+    FoggyPicture,
+    Light,
+    Pixels,
+    Restoration,
+    ToneCurve,
+    largest_value,
+    written_values,
+)
+from fogsim.units import LUMINANCE_WEIGHTS
 from fogsim.values.camera import Camera
 from fogsim.values.camera_response import exposure_of, respond
+
+KEY = 0.18
+"""Luminance that the middle of what is seen gets, relative to full scale [-] (Reinhard et al. 2002)."""
+
+BRIGHT, WHITE, DARKEST = 0.99, 1.25, 0.01
+"""White is so many times what this share of the picture is darker than; what is darker than that share of the airlight
+counts as that [-]."""
+
+
+def tone_curve(light: Floats, transmission: Floats, picture: FoggyPicture) -> ToneCurve:
+    """Curve that brings out what the fog lets through: L (1 + L / L_w²) / (1 + L) (Reinhard et al. 2002, eq. 4).
+
+    L is light over its logarithmic mean, times 0.18. Unlike the paper's, the mean is weighted by transmission: the sky
+    and what the fog has hidden, which are brighter than all else, do not make the road black.
+
+    Takes `light` (rows, cols, channels), `transmission` (rows, cols).
+    """
+    some = light.astype(np.float64) * picture.airlight
+    luminance = some[..., 0] if some.shape[2] == 1 else (some * LUMINANCE_WEIGHTS).sum(axis=2)
+    luminance = np.maximum(luminance, DARKEST * float(picture.airlight.max()))
+    weights = transmission.astype(np.float64)
+    middle = float(np.exp((weights * np.log(luminance)).sum() / weights.sum()))
+    exposure = KEY / middle
+    white = max(exposure * WHITE * float(np.quantile(luminance, BRIGHT)), 1.0)
+
+    def curve(shown: Light) -> Light:
+        scaled = exposure * shown
+        return np.asarray(scaled * (1.0 + scaled / white**2) / (1.0 + scaled))
+
+    return curve
+
+
+STRIDE = 4
+"""Every how manyeth pixel of every how manyeth row is looked at for noise and tones."""
+
+RADIUS, MORE_NOISE, COLOUR_NOISE = 2, 4.0, 2.0
+"""Windows in which noise is smoothed are 2 r + 1 wide [px]; what counts as noise, in its variance: local variances
+scatter, and three channels have more of it than their mean. Chosen on pool 0 of benchmarks/restoration.py."""
+
+
+def without_veil(picture: FoggyPicture, transmission: Floats, *, smooths: bool, tone_map: bool) -> Pixels:
+    """Undo Koschmieder's law, R = A + (I − A) / t, in pixel values.
+
+    Returns like the picture's (rows, cols, channels) uint8. Takes `transmission` (rows, cols).
+    """
+    tables = picture.relative_tables()
+    smoothing = _smoothing(picture, tables, transmission) if smooths else _no_smoothing()
+    curve = None
+    if tone_map:
+        light = light_kernels.restored_light(picture.pixels, tables, transmission, smoothing, STRIDE)
+        curve = tone_curve(light, transmission[::STRIDE, ::STRIDE], picture)
+    values = written_values(picture, curve)
+    scale = ((len(values) - 1) * picture.airlight).astype(np.float32)
+    return light_kernels.restored_pixels(picture.pixels, tables, transmission, smoothing, scale, values)
+
+
+def _smoothing(picture: FoggyPicture, tables: Floats, transmission: Floats) -> Smoothing:
+    """Local statistics of the luminance, and its noise where least light comes through: the median variance there."""
+    weights = np.array(LUMINANCE_WEIGHTS if len(tables) == 3 else (1.0,), np.float32)
+    light = light_kernels.luminance(picture.pixels, tables * weights[:, None])
+    mean, square = box_mean(light, RADIUS), box_mean(light * light, RADIUS)
+    some = (slice(None, None, STRIDE), slice(None, None, STRIDE))
+    veiled = transmission[some] < 1.5 / picture.most_gain
+    if not veiled.any():
+        return _no_smoothing()
+    noise = max(float(np.median((square[some] - mean[some] ** 2)[veiled])), 0.0)
+    return Smoothing(light, mean, square, np.float32(MORE_NOISE * noise), np.float32(COLOUR_NOISE))
+
+
+def _no_smoothing() -> Smoothing:
+    nothing = np.empty((0, 0), np.float32)
+    return Smoothing(nothing, nothing, nothing, np.float32(0.0), np.float32(0.0))
+
 
 MOST_GAIN = 5.0
 """Most by which light, and with it noise, is amplified if nothing else is asked for [-]; chosen on pool 0 of

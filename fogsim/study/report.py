@@ -1,30 +1,249 @@
 """A study as a page to read: what was compared, the results, and their certainty."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from fogsim.core.files.atomic import write_text
 from fogsim.metrics import metric_topics
+from fogsim.recorders.manifest import versions
 from fogsim.recorders.templating import render
+from fogsim.scenario import Scenario, build
+from fogsim.scenario.wording.non_defaults import Setting, non_default_settings
+from fogsim.scenario.wording.sentences import SENTENCES
 from fogsim.study.comparison import (
+    RESAMPLES,
     Difference,
     adjust_p_values,
     compare_to_baseline,
+    mean_interval,
     moved_denominators,
+    number_of,
     numeric_metrics,
     uninformative,
 )
-from fogsim.study.drawing import StudyFigure
-from fogsim.study.figures import differences_figure, trade_off_figure
-from fogsim.study.main_metrics import DELAY_METRICS, SAFETY_METRICS, main_metrics
-from fogsim.study.methods import write_methods
-from fogsim.study.plan import Study
+from fogsim.study.drawing import MUTED, Grid, StudyFigure, label_figure, svg_of
+from fogsim.study.main_metrics import DELAY_METRICS, SAFETY_METRICS, main_metrics, metric_words
+from fogsim.study.plan import Study, file_digests
 from fogsim.study.pooled_profiles import Cell, PooledProfiles
 from fogsim.study.profile_figures import collisions_figure, speed_figure, survival_figure
 from fogsim.study.report_tables import Table, comparison_table, events_of_both, main_tables
 from fogsim.study.report_words import summary
 from fogsim.study.table import Row, rows_of_cells, write_csv
+
+_MOST_VARIANTS = 10
+_DISTRIBUTIONS = {"fogsim": "FogSim", "libsumo": "SUMO (libsumo)", "python": "Python"}
+
+
+@dataclass(frozen=True, slots=True)
+class Methods:
+    """Paragraphs by their headings, and tables of text by their captions."""
+
+    paragraphs: Mapping[str, str]
+    tables: Mapping[str, Table]
+
+    def markdown(self, title: str) -> str:
+        """Text of ``methods.md``."""
+        parts = [f"# {title}", *(f"**{name}.** {text}" for name, text in self.paragraphs.items())]
+        for caption, table in self.tables.items():
+            lines = [table.head, ["---"] * len(table.head), *table.rows]
+            cells = [[str(cell).replace("|", "\\|").replace("\n", " ") for cell in row] for row in lines]
+            parts += [f"## {caption}", "\n".join(f"| {' | '.join(row)} |" for row in cells)]
+        return "\n\n".join(parts) + "\n"
+
+
+def write_methods(study: Study, folder: Path) -> Methods:
+    """Write ``methods.md`` and return its content."""
+    found = study_methods(study)
+    write_text(folder / "methods.md", found.markdown(f"Methods of the study {study.name}"))
+    return found
+
+
+def study_methods(study: Study) -> Methods:
+    """Methods of a study."""
+    scenarios = list(study.cells().values())
+    paragraphs = {
+        "Design": _design(study),
+        **{heading: _by_level(study, words) for heading, words in SENTENCES.items()},
+        "Statistics": _statistics(study),
+        "Software": _software(),
+    }
+    levels = [
+        [factor, level, ", ".join(given) or "–"]
+        for factor, of_factor in study.level_settings.items()
+        for level, given in of_factor.items()
+    ]
+    settings = [[key, one.value, one.default or "(required)", one.meaning] for key, one in _common(scenarios).items()]
+    digests = dict(item for one in scenarios for item in file_digests(one).items())
+    tables = {
+        "Factors": Table(["factor", "level", "settings"], levels),
+        "Settings of all runs that differ from FogSim's defaults": Table(
+            ["key", "value", "default", "meaning"], settings
+        ),
+        "Input files": Table(["file", "SHA-256 (first 20 digits)"], list(digests.items())),
+    }
+    return Methods(paragraphs, {caption: table for caption, table in tables.items() if table.rows})
+
+
+def _software() -> str:
+    found = {_DISTRIBUTIONS.get(name, name): version for name, version in versions().items() if version}
+    return "; ".join(f"{name} {version}" for name, version in found.items()) + "."
+
+
+def _common(scenarios: Sequence[Scenario]) -> dict[str, Setting]:
+    """Non-default settings that all scenarios have in common."""
+    first, *others = [non_default_settings(one) for one in scenarios]
+    return {key: one for key, one in first.items() if all(other.get(key) == one for other in others)}
+
+
+def _by_level(study: Study, words: Callable[[Scenario], str]) -> str:
+    """Words on the scenarios of all cells: once if they agree, else by the levels of the factor that they depend on."""
+    texts = [(run.levels, words(run.scenario)) for run in {id(run.scenario): run for run in study.runs}.values()]
+    cells_of: dict[str, list[Mapping[str, str]]] = {}
+    for levels, text in texts:
+        cells_of.setdefault(text, []).append(levels)
+    if len(cells_of) == 1:
+        return texts[0][1]
+    if len(cells_of) > _MOST_VARIANTS:
+        return f"{texts[0][1]} (The first cell, {_levels(texts[0][0])}; the table of factors has what varies.)"
+    for factor in study.factors:
+        of_text = {text: list(dict.fromkeys(at[factor] for at in cells)) for text, cells in cells_of.items()}
+        if sum(map(len, of_text.values())) == len(study.factors[factor]):
+            return " ".join(f"{factor} {', '.join(levels)}: {text}" for text, levels in of_text.items())
+    return " ".join(f"{'; '.join(map(_levels, cells))}: {text}" for text, cells in cells_of.items())
+
+
+def _levels(levels: Mapping[str, str]) -> str:
+    return ", ".join(f"{factor} {level}" for factor, level in levels.items())
+
+
+def _design(study: Study) -> str:
+    shape = "; ".join(f"{name}: {', '.join(levels)}" for name, levels in study.factors.items())
+    seeds = list(dict.fromkeys(run.seed for run in study.runs))
+    is_range = len(seeds) > 1 and seeds == list(range(seeds[0], seeds[-1] + 1))
+    numbered = f"{seeds[0]} to {seeds[-1]}" if is_range else ", ".join(map(str, seeds))
+    return (
+        f"Every combination of the factors ({shape}) was run with {len(seeds)} seeds ({numbered}), {len(study.runs)} "
+        f"runs in all. The baseline is {_levels(study.baseline)}. Runs of the same seed have the same demand, the "
+        "same drivers and the same sensor noise."
+    )
+
+
+def _statistics(study: Study) -> str:
+    standards = dict.fromkeys(build.safety_standard(one) for one in study.cells().values())
+    judged = "; ".join(
+        f"reaction time {one.reaction_time:g} s and deceleration {one.deceleration:g} m/s² in stopping sight "
+        f"distances, time to collision {one.time_to_collision:g} s"
+        for one in standards
+    )
+    return (
+        "Differences to the baseline are means over pairs of runs with the same seed. Intervals: "
+        f"{100.0 * study.confidence:g} %, bias-corrected and accelerated bootstrap of {RESAMPLES:,} resamples "
+        "(Efron 1987). p-values: two-sided paired permutation tests, adjusted among the main metrics by Benjamini & "
+        "Hochberg (1995). "
+        f"Thresholds of the safety metrics: {judged}."
+    )
+
+
+def differences_figure(study: Study, metric: str, differences: Sequence[Difference]) -> StudyFigure:
+    """Differences of one metric to the baseline with their intervals: a line per policy, a panel per fog."""
+    grid, words = Grid(study), metric_words(metric)
+    by_cell = {tuple(one.levels.values()): one for one in differences}
+    compared = [
+        policy for policy in reversed(grid.policies) if policy in {d.levels[grid.policy_factor] for d in differences}
+    ]
+    figure, panels = grid.figure(0.35 + 0.19 * len(compared), across=4)
+    for panel, axes in panels:
+        for place, policy in enumerate(compared):
+            one = by_cell.get(grid.cell(policy, panel))
+            if one is None:
+                continue
+            look = grid.looks[policy]
+            if one.low is not None and one.high is not None:
+                ends = (words.scale * one.low, words.scale * one.high)
+                axes.plot(ends, (place, place), color=look.colour, linewidth=2.0, solid_capstyle="butt")
+            filled = look.colour if one.is_shown(study.confidence) else "white"
+            axes.plot(
+                words.scale * one.difference,
+                place,
+                look.marker,
+                color=look.colour,
+                markersize=5.5,
+                markerfacecolor=filled,
+            )
+        axes.axvline(0.0, color=MUTED, linewidth=0.9, zorder=0.5)
+        axes.set_yticks(range(len(compared)), compared)
+        axes.set_ylim(-0.6, len(compared) - 0.4)
+        axes.grid(visible=False, axis="y")
+        axes.locator_params(axis="x", nbins=4)
+    figure.supxlabel(f"{words.axis}, difference to {grid.baseline}", fontsize=8.5)
+    caption = (
+        f"{words.label}: difference to {grid.baseline} of runs with the same seed, mean and {study.confidence:.0%} "
+        "interval. Filled: a difference is shown; open: none could be shown."
+    )
+    columns = [*study.factors, "difference", "low", "high"]
+    rows = [[*one.levels.values(), one.difference, one.low, one.high] for one in differences]
+    return StudyFigure(metric, caption, svg_of(figure, metric), columns, rows)
+
+
+def trade_off_figure(study: Study, rows: Sequence[Row], across: str, upwards: str) -> StudyFigure:
+    """Means of two metrics of completed runs with their intervals: a point per policy, a panel per fog."""
+    grid = Grid(study)
+    by_cell = rows_of_cells(study.factors, rows)
+    figure, panels = grid.figure(2.4, same_axes=False)
+    scales = metric_words(across).scale, metric_words(upwards).scale
+    table = []
+    for panel, axes in panels:
+        for policy, look in grid.looks.items():
+            cell = grid.cell(policy, panel)
+            found = [
+                _mean_and_interval(by_cell.get(cell, []), metric, study.confidence) for metric in (across, upwards)
+            ]
+            (x, *of_x), (y, *of_y) = found
+            if x is None or y is None:
+                continue
+            table.append([*cell, x, *of_x, y, *of_y])
+            errors = [_errors(mean, ends, scale) for (mean, *ends), scale in zip(found, scales, strict=True)]
+            axes.errorbar(
+                *(scales[0] * x, scales[1] * y, errors[1], errors[0]),
+                fmt=look.marker,
+                color=look.colour,
+                markersize=6.0,
+                elinewidth=0.9,
+                alpha=0.9,
+                label=policy,
+            )
+        if not any(axes.dataLim.intervaly):
+            # Around only zeros matplotlib would show negative numbers, which do not occur.
+            axes.set_ylim(-0.05, 1.0)
+    label_figure(figure, metric_words(across).axis, metric_words(upwards).axis)
+    name = f"trade_off_{upwards}"
+    caption = (
+        f"{metric_words(upwards).label} against {metric_words(across).label}: mean of all seeds; bars are its "
+        f"{study.confidence:.0%} bootstrap intervals. The panels' axes differ."
+    )
+    ends = [f"{metric}{end}" for metric in (across, upwards) for end in ("", "_low", "_high")]
+    return StudyFigure(name, caption, svg_of(figure, name), [*study.factors, *ends], table)
+
+
+def _mean_and_interval(
+    rows: Sequence[Row], metric: str, confidence: float
+) -> tuple[float | None, float | None, float | None]:
+    values = np.array([v for row in rows if (v := number_of(row.get(metric))) is not None])
+    if not len(values):
+        return None, None, None
+    return float(values.mean()), *mean_interval(values, confidence)
+
+
+def _errors(mean: float | None, ends: Sequence[float | None], scale: float) -> list[list[float]] | None:
+    """Lengths of the two error bars at a point, as matplotlib needs them."""
+    low, high = ends
+    if mean is None or low is None or high is None:
+        return None
+    return [[scale * (mean - low)], [scale * (high - mean)]]
+
 
 _MOST_FAILURES = 50
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fogsim.camera import FaultyLens
-from fogsim.camera.blots import PUPIL, passed_light, scattered_blots, shared_area
+from fogsim.camera.faulty_lens import PUPIL, passed_light, scattered_blots, shared_area
 from fogsim.values import Camera, Fault, RunningFault
 from fogsim.values.fault import DirtyLens, FaultKind, FrozenFrame, Glare, TimeStamp, WetLens
 

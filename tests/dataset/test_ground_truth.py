@@ -23,8 +23,8 @@ from fogsim.dataset import (
     sign_picture,
     transmission,
 )
-from fogsim.dataset.annotations import object_records
 from fogsim.dataset.encoding import png
+from fogsim.dataset.write import object_records
 from fogsim.errors import InputError
 from fogsim.values import Camera, CameraPose, FogField, Sign, SignMap, Step, Truth, View
 from fogsim.values.observation import sign_map_values

@@ -15,7 +15,7 @@ from early_motorway import EARLY, ROUTES
 import fogsim
 from fogsim.dataset import read_png
 from fogsim.dataset.directory import LAYERS, DatasetDirectory
-from fogsim.dataset.inputs import input_digests
+from fogsim.dataset.write import input_digests
 from fogsim.errors import InputError
 from fogsim.scenario import Scenario, scenario_from_config
 

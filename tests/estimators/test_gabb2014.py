@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fogsim.estimators import make
-from fogsim.estimators.other_sensors.loss_likelihood import LossLikelihood
+from fogsim.estimators.other_sensors.gabb2014 import LossLikelihood
 from fogsim.units import extinction_from_visibility
 from fogsim.values import Camera, Frame, LeadMeasurement, Observation
 from fogsim.values.estimate import ExtinctionBounds

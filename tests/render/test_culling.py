@@ -6,8 +6,7 @@ import numpy as np
 import trimesh
 
 from fogsim.render.cpu.rasteriser import CPURasteriser
-from fogsim.render.drawing import NEAR, RECORD, Drawing, MeshTable
-from fogsim.render.solids import in_solids
+from fogsim.render.drawing import NEAR, RECORD, Drawing, MeshTable, in_solids
 from fogsim.values import Camera, CameraPose, Mesh, Surface
 from fogsim.values.pinhole import camera_axes
 

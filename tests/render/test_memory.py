@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from fogsim.render.shading.memory import Memory
+from fogsim.render.shading.picture import Memory
 
 
 @pytest.mark.skipif(not hasattr(sys, "getrefcount"), reason="without a count of references nothing is used again")

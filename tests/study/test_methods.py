@@ -11,8 +11,8 @@ from fogsim.scenario.wording.non_defaults import non_default_settings
 from fogsim.scenario.wording.sentences import SENTENCES, empty_start
 from fogsim.study import load_study
 from fogsim.study.comparison import compare_to_baseline
-from fogsim.study.methods import study_methods
 from fogsim.study.plan import Study
+from fogsim.study.report import study_methods
 from fogsim.study.report_tables import event_count
 from fogsim.study.report_words import scarce_events
 

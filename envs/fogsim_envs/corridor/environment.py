@@ -4,7 +4,7 @@ import functools
 import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -15,8 +15,12 @@ from fogsim.core.parameters import checked_parameters
 from fogsim.core.randomness import Seed
 from fogsim.errors import InputError, MissingDependencyError
 from fogsim.scenario import Scenario, build, load_scenario, override
+from fogsim.scenario.road_sections import road_sections, stations
 from fogsim.simulation.road_advice import RoadAdvice, stretch_advices
+from fogsim.traffic.road.configuration import configured_files
+from fogsim.traffic.road.network import read_net, route_axis
 from fogsim.values import Command, Display, Ending, TrafficStep
+from fogsim.values.road import LaneKind
 from fogsim_envs.actions import checked_action, checked_options
 from fogsim_envs.corridor.loops import InductionLoops
 from fogsim_envs.corridor.observation import (
@@ -28,11 +32,41 @@ from fogsim_envs.corridor.observation import (
     sign_observation,
 )
 from fogsim_envs.corridor.rewards import CorridorReward, CorridorWeights
-from fogsim_envs.corridor.road import SignedRoad, signed_road
 from fogsim_envs.hosting import TIMEOUT, Timeout, TrafficSimulation, begin_traffic, checked_timeout, refuse_copies
 from fogsim_envs.infos import flat_numbers
 from fogsim_envs.task.episodes import FogDistribution
 from fogsim_envs.task.sampling import EpisodeChoice, EpisodeSource
+
+
+class SignedRoad(NamedTuple):
+    """A road with message signs."""
+
+    starts: tuple[float, ...]  # Places of the signs along the road [m]
+    axis: NDArray[np.float64]  # (m, 3): Polyline along it [m]
+    length: float  # Its length [m]
+    lanes: int  # Lanes for vehicles where it begins
+
+
+def signed_road(scenario: Scenario) -> SignedRoad:
+    """The road along which a scenario without an ego has its signs."""
+    if scenario.traffic.has_ego or scenario.drivers.advised != "signs":
+        raise InputError(
+            "FogCorridor: expected a scenario with traffic.ego: none and drivers.advised: signs, got "
+            f"traffic.ego: {scenario.traffic.ego} and drivers.advised: {scenario.drivers.advised}"
+        )
+    setup = build.traffic_setup(scenario)
+    net = setup.net if setup.config is None else configured_files(setup.config)[0]
+    if net is None:
+        raise InputError("FogCorridor: expected a scenario with a road network, got none")
+    roads = read_net(net)
+    axis, _ = route_axis(roads, scenario.traffic.along)
+    length = float(stations(axis)[-1])
+    starts = tuple(section.start for section in road_sections(scenario, length))
+    if not starts:
+        raise InputError(f"FogCorridor: no sign of drivers.signs stands on the road of {length:.0f} m")
+    lanes = sum(roads.lanes[place].kind is LaneKind.CARRIAGEWAY for place in roads.edges[scenario.traffic.along[0]])
+    return SignedRoad(starts, axis, length, max(lanes, 1))
+
 
 try:
     from pettingzoo import ParallelEnv

@@ -1,5 +1,6 @@
 """The agent advises the ego's speed and chooses its lamps, in another fog, traffic and light each episode."""
 
+import dataclasses
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -17,7 +18,9 @@ from fogsim.metrics import RunMetrics
 from fogsim.scenario import Scenario, build
 from fogsim.simulation.advised_driving import AdvisedDriving, spread_advice
 from fogsim.simulation.ego.view_rendering import prepare_lamplight
-from fogsim.values import Command, Ending, Step
+from fogsim.traffic import SPEED_CHOICES
+from fogsim.traffic.drivers.speed_choice import speed_share
+from fogsim.values import Command, Ending, SpeedAdvice, Step
 from fogsim_envs.actions import checked_action, checked_options
 from fogsim_envs.hosting import TIMEOUT, Simulation, Timeout, begin, checked_timeout, refuse_copies, restart
 from fogsim_envs.infos import flat_numbers
@@ -25,9 +28,27 @@ from fogsim_envs.rendering import RENDER_MODES, StepRenderer, render_modes
 from fogsim_envs.spaces import ACTION_LEVELS, ImageSize, action_space, command_of
 from fogsim_envs.task.episodes import FogDistribution, ScenarioDistribution
 from fogsim_envs.task.observation import task_observation, task_space
-from fogsim_envs.task.own_driver import OwnDriver
 from fogsim_envs.task.rewards import TaskWeights, Way, fault, strikes, task_terms, time_to_collision, unseen_share
 from fogsim_envs.task.sampling import AnyScenario, EpisodeChoice, EpisodeSource
+
+
+class OwnDriver:
+    """A driver who goes by the advice, or by an own choice of speed where that is lower."""
+
+    def __init__(self, choice: str) -> None:
+        self._choice = SPEED_CHOICES[choice]
+
+    def follow(self, command: Command, step: Step) -> Command:
+        """Command that the vehicle gets."""
+        if command.control is not None:
+            return command
+        visibility = step.truth.visibility_ahead
+        free = step.traffic.free_speed
+        in_clear_air = float(free[step.ego]) if len(free) else step.speed_limit
+        own = min(self._choice(visibility), speed_share(self._choice, visibility) * in_clear_air)
+        if own >= min(command.advice.speed, in_clear_air) or not math.isfinite(own):
+            return command
+        return dataclasses.replace(command, advice=SpeedAdvice(own))
 
 
 @checked_parameters

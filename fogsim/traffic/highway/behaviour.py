@@ -6,18 +6,156 @@ drivers have chosen their speeds, and before the script has its way. IDM and MOB
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any, TypeGuard
 
 from highway_env.vehicle.behavior import IDMVehicle
+from highway_env.vehicle.controller import ControlledVehicle
 
-from fogsim.traffic.drivers.events import Event
+from fogsim.core.kinematics import decelerated_speed
+from fogsim.core.linear_algebra import matrix_product
+from fogsim.errors import InputError, suggest
+from fogsim.traffic.drivers.events import Event, Order, Script, Situation, signed_gap
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
 from fogsim.traffic.drivers.speed_choice import DriverSetup
 from fogsim.traffic.highway.desired_speeds import HighwayDesiredSpeeds
-from fogsim.traffic.highway.fleet import Fleet, acceleration
-from fogsim.traffic.highway.manoeuvres import Manoeuvres
+from fogsim.traffic.highway.fleet import LEAD, Fleet, acceleration
 from fogsim.traffic.highway.perception import limit_sight
 from fogsim.values import Command, Unplayed
-from fogsim.values.script import TrafficAction
+from fogsim.values.light import ALL_LAMPS
+from fogsim.values.script import ChangeLane, SetLamps, TrafficAction
+
+
+class Manoeuvres:
+    """Makes vehicles do what is scripted."""
+
+    def __init__(self, fleet: Fleet, events: Sequence[Event]) -> None:
+        there = list(dict.fromkeys([*fleet.present(), LEAD]))
+        for event in events:
+            if event.vehicle not in there:
+                raise InputError(
+                    f"traffic.events: there is no vehicle {event.vehicle!r} in "
+                    f"{type(fleet.environment).__name__}; {suggest(event.vehicle, there)}"
+                )
+        self._fleet = fleet
+        self._script = Script(events)
+        self._driven: dict[str, float] = {}
+        self._keeping_lane: dict[str, tuple[float, bool]] = {}
+
+    def begin(self, actions: Sequence[TrafficAction]) -> tuple[TrafficAction, ...]:
+        """Begin what a script asks for: changes of lane as they are here, and lamps that fail all at once.
+
+        Returns those that could not begin: the vehicle has left, or there is no such lane.
+        """
+        vehicles, refused = self._fleet.present(), list[TrafficAction]()
+        situation = self._situation(vehicles)
+        for action in actions:
+            if not _is_playable(action):
+                raise InputError(
+                    f"timeline: highway-env's vehicles cannot play {type(action).__name__}: only changes of lane "
+                    "without duration and indicator, and the failure of all lamps"
+                )
+            if action.vehicle not in vehicles:
+                refused.append(action)
+            elif isinstance(action, SetLamps):
+                self._script.lamps.switch(action)
+            elif situation.has_lane(action.vehicle, action.lanes):
+                self._change_lane(vehicles[action.vehicle], action)
+            else:
+                refused.append(action)
+        return tuple(refused)
+
+    def plan(self) -> Mapping[str, Order]:
+        """Begin what is due, before the drivers decide.
+
+        Returns speeds for this step, for `apply` once the drivers have decided.
+        """
+        vehicles = self._fleet.present()
+        self._end_lane_changes(vehicles)
+        actions = self._script.play(self._situation(vehicles))
+        for event in actions.lane_changes:
+            self._change_lane(vehicles[event.vehicle], event)
+        self._fleet.dark = self._script.dark
+        for name, vehicle in vehicles.items():
+            self._driven[name] = self._driven.get(name, 0.0) + max(vehicle.speed, 0.0) * self._fleet.step_length
+        return actions.orders
+
+    def apply(self, orders: Mapping[str, Order]) -> None:
+        """Slow vehicles down to the speeds of their orders, whatever their drivers have decided."""
+        vehicles = self._fleet.present() if orders else {}
+        for name, (target, deceleration) in orders.items():
+            vehicle = vehicles[name]
+            vehicle.action["acceleration"] = _limited_acceleration(
+                vehicle, target, deceleration, self._fleet.step_length
+            )
+
+    def unplayed(self, keep_lane: Sequence[str]) -> Unplayed:
+        """List what has not been played so far, and which vehicles of `keep_lane` are missing."""
+        present = self._fleet.present()
+        return self._script.unplayed(self._fleet.known(), present, keep_lane)
+
+    def _situation(self, vehicles: Mapping[str, Any]) -> Situation:
+        ego = self._fleet.ego
+
+        def gap_to_ego(name: str) -> float | None:
+            return _gap(vehicles[name], ego) if ego in vehicles.values() else None
+
+        def has_lane(name: str, lanes: int) -> bool:
+            vehicle = vehicles[name]
+            return not isinstance(vehicle, ControlledVehicle) or _lane_over(vehicle, lanes) != vehicle.lane_index
+
+        driven = self._driven
+        return Situation(self._fleet.time, set(vehicles), lambda name: driven.get(name, 0.0), gap_to_ego, has_lane)
+
+    def _change_lane(self, vehicle: Any, event: ChangeLane) -> None:
+        """Aim for another lane, as far over as there are lanes, and stay there: MOBIL would call it off."""
+        if not isinstance(vehicle, ControlledVehicle):
+            raise InputError(
+                f"traffic.events: {event.vehicle!r} cannot change lane: a {type(vehicle).__name__} steers for no lane"
+            )
+        vehicle.target_lane_index = _lane_over(vehicle, event.lanes)
+        if hasattr(vehicle, "enable_lane_change"):
+            _, own = self._keeping_lane.get(event.vehicle, (0.0, vehicle.enable_lane_change))
+            self._keeping_lane[event.vehicle] = (self._fleet.time + event.stay, own)
+            vehicle.enable_lane_change = False
+
+    def _end_lane_changes(self, vehicles: Mapping[str, Any]) -> None:
+        for name, (until, own) in list(self._keeping_lane.items()):
+            if self._fleet.time >= until:
+                del self._keeping_lane[name]
+                if name in vehicles:
+                    vehicles[name].enable_lane_change = own
+
+
+def _is_playable(action: TrafficAction) -> TypeGuard[ChangeLane | SetLamps]:
+    if isinstance(action, ChangeLane):
+        return (action.duration, action.offset) == (None, None) and action.indicator == 0.0 and not action.oncoming
+    return isinstance(action, SetLamps) and action.failed == ALL_LAMPS and action.side is None
+
+
+def _lane_over(vehicle: Any, lanes: int) -> tuple[str, str, int]:
+    """Lane so many to the left of a vehicle's, negative to the right, as far over as there are lanes."""
+    start, end, index = vehicle.lane_index
+    # highway-env counts lanes from the left.
+    return start, end, min(max(index - lanes, 0), len(vehicle.road.network.graph[start][end]) - 1)
+
+
+def _gap(vehicle: Any, ego: Any) -> float | None:
+    """Gap to the ego along the ego's lane, whichever lane the vehicle is on [m]; None if it drives the other way."""
+    if float(matrix_product(vehicle.direction, ego.direction)) <= 0.0:
+        return None
+    # The library measures from middle to middle.
+    apart = float(ego.lane_distance_to(vehicle)) + 0.5 * (vehicle.LENGTH - ego.LENGTH)
+    ahead, behind = (apart, None) if apart >= 0.0 else (None, -apart)
+    return signed_gap(ahead, behind, vehicle.LENGTH, ego.LENGTH)
+
+
+def _limited_acceleration(vehicle: Any, target: float, deceleration: float, step_length: float) -> float:
+    """Acceleration of a vehicle that is brought to a speed and kept there [m/s²]; it does not roll backwards."""
+    # What no driver steers is left to roll.
+    own = acceleration(vehicle) if isinstance(vehicle, ControlledVehicle) else 0.0
+    hardest = min(deceleration, getattr(vehicle, "ACC_MAX", math.inf))
+    asked = (decelerated_speed(vehicle.speed, target, hardest, step_length) - vehicle.speed) / step_length
+    return float(max(min(own, asked), -max(vehicle.speed, 0.0) / step_length))
 
 
 class DriverControl:

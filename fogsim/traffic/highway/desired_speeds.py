@@ -1,13 +1,13 @@
 """How fast highway-env's drivers desire to drive: by their own choice in fog, and when they are advised."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from highway_env.vehicle.behavior import IDMVehicle
 
-from fogsim.traffic.drivers.advice_hearing import AdviceHearing, Heard, heard_since
+from fogsim.traffic.drivers.advice_hearing import AdviceHearing, Heard, check_edges, check_start, heard_since
 from fogsim.traffic.drivers.following import CATCHING_UP, FOLLOWING_MODELS, Surroundings, misjudged_headway
 from fogsim.traffic.drivers.leader_reach import drivers_visibility, leader_reach
 from fogsim.traffic.drivers.sight import DriverSight, FogAccess
@@ -21,11 +21,62 @@ from fogsim.traffic.drivers.speed_choice import (
     driver_traits,
 )
 from fogsim.traffic.highway.fleet import Fleet
-from fogsim.traffic.highway.network import speed_limit
+from fogsim.traffic.highway.network import edge_id, speed_limit
+from fogsim.traffic.highway.route import lanes_ahead
 from fogsim.traffic.highway.snapshot import front_bumper
-from fogsim.traffic.highway.vehicle_places import HighwayVehiclePlaces
 from fogsim.units import visibility_from_extinction
-from fogsim.values import Command
+from fogsim.values import Command, Stretch
+
+
+class HighwayVehiclePlaces:
+    """Finds vehicles by their lanes; edges are named as in the road network. See `VehiclePlaces`."""
+
+    def __init__(self, fleet: Fleet) -> None:
+        self._fleet = fleet
+        network = fleet.environment.road.network
+        self._route = tuple(edge_id(*lane[:2]) for lane in lanes_ahead(network, fleet.ego))
+        self._length = {
+            edge_id(start, end): float(lanes[0].length)
+            for start, ends in network.graph.items()
+            for end, lanes in ends.items()
+        }
+
+    def on_stretch(self, stretch: Stretch, among: Collection[str] | None = None) -> dict[str, float]:
+        """Vehicles on a stretch, and how far past its beginning they are [m]; see `VehiclePlaces.on_stretch`."""
+        starts = self._edge_starts(stretch)
+        past: dict[str, float] = {}
+        for name, vehicle in self._fleet.present().items():
+            start = starts.get(edge_id(*vehicle.lane_index[:2]))
+            if start is not None and (among is None or name in among):
+                front = vehicle.position + 0.5 * vehicle.LENGTH * vehicle.direction
+                position = start + float(vehicle.lane.local_coordinates(front)[0])
+                if stretch.start <= position < stretch.end:
+                    past[name] = position - stretch.start
+        return past
+
+    def _edge_starts(self, stretch: Stretch) -> dict[str, float]:
+        """Where the edges of a stretch's road begin along it [m]."""
+        edges: Sequence[str] = stretch.edges or self._route
+        check_edges(stretch, self._length)
+        starts, length = {}, 0.0
+        for edge in edges:
+            starts[edge] = length
+            length += self._length[edge]
+        check_start(stretch, length)
+        return starts
+
+    def near_ego(self, distance: float, among: Collection[str] | None = None) -> list[str]:
+        """Vehicles near the ego; see `VehiclePlaces.near_ego` (`distance` [m])."""
+        vehicles = self._fleet.present()
+        if self._fleet.ego not in vehicles.values():
+            return []
+        here = front_bumper(self._fleet.ego)
+        asked = vehicles.keys() if among is None else among
+        return [name for name in asked if math.dist(front_bumper(vehicles[name]), here) <= distance]
+
+    def speed(self, vehicle: str) -> float:
+        """Speed of a vehicle [m/s]; see `VehiclePlaces.speed`."""
+        return float(self._fleet.present()[vehicle].speed)
 
 
 class HighwayDesiredSpeeds:

@@ -1,7 +1,9 @@
 """Roads of a SUMO network as plain geometry."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import sumolib
@@ -10,11 +12,243 @@ from numpy.typing import NDArray
 from fogsim.core.files.readers import FARTHEST
 from fogsim.core.files.xml_reader import read_elements, root_tag
 from fogsim.core.garbage import no_garbage_collection
+from fogsim.core.linear_algebra import matrix_product
 from fogsim.errors import InputError
+from fogsim.traffic.road.limit_signs import limit_sign
 from fogsim.traffic.road.map_cache import cached_map, compacted, is_worth_caching, keep_map
-from fogsim.traffic.road.net_lanes import map_of
-from fogsim.traffic.road.road_map import RoadMap
-from fogsim.values import Lane, RoadNetwork, Structure
+from fogsim.traffic.road.road_map import RoadMap, edge_ranges
+from fogsim.values import Lane, LaneEnd, LaneKind, LaneMarking, PavedArea, RoadNetwork, SignalHead, Structure
+from fogsim.values.light import SIGNAL_DIAMETER
+
+LARGE_DIAMETER = 0.3
+"""Diameter of the lenses above roads and next to fast ones [m]."""
+
+FAST = 16.7
+"""Speed limit above which the lenses next to a road are large, too [m/s]."""
+
+POST_HEIGHT, ARM_HEIGHT = 2.75, 5.5
+"""Height of the middle lens next to and above the road [m]: footways are clear to 2.1 m, roads to 4.5 m."""
+
+ON_FOOT_HEIGHT = 2.4
+"""Height of the middle of heads for pedestrians [m]."""
+
+_BEYOND, _BESIDE_CROSSING = 0.5, 0.4  # of posts of such heads, from the end and the border of their crossing [m]
+_BESIDE = 0.6  # of posts, beyond the edge of the outermost lane [m]
+
+
+def signal_heads(lanes: Sequence[Any], side: float) -> Iterator[SignalHead]:
+    """Heads at the end of an edge: one on a post for the outermost lane, one on its arm for each other lane.
+
+    `lanes` (sumolib) are those for vehicles, from the side that they keep to: left (1) or right (−1). A lane whose
+    points coincide, which SUMO reads as any other, has no direction to stand across, and no head.
+    """
+    lanes = [lane for lane in lanes if _steps(np.array(lane.getShape3D(), np.float64)).size]
+    heads = [(lane, signal, links) for lane in lanes for signal, links in _signals(lane)]
+    if not heads:
+        return
+    outer = np.array(lanes[0].getShape3D(), np.float64)
+    half, heading = 0.5 * float(lanes[0].getWidth()), _heading(outer)
+    across = side * np.array([-math.sin(heading), math.cos(heading), 0.0])
+    post = outer[-1] + (half + _BESIDE) * across
+    for number, (lane, signal, links) in enumerate(heads):
+        end = np.array(lane.getShape3D()[-1], np.float64)
+        # Lanes of an edge end on a line across it, and arms extend along that line.
+        place = post if number == 0 else post + across * float(matrix_product(end - post, across))
+        height = ARM_HEIGHT if number else POST_HEIGHT
+        is_large = number > 0 or float(lane.getSpeed()) > FAST
+        yield SignalHead(
+            signal_id=signal,
+            lane_id=lane.getID(),
+            links=links,
+            position=_tuple(place + np.array([0.0, 0.0, height])),
+            heading=heading,
+            diameter=LARGE_DIAMETER if is_large else SIGNAL_DIAMETER,
+            post=_tuple(post),
+        )
+
+
+def crossing_heads(crossing: Any, side: float) -> Iterator[SignalHead]:
+    """Heads for pedestrians at both ends of a crossing lane (sumolib).
+
+    `side` is the side that vehicles keep to: left (1) or right (−1).
+    """
+    edge = crossing.getEdge()
+    ways = [way for source in edge.getIncoming() for way in source.getConnections(edge) if way.getTLSID()]
+    line = np.array(crossing.getShape3D(), np.float64)
+    if not ways or not _steps(line).size:
+        return
+    for name, there in ((crossing.getID(), line), (edge.getID(), line[::-1])):
+        heading = _heading(there)
+        ahead = np.array([math.cos(heading), math.sin(heading), 0.0])
+        across = side * np.array([-ahead[1], ahead[0], 0.0])
+        post = there[-1] + _BEYOND * ahead + (0.5 * float(crossing.getWidth()) + _BESIDE_CROSSING) * across
+        yield SignalHead(
+            signal_id=ways[0].getTLSID(),
+            lane_id=name,
+            links=(ways[0].getTLLinkIndex(),),
+            position=_tuple(post + np.array([0.0, 0.0, ON_FOOT_HEIGHT])),
+            heading=heading,
+            diameter=SIGNAL_DIAMETER,
+            post=_tuple(post),
+            on_foot=True,
+        )
+
+
+def _signals(lane: Any) -> list[tuple[str, tuple[int, ...]]]:
+    """The traffic light at the end of a lane with the links of the lane; none without a light."""
+    # A link with the index −1 is not controlled, as that of a track across a level crossing.
+    outgoing = lane.getOutgoing()
+    ways = [(w.getTLSID(), w.getTLLinkIndex()) for w in outgoing if w.getTLSID() and w.getTLLinkIndex() >= 0]
+    return [(ways[0][0], tuple(sorted(link for signal, link in ways if signal == ways[0][0])))] if ways else []
+
+
+def _steps(line: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Horizontal steps (n, 2) [m] along a polyline between points that do not coincide."""
+    steps = np.diff(line.reshape(-1, 3)[:, :2], axis=0)
+    return steps[np.hypot(steps[:, 0], steps[:, 1]) > 1e-3]
+
+
+def _heading(line: NDArray[np.float64]) -> float:
+    x, y = _steps(line)[-1].tolist()
+    return math.atan2(y, x)
+
+
+def _tuple(place: NDArray[np.float64]) -> tuple[float, float, float]:
+    x, y, z = place.tolist()
+    return x, y, z
+
+
+_WALKING_AREA = "walkingarea"
+_OFF_ROAD = frozenset(
+    ("rail", "rail_urban", "rail_electric", "rail_fast", "tram", "subway", "cable_car", "ship", "aircraft", "drone")
+)
+_STOP_STATES = frozenset(("s", "w", "a"))  # stop sign, all-way stop, traffic light with right turn on red
+_ADJOINING = 0.6  # two carriageways whose borders are nearer than this share a line [m]
+
+
+def map_of(net: Any, lefthand: bool) -> RoadMap:
+    """Map of a network that was read with its internal edges.
+
+    Without any road or footway, tracks or waterways are drawn instead, as lanes without lines.
+    """
+    edges = net.getEdges()
+    lanes = [lane for edge in edges for lane in edge.getLanes()]
+    walked = np.array([lane.getEdge().getFunction() == _WALKING_AREA for lane in lanes], np.bool_)
+    drawn = ~walked & np.array([_kind(lane) is not None for lane in lanes], np.bool_)
+    between = [not lane.getEdge().getFunction() and set(lane.getPermissions()) != {"pedestrian"} for lane in lanes]
+    side = 1.0 if lefthand else -1.0
+    signs = (limit_sign(edge, side) for edge in net.getEdges(withInternal=False))
+    return RoadMap(
+        edges=edge_ranges([edge.getID() for edge in edges], [len(edge.getLanes()) for edge in edges]),
+        lanes=tuple(_lane(lane, lefthand) for lane in lanes),
+        drawn=drawn if drawn.any() else ~walked,
+        between=np.array(between, np.bool_),
+        areas=(*_junctions(net), *_walking_areas(net)),
+        limit_signs=tuple(sign for sign in signs if sign is not None),
+        signal_heads=tuple(head for edge in edges for head in _heads(edge, side)),
+        location=_location(net),
+    )
+
+
+def _heads(edge: Any, side: float) -> Iterator[SignalHead]:
+    function = edge.getFunction()
+    if function:
+        return crossing_heads(edge.getLanes()[0], side) if function == "crossing" else iter(())
+    return signal_heads([lane for lane in edge.getLanes() if _kind(lane) is LaneKind.CARRIAGEWAY], side)
+
+
+def _location(net: Any) -> tuple[str, str] | None:
+    """Offset and projection as written; None if the network has no location."""
+    written: dict[str, str] = net._location  # sumolib returns both only in converted form
+    return (written["netOffset"], written["projParameter"]) if written else None
+
+
+def _kind(lane: Any) -> LaneKind | None:
+    """Use of a lane; None for rails and waterways."""
+    function = lane.getEdge().getFunction()
+    if function == "crossing":
+        return LaneKind.CROSSING
+    allowed = set(lane.getPermissions())
+    if allowed and allowed <= _OFF_ROAD:
+        return None
+    if allowed == {"pedestrian"}:
+        return LaneKind.FOOTWAY
+    return LaneKind.JUNCTION if function == "internal" else LaneKind.CARRIAGEWAY
+
+
+def _lane(lane: Any, lefthand: bool) -> Lane:
+    """A lane as it is drawn, whatever its use."""
+    kind = _kind(lane)
+    inner, outer = _markings(lane) if kind is LaneKind.CARRIAGEWAY else (LaneMarking.NONE, LaneMarking.NONE)
+    # Lanes are counted from the side that vehicles keep to.
+    left, right = (outer, inner) if lefthand else (inner, outer)
+    rightmost = _carriageway(lane.getEdge())[-1 if lefthand else 0] if kind is LaneKind.CARRIAGEWAY else None
+    return Lane(
+        lane_id=lane.getID(),
+        edge_id=lane.getEdge().getID(),
+        centreline=_shape(lane),
+        width=float(lane.getWidth()),
+        speed_limit=float(lane.getSpeed()),
+        left=left,
+        right=right,
+        outermost=lane is rightmost,
+        kind=kind or LaneKind.CARRIAGEWAY,
+        end=_end(lane) if kind is LaneKind.CARRIAGEWAY else LaneEnd.OPEN,
+    )
+
+
+def _shape(lane: Any) -> NDArray[np.float64]:
+    return np.array(lane.getShape3D(), dtype=np.float64).reshape(-1, 3)
+
+
+def _carriageway(edge: Any) -> list[Any]:
+    """Lanes of an edge for vehicles, from the side that they keep to."""
+    return [lane for lane in edge.getLanes() if _kind(lane) in {LaneKind.CARRIAGEWAY, LaneKind.JUNCTION}]
+
+
+def _markings(lane: Any) -> tuple[LaneMarking, LaneMarking]:
+    """Lines on the side of the other direction and on the side that vehicles keep to."""
+    lanes = _carriageway(lane.getEdge())
+    left = _between_directions(lanes) if lane is lanes[-1] else LaneMarking.DASHED
+    return left, LaneMarking.SOLID if lane is lanes[0] else LaneMarking.DASHED
+
+
+def _between_directions(lanes: Sequence[Any]) -> LaneMarking:
+    """Line towards the other direction: overtaking is allowed on a road with two lanes, not on wider ones."""
+    edge = lanes[-1].getEdge()
+    here = _shape(lanes[-1])
+    for other in edge.getToNode().getOutgoing():
+        opposite = _carriageway(other)
+        if other.getToNode() is not edge.getFromNode() or other is edge or not opposite:
+            continue
+        there = _shape(opposite[-1])
+        if not (len(here) and len(there)):
+            continue
+        apart = 0.5 * (lanes[-1].getWidth() + opposite[-1].getWidth())
+        if abs(math.dist(here[0, :2], there[-1, :2]) - apart) < _ADJOINING:
+            return LaneMarking.DASHED if len(lanes) == len(opposite) == 1 else LaneMarking.DOUBLE
+    return LaneMarking.SOLID
+
+
+def _end(lane: Any) -> LaneEnd:
+    """Line across the end of a lane: at traffic lights and stop signs, or where vehicles must give way."""
+    states = {(connection.getState(), bool(connection.getTLSID())) for connection in lane.getOutgoing()}
+    if any(controlled or state in _STOP_STATES for state, controlled in states):
+        return LaneEnd.STOP
+    # A lane that gives way only for turning has no line to wait behind.
+    return LaneEnd.YIELD if states and all(state == "m" for state, _ in states) else LaneEnd.OPEN
+
+
+def _junctions(net: Any) -> list[PavedArea]:
+    outlines = [(node.getID(), np.array(node.getShape3D(), dtype=np.float64)) for node in net.getNodes()]
+    return [PavedArea(name, outline) for name, outline in outlines if len(outline) > 2]
+
+
+def _walking_areas(net: Any) -> list[PavedArea]:
+    lanes = [lane for edge in net.getEdges() if edge.getFunction() == _WALKING_AREA for lane in edge.getLanes()]
+    shapes = [(lane.getID(), np.array(lane.getShape3D(), dtype=np.float64)) for lane in lanes]
+    return [PavedArea(name, shape, LaneKind.FOOTWAY) for name, shape in shapes if len(shape) > 2]
+
 
 _MOST_BYTES = 2_000_000_000  # of a network, unpacked
 

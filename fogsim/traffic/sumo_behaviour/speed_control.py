@@ -12,20 +12,62 @@ from fogsim.traffic.appearance import TRAINS
 from fogsim.traffic.drivers.advice_hearing import AdviceHearing, Heard, advised_by_name, heard_since
 from fogsim.traffic.drivers.compliance import Compliance
 from fogsim.traffic.drivers.events import Order
-from fogsim.traffic.drivers.sight import FogAccess
-from fogsim.traffic.drivers.speed_choice import CHOICE_PERIOD, speed_by_compliance
+from fogsim.traffic.drivers.following import FollowingModel
+from fogsim.traffic.drivers.leader_reach import LeaderReach, drivers_visibility, leader_reach
+from fogsim.traffic.drivers.sight import DriverSight, FogAccess
+from fogsim.traffic.drivers.speed_choice import (
+    CHOICE_PERIOD,
+    SPEED_CHOICES,
+    DriverSetup,
+    speed_by_compliance,
+    speed_share,
+    unaffected,
+)
 from fogsim.traffic.setup import TrafficSetup
 from fogsim.traffic.sumo.link import UNKNOWN, Api, vehicle_getter
 from fogsim.traffic.sumo.roster import Roster
 from fogsim.traffic.sumo_behaviour.driver_table import Column, DriverTable
-from fogsim.traffic.sumo_behaviour.fog_choices import FogChoices
 from fogsim.traffic.sumo_behaviour.headways import HeadwayControl
 from fogsim.traffic.sumo_behaviour.keeping_up import KeepingUp
 from fogsim.traffic.sumo_behaviour.speed_shares import SpeedShareControl
 from fogsim.traffic.sumo_behaviour.top_speeds import TopSpeedControl
 from fogsim.traffic.sumo_lanes.leaders import Leaders
 from fogsim.traffic.sumo_lanes.vehicle_places import SumoVehiclePlaces
+from fogsim.units import visibility_from_extinction
 from fogsim.values import Command, Display
+
+
+class FogChoices:
+    """Writes into the table what drivers choose."""
+
+    def __init__(self, table: DriverTable, setup: DriverSetup, sight: DriverSight | None) -> None:
+        self._table = table
+        self._choice = SPEED_CHOICES[setup.speed_choice]
+        plain = self._choice is unaffected and set(table.kinds) == {FollowingModel()}
+        self._sight = None if plain and setup.misjudgement == 0.0 else sight
+
+    def update(self, rows: NDArray[np.intp], extinction: NDArray[np.float64]) -> None:
+        """Choose where the fog is another than at the last choice (`rows` (n,) int, `extinction` (n,) [1/m])."""
+        table = self._table
+        changed = np.flatnonzero(extinction != table.values[rows, Column.EXTINCTION])
+        if not len(changed):
+            return
+        of, here = rows[changed], extinction[changed].tolist()
+        # Mostly there are some twenty, which np.unique would take longer to sort.
+        found = {k: self._choose_in(k) for k in dict.fromkeys(here)}
+        kinds = table.values[of, Column.KIND].astype(np.intp).tolist()
+        # The table's last columns.
+        table.values[of, Column.EXTINCTION :] = [
+            (*found[k][0], table.kinds[kind].top_speed(found[k][1])) for k, kind in zip(here, kinds, strict=True)
+        ]
+
+    def _choose_in(self, extinction: float) -> tuple[tuple[float, ...], LeaderReach]:
+        """Columns `EXTINCTION` to `SHARE` in a fog, and how far away leaders are seen in it."""
+        visibility = visibility_from_extinction(extinction)
+        seen, reach = drivers_visibility(self._sight, visibility), leader_reach(self._sight, visibility)
+        chosen = self._choice(seen), speed_share(self._choice, seen)
+        return (extinction, seen, reach.by_body, reach.farthest, *chosen), reach
+
 
 _SUMO_DRIVES = -1.0
 _IMPOSED = 1 + 8 + 16 + 64

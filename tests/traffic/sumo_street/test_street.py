@@ -8,8 +8,7 @@ import pytest
 
 from fogsim.traffic import TrafficSetup, libsumo_traffic
 from fogsim.traffic.road.map_cache import compacted
-from fogsim.traffic.road.network import read_net
-from fogsim.traffic.road.signal_heads import ARM_HEIGHT, LARGE_DIAMETER, POST_HEIGHT, signal_heads
+from fogsim.traffic.road.network import ARM_HEIGHT, LARGE_DIAMETER, POST_HEIGHT, read_net, signal_heads
 from fogsim.values import Command, SignalColour, TrafficSnapshot
 
 NET = Path(__file__).resolve().parents[2] / "data" / "crossing" / "lights.net.xml"
